@@ -176,8 +176,8 @@ class Condensed:
         """Kept rows q' - f as stretches (core/system/condensed.h), where no block adds to any and none is held."""
         whole, form = self.whole, self.whole.form
         firsts = [planned.to[(planned.to >= 0) & (planned.to < form.k_row.size)] for planned in form.calls]
-        row = _numbers(whole.rows, self.kept_rows)[form.k_row]
-        q = _numbers(whole.unknowns, self.kept)[form.k_q]
+        row = numbers_of(whole.rows, self.kept_rows)[form.k_row]
+        q = numbers_of(whole.unknowns, self.kept)[form.k_q]
         here = row >= 0
         if any(first.size for first in firsts) or whole.core.held or (q[here] < 0).any():
             return np.zeros((0, 4), dtype=np.int32)

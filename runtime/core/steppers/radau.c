@@ -1,4 +1,5 @@
 /* The step of Radau IIA: weights, start, error, step size (see radau.h). */
+#include "linear/lanes.h"
 #include "steppers/radau.h"
 #include "steppers/threads.h"
 
@@ -48,10 +49,10 @@ static void start(void *radau, double t, const double *y, const double *yd, doub
 static void show(const void *self, int32_t s, double *y, double *yd)
 {
     const sd_radau *radau = self;
-    sd_radau_combine(radau->used->stages, radau->n, radau->used->inverse[s], radau->kept, yd);
+    sd_radau_combine(radau->used->stages, radau->n, radau->used->inverse[s], radau->kept, radau->rate);
     for (int32_t i = 0; i < radau->n; i++) {
         y[i] = radau->last[i] + radau->kept[s][i];
-        yd[i] /= radau->h_used;
+        yd[i] = radau->rate[i] / radau->h_used;
     }
 }
 
@@ -60,7 +61,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     sd_radau *radau = calloc(1, sizeof *radau);
     if (!radau)
         return NULL;
-    size_t nnz = (size_t)system->entries + 1, m = (size_t)system->unknowns + 1;
+    size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(system->unknowns + 1);
     double **vectors[] = {&radau->phi, &radau->yd, &radau->last, &radau->before, &radau->slope[0], &radau->slope[1],
                           &radau->slope[2], &radau->y, &radau->rate, &radau->ee, &radau->weight, &radau->newton_weight,
                           &radau->scale, &radau->pull, &radau->terms, &radau->first}; /* the last ones: of steep laws */

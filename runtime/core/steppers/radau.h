@@ -75,6 +75,8 @@ typedef struct sd_radau {
     int32_t since;                                  /* steps accepted since the method changed */
     int32_t hold;                                   /* steps that still take three stages */
     int32_t creeping;                               /* steps in a row for which Newton failed at first */
+    double lead[SD_STAGES][SD_STAGES], h_lead;      /* A^-1 / h, of the h and the method that they were made for */
+    const sd_radau_method *of_lead;
     double *phi, *yd;         /* [n] the last accepted point */
     double *last, *before;    /* [n] the points before it: the start of the last step, of the one before */
     double *slope[SD_POINTS]; /* [n] derivatives at phi, last, before, for values within the step */
@@ -124,9 +126,10 @@ void sd_radau_extrapolate(sd_radau *radau, double h);
  * that of three stages */
 double sd_radau_norm(const sd_radau *radau, const double *x);
 double sd_radau_strictness(const sd_radau *radau, const sd_radau_method *method);
-/* radau_systems.c: out [n] := sum of weight[j] v[j] over the stages; y, rate [n] := those of a stage; then as they say there */
+/* radau_systems.c: out [n] := sum of weight[j] v[j] over the stages, of vectors with room for whole lanes; y, rate [n] := those
+ * of a stage; then as they say there */
 void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out);
-void sd_radau_stage(const sd_radau *radau, int s, double *y, double *rate);
+void sd_radau_stage(sd_radau *radau, int s, double *y, double *rate);
 int sd_radau_factorise(sd_radau *radau, int at_end);
 int sd_radau_residuals(sd_radau *radau);
 double sd_radau_correct(sd_radau *radau);

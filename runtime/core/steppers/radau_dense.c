@@ -225,19 +225,14 @@ int sd_radau_astray(sd_radau *radau)
 void sd_radau_extrapolate(sd_radau *radau, double h)
 {
     const sd_radau_method *used = radau->used;
-    int last = used->stages - 1;
     for (int s = 0; s < radau->method->stages; s++) {
-        double *z = radau->z[s], v[SD_STAGES + 1], slope[SD_STAGES + 1];
+        double v[SD_STAGES + 1], slope[SD_STAGES + 1];
         if (radau->taken == 0) {
-            memset(z, 0, (size_t)radau->n * sizeof *z);
+            memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
             continue;
         }
         lagrange(radau, used, 1.0 + radau->method->c[s] * h / radau->h_used, v, slope);
-        for (int32_t i = 0; i < radau->n; i++) {
-            double sum = 0.0;
-            for (int j = 0; j < last; j++)
-                sum += v[j + 1] * radau->kept[j][i];
-            z[i] = sum + (v[last + 1] - 1.0) * radau->kept[last][i];
-        }
+        v[used->stages] -= 1.0; /* of the point that the step begins at */
+        sd_radau_combine(used->stages, radau->n, v + 1, radau->kept, radau->z[s]);
     }
 }

@@ -1,24 +1,25 @@
 /* The systems of a Newton step of Radau IIA: matrices and factors, residuals of the stages, corrections; those of large
  * models are whole tasks for threads (see radau.h). */
 #include "system/condensed.h"
+#include "linear/lanes.h"
 #include "steppers/radau.h"
 #include "steppers/threads.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-/* out [n] := sum_j weight[j] v[j] */
-static inline void sum(int stages, int32_t n, const double *weight, double *const *v, double *out)
+/* out [n] := sum_j weight[j] v[j], in whole lanes, for which all vectors have room */
+static inline __attribute__((always_inline)) void sum(int stages, int32_t n, const double *weight, double *const *v, double *out)
 {
-    for (int32_t i = 0; i < n; i++) {
-        double x = weight[0] * v[0][i];
+    for (int32_t i = 0; i < n; i += SD_LANES) {
+        sd_lanes x = weight[0] * SD_FROM(v[0], i);
         for (int j = 1; j < stages; j++)
-            x += weight[j] * v[j][i];
-        out[i] = x;
+            x += weight[j] * SD_FROM(v[j], i);
+        SD_AT(out, i) = x;
     }
 }
 
-void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out)
+SD_WIDE void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out)
 {
     if (stages == 3)
         sum(3, n, weight, v, out);
@@ -83,13 +84,22 @@ static int factorise_all(sd_radau *radau)
     return failed;
 }
 
-void sd_radau_stage(const sd_radau *radau, int s, double *y, double *rate)
+/* A^-1 / h, of the step and the method at hand */
+static void set_lead(sd_radau *radau)
 {
-    const sd_radau_method *method = radau->method;
-    double weight[SD_STAGES];
-    for (int j = 0; j < method->stages; j++)
-        weight[j] = method->inverse[s][j] / radau->h;
-    sd_radau_combine(method->stages, radau->n, weight, radau->z, rate);
+    if (radau->h_lead == radau->h && radau->of_lead == radau->method)
+        return;
+    for (int s = 0; s < radau->method->stages; s++)
+        for (int j = 0; j < radau->method->stages; j++)
+            radau->lead[s][j] = radau->method->inverse[s][j] / radau->h;
+    radau->h_lead = radau->h;
+    radau->of_lead = radau->method;
+}
+
+void sd_radau_stage(sd_radau *radau, int s, double *y, double *rate)
+{
+    set_lead(radau);
+    sd_radau_combine(radau->method->stages, radau->n, radau->lead[s], radau->z, rate);
     for (int32_t i = 0; i < radau->n; i++)
         y[i] = radau->phi[i] + radau->z[s][i];
 }
@@ -150,8 +160,8 @@ static int accompanied(sd_radau *radau)
         return 0;
     if (!radau->beside) {
         radau->beside = sd_beside_new(radau->system);
-        radau->point_y = calloc(2 * ((size_t)radau->n + 1), sizeof(double));
-        radau->point_rate = radau->point_y + radau->n + 1;
+        radau->point_y = calloc(2 * (size_t)sd_whole_lanes(radau->n + 1), sizeof(double));
+        radau->point_rate = radau->point_y + sd_whole_lanes(radau->n + 1);
     }
     if (!radau->beside || !radau->point_y)
         return 0;
@@ -165,6 +175,7 @@ int sd_radau_residuals(sd_radau *radau)
     int32_t n = radau->n;
     int64_t before = radau->system->residual_evaluations;
     int made = accompanied(radau);
+    set_lead(radau); /* before two threads read it */
     if (made)
         sd_side_by_side(2, residual_part, radau);
     for (int s = 0; s < radau->method->stages; s++) {
@@ -173,56 +184,106 @@ int sd_radau_residuals(sd_radau *radau)
         radau->system->residual_evaluations = before + s + 1; /* those that are looked at */
         if (*radau->system->stop)
             return SD_STOPPED;
-        int32_t bad = sd_first_bad(n, radau->d[s]);
-        if (bad >= 0) {
-            radau->bad_row = bad;
+        if (!sd_finite(n, radau->d[s])) {
+            radau->bad_row = sd_first_bad(n, radau->d[s]);
             return SD_NONFINITE;
         }
     }
     return SD_FINE;
 }
 
-/* d, w := the right sides of the real system and of the complex ones: S^-1 times minus the residuals in d */
-static inline void split(sd_radau *radau, int stages, int pairs)
+/* real and imaginary parts of four complex numbers, and back */
+static inline __attribute__((always_inline)) void parts(const double complex *w, sd_lanes *re, sd_lanes *im)
+{
+    const double *at = (const double *)w;
+    const sd_lanes one = SD_FROM(at, 0), two = SD_FROM(at, SD_LANES);
+    *re = (sd_lanes){one[0], one[2], two[0], two[2]};
+    *im = (sd_lanes){one[1], one[3], two[1], two[3]};
+}
+
+static inline __attribute__((always_inline)) void join_parts(sd_lanes re, sd_lanes im, double complex *w)
+{
+    double *at = (double *)w;
+    SD_AT(at, 0) = (sd_lanes){re[0], im[0], re[1], im[1]};
+    SD_AT(at, SD_LANES) = (sd_lanes){re[2], im[2], re[3], im[3]};
+}
+
+/* d, w := the right sides of the real system and of the complex ones: S^-1 times minus the residuals in d.  In whole lanes,
+ * for which all vectors have room. */
+static inline __attribute__((always_inline)) void split(sd_radau *radau, int stages, int pairs)
 {
     const sd_radau_method *method = radau->method;
-    for (int32_t i = 0; i < radau->n; i++) {
-        double r[SD_STAGES];
+    for (int32_t i = 0; i < radau->n; i += SD_LANES) {
+        sd_lanes r[SD_STAGES];
         for (int j = 0; j < stages; j++)
-            r[j] = -radau->d[j][i];
+            r[j] = -SD_FROM(radau->d[j], i);
         for (int k = 0; k < pairs; k++) {
-            double complex w = method->rows[k][0] * r[0];
-            for (int j = 1; j < stages; j++)
-                w += method->rows[k][j] * r[j];
-            radau->w[k][i] = w;
+            sd_lanes re = creal(method->rows[k][0]) * r[0], im = cimag(method->rows[k][0]) * r[0];
+            for (int j = 1; j < stages; j++) {
+                re += creal(method->rows[k][j]) * r[j];
+                im += cimag(method->rows[k][j]) * r[j];
+            }
+            join_parts(re, im, radau->w[k] + i);
         }
-        double real = method->row[0] * r[0];
+        sd_lanes real = method->row[0] * r[0];
         for (int j = 1; j < stages; j++)
             real += method->row[j] * r[j];
-        radau->d[0][i] = real;
+        SD_AT(radau->d[0], i) = real;
     }
 }
 
-/* z += S times the solutions in d and w; sums of squares of the correction in Newton's weights, over all unknowns and
- * over what carries the state */
-static inline void join(sd_radau *radau, int stages, int pairs, double *sum, double *state)
+/* sum of the squares of v at i, of what carries the state alone */
+static inline double squares_of_state(const sd_radau *radau, int32_t i, sd_lanes v)
+{
+    const int32_t *idle = radau->linear->idle;
+    double sum = 0.0;
+    for (int32_t l = 0; l < SD_LANES && i + l < radau->n; l++)
+        sum += idle[i + l] ? 0.0 : v[l] * v[l];
+    return sum;
+}
+
+/* z += S times the solutions in d and w; sums of squares of the correction in Newton's weights, over all unknowns and, where
+ * some are idle, over what carries the state */
+static inline __attribute__((always_inline)) void join(sd_radau *radau, int stages, int pairs, sd_lanes *sum, double *state)
 {
     const sd_radau_method *method = radau->method;
-    const int32_t *idle = radau->linear->idle;
-    for (int32_t i = 0; i < radau->n; i++) {
-        double real = radau->d[0][i];
+    for (int32_t i = 0; i < radau->n; i += SD_LANES) {
+        sd_lanes real = SD_FROM(radau->d[0], i), re[SD_PAIRS], im[SD_PAIRS];
+        for (int k = 0; k < pairs; k++)
+            parts(radau->w[k] + i, &re[k], &im[k]);
         for (int s = 0; s < stages; s++) {
-            double dz = method->column[s] * real;
+            sd_lanes dz = method->column[s] * real;
             for (int k = 0; k < pairs; k++)
-                dz += 2.0 * (creal(method->columns[k][s]) * creal(radau->w[k][i]) -
-                             cimag(method->columns[k][s]) * cimag(radau->w[k][i]));
-            double v = dz * radau->newton_weight[i];
-            radau->z[s][i] += dz;
+                dz += 2.0 * (creal(method->columns[k][s]) * re[k] - cimag(method->columns[k][s]) * im[k]);
+            sd_lanes v = dz * SD_FROM(radau->newton_weight, i);
+            SD_AT(radau->z[s], i) += dz;
             *sum += v * v;
-            if (idle && !idle[i])
-                *state += v * v;
+            if (radau->linear->idle)
+                *state += squares_of_state(radau, i, v);
         }
     }
+}
+
+static SD_WIDE void split_all(sd_radau *radau)
+{
+    if (radau->method->stages == 3)
+        split(radau, 3, 1);
+    else if (radau->method->stages == 5)
+        split(radau, 5, 2);
+    else
+        split(radau, 7, 3);
+}
+
+static SD_WIDE void join_all(sd_radau *radau, double *all, double *state)
+{
+    sd_lanes sum = {0.0};
+    if (radau->method->stages == 3)
+        join(radau, 3, 1, &sum, state);
+    else if (radau->method->stages == 5)
+        join(radau, 5, 2, &sum, state);
+    else
+        join(radau, 7, 3, &sum, state);
+    *all = SD_TOTAL(sum);
 }
 
 /* part 0: the real system; part k: that of pair k - 1 */
@@ -239,25 +300,14 @@ static void solve_one(void *context, int part)
  * state in state_size. */
 double sd_radau_correct(sd_radau *radau)
 {
-    int stages = radau->method->stages;
-    double all = 0.0, state = 0.0, number = (double)stages * radau->n;
-    if (stages == 3)
-        split(radau, 3, 1);
-    else if (stages == 5)
-        split(radau, 5, 2);
-    else
-        split(radau, 7, 3);
+    double all = 0.0, state = 0.0, number = (double)radau->method->stages * radau->n;
+    split_all(radau);
     if (large(radau))
         sd_side_by_side(radau->method->pairs + 1, solve_one, radau);
     else
         for (int part = 0; part <= radau->method->pairs; part++)
             solve_one(radau, part);
-    if (stages == 3)
-        join(radau, 3, 1, &all, &state);
-    else if (stages == 5)
-        join(radau, 5, 2, &all, &state);
-    else
-        join(radau, 7, 3, &all, &state);
+    join_all(radau, &all, &state);
     radau->newton_iterations++;
     radau->state_size = sqrt(state / number);
     return radau->n ? sqrt(all / number) : 0.0; /* nothing may move: samples alone */

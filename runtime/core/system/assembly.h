@@ -21,6 +21,7 @@
 #ifndef SYSDYN_ASSEMBLY_H
 #define SYSDYN_ASSEMBLY_H
 
+#include "linear/lanes.h"
 #include "system/contract.h"
 
 typedef struct sd_call {
@@ -82,11 +83,15 @@ int32_t sd_first_astray(sd_system *system, double t, const double *y, const doub
                         const double *jy, const double *jyd, double h, const double *open, int all, double *s);
 /* position of the first number that is not finite, -1 where all are */
 int32_t sd_first_bad(int32_t n, const double *x);
-/* 1: all are; of few numbers at once */
+/* 1: all are */
 static inline int sd_finite(int32_t n, const double *x)
 {
-    double sum = 0.0; /* x - x is 0 for a finite number and not a number otherwise */
-    for (int32_t i = 0; i < n; i++)
+    sd_lanes sums = {0.0}; /* x - x is 0 for a finite number and not a number otherwise */
+    const int32_t whole = n - n % SD_LANES;
+    for (int32_t i = 0; i < whole; i += SD_LANES)
+        sums += SD_FROM(x, i) - SD_FROM(x, i);
+    double sum = SD_TOTAL(sums);
+    for (int32_t i = whole; i < n; i++)
         sum += x[i] - x[i];
     return sum == 0.0;
 }
