@@ -17,6 +17,7 @@ from sysdyn.compiler.binding.following import Following
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.program.emit_c import emit_c
 from sysdyn.runtime import core
+from sysdyn.runtime.model.forms import stretches
 
 HERE = Path(__file__).parent
 CORE = Path(core.__path__[0])
@@ -25,7 +26,7 @@ ALGEBRA = (
     "linear/number.h", "linear/elimination.h", "linear/machine_code.h", "linear/linear.h", "linear/sparse.h",
     "system/settle.h", "steppers/stepper.h", "steppers/underlying.h",
     "linear/machine_code.c", "linear/elimination_order.c", "linear/elimination.c", "linear/linear.c",
-    "linear/blocks.h", "linear/dense_rest.h", "linear/sparse.c", "steppers/underlying.c",
+    "linear/blocks.h", "linear/chains.h", "linear/dense_rest.h", "linear/sparse.c", "steppers/underlying.c",
 )  # fmt: skip
 A_LINE = 16
 """Numbers in a line."""
@@ -145,6 +146,8 @@ def _system(name: str, system: Assembled) -> Iterable[str]:
     fields = ("k_row", "k_q", "k_f", "k_slot_q", "k_slot_f", "held_row", "held_unknown", "held_slot", "cleared")
     for field in ("column", "row", *fields):
         yield ints(f"{name}_{field}", getattr(system, field))
+    spans = stretches(system.k_row, system.k_q, system.k_f)
+    yield ints(f"{name}_k_span", spans.ravel())
     yield doubles(f"{name}_k_scale", np.ones(system.k_row.size))
     sizes = {
         "unknowns": system.unknowns,
@@ -152,11 +155,12 @@ def _system(name: str, system: Assembled) -> Iterable[str]:
         "entries": system.entries,
         "calls": len(system.calls),
         "kinematics": system.k_row.size,
+        "k_spans": len(spans),
         "held": system.held_row.size,
         "clear": system.cleared.size,
     }
     said = [f".{field} = {value}" for field, value in sizes.items()]
-    said += [f".{field} = {name}_{field}" for field in ("column", "row", "call", "k_scale", *fields)]
+    said += [f".{field} = {name}_{field}" for field in ("column", "row", "call", "k_span", "k_scale", *fields)]
     yield f"static const sd_system {name}_form = {{\n    {', '.join(said)}\n}};"
 
 

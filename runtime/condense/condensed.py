@@ -18,6 +18,7 @@ from sysdyn.runtime.condense.elimination import Elimination, Longs, Mask, defina
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
+from sysdyn.runtime.model.forms import stretches
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import least_norm
@@ -280,11 +281,14 @@ class Condensed:
         kept[self.kept_rows] = True
         here = kept[form.k_row]
         parts = (form.k_row, form.k_q, form.k_f, *whole.slots[:2])
-        row, q, f, slot_q, slot_f = (self._hold(np.ascontiguousarray(part[here])) for part in parts)
+        kept_parts = [np.ascontiguousarray(part[here]) for part in parts]
+        row, q, f, slot_q, slot_f = map(self._hold, kept_parts)
+        spans = stretches(*kept_parts[:3])
         made = lib.System.from_buffer_copy(whole.core)
-        made.kinematics, made.column, made.row = int(here.sum()), None, None  # nothing reads its pattern
+        made.kinematics, made.column, made.row = kept_parts[0].size, None, None  # nothing reads its pattern
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
-        made.k_scale = self._hold(np.ones(here.size))
+        made.k_scale = self._hold(np.ones(kept_parts[0].size))
+        made.k_span, made.k_spans = self._hold(spans), len(spans)
         made.call = c.addressof(self._calls(kept))
         return made
 

@@ -93,7 +93,7 @@ class Form:
 
     written: unknowns as written (nu, and those of the start alone, stand behind them); at: places of the families,
     audit families behind all (`extended`); kind: (kind, number) of unknowns one after the other; k_row, k_q, k_f: the
-    rows q' - f;
+    rows q' - f, and k_span: their stretches;
     groups: (name of the group, row family, first row), ascending; scales: calls of the scale blocks of steep rows.
     """
 
@@ -108,6 +108,7 @@ class Form:
     k_row: Ints
     k_q: Ints
     k_f: Ints
+    k_span: Ints
     groups: tuple[tuple[str, int, int], ...]
     scales: tuple[Planned, ...]
 
@@ -220,6 +221,14 @@ def _leveled(
     return found, number
 
 
+def stretches(row: Ints, q: Ints, f: Ints) -> Ints:
+    """Rows q' - f as stretches of which all three ascend by one: number, first row, q and f [stretches, 4]."""
+    parts = np.stack([row, q, f])
+    begin = np.flatnonzero(np.concatenate([[True], (np.diff(parts) != 1).any(axis=0)])[: row.size])
+    number = np.diff(np.concatenate([begin, [row.size]]))
+    return np.ascontiguousarray(np.stack([number, *parts[:, begin]], axis=1), dtype=np.int32)
+
+
 def plan(description: Description, name: str) -> Form:
     """The calls and tables of one index form."""
     own = START if name == "start" else ()
@@ -230,9 +239,8 @@ def plan(description: Description, name: str) -> Form:
     k_q, k_f, first = description.layouts["kinematics"]
     bare = name in BARE
     if bare:
-        k_rows, number = np.zeros(0, np.int32), 0
-    else:
-        k_rows, number = np.arange(k_q.size, dtype=np.int32), int(k_q.size)
+        k_q = k_f = np.zeros(0, np.int32)
+    k_rows, number = np.arange(k_q.size, dtype=np.int32), int(k_q.size)
     nu = at.copy()
     tables: dict[str, Ints] = {}
     groups: list[tuple[str, int, int]] = []
@@ -280,8 +288,9 @@ def plan(description: Description, name: str) -> Form:
         calls=tuple(calls),
         kind=tuple(kind),
         k_row=k_rows,
-        k_q=np.zeros(0, np.int32) if bare else k_q,
-        k_f=np.zeros(0, np.int32) if bare else k_f,
+        k_q=k_q,
+        k_f=k_f,
+        k_span=stretches(k_rows, k_q, k_f),
         groups=tuple(groups),
         scales=tuple(scales),
     )

@@ -430,3 +430,45 @@ def test_a_factorisation_leaves_small_numbers_to_others():
     for _ in range(2):
         assert lib.core.sd_linear_factor(solver.linear, lib.pointer(matrix.data), None) == 0
         assert np.full(2, 1e-310)[0] * 0.5 > 0.0
+
+
+def lines(steps, seed):
+    """Lines of 90 to 150 unknowns of which each waits for the one `step` before, taken in turn; behind them, joined to the
+    ends of each, a dense block."""
+    rng = np.random.default_rng(seed)
+    blocks, ends, first = [], [], 0
+    for step in steps:
+        n = step * int(rng.integers(90 // step, 150 // step))
+        off = [rng.uniform(-1.0, -0.5, n - step) for _ in range(2)]
+        blocks.append(diags_array([*off, rng.uniform(2.5, 4.0, n)], offsets=[step, -step, 0]).toarray())
+        ends += list(range(first + n - step, first + n))
+        first += n
+    full = np.zeros((first + 5, first + 5))
+    at = 0
+    for block in blocks:
+        full[at : at + len(block), at : at + len(block)] = block
+        at += len(block)
+    full[first:, first:] = rng.normal(size=(5, 5)) + 20.0 * np.eye(5)
+    full[first:, ends] = rng.normal(size=(5, len(ends)))
+    full[np.ix_(ends, range(first, first + 5))] = rng.normal(size=(len(ends), 5))
+    return csc_array(full)
+
+
+@pytest.mark.parametrize("steps", [(1,), (2,), (3,), (7,), (1, 2), (2, 1), (3, 1, 2), (1, 40), (2, 2, 5)])
+@pytest.mark.parametrize("seed", range(3))
+def test_chains_are_solved_and_refactorised_as_any_matrix(steps, seed):
+    matrix = lines(steps, seed)
+    solver = Solver(matrix, sparse=True)
+    rng = np.random.default_rng(seed)
+    n = matrix.shape[0]
+    for scale in (None, 10.0 ** rng.uniform(-6, 6, n)):
+        for _ in range(3):
+            values = matrix.data * rng.uniform(0.8, 1.2, matrix.data.size)
+            if scale is not None:  # in units of its unknowns
+                values = values / np.repeat(scale, np.diff(matrix.indptr))
+            assert solver.factor(values, scale) == 0
+            full = csc_array((values, matrix.indices, matrix.indptr), shape=(n, n)).toarray()
+            x = rng.normal(size=n) * (1.0 if scale is None else scale)
+            error = (solver.solve(full @ x) - x) / (1.0 if scale is None else scale)
+            assert np.abs(error).max() < 1e-12
+    assert solver.linear.contents.pivotings == 1

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define GROWTH 1e3         /* largest multiplier, in scaled terms: it costs that many digits of a correction */
+#define GROWTH 1e4         /* largest multiplier, in scaled terms: it costs that many digits of a correction */
 #define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
 #define FIRST 3            /* matrices seen before an order is looked for: one-off systems do not pay for it, */
 #define SHARE 4            /* nor do large ones before this part of n */

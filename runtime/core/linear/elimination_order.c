@@ -49,7 +49,9 @@ static int fill_in(sd_full *full, const sd_elimination *e)
 {
     size_t n = (size_t)full->n, entries = (size_t)e->entries;
     const sd_number *sample = e->sample + (size_t)(e->samples - full->samples) * entries;
-    for (size_t j = 0; j < n; j++)
+    for (size_t j = 0; j < n; j++) {
+        for (size_t s = 0; s < (size_t)full->samples; s++)
+            memset(full->value + (s * n + j) * n, 0, n * sizeof *full->value);
         for (int32_t k = e->column[j]; k < e->column[j + 1]; k++) {
             size_t place = j * n + (size_t)e->row[k];
             if (full->entry[place])
@@ -60,6 +62,7 @@ static int fill_in(sd_full *full, const sd_elimination *e)
             for (size_t s = 0; s < (size_t)full->samples; s++)
                 full->value[s * n * n + place] = sample[s * entries + (size_t)k];
         }
+    }
     for (int32_t k = 0; k < full->n; k++)
         full->row[k] = full->column[k] = k;
     full->open = full->n;
@@ -73,7 +76,7 @@ static int full_new(sd_full *full, const sd_elimination *e, int32_t samples)
 {
     size_t n = (size_t)e->n, all = n * n;
     *full = (sd_full){.n = e->n, .samples = samples};
-    full->value = calloc((size_t)samples * all + 1, sizeof(sd_number));
+    full->value = malloc(((size_t)samples * all + 1) * sizeof(sd_number));
     full->entry = calloc(all + 1, 1);
     full->row = calloc(4 * n + 1, sizeof(int32_t));
     full->size = calloc(SD_SAMPLES * n + 1, sizeof(double));

@@ -1,6 +1,7 @@
 /* Left-looking sparse LU (Gilbert & Peierls, SIAM J. Sci. Stat. Comput. 9, 1988) with threshold pivoting. */
 #include "linear/sparse.h"
 #include "linear/blocks.h"
+#include "linear/chains.h"
 #include "linear/dense_rest.h"
 
 #include <math.h>
@@ -16,6 +17,7 @@ void sd_sparse_free(sd_sparse *lu)
 {
     if (!lu)
         return;
+    leave_chains(lu);
     free(lu->order);
     free(lu->l_start);
     free(lu->l_row);
@@ -367,6 +369,8 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     }
     lu->widest = failed ? 0 : widest_block(lu);
     leave_search(lu);
+    if (!failed)
+        find_chains(lu);
     return failed;
 }
 
@@ -399,6 +403,40 @@ static int refactor_column(sd_sparse *lu, const int32_t *column, const int32_t *
     return !keeps_pivot(lu, column, value, k, diagonal, largest);
 }
 
+/* 1: the k-th position waits for one alone, which no other waits for, and one at most waits for it */
+static inline int is_link(const sd_sparse *lu, int32_t k)
+{
+    if (!lu->lowers || lu->u_start[k + 1] - lu->u_start[k] != 1 || lu->l_start[k + 1] - lu->l_start[k] > 1)
+        return 0;
+    int32_t j = lu->u_row[lu->u_start[k]];
+    return lu->l_start[j + 1] - lu->l_start[j] == 1 && lu->l_row[lu->l_start[j]] == k;
+}
+
+/* refactor_column of such a position */
+static int refactor_link(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k)
+{
+    int32_t c = lu->order[k], u = lu->u_start[k], l = lu->l_start[k], j = lu->u_row[u];
+    sd_number pivot = 0.0, above = 0.0, below = 0.0;
+    for (int32_t e = column[c]; e < column[c + 1]; e++) {
+        int32_t p = lu->place[row[e]];
+        if (p == k)
+            pivot += value[e];
+        else if (p == j)
+            above += value[e];
+        else
+            below += value[e];
+    }
+    pivot -= lu->l_value[lu->l_start[j]] * above;
+    lu->u_value[u] = above;
+    sd_number inverse = lu->inverse[k] = 1.0 / pivot;
+    double largest = sd_size(pivot);
+    if (l < lu->l_start[k + 1]) {
+        lu->l_value[l] = below * inverse;
+        largest = sd_size(below) > largest ? sd_size(below) : largest;
+    }
+    return !keeps_pivot(lu, column, value, k, pivot, largest);
+}
+
 /* the columns of the rest, which are full: 1: a pivot became unhealthy, or there is no memory */
 static int renew_rest(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, sd_number *block)
 {
@@ -425,7 +463,8 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
     lu->smallest = 1.0;
     unsigned before = sd_no_subnormals();
     for (int32_t k = 0; k < lu->rest && !failed; k++)
-        failed = lu->source[k] >= 0 && refactor_column(lu, column, row, value, k, block);
+        failed = is_link(lu, k) ? refactor_link(lu, column, row, value, k)
+                                : lu->source[k] >= 0 && refactor_column(lu, column, row, value, k, block);
     if (!failed && lu->rest < lu->n)
         failed = renew_rest(lu, column, row, value, block);
     sd_subnormals(before);
@@ -486,6 +525,11 @@ static inline __attribute__((always_inline)) void substitute(const sd_sparse *lu
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
 {
     int32_t n = lu->n;
+    if (lu->lowers) {
+        descend_chains(lu, x, row_scale, work);
+        ascend_chains(lu, x, column_scale, work);
+        return;
+    }
     for (int32_t k = 0; k < n; k++) {
         int32_t r = lu->source[k];
         work[k] = r < 0 ? 0.0 : row_scale ? x[r] * row_scale[r] : x[r];

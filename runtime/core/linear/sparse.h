@@ -9,6 +9,11 @@
 
 #include <stdint.h>
 
+/* positions [from, to) of a factor that wait for the one `step` before (behind) them alone; step 0: for any (chains.h) */
+typedef struct sd_chain {
+    int32_t from, to, step;
+} sd_chain;
+
 typedef struct sd_sparse {
     int32_t n, rows;             /* columns; rows, as many or more */
     int32_t *order;              /* [n] column of the matrix that is eliminated k-th */
@@ -24,6 +29,9 @@ typedef struct sd_sparse {
     uint64_t *among;             /* bits of n positions, likewise */
     int32_t rest;                /* the position from which the factors are full (dense_rest.h); n: none */
     int32_t widest;              /* numbers that the widest block touches; 0: there is none */
+    sd_chain *lower, *upper;     /* [lowers], [uppers] of L and of U; none: the factors are no line's */
+    int32_t lowers, uppers;
+    char *pulled;                /* [n] which substitutions take what a column makes of another position within a chain */
     sd_number *x;                /* [the larger of n and rows, + 1] */
     int pivoted;                 /* a valid pattern exists */
     int paired;                  /* row own[c] pivots in column c wherever its entry will do: the order is one of A + A^T */

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define VECTORS 14
+#define VECTORS 13
 #define ITERATIONS 4        /* of Newton a step */
 #define NEWTON_TOLERANCE 0.33 /* of the error tolerance (Brenan, Campbell & Petzold) */
 #define TRUST 0.02          /* least contraction assumed of a first correction (an exponential law may lie ahead) */
@@ -49,17 +49,17 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
         return NULL;
     size_t m = (size_t)sd_whole_lanes(system->unknowns), nnz = (size_t)sd_whole_lanes(system->entries);
     bdf->memory = calloc((SD_MAX_ORDER + 2 + VECTORS) * m + 3 * nnz + 1, sizeof(double));
-    bdf->powered = calloc(m + 1, sizeof *bdf->powered);
+    bdf->powered = calloc(m + m / SD_LANES + 1, sizeof *bdf->powered);
     if (!bdf->memory || !bdf->powered) {
         sd_bdf_free(bdf);
         return NULL;
     }
+    bdf->apart = bdf->powered + m;
     double *next = bdf->memory;
     for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
         bdf->phi[i] = next;
-    double **vectors[] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->newton_weight, &bdf->test_weight, &bdf->delta,
-                          &bdf->moved, &bdf->moved_d, &bdf->scale, &bdf->terms, &bdf->rate,
-                          &bdf->newton_power, &bdf->test_power};
+    double **vectors[] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->delta, &bdf->moved, &bdf->moved_d, &bdf->scale,
+                          &bdf->terms, &bdf->rate, &bdf->own, &bdf->newton_power, &bdf->test_power};
     for (int i = 0; i < VECTORS; i++, next += m)
         *vectors[i] = next;
     bdf->jy = next;
@@ -114,7 +114,7 @@ void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, doub
     bdf->linear->null_pivot = bdf->linear->idle ? SD_LEAST_PIVOT : 0.0;
     sd_bdf_begin_powers(bdf);
     sd_bdf_weights(bdf);
-    sd_bdf_step_weights(bdf);
+    sd_bdf_weigh(bdf, SD_LOCAL_ERROR_TEST);
     bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : h > 0.0 ? h : sd_bdf_first_step(bdf, bdf->t_end - t);
     bdf->h = fmin(bdf->h, bdf->h_max);
     for (int32_t i = 0; i < bdf->n; i++)
@@ -207,7 +207,7 @@ static int cause_of(sd_bdf *bdf, double t, int corrections)
         if (!finite(bdf))
             return SD_NONFINITE;
         sd_linear_solve(bdf->linear, bdf->delta);
-        sd_bdf_move(bdf);
+        sd_bdf_move(bdf, m == 0);
     }
     return SD_NEWTON;
 }
@@ -232,7 +232,7 @@ static int iterate(sd_bdf *bdf, double t)
             break;
         converged = 0;
         sd_linear_solve(bdf->linear, d);
-        double size = sd_bdf_move(bdf);
+        double size = sd_bdf_move(bdf, m == 0);
         if (!isfinite(size))
             return cause_of(bdf, t, m + 1);
         if (m == 0) {
@@ -266,7 +266,7 @@ static int correct(sd_bdf *bdf)
 {
     double t = bdf->t + bdf->h;
     bdf->fresh_jacobian = 0;
-    sd_bdf_step_weights(bdf);
+    sd_bdf_weigh(bdf, SD_NEWTON_TEST);
     for (;;) {
         int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->taken == 0 || bdf->fresh_jacobian < 0;
         if (fresh || !bdf->ready || bdf->cj != bdf->cj_factored) {
@@ -337,7 +337,7 @@ static void project(sd_bdf *bdf)
 int sd_bdf_step(sd_bdf *bdf)
 {
     int32_t error_failures = 0, order_next = 1;
-    double ck, error;
+    double ck, error, norm[4];
     sd_bdf_weights(bdf);
     bdf->cause = SD_FINE;
     bdf->jacobian_age++;
@@ -350,7 +350,7 @@ int sd_bdf_step(sd_bdf *bdf)
         sd_bdf_coefficients(bdf, &ck);
         sd_bdf_predict(bdf);
         int cause = correct(bdf);
-        if (cause == SD_FINE && (sd_bdf_test(bdf, ck, &error, &order_next) || bdf->fixed_h > 0.0))
+        if (cause == SD_FINE && (sd_bdf_test(bdf, ck, norm, &error, &order_next) || bdf->fixed_h > 0.0))
             break;
         sd_bdf_restore(bdf);
         bdf->cause = cause ? cause : SD_ERROR_TEST;
@@ -375,9 +375,11 @@ int sd_bdf_step(sd_bdf *bdf)
     bdf->cause = SD_FINE;
     double t = bdf->t + bdf->h;
     bdf->t = fabs(bdf->t_end - t) <= 1e-12 * bdf->h ? bdf->t_end : t;
-    if (bdf->project)
+    if (bdf->project) {
         project(bdf);
-    sd_bdf_accept(bdf, order_next);
+        sd_bdf_orders(bdf, norm);
+    }
+    sd_bdf_accept(bdf, norm, order_next);
     return SD_FINE;
 }
 

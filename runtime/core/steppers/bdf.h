@@ -6,7 +6,8 @@
  *   psi[i]    t_n - t_(n-i-1);  alpha, beta, sigma, gamma: coefficients of the prediction and the error
  *   cj        yd = (predicted yd) + cj (y - predicted y);   G = dF/dy + cj dF/dyd
  *   ee        correction y - predicted y
- *   ns        steps taken with the present step size and order
+ *   ns        steps taken with the present step size and order: from phi[ns] on the differences of the past, times beta, are
+ *             those of the step under way
  * Error test: weights w_i = atol_i + rtol |y_i|, atol_i = rtol * magnitude_i; unknowns with test_i < 0 (multipliers,
  * implicit efforts, flows of massless coordinates) are left out, those with test_i = k count with h^k.
  * Of a group in `common` the part that its unknowns have in common (their mean in these weights) is left out too.
@@ -38,10 +39,12 @@ typedef struct sd_bdf {
     double psi[SD_MAX_ORDER + 2], alpha[SD_MAX_ORDER + 2], beta[SD_MAX_ORDER + 2], sigma[SD_MAX_ORDER + 2],
         gamma[SD_MAX_ORDER + 2];
     double *phi[SD_MAX_ORDER + 2];
-    double *y, *yd, *ee, *weight, *newton_weight, *test_weight, *delta, *moved, *moved_d, *scale;
+    double *y, *yd, *ee, *delta, *moved, *moved_d, *scale;
     double *terms, *rate, *jy, *jyd, *g, *memory;
-    double *newton_power, *test_power, h_weighed; /* powers of h by which unknowns count, and of which h */
+    double *weight; /* [n] as Newton's test has them, then that of the error */
+    double *own, *newton_power, *test_power, h_weighed; /* [n] weights and powers of h of unknowns in `apart`, and of which h */
     int32_t *powered, powers; /* [powers] unknowns that do not count alike at every h */
+    int32_t *apart, aparts;   /* [aparts] lanes of unknowns that do not count alike in both tests */
     double error_next;        /* estimate of the local error at the order chosen next */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations;
@@ -67,19 +70,19 @@ void sd_bdf_restore(sd_bdf *bdf);
 /* bdf_passes.c */
 void sd_bdf_weights(sd_bdf *bdf);
 void sd_bdf_begin_powers(sd_bdf *bdf);
-void sd_bdf_step_weights(sd_bdf *bdf);
+enum sd_test { SD_NEWTON_TEST, SD_LOCAL_ERROR_TEST };
+void sd_bdf_weigh(sd_bdf *bdf, enum sd_test test);
 void sd_bdf_predict(sd_bdf *bdf);
 void sd_bdf_matrix(sd_bdf *bdf);
-double sd_bdf_move(sd_bdf *bdf);
+double sd_bdf_move(sd_bdf *bdf, int first);
 void sd_bdf_orders(const sd_bdf *bdf, double *norm);
 double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *minus);
 void sd_bdf_interpolate(const sd_bdf *bdf, int32_t order, const double *value, const double *rate, double *y,
                         double *yd);
-void sd_bdf_stretch(sd_bdf *bdf, int32_t first, int32_t last, const double *beta);
 void sd_bdf_shift(sd_bdf *bdf);
 /* controller.c */
-int sd_bdf_test(sd_bdf *bdf, double ck, double *error, int32_t *order_next);
-void sd_bdf_accept(sd_bdf *bdf, int32_t order_next);
+int sd_bdf_test(sd_bdf *bdf, double ck, double *norm, double *error, int32_t *order_next);
+void sd_bdf_accept(sd_bdf *bdf, const double *norm, int32_t order_next);
 double sd_bdf_first_step(const sd_bdf *bdf, double span);
 
 #endif

@@ -1,9 +1,9 @@
-/* Coefficients of the fixed-leading-coefficient BDF, and the differences scaled with them (see bdf.h). */
+/* Coefficients of the fixed-leading-coefficient BDF, and how far the past's differences stretch (see bdf.h). */
 #include "steppers/bdf.h"
 
 #include <math.h>
 
-/* Prepares a step of size h and the present order: psi, alpha, beta, sigma, gamma, cj; phi made "modified".
+/* Prepares a step of size h and the present order: psi, alpha, beta, sigma, gamma, cj; what makes phi "modified".
  * ck: constant of the local error against |y - predicted y|. */
 void sd_bdf_coefficients(sd_bdf *bdf, double *ck)
 {
@@ -35,7 +35,6 @@ void sd_bdf_coefficients(sd_bdf *bdf, double *ck)
     bdf->cj = -fixed / h;
     double tail = fabs(bdf->alpha[k] + fixed - variable);
     *ck = tail > bdf->alpha[k] ? tail : bdf->alpha[k];
-    sd_bdf_stretch(bdf, bdf->ns, k, bdf->beta);
 }
 
 /* Undoes sd_bdf_coefficients after a step that was not accepted. */
@@ -43,8 +42,4 @@ void sd_bdf_restore(sd_bdf *bdf)
 {
     for (int32_t i = 1; i <= bdf->order; i++)
         bdf->psi[i - 1] = bdf->psi[i] - bdf->h;
-    double back[SD_MAX_ORDER + 2];
-    for (int32_t i = bdf->ns; i <= bdf->order; i++)
-        back[i] = 1.0 / bdf->beta[i];
-    sd_bdf_stretch(bdf, bdf->ns, bdf->order, back);
 }

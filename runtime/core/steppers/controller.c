@@ -5,11 +5,12 @@
 #include <math.h>
 #include <string.h>
 
-/* Error of the step and the order that promises more (never a higher one here).  1: the step passes. */
-int sd_bdf_test(sd_bdf *bdf, double ck, double *error, int32_t *order_next)
+/* Error of the step and the order that promises more (never a higher one here); norm [4]: as sd_bdf_orders has
+ * them.  1: the step passes. */
+int sd_bdf_test(sd_bdf *bdf, double ck, double *norm, double *error, int32_t *order_next)
 {
     int32_t k = bdf->order;
-    double norm[3];
+    sd_bdf_weigh(bdf, SD_LOCAL_ERROR_TEST);
     sd_bdf_orders(bdf, norm);
     double here = bdf->sigma[k] * norm[0], term = (k + 1) * here;
     *order_next = k;
@@ -26,8 +27,8 @@ int sd_bdf_test(sd_bdf *bdf, double ck, double *error, int32_t *order_next)
     return *error <= 1.0;
 }
 
-/* Order and step size after an accepted step, then the differences of the next. */
-void sd_bdf_accept(sd_bdf *bdf, int32_t order_next)
+/* Order and step size after an accepted step whose corrections were `norm`, then the differences of the next. */
+void sd_bdf_accept(sd_bdf *bdf, const double *norm, int32_t order_next)
 {
     int32_t k = bdf->order, order_change = k - bdf->order_used;
     double error = bdf->error_next, h = bdf->h, h_next = h;
@@ -46,8 +47,7 @@ void sd_bdf_accept(sd_bdf *bdf, int32_t order_next)
     } else {
         int32_t order = order_next;
         if (order_next == k && k < bdf->max_order && k + 1 < bdf->ns && order_change != 1) {
-            double norm[3], above = sd_bdf_norm(bdf, bdf->ee, bdf->phi[k + 1]) / (k + 2), below = 0.0;
-            sd_bdf_orders(bdf, norm); /* a projection has moved them */
+            double above = norm[3] / (k + 2), below = 0.0;
             double term_above = (k + 2) * above, term = (k + 1) * bdf->sigma[k] * norm[0];
             if (k == 1) {
                 if (term_above < 0.5 * term)

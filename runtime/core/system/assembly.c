@@ -25,11 +25,13 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
 
 void sd_add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r)
 {
-    const int32_t *const row = system->k_row, *const q = system->k_q, *const f = system->k_f, kinematics = system->kinematics;
-    const double *const scale = system->k_scale;
-#pragma GCC unroll 4
-    for (int32_t i = 0; i < kinematics; i++)
-        r[row[i]] = scale[i] * (yd[q[i]] - y[f[i]]);
+    const double *scale = system->k_scale;
+    for (const int32_t *span = system->k_span, *end = span + 4 * (size_t)system->k_spans; span < end; scale += *span, span += 4) {
+        const double *restrict own = scale, *restrict q = yd + span[2], *restrict f = y + span[3];
+        double *restrict to = r + span[1];
+        for (int32_t i = 0; i < span[0]; i++)
+            to[i] = own[i] * (q[i] - f[i]);
+    }
     for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++)
         call->rows(&call->frame, t, y, yd, r);
     for (int32_t i = 0; i < system->held; i++)

@@ -9,6 +9,7 @@
  *   y, yd [unknowns]   r [rows]   column [unknowns + 1]   row, jy, jyd [entries]   v [largest list of entries]
  *   slot_dy [n_dy], slot_dyd [n_dyd]      place in jy / jyd of each entry of the block's list
  *   k_row, k_q, k_f, k_slot_q, k_slot_f [kinematics]      the rows q' - f and their two entries
+ *   k_span [k_spans][4]                the same rows as stretches: number, first row, q and f
  *   k_scale [kinematics]               factors of these rows: beside Phi_q^T nu they are the inverse metric of q
  *   held_row, held_unknown, held_slot [held]   rows that read "unknown = 0" in the place of their equation (the
  *                                      multiplier of a redundant constraint), with their entry
@@ -43,10 +44,11 @@ typedef struct sd_left {
 } sd_left;
 
 struct sd_system {
-    int32_t unknowns, rows, entries, calls, kinematics;
+    int32_t unknowns, rows, entries, calls, kinematics, k_spans;
     const int32_t *column, *row;
     const sd_call *call;
     const int32_t *k_row, *k_q, *k_f, *k_slot_q, *k_slot_f;
+    const int32_t *k_span;
     const double *k_scale;
     int32_t held, clear;
     const int32_t *held_row, *held_unknown, *held_slot, *held_rate, *cleared;
