@@ -86,10 +86,10 @@ def _numbers(size: int, places: NDArray[np.integer]) -> Ints:
     return found
 
 
-def _spans(full: NDArray[np.integer]) -> tuple[NDArray[np.integer], Longs, Longs]:
-    """Stretches of ascending places: first place, first number, length."""
-    begin = np.flatnonzero(np.concatenate([[True], np.diff(full) != 1])) if full.size else np.zeros(0, dtype=np.int64)
-    return full[begin], begin, np.diff(np.concatenate([begin, [full.size]]))
+def _spans(full: NDArray[np.integer], number: NDArray[np.integer]) -> tuple[NDArray[np.integer], ...]:
+    """Stretches in which places and numbers ascend by one: first place, first number, length."""
+    begin = np.flatnonzero(np.concatenate([[True], (np.diff(full) != 1) | (np.diff(number) != 1)])[: full.size])
+    return full[begin], number[begin], np.diff(np.concatenate([begin, [full.size]]))
 
 
 class Room:
@@ -118,6 +118,9 @@ class Straights:
         broken = np.zeros(number, dtype=bool)
         broken[np.repeat(np.arange(number), count)[~steps]] = True
         begin = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
+        unlike = np.zeros(number, dtype=bool)
+        unlike[np.repeat(np.arange(number), count)[inner][found.factor[inner] != found.factor[above[inner]]]] = True
+        begin = self._cut(begin, unlike)
         ends = np.concatenate([begin[1:], [number]]).astype(np.int64)
         made = (lib.Straight * max(begin.size, 1))()
         order = np.arange(found.factor.size)
@@ -140,6 +143,15 @@ class Straights:
         sizes = (ends - begin)[long] * terms_of[long]
         entries = found.start[begin[long]]
         self._long = [tuple(map(int, line)) for line in zip(long, entries, sizes, strict=True)]
+
+    @staticmethod
+    def _cut(begin: Longs, unlike: Mask) -> Longs:
+        """Where stretches begin, once long ones are cut where factors change, if these are few: an end of a line."""
+        unlike[begin] = False
+        changes = np.add.reduceat(unlike, begin, dtype=np.int64) if begin.size else begin
+        length = np.diff(np.concatenate([begin, [unlike.size]]))
+        unlike &= np.repeat(changes * LONG <= length, length)
+        return np.union1d(begin, np.flatnonzero(unlike))
 
     def renew(self, found: Sums) -> None:
         """Takes the numbers of other sums of the same structure."""
@@ -245,8 +257,10 @@ class Condensed:
         self.pattern: Pattern
         self.pattern, (self._to,) = compress(self.rows, self.unknowns, [Places(row, column)])
 
-    def _spans(self, full: Ints) -> tuple[c.Array[Any], int]:
-        first, begin, number = _spans(full)
+    def _spans(self, full: Ints, chosen: Mask | None = None) -> tuple[c.Array[Any], int]:
+        """Of the places of all numbers, or of those chosen [full]."""
+        number = np.arange(full.size) if chosen is None else np.flatnonzero(chosen)
+        first, begin, number = _spans(full[number], number)
         made = (lib.Span * max(first.size, 1))()
         for k, span in enumerate(zip(first.tolist(), begin.tolist(), number.tolist(), strict=True)):
             made[k] = lib.Span(*span)
@@ -274,6 +288,28 @@ class Condensed:
         read = {family for kernel in kernels for family in kernel.rates or ()}
         return bool(read & set(self.whole.family_of[self.sums.place].tolist()))
 
+    def _own_rows(self) -> Ints:
+        """Kept rows q' - f as stretches (core/system/condensed.h), where no block adds to any and none is held."""
+        whole, form = self.whole, self.whole.form
+        firsts = [planned.to[(planned.to >= 0) & (planned.to < form.k_row.size)] for planned in form.calls]
+        row = _numbers(whole.rows, self.kept_rows)[form.k_row]
+        q = _numbers(whole.unknowns, self.kept)[form.k_q]
+        here = row >= 0
+        if any(first.size for first in firsts) or whole.core.held or (q[here] < 0).any():
+            return np.zeros((0, 4), dtype=np.int32)
+        order = np.argsort(row[here], kind="stable")
+        return stretches(row[here][order], q[here][order], form.k_f[here][order])
+
+    def _rated(self) -> Mask:
+        """Of the kept unknowns [unknowns] those whose derivatives enter a row that is not q' - f by itself."""
+        blocks, form = self.whole.description.blocks, self.whole.form
+        planned = [call.block for call in (*form.calls, *form.scales)]
+        rates = [kernel.rates for block in planned for kernel in blocks.get(block, ())]
+        if not self._own.size or None in rates:
+            return np.ones(self.unknowns, dtype=bool)
+        read = frozenset[int]().union(*(families for families in rates if families))
+        return np.isin(self.whole.family_of[self.kept], sorted(read))
+
     def _trimmed(self) -> lib.System:
         """The whole system without rows q' - f that are not kept."""
         whole, form = self.whole, self.whole.form
@@ -288,7 +324,7 @@ class Condensed:
         made.kinematics, made.column, made.row = kept_parts[0].size, None, None  # nothing reads its pattern
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
         made.k_scale = self._hold(np.ones(kept_parts[0].size))
-        made.k_span, made.k_spans = self._hold(spans), len(spans)
+        made.k_span, made.k_spans = self._hold(spans), 0 if self._own.size else len(spans)
         made.call = c.addressof(self._calls(kept))
         return made
 
@@ -304,8 +340,11 @@ class Condensed:
 
     def _make(self) -> None:
         whole = self.whole
+        self._own = self._own_rows()
         self._trim = self._trimmed()
         unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
+        rate = self._spans(self.kept, self._rated())
+        rest = self._spans(self.kept_rows, self.kept_rows >= (whole.form.k_row.size if self._own.size else 0))
         self.renew(self.sums)
         room = self._room
         self.condensed = lib.Condensed(
@@ -314,9 +353,15 @@ class Condensed:
             rows=self.rows,
             unknown_spans=unknown[1],
             row_spans=row[1],
+            rate_spans=rate[1],
+            rest_spans=rest[1],
+            own_spans=len(self._own),
             straights=self._straights.number,
             unknown=c.addressof(unknown[0]),
             row=c.addressof(row[0]),
+            rate=c.addressof(rate[0]),
+            rest=c.addressof(rest[0]),
+            own=self._hold(self._own),
             straight=c.addressof(self._straights.array),
             observed_rates=int(self._observed_rates()),
             products=self._from.size,

@@ -134,7 +134,7 @@ static void descend_chains(const sd_sparse *lu, const sd_number *x, const double
     }
 }
 
-/* x := column_scale U^-1 work along one chain, work := U^-1 work; step as above */
+/* x := column_scale U^-1 work along one chain, at its beginning work too; step as above */
 static inline __attribute__((always_inline)) void ascend_chain(const sd_sparse *lu, const sd_chain *chain, const int32_t step,
                                                                sd_number *x, const double *column_scale, sd_number *work)
 {
@@ -144,9 +144,14 @@ static inline __attribute__((always_inline)) void ascend_chain(const sd_sparse *
         sd_number v = (work[k] - *u-- * (step > 2 ? work[k + step] : before)) * inverse[k];
         int32_t c = lu->order[k];
         before = step == 2 ? last : v;
-        work[k] = last = v;
+        last = v;
+        if (step > 2)
+            work[k] = v;
         x[c] = column_scale ? v * column_scale[c] : v;
     }
+    work[chain->from] = last; /* what is before the chain may wait for these */
+    if (step == 2)
+        work[chain->from + 1] = before;
 }
 
 static inline void ascend_columns(const sd_sparse *lu, int32_t from, int32_t to, int solved, sd_number *x,

@@ -93,12 +93,10 @@ static inline void copy(double *to, const double *from, int32_t number)
         memcpy(to, from, (size_t)number * sizeof *to);
 }
 
-static void scatter(const sd_condensed *condensed, const double *z, double *x)
+static void scatter(int32_t spans, const sd_span *span, const double *z, double *x)
 {
-    for (int32_t s = 0; s < condensed->unknown_spans; s++) {
-        const sd_span *span = &condensed->unknown[s];
-        copy(x + span->full, z + span->kept, span->number);
-    }
+    for (int32_t s = 0; s < spans; s++)
+        copy(x + span[s].full, z + span[s].kept, span[s].number);
 }
 
 static void gather(int32_t spans, const sd_span *span, const double *x, double *z)
@@ -109,14 +107,14 @@ static void gather(int32_t spans, const sd_span *span, const double *x, double *
 
 void sd_condensed_expand(const sd_condensed *condensed, const double *z, double *x, int rate)
 {
-    scatter(condensed, z, x);
+    scatter(condensed->unknown_spans, condensed->unknown, z, x);
     sd_condensed_complete(condensed, x, rate);
 }
 
 void sd_condensed_show(const sd_condensed *condensed, const double *z, const double *zd, double *y, double *yd)
 {
     sd_condensed_expand(condensed, z, y, 0);
-    scatter(condensed, zd, yd);
+    scatter(condensed->unknown_spans, condensed->unknown, zd, yd);
     if (condensed->observed_rates)
         sd_condensed_complete(condensed, yd, 1);
 }
@@ -126,21 +124,34 @@ void sd_condensed_gather(const sd_condensed *condensed, const double *x, double 
     gather(condensed->unknown_spans, condensed->unknown, x, z);
 }
 
-/* the point (z, zd) in y, yd; rates of eliminated unknowns are read by no row */
+/* the point (z, zd) in y, yd, rates as far as blocks read them */
 static void place(const sd_condensed *condensed, const double *z, const double *zd)
 {
     sd_condensed_expand(condensed, z, condensed->y, 0);
-    scatter(condensed, zd, condensed->yd);
+    scatter(condensed->rate_spans, condensed->rate, zd, condensed->yd);
+}
+
+/* kept rows q' - f that are nothing else */
+SD_WIDE static void write_own(const sd_condensed *condensed, const double *zd, double *r)
+{
+    for (const int32_t *own = condensed->own, *end = own + 4 * (size_t)condensed->own_spans; own < end; own += 4) {
+        const double *restrict q = zd + own[2], *restrict f = condensed->y + own[3];
+        double *restrict to = r + own[1];
+        const int32_t number = own[0];
+        for (int32_t i = 0; i < number; i++)
+            to[i] = q[i] - f[i];
+    }
 }
 
 static void residual(const sd_left *left, double t, const double *z, const double *zd, double *r)
 {
     const sd_condensed *condensed = (const sd_condensed *)left;
     place(condensed, z, zd);
-    for (int32_t s = 0; s < condensed->row_spans; s++) /* others are nobody's */
-        memset(condensed->r + condensed->row[s].full, 0, (size_t)condensed->row[s].number * sizeof *r);
+    for (int32_t s = 0; s < condensed->rest_spans; s++) /* others are nobody's */
+        memset(condensed->r + condensed->rest[s].full, 0, (size_t)condensed->rest[s].number * sizeof *r);
     sd_add_rows(condensed->full, t, condensed->y, condensed->yd, condensed->r);
-    gather(condensed->row_spans, condensed->row, condensed->r, r);
+    gather(condensed->rest_spans, condensed->rest, condensed->r, r);
+    write_own(condensed, zd, r);
 }
 
 static void jacobian(const sd_left *left, double t, const double *z, const double *zd, double *jz, double *jzd)

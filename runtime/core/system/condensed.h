@@ -8,6 +8,8 @@
  * Shapes
  *   unknowns, rows: kept ones; full: the system with all of them
  *   unknown, row: spans of kept places, one behind the other in both
+ *   rate: those of the kept unknowns whose rates a block reads; rest: kept rows that a block adds to
+ *   own [own_spans][4]: kept rows q' - f that no block adds to, as stretches: number, kept row, kept q, place of f in y
  *   straight: eliminated unknowns in an order in which each reads kept ones and those before it
  *   from, to, share [products]: entry `to` of the kept matrix += share * entry `from` of the full one
  *   y, yd [room of the full system], r [full rows], slope [full entries]: work
@@ -33,9 +35,10 @@ typedef struct sd_straight {
 typedef struct sd_condensed {
     sd_left left;
     sd_system *full;
-    int32_t unknowns, rows, unknown_spans, row_spans, straights;
+    int32_t unknowns, rows, unknown_spans, row_spans, rate_spans, rest_spans, own_spans, straights;
     int32_t observed_rates; /* 0: nobody reads rates of eliminated unknowns before a point is settled */
-    const sd_span *unknown, *row;
+    const sd_span *unknown, *row, *rate, *rest;
+    const int32_t *own;
     const sd_straight *straight;
     int64_t products;
     const int32_t *from, *to;

@@ -97,9 +97,10 @@ class Condensed(c.Structure):
     _fields_ = [
         ("left", Left),
         ("full", P),
-        *[(name, I) for name in ["unknowns", "rows", "unknown_spans", "row_spans", "straights"]],
+        *[(name, I) for name in ["unknowns", "rows", "unknown_spans", "row_spans"]],
+        *[(name, I) for name in ["rate_spans", "rest_spans", "own_spans", "straights"]],
         ("observed_rates", I),
-        *[(name, P) for name in ["unknown", "row", "straight"]],
+        *[(name, P) for name in ["unknown", "row", "rate", "rest", "own", "straight"]],
         ("products", L),
         *[(name, P) for name in ["from_", "to", "share", "y", "yd", "r", "slope"]],
     ]
