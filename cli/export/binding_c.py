@@ -26,7 +26,7 @@ ALGEBRA = (
     "linear/number.h", "linear/elimination.h", "linear/machine_code.h", "linear/linear.h", "linear/sparse.h",
     "system/settle.h", "steppers/stepper.h", "steppers/underlying.h",
     "linear/machine_code.c", "linear/elimination_order.c", "linear/elimination.c", "linear/linear.c",
-    "linear/blocks.h", "linear/chains.h", "linear/dense_rest.h", "linear/sparse.c", "steppers/underlying.c",
+    "linear/blocks.h", "linear/dense_rest.h", "linear/chains.h", "linear/sparse.c", "steppers/underlying.c",
 )  # fmt: skip
 A_LINE = 16
 """Numbers in a line."""

@@ -260,9 +260,9 @@ class Condensed:
     def _spans(self, full: Ints, chosen: Mask | None = None) -> tuple[c.Array[Any], int]:
         """Of the places of all numbers, or of those chosen [full]."""
         number = np.arange(full.size) if chosen is None else np.flatnonzero(chosen)
-        first, begin, number = _spans(full[number], number)
+        first, begin, length = _spans(full[number], number)
         made = (lib.Span * max(first.size, 1))()
-        for k, span in enumerate(zip(first.tolist(), begin.tolist(), number.tolist(), strict=True)):
+        for k, span in enumerate(zip(first.tolist(), begin.tolist(), length.tolist(), strict=True)):
             made[k] = lib.Span(*span)
         self._keep.append(made)
         return made, int(first.size)

@@ -433,8 +433,9 @@ def test_a_factorisation_leaves_small_numbers_to_others():
 
 
 def lines(steps, seed):
-    """Lines of 90 to 150 unknowns of which each waits for the one `step` before; behind them, joined to the ends of each, a
-    dense block.
+    """Lines of 90 to 150 unknowns of which each waits for the one `step` before.
+
+    Behind them, joined to the ends of each, stands a dense block.
     """
     rng = np.random.default_rng(seed)
     blocks, ends, first = [], [], 0

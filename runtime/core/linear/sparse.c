@@ -403,40 +403,6 @@ static int refactor_column(sd_sparse *lu, const int32_t *column, const int32_t *
     return !keeps_pivot(lu, column, value, k, diagonal, largest);
 }
 
-/* 1: the k-th position waits for one alone, which no other waits for, and one at most waits for it */
-static inline int is_link(const sd_sparse *lu, int32_t k)
-{
-    if (!lu->lowers || lu->u_start[k + 1] - lu->u_start[k] != 1 || lu->l_start[k + 1] - lu->l_start[k] > 1)
-        return 0;
-    int32_t j = lu->u_row[lu->u_start[k]];
-    return lu->l_start[j + 1] - lu->l_start[j] == 1 && lu->l_row[lu->l_start[j]] == k;
-}
-
-/* refactor_column of such a position */
-static int refactor_link(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k)
-{
-    int32_t c = lu->order[k], u = lu->u_start[k], l = lu->l_start[k], j = lu->u_row[u];
-    sd_number pivot = 0.0, above = 0.0, below = 0.0;
-    for (int32_t e = column[c]; e < column[c + 1]; e++) {
-        int32_t p = lu->place[row[e]];
-        if (p == k)
-            pivot += value[e];
-        else if (p == j)
-            above += value[e];
-        else
-            below += value[e];
-    }
-    pivot -= lu->l_value[lu->l_start[j]] * above;
-    lu->u_value[u] = above;
-    sd_number inverse = lu->inverse[k] = 1.0 / pivot;
-    double largest = sd_size(pivot);
-    if (l < lu->l_start[k + 1]) {
-        lu->l_value[l] = below * inverse;
-        largest = sd_size(below) > largest ? sd_size(below) : largest;
-    }
-    return !keeps_pivot(lu, column, value, k, pivot, largest);
-}
-
 /* the columns of the rest, which are full: 1: a pivot became unhealthy, or there is no memory */
 static int renew_rest(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, sd_number *block)
 {
