@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define GROWTH 1e4         /* largest multiplier, in scaled terms: it costs that many digits of a correction */
+#define GROWTH 1e4         /* of multipliers, where a solution is a correction that the next one corrects */
 #define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
 #define FIRST 3            /* matrices seen before an order is looked for: one-off systems do not pay for it, */
 #define SHARE 4            /* nor do large ones before this part of n */
@@ -80,6 +80,7 @@ sd_elimination *sd_elimination_new(int32_t n, const int32_t *column, const int32
         return NULL;
     }
     e->pivot_column = e->pivot_row + n;
+    e->growth = GROWTH;
     sd_elimination_forget(e);
     return e;
 }
@@ -320,7 +321,7 @@ static SD_WIDE int healthy(const sd_elimination *e)
     int64_t fine = 1; /* as wide as a number: the loop runs in lanes */
     for (int32_t k = 0; k < n; k++) {
         double row = sd_size(size[k]);
-        fine &= sd_size(growth[k]) <= GROWTH * row;
+        fine &= sd_size(growth[k]) <= e->growth * row;
         fine &= sd_size(inverse[k]) * row * weak[k] <= sd_size(scale[k]);
     }
     return fine != 0;

@@ -45,6 +45,7 @@ typedef struct sd_elimination {
     sd_number *cell;             /* inverse pivots, other factors; then n each: right side, magnitudes, sizes of rows, their
                                     growth; constants */
     int32_t *pivot_row, *pivot_column; /* [n] */
+    double growth;               /* largest multiplier that is borne, in scaled terms: it costs that many digits */
     double *weak;                /* [n] least size of each pivot, scaled, as its column was when the order was found */
     sd_list factor, solve;
     int64_t interpreted;         /* operations so far */
