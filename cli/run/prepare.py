@@ -5,11 +5,8 @@ The one place where what the compiler makes is handed to the runtime.
 
 from __future__ import annotations
 
-import importlib.abc
-import importlib.util
 import time
 from dataclasses import field
-from types import ModuleType
 from typing import Any
 
 from sysdyn.compiler.binding.binding import Binding
@@ -139,29 +136,10 @@ def _compiled(
             first = error.output.strip().splitlines()[:1]
             said = ": ".join([str(error), *first])
             report.note("N609", f"{said}: the NumPy backend takes over", network.place, help="--backend numpy")
+    from sysdyn.cli.run.generated import module_of
+
     compiled = compile_network(network, formulation, "numpy", traced=traced, gather=gather)
     return compiled, carrier.load(module_of(compiled.text)), "numpy"
-
-
-class _Text(importlib.abc.InspectLoader):
-    """Loads the module that the compiler has generated."""
-
-    def __init__(self, text: str) -> None:
-        self._text = text
-
-    def get_source(self, fullname: str) -> str:
-        """The generated text."""
-        return self._text
-
-
-def module_of(text: str) -> ModuleType:
-    """A generated NumPy text as a module."""
-    loader = _Text(text)
-    spec = importlib.util.spec_from_loader("sysdyn_residual", loader)
-    assert spec is not None
-    module = importlib.util.module_from_spec(spec)
-    loader.exec_module(module)
-    return module
 
 
 def place_at(network: Network, file: str, line: int) -> Place:

@@ -22,7 +22,7 @@ from sysdyn.cli.run.starting import Started, start
 from sysdyn.cli.run.targets import Target
 from sysdyn.cli.run.verdict import differences, stopped, verdict
 from sysdyn.compiler.binding.columns import Read, value_of
-from sysdyn.compiler.binding.instants import instants
+from sysdyn.compiler.binding.instants import distinct, instants
 from sysdyn.compiler.binding.pulses import pulses
 from sysdyn.compiler.forms.kane import repeats
 from sysdyn.compiler.network.pruning import listed
@@ -323,7 +323,7 @@ def _stops(prepared: Prepared, t0: float, t1: float) -> tuple[np.ndarray, str | 
     read = Read(binding.parameters)
     text = prepared.compiled.form, replace(binding, parameters=read), t0, t1, prepared.network.tables
     found = instants(*text, [o.expression for o in prepared.network.observations if not o.stored])
-    answer = np.union1d(found.times, pulses(*text)), found.note
+    answer = distinct(found.times, pulses(*text)), found.note
     kept.clear()
     kept[t0, t1] = answer, {name: value_of(binding, name) for name in read.read}
     return answer

@@ -26,11 +26,18 @@ class _Standard:
     name: str = ""
 
 
+_NEW = object()
+"""Stands where a field's value is made anew for each value."""
+
+
 @cache
-def _setting(count: int, after: bool) -> CodeType:
-    """`__init__` of a value of so many fields, set each by its slot; after: `__post_init__` follows."""
+def _setting(count: int, after: bool, anew: tuple[int, ...]) -> CodeType:
+    """`__init__` of a value of so many fields, set each by its slot; after: `__post_init__` follows; anew: the fields
+    that have a default factory.
+    """
     names = [f"a{k}" for k in range(count)]
-    lines = [f"_{name}(self, {name})" for name in names] + ["_after(self)"] * after
+    values = [f"_new{k}() if a{k} is _NEW else a{k}" if k in anew else f"a{k}" for k in range(count)]
+    lines = [f"_a{k}(self, {value})" for k, value in enumerate(values)] + ["_after(self)"] * after
     made: dict[str, Any] = {}
     exec(f"def __init__({', '.join(['self', *names])}):\n " + "\n ".join(lines), made)  # noqa: S102 (numbers alone)
     code: CodeType = made["__init__"].__code__
@@ -54,14 +61,19 @@ def _restore(self: Any, state: list[Any]) -> None:
         object.__setattr__(self, name, value)
 
 
-def _text(self: Any) -> str:
-    inside = ", ".join(f"{name}={getattr(self, name)!r}" for name in self.__match_args__)
-    return f"{type(self).__qualname__}({inside})"
+def _shown(names: tuple[str, ...]) -> Callable[[object], str]:
+    """Values as the names of their fields and what they hold."""
+
+    def text(self: object) -> str:
+        inside = ", ".join(f"{name}={getattr(self, name)!r}" for name in names)
+        return f"{type(self).__qualname__}({inside})"
+
+    return text
 
 
 SHARED = {
     "__setattr__": _refuse_set, "__delattr__": _refuse_delete, "__getstate__": _state, "__setstate__": _restore,
-    "__repr__": _text, "__replace__": dataclasses.replace,
+    "__replace__": dataclasses.replace,
 }  # fmt: skip
 
 
@@ -84,14 +96,21 @@ def _plain(cls: type, options: dict[str, bool]) -> bool:
         options in ({"frozen": True, "slots": True}, {"frozen": True, "slots": True, "eq": False})
         and cls.__bases__ == (object,)
         and bool(cls.__annotations__)
-        and not any(isinstance(value, dataclasses.Field) for value in vars(cls).values())
+        and all(_usual(value) for value in vars(cls).values() if isinstance(value, dataclasses.Field))
         and not any(kind in str(written) for written in cls.__annotations__.values() for kind in SPECIAL)
     )
 
 
+def _usual(said: dataclasses.Field[Any]) -> bool:
+    """Whether `field(...)` says a default or its factory, what is compared and what is shown, and nothing else."""
+    if said.default is MISSING and said.default_factory is MISSING:
+        return False
+    return said.init and said.hash is None and said.kw_only is not True and not said.metadata
+
+
 def _field(name: str, kind: Any, default: Any) -> Any:
-    """A field as the standard decorator leaves it."""
-    made: Any = dataclasses.field(default=default)
+    """A field as the standard decorator leaves it; default: of its own, or what `field` has made."""
+    made: Any = default if isinstance(default, dataclasses.Field) else dataclasses.field(default=default)
     made.name, made.type = name, kind
     made._field_type = _Standard.__dataclass_fields__["name"]._field_type  # type: ignore[attr-defined]
     return made
@@ -117,18 +136,37 @@ def _made(cls: type, *, eq: bool) -> Any:
     defaults = {name: own.pop(name) for name in names if name in own}
     if list(defaults) != list(names[len(names) - len(defaults) :]):
         raise TypeError(f"{cls.__qualname__}: a field without a default follows one with it")
-    own = SHARED | (_compared(names) if eq else {}) | own
+    said = {name: value for name, value in defaults.items() if isinstance(value, dataclasses.Field)}
+    compared, shown = (
+        tuple(n for n in names if n not in said or getattr(said[n], what)) for what in ("compare", "repr")
+    )
+    own = SHARED | {"__repr__": _shown(shown)} | (_compared(compared) if eq else {}) | own
     own |= {"__slots__": names, "__match_args__": names}
     own["__dataclass_params__"] = _Standard.__dataclass_params__  # type: ignore[attr-defined]
     own["__dataclass_fields__"] = _Fields(kinds, defaults)
     made = type(cls.__name__, (), own)
-    code = _setting(len(names), "__post_init__" in own)
-    code = code.replace(co_varnames=("self", *names), co_qualname=f"{cls.__qualname__}.__init__")
-    known = {f"_a{k}": vars(made)[name].__set__ for k, name in enumerate(names)} | {"_after": own.get("__post_init__")}
-    init = FunctionType(code, known, "__init__", tuple(defaults.values()))
-    init.__annotations__ = kinds | {"return": None}
-    made.__init__ = init  # type: ignore[misc]
+    made.__init__ = _initial(made, names, defaults)  # type: ignore[misc]
     return made
+
+
+def _initial(made: Any, names: tuple[str, ...], defaults: dict[str, Any]) -> FunctionType:
+    """`__init__` of a class with slots."""
+    first = [_first(default) for default in defaults.values()]
+    head, after = len(names) - len(first), getattr(made, "__post_init__", None)
+    anew = {head + k: defaults[names[head + k]].default_factory for k, value in enumerate(first) if value is _NEW}
+    code = _setting(len(names), after is not None, tuple(anew))
+    code = code.replace(co_varnames=("self", *names), co_qualname=f"{made.__qualname__}.__init__")
+    known = {f"_a{k}": vars(made)[name].__set__ for k, name in enumerate(names)} | {"_after": after, "_NEW": _NEW}
+    init = FunctionType(code, known | {f"_new{k}": factory for k, factory in anew.items()}, "__init__", tuple(first))
+    init.__annotations__ = made.__annotations__ | {"return": None}
+    return init
+
+
+def _first(default: Any) -> Any:
+    """What a field holds where nothing is given, as `__init__` has it."""
+    if not isinstance(default, dataclasses.Field):
+        return default
+    return _NEW if default.default is MISSING else default.default
 
 
 if TYPE_CHECKING:

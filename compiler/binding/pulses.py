@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.enclosures import Array, Bounds, Outline, Values, enclose
+from sysdyn.compiler.binding.instants import distinct
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, DescriptorForm
 from sysdyn.compiler.model.interpret import Value, evaluate, grid
 from sysdyn.compiler.model.terms import Nest
@@ -53,7 +54,7 @@ def pulses(form: DescriptorForm, binding: Binding, t0: float, t1: float, tables:
                 found += _of(_bounded(root, _fixed(binding, held), outlines), t0, t1)
             except KeyError:  # a constant that is known at the start only
                 break
-    times = np.unique(np.concatenate([np.zeros(0), *found]))
+    times = distinct(np.zeros(0), *found)
     times = times[(times > t0) & (times < t1)]
     return times if times.size <= 5 * PULSES else times[:0]
 
@@ -151,12 +152,12 @@ def _cells(signal: Outline, t0: float, t1: float) -> Array:
         done.append(low[~open_])
         low, high = low[open_], high[open_]
         if not low.size:
-            return np.unique(np.concatenate(done))
+            return distinct(*done)
         if low.size > MOST:
             return np.zeros(0)
         middle = low + 0.5 * (high - low)
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
-    return np.unique(np.concatenate([*done, low]))
+    return distinct(*done, low)
 
 
 def _of(signal: Outline, t0: float, t1: float) -> Iterator[Array]:
@@ -189,4 +190,4 @@ def _within(signal: Outline, edges: Array) -> Array:
     if not travelled[-1] > 0.0:
         return edges[[0, -1]]
     inside = np.searchsorted(travelled, travelled[-1] * np.array([0.25, 0.5, 0.75]))
-    return np.unique(edges[[0, *np.minimum(inside, edges.size - 1), edges.size - 1]])
+    return distinct(edges[[0, *np.minimum(inside, edges.size - 1), edges.size - 1]])

@@ -88,8 +88,8 @@ def _outside(group: Any) -> str | None:
         is_data = info.type == h5o.TYPE_DATASET
         return _shown(name) if is_data and _elsewhere(h5o.open(group, name)) else None
 
-    found = group.links.visit(link, info=True)
-    return h5o.visit(group, data, info=True) if found is None else found
+    found: str | None = group.links.visit(link, info=True)
+    return found or h5o.visit(group, data, info=True)
 
 
 def _elsewhere(data: Any) -> bool:

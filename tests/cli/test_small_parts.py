@@ -222,6 +222,14 @@ class Point:
     y: float = 2.0
 
 
+@dataclass(frozen=True, slots=True)
+class Held:
+    x: float
+    own: list[float] = dataclasses.field(default_factory=list)
+    kept: dict[str, float] = dataclasses.field(default_factory=dict, compare=False, repr=False)
+    last: int = dataclasses.field(default=7, compare=False)
+
+
 class TestValues:
     def test_they_are_frozen_and_compared_by_their_fields(self):
         one = Point(1.0)
@@ -243,6 +251,25 @@ class TestValues:
         assert pickle.loads(pickle.dumps(one)) == one
         with pytest.raises(TypeError):
             Point()
+
+    def test_what_fields_say_of_themselves(self):
+        """As the standard decorator reads `field`: made anew for each value, left out of comparison and text."""
+        standard = dataclasses.dataclass(frozen=True, slots=True)(
+            type("Held", (), {"__annotations__": dict(Held.__annotations__), **{
+                "own": dataclasses.field(default_factory=list),
+                "kept": dataclasses.field(default_factory=dict, compare=False, repr=False),
+                "last": dataclasses.field(default=7, compare=False),
+            }})
+        )  # fmt: skip
+        for cls in (Held, standard):
+            one, two = cls(1.0), cls(1.0, kept={"a": 2.0}, last=3)
+            assert one.own is not two.own
+            assert one == two != cls(1.0, [2.0])
+            assert repr(two) == "Held(x=1.0, own=[], last=3)"
+            assert (two.kept, one.kept, one.last) == ({"a": 2.0}, {}, 7)
+            assert dataclasses.replace(two, x=5.0).kept is two.kept
+            assert [f.name for f in dataclasses.fields(one) if f.compare] == ["x", "own"]
+        assert pickle.loads(pickle.dumps(Held(2.0, [1.0]))) == Held(2.0, [1.0])
 
     def test_a_default_before_a_field_without_one_is_refused(self):
         with pytest.raises(TypeError, match="default"):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from handwritten import chain, ladder, lattice, mesh, mixed, power_grid, stages, woven
 from sysdyn.api import simulate
-from sysdyn.cli.run.prepare import Prepared, module_of
+from sysdyn.cli.run.generated import module_of
+from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.network import gathered as gathered_
 from sysdyn.compiler.network.gathered import gathered
 from sysdyn.compiler.pipeline import compile_network
