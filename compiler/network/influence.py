@@ -30,7 +30,6 @@ from sysdyn.values import dataclass
 Quantity = tuple[str, str]
 """What it is (x coordinate, n node, b branch, u implicit unknown, s state, c constraint) and its name."""
 MECHANICAL = frozenset("xnb")
-NOTHING = frozenset[Quantity]()
 EVERYTHING: Quantity = ("*", "")
 """What an expression reads that no quantity stands for: a member of the audit."""
 
@@ -52,7 +51,7 @@ class Link:
 def read_by(network: Network, roots: Iterable[Node]) -> frozenset[Quantity]:
     """The quantities that stand in expressions."""
     unknowns = {u.name for u in network.unknowns}
-    return frozenset([_quantity(n, unknowns) for root in roots for n in variables(root) if n.op == "var"])
+    return frozenset(_quantity(n, unknowns) for root in roots for n in variables(root) if n.op == "var")
 
 
 def _quantity(node: Node, unknowns: set[str]) -> Quantity:
@@ -120,12 +119,9 @@ def _held(network: Network, item: Any, root: Node, own: frozenset[Quantity]) -> 
 
 
 def _branch(network: Network, b: Branch) -> Link:
-    ends = [("n", end.node) for end in (b.plus, b.minus) if end is not None and end.node is not None]
-    own = frozenset([*ends, ("b", b.name)])
-    if b.on is None:
-        return Link(b, own, NOTHING if b.law is None else read_by(network, [b.law]))
-    found = _acting(network, b, [b.on], [] if b.law is None else [b.law])
-    return replace(found, joined=found.joined | own)
+    ends = {("n", end.node) for end in (b.plus, b.minus) if end is not None and end.node is not None}
+    found = _acting(network, b, [] if b.on is None else [b.on], [] if b.law is None else [b.law])
+    return replace(found, joined=found.joined | ends | {("b", b.name)})
 
 
 def _coupling(network: Network, c: Coupling) -> Link:
@@ -171,17 +167,14 @@ def _whole(c: Constraint, shape: Shape) -> bool:
 
 def reached(found: Sequence[Link], asked: frozenset[Quantity]) -> frozenset[Quantity]:
     """All that influences what is asked: through what is joined both ways, through what is read one way."""
-    of: dict[Quantity, list[int]] = {}
-    for k, link in enumerate(found):
+    of: dict[Quantity, list[Link]] = {}
+    for link in found:
         for q in link.joined:
-            of.setdefault(q, []).append(k)
+            of.setdefault(q, []).append(link)
     kept, ahead = set(asked), list(asked)
-    followed = bytearray(len(found))
     while ahead:
-        for k in of.get(ahead.pop(), ()):
-            if not followed[k]:
-                followed[k] = True
-                new = (found[k].joined | found[k].reads) - kept
-                kept |= new
-                ahead += new
+        for link in of.pop(ahead.pop(), ()):
+            new = (link.joined | link.reads) - kept
+            kept |= new
+            ahead += new
     return frozenset(kept)

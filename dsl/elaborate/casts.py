@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.values import Values
 from sysdyn.values import dataclass
@@ -39,7 +40,7 @@ class Cast:
         """Whether it is true of another instance, whose own node is not made for that."""
         named = self.named
         root = self.steps[-1][3]
-        return bool(ex.evaluate([root], lambda n: known.element(path + named[n]) if n in named else math.nan)[0])
+        return bool(evaluate([root], lambda n: known.element(path + named[n]) if n in named else math.nan)[0])
 
 
 def cast_of(root: Node, path: str) -> Cast | None:

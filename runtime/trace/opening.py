@@ -88,8 +88,9 @@ def _outside(group: Any) -> str | None:
         is_data = info.type == h5o.TYPE_DATASET
         return _shown(name) if is_data and _elsewhere(h5o.open(group, name)) else None
 
-    found = group.links.visit(link, info=True)
-    return h5o.visit(group, data, info=True) if found is None else found
+    linked: str | None = group.links.visit(link, info=True)
+    stored: str | None = linked or h5o.visit(group, data, info=True)
+    return stored
 
 
 def _elsewhere(data: Any) -> bool:

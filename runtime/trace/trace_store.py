@@ -22,7 +22,6 @@ import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Description, Floats
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace import scalars
 from sysdyn.values import dataclass
 
 BLOCK = 1024
@@ -99,6 +98,25 @@ def _set(attributes: Any, values: Mapping[str, Any]) -> None:
         attributes[name] = _text(value) if isinstance(value, str) else value
 
 
+def _keep(group: Any, parameters: Sequence[Parameter]) -> None:
+    """A scalar data set with its unit each, by HDF5's own calls: a netlist has tens of thousands of them."""
+    from h5py import h5a, h5d, h5p, h5s, h5t
+
+    scalar, real = h5s.create(h5s.SCALAR), h5t.IEEE_F64LE
+    untimed = h5p.create(h5p.DATASET_CREATE)
+    untimed.set_obj_track_times(False)
+    units: dict[str, tuple[Any, Any]] = {}
+    for parameter in parameters:
+        if parameter.unit not in units:
+            unit = _text(parameter.unit)
+            units[parameter.unit] = h5t.py_create(unit.dtype, logical=True), unit
+        kind, unit = units[parameter.unit]
+        name = parameter.name.replace("/", "\u2215").encode()
+        data = h5d.create(group.id, name, real, scalar, untimed)
+        data.write(h5s.ALL, h5s.ALL, np.array(parameter.value, dtype=np.float64), real)
+        h5a.create(data, b"units", kind, scalar).write(unit, kind)
+
+
 def clear(path: Path) -> None:
     """Remove the stores that killed runs left beside a trace, which is claimed: no living run has any."""
     name = re.compile(re.escape(f".{path.name}.") + r"[0-9a-f]{8}\.[ab](\.link)?")
@@ -126,11 +144,7 @@ class Store:
         self._room(0 if like is None else like._length)
         if like is not None:
             shutil.copyfile(like.path, path)
-        elif layout.parameters:
-            kept = layout.parameters
-            names = [p.name.replace("/", "\u2215") for p in kept]
-            scalars.begin(path, names, [p.value for p in kept], [p.unit for p in kept])
-        mode = "x" if like is None and not layout.parameters else "r+"
+        mode = "x" if like is None else "r+"
         self._file = h5py.File(path, mode, libver=("earliest", "v110"))
         with contextlib.suppress(OSError):
             fcntl.flock(self._file.id.get_vfd_handle(), fcntl.LOCK_UN)
@@ -180,6 +194,8 @@ class Store:
             ("/audit/constraints", "1", "norm of the scaled constraint equations", 7),
         ):
             self._sets.append((self._data(path, unit, name, time), place))
+        if layout.parameters:
+            _keep(self._file.create_group("parameters"), layout.parameters)
 
     def _data(self, name: str, unit: str, long_name: str, scale: Any) -> Any:
         data = self._file.create_dataset(

@@ -25,6 +25,13 @@ def found(statements, t1=2.0, tables="", settings=()):
         return instants(model.form, model.bind(), 0.0, t1, network.tables)
 
 
+def test_numbers_in_their_order_each_once():
+    draw = np.random.default_rng(3)
+    parts = [np.array([]), draw.integers(0, 9, 40) / 3.0, np.array([-1.0, 2.0, np.inf, np.inf, -np.inf])]
+    assert module.distinct(*parts).tolist() == np.unique(np.concatenate(parts)).tolist()
+    assert module.distinct(np.array([])).size == 0
+
+
 def on_x(effort):
     return f"work {effort} on x[1]"
 

@@ -82,6 +82,7 @@ BAD = [
     "W: resistor.fine(R = 3 ohm) v1 -> v2",
     "W: leak(G = 5 A/V, G0 = 1 A/V) v1 -> v2",
     "W: noisy(R = 5 ohm) v1 -> W.e",
+    "W: resistor(R = X0.R) v1 -> v2",
     "for i in 1..3 { W[i]: resistor(R = 3 ohm) v1 -> v2 }",
     "coord y: m",
     "node w: translational",

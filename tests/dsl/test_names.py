@@ -1,6 +1,8 @@
 """Expressions and laws as a model reads them, one text at a time: values, units, and what is said of wrong ones."""
 
 import math
+import random
+from fractions import Fraction
 
 import pytest
 from sysdyn.dsl import load
@@ -101,6 +103,17 @@ def read(fresh):
 def test_a_number_and_its_unit(read, text, value, unit):
     assert isinstance(read.context, Arithmetic)
     assert read.value(text) == (pytest.approx(value, rel=1e-15), unit)
+
+
+def test_a_quantity_is_the_nearest_double_to_what_is_written(read):
+    """Whatever its prefix: 1.1 uF is 1.1e-6, not 1.1 times a rounded 1e-6."""
+    draw = random.Random(5)
+    scales = {"uF": "1e-6", "pF": "1e-12", "kohm": "1000", "min": "60", "h": "3600", "mm": "1e-3"}
+    for _ in range(200):
+        plain = f"{draw.random() * 10 ** draw.randint(-3, 9):.{draw.randint(0, 17)}f}"
+        text = draw.choice([plain, plain, "1.1", "1e-3", "0.0"])
+        unit, scale = draw.choice([*scales.items()])
+        assert read.value(f"{text} {unit}")[0] == float(Fraction(text) * Fraction(scale))
 
 
 def test_arrays_are_added_and_stretched_item_by_item(read):

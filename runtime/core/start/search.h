@@ -1,6 +1,6 @@
 /* The search for a start on small models: rows of the settled form in few unknowns, by Gauss-Newton steps of least norm.
  *
- * What runtime/numerics/least_change.py does for a Problem and runtime/start/starter.py for its rows, on full matrices;
+ * What runtime/numerics/gauss_newton.py does for a Problem and runtime/start/starter.py for its rows, on full matrices;
  * every constant is that file's.
  */
 #ifndef SYSDYN_SEARCH_H
