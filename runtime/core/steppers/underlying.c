@@ -14,7 +14,7 @@
 #define EXACT 1e-16     /* next move, in magnitudes, that is not worth making */
 #define CLOSE 1e-12     /* move with which a projection that stagnates is content */
 #define STAGNANT 0.3
-#define GROWTH 1e3      /* of multipliers: slopes are solved for once, nothing corrects their digits */
+#define BORNE 1e3       /* of multipliers: slopes are solved for once, nothing corrects their digits */
 
 sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
 {
@@ -34,7 +34,7 @@ sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
     u->linear = linear;
     sd_linear_replayed(linear);
     if (linear->elimination)
-        linear->elimination->growth = GROWTH;
+        linear->elimination->growth = BORNE;
     u->n = system->unknowns;
     u->first = system->kinematics;
     u->solved = linear->n;
