@@ -74,11 +74,11 @@ static int32_t written_by(const sd_system *system)
 }
 
 /* Notes a list of n entries that is written to *to, and moves that on; they come to these places, where the first to come is
- * copied and others are added. */
+ * copied and others are added; none: where nothing has come yet. */
 static void note_list(sd_underlying *u, sd_entries *block, const sd_frame *frame, int32_t n, const int32_t *slot,
-                      const int32_t *place, double **to)
+                      const int32_t *place, int32_t none, double **to)
 {
-    const int32_t none = written_by(u->matrix), entries = u->linear->entries, at = (int32_t)(*to - u->written);
+    const int32_t entries = u->linear->entries, at = (int32_t)(*to - u->written);
     if (n == 0)
         return;
     u->list[u->lists++] = (sd_written){block, frame, *to};
@@ -114,8 +114,8 @@ static int find_places(sd_underlying *u)
     }
     double *to = u->written;
     for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++) {
-        note_list(u, call->dy, &call->frame, call->n_dy, call->slot_dy, u->place_y, &to);
-        note_list(u, call->dyd, &call->frame, call->n_dyd, call->slot_dyd, u->place_yd, &to);
+        note_list(u, call->dy, &call->frame, call->n_dy, call->slot_dy, u->place_y, none, &to);
+        note_list(u, call->dyd, &call->frame, call->n_dyd, call->slot_dyd, u->place_yd, none, &to);
     }
     u->flows = 0;
     for (int32_t i = 0; i < u->system->kinematics; i++)
@@ -204,7 +204,8 @@ static int kinematics(const sd_underlying *u, const double *y, double *yd)
 /* the cause where the slopes are no numbers: the residual first */
 static int no_number(sd_underlying *u, double t, const double *y, const double *yd, int cause)
 {
-    sd_residual(u->direct ? u->applied : u->system, t, y, yd, u->r); /* a solution may stand there */
+    if (!cause) /* the solution stands where the rows stood */
+        sd_residual(u->direct ? u->applied : u->system, t, y, yd, u->r);
     int32_t bad = sd_first_bad(u->system->rows, u->r);
     u->bad_row = bad >= 0 ? bad : u->bad_row;
     return bad >= 0 || !cause ? SD_NONFINITE : cause;
