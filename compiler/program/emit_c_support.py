@@ -137,12 +137,23 @@ static SD_APART void sd_turn_to(sd_turn *kept, double angle)
         return;
     }
     memcpy(&n, &turns, sizeof n);
-    kept->sine = n & 1 ? c : s;
-    kept->cosine = n & 1 ? s : c;
-    if (n & 2)
-        kept->sine = -kept->sine;
-    if ((n + 1) & 2)
-        kept->cosine = -kept->cosine;
+    switch (n & 3) {
+    case 0:
+        kept->sine = s;
+        kept->cosine = c;
+        return;
+    case 1:
+        kept->sine = c;
+        kept->cosine = -s;
+        return;
+    case 2:
+        kept->sine = -s;
+        kept->cosine = -c;
+        return;
+    default:
+        kept->sine = -c;
+        kept->cosine = s;
+    }
 }
 
 static inline const sd_turn *sd_turned(sd_turn *kept, double angle)

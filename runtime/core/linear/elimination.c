@@ -331,10 +331,16 @@ static SD_WIDE int healthy(const sd_elimination *e)
 static SD_APART void measure(sd_elimination *e, const double *scale)
 {
     sd_number *magnitudes = e->cell + magnitude(e, 0);
-#pragma GCC unroll 4
-    for (int32_t k = 0; k < e->n; k++)
-        magnitudes[k] = scale ? scale[e->pivot_column[k]] : 1.0;
+    const int32_t *column = e->pivot_column, n = e->n;
     e->scaled = scale != NULL;
+    if (!scale)
+        for (int32_t k = 0; k < n; k++)
+            magnitudes[k] = 1.0;
+    else {
+#pragma GCC unroll 4
+        for (int32_t k = 0; k < n; k++)
+            magnitudes[k] = scale[column[k]];
+    }
 }
 
 int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale)
