@@ -137,8 +137,15 @@ a draft looser than a thirtieth says little of them.  Errors of short runs may f
 water tube as co_hamiltonian: 0.2, 0.015, 0.011 of 0.03, 1e-4, 1e-5)."""
 
 
-def law_of(method: str, *, steep: bool) -> Law:
+LONG_MOTION = Law(400.0, 1.0, 0.6, 1e-17, ratio=0.03, loosest=1e-5, little=0.1, safety=1.8)
+"""Of radau, with all its stages, on a motion that is long and smooth however steep its laws: a loose draft has nothing
+in common with the run behind it, and is not cheaper."""
+
+
+def law_of(method: str, *, steep: bool, smooth: bool = False) -> Law:
     """What follows from the tolerance of a method on a model."""
+    if smooth and method == "radau":
+        return LONG_MOTION
     return {"bdf": STEEP, "radau": OF_THREE_STAGES}.get(method, LAWS[method]) if steep else LAWS[method]
 
 

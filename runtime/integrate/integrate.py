@@ -62,6 +62,8 @@ of a larger net is dear to find (a driven grid of 35 x 35: 20 s): its loops of s
 """
 STAGED = 100_000
 """Unknowns of a system up to which radau may take more stages than three, whose factors need three times the room."""
+SMOOTH = 4.5
+"""Mean order of the bdf from which on a motion is smooth (of rectifiers 2.5 to 4.7)."""
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
@@ -418,7 +420,13 @@ class Integration:
             cause = "newton" if cause == "singular" else cause
         if cause in ("error_test", "step_too_small", "newton"):
             unknown = self._worst()
-        return SolverFailure(cause, method.t, method.h, unknown, row)
+        return SolverFailure(cause, method.t, method.h, unknown, row, smooth=self.smooth)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the bdf takes nearly all steps at its highest order."""
+        method = self.method.contents
+        return self.request.method == "bdf" and method.orders > SMOOTH * method.steps
 
     def _null_place(self) -> tuple[tuple[str, ...], int]:
         """Unknowns and row of a singular pencil at the last accepted point; () where it is regular."""

@@ -24,6 +24,7 @@ from sysdyn.runtime.integrate.request import COMPARED, LONGEST, STEP, TRACE, Fin
 from sysdyn.runtime.integrate.round_off import LeftOpen, left_open
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Description, Floats, Ints
+from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.start import ConsistentState
@@ -72,7 +73,7 @@ METERS = {
 @dataclass(frozen=True, slots=True)
 class Way:
     """A method on a form of the model; index: of the form as the error test takes it, name: as the trace names it;
-    reason: why method auto takes it.
+    reason: why method auto takes it; smooth: the motion is long and smooth, however steep its laws.
     """
 
     method: str
@@ -80,11 +81,12 @@ class Way:
     index: int
     name: str
     reason: str = ""
+    smooth: bool = False
 
     @property
     def law(self) -> accuracy.Law:
         """How its errors follow its tolerance."""
-        return accuracy.law_of(self.method, steep=bool(self.system.form.scales))
+        return accuracy.law_of(self.method, steep=bool(self.system.form.scales), smooth=self.smooth)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +138,7 @@ class Runs:
         self.instants, self.kinds, self.common, self._joined = self._instants()
         self.keeping = keeping(options.output)
         self.statistics, self.last_statistics = Statistics(), Statistics()
+        self.smooth = False
         self.cpu = self.wall = 0.0
         self.number = 0
         self.began = time.monotonic()
@@ -223,6 +226,7 @@ class Runs:
             index=self.index,
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
+            stages=(3, lib.STAGES) if self.way.smooth else None,
             stiff_steps=HELD if options.method == "auto" else STIFF,
             spare_steps=SPARE if draft and options.method == "auto" and self.system.unknowns <= FACTORED else 0.0,
             settled_to=ROUGH * rtol if self.controlled else 0.0,
@@ -336,7 +340,7 @@ class Runs:
     def _account(self, integration: Integration, wall: float) -> None:
         self.cpu += integration.cpu
         self.wall += time.monotonic() - wall
-        self.last_statistics = integration.statistics()
+        self.last_statistics, self.smooth = integration.statistics(), integration.smooth
         self.statistics = self.statistics + self.last_statistics
 
     def _leave(self, integration: Integration, first: bool) -> None:
@@ -423,6 +427,8 @@ class Runs:
     def sampled(self, tolerance: float, longest: float) -> Sampled:
         """One run of the accuracy control; longest: step, as part of the span."""
         self.controlled = True
+        if self._hopeless(tolerance):
+            raise SolverFailure("max_steps", self.options.t_start, 0.0, smooth=True)
         finished = self.run(tolerance, None, longest)
         rows = np.concatenate(self.rows) if self.rows else np.zeros((0, self._width))
         if self.open:
@@ -448,6 +454,15 @@ class Runs:
         found = Sampled(tolerance, values, sizes, counted.steps, noise, open_, between, late, there)
         self.samplings = (*self.samplings[-1:], found)
         return found
+
+    def _hopeless(self, tolerance: float) -> bool:
+        """Whether the bdf would take more steps than the patience with it: on a smooth motion they grow with the power
+        1 / (order + 1) of the tolerance at least.
+        """
+        if self.patience is None or not self.smooth or not self.samplings:
+            return False
+        last = self.samplings[-1]
+        return last.steps * (last.tolerance / tolerance) ** (1.0 / (lib.MAX_ORDER + 1)) > self.patience
 
     def _left_open(self, finished: Finished) -> LeftOpen:
         """Asked of the equations once a run: of its quantities, and of each of its ledgers."""

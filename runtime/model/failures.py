@@ -46,12 +46,21 @@ class SolverFailure(Exception):  # noqa: N818 (a name of the house)
 
     cause: newton, error_test, singular, inertia, nonfinite, step_too_small, stiff, strained, max_steps, max_wall,
     memory.
-    unknown: name of the unknown in the way, row: its row; None where the cause has no place.
+    unknown: name of the unknown in the way, row: its row; None where the cause has no place; smooth: the bdf took
+    nearly all steps at its highest order.
     """
 
     def __init__(
-        self, cause: str, time: float, step: float, unknown: str | None = None, row: RowLabel | None = None
+        self,
+        cause: str,
+        time: float,
+        step: float,
+        unknown: str | None = None,
+        row: RowLabel | None = None,
+        *,
+        smooth: bool = False,
     ) -> None:
+        self.smooth = smooth
         self.cause, self.time, self.step, self.unknown, self.row = cause, time, step, unknown, row
         self.partial: object = None
         self.state: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None

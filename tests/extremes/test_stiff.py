@@ -95,3 +95,17 @@ def test_a_draft_in_which_newton_fails_is_given_up(tmp_path, published):
     assert run.met
     assert [run.trace[f"y{k}"][-1] for k in wanted.ref] == pytest.approx([*wanted.ref.values()], rel=1e-2)
     assert run.trace.statistics["newton_failures"] < 100
+
+
+def test_a_long_smooth_motion_is_radau_with_all_its_stages(tmp_path, published):
+    """The ring modulator's diodes are steep, its motion is smooth: the bdf at its highest order would take a million
+    steps, radau of three stages took 380 000 behind 2.2 million of other runs.
+    """
+    wanted = published.ring() if callable(published.ring) else published.ring
+    run = ran(tmp_path, ROOT / "models/benchmark/ring.sd", scene="reference", accuracy=1e-6)
+    assert run.met
+    assert run.trace.attributes["method"] == "radau"
+    assert run.trace.statistics["steps"] < 1_000_000
+    for number, value in wanted.ref.items():
+        values = np.asarray(run.trace[f"y{number}"])
+        assert abs(values[-1] - value) < 1e-6 * np.abs(values).max(), number

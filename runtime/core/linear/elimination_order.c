@@ -9,14 +9,14 @@
 #define OLDER 0.01         /* and in those before */
 
 /* Matrices in full while they are eliminated: value [samples][n][n] by columns, zero outside the pattern; entry [n][n] by
- * columns: in the pattern, with what was filled.  Of what is left: column [open]; of each column c its rows below[c*n],
- * as many as column_left[c]; counts of entries; size [n][SD_SAMPLES]: largest entries of columns, -1 where they are not
- * known */
+ * columns: in the pattern, with what was filled.  Of what is left: row, column [open], place [n] of each row in `row`; of
+ * each column c its rows below[c*n], as many as column_left[c]; counts of entries; size [n][SD_SAMPLES]: largest entries
+ * of columns, -1 where they are not known */
 typedef struct sd_full {
     int32_t n, samples, open;
     sd_number *value;
     char *entry;
-    int32_t *row, *column, *row_left, *column_left, *below;
+    int32_t *row, *column, *place, *row_left, *column_left, *below;
     double *size;
 } sd_full;
 
@@ -71,7 +71,7 @@ static int fill_in(sd_full *full, const sd_elimination *e)
                 full->value[s * n * n + place] = sample[s * entries + (size_t)k];
         }
     for (int32_t k = 0; k < full->n; k++)
-        full->row[k] = full->column[k] = k;
+        full->row[k] = full->column[k] = full->place[k] = k;
     full->open = full->n;
     for (int32_t c = 0; c < full->n; c++)
         full->size[c * SD_SAMPLES] = -1.0;
@@ -85,12 +85,13 @@ static int full_new(sd_full *full, const sd_elimination *e, int32_t samples)
     *full = (sd_full){.n = e->n, .samples = samples};
     full->value = malloc(((size_t)samples * all + 1) * sizeof(sd_number));
     full->entry = calloc(all + 1, 1);
-    full->row = calloc(4 * n + all + 1, sizeof(int32_t));
+    full->row = calloc(5 * n + all + 1, sizeof(int32_t));
     full->size = malloc((SD_SAMPLES * n + 1) * sizeof(double));
     int failed = !full->value || !full->entry || !full->row || !full->size ? 2 : 0;
     if (!failed) {
         full->column = full->row + n;
-        full->row_left = full->column + n;
+        full->place = full->column + n;
+        full->row_left = full->place + n;
         full->column_left = full->row_left + n;
         full->below = full->column_left + n;
         failed = fill_in(full, e);
@@ -123,6 +124,7 @@ static int choose_pivot(const sd_full *full, int32_t *row, int32_t *column)
     int64_t least = INT64_MAX;
     double best = 0.0;
     int32_t fewest = full->n;
+    *row = *column = -1;
     for (int32_t i = 0; i < full->open; i++)
         fewest = full->row_left[full->row[i]] < fewest ? full->row_left[full->row[i]] : fewest;
     for (int32_t j = 0; j < full->open; j++) {
@@ -134,7 +136,8 @@ static int choose_pivot(const sd_full *full, int32_t *row, int32_t *column)
             if (fill > least)
                 continue;
             double healthy = health(full, *r, c);
-            if (healthy >= 1.0 && (fill < least || healthy > best)) {
+            int alike = fill == least && healthy == best && j == *column; /* the first row, wherever the column lists it */
+            if (healthy >= 1.0 && (fill < least || healthy > best || (alike && full->place[*r] < full->place[*row]))) {
                 least = fill;
                 best = healthy;
                 *row = *r;
@@ -176,11 +179,10 @@ static void take_column(sd_full *full, int32_t r, int32_t p, int32_t c)
 static void take(sd_full *full, int32_t r, int32_t j)
 {
     size_t n = (size_t)full->n;
-    int32_t p = full->column[j], place = 0;
-    full->column[j] = full->column[--full->open];
-    while (full->row[place] != r)
-        place++;
-    full->row[place] = full->row[full->open];
+    int32_t p = full->column[j], last = full->row[--full->open];
+    full->column[j] = full->column[full->open];
+    full->row[full->place[r]] = last;
+    full->place[last] = full->place[r];
     take_row(full, r, p);
     const int32_t *row = rows_of(full, p), *end = row + full->column_left[p];
     for (const int32_t *i = row; i < end; i++)

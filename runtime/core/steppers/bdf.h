@@ -48,6 +48,7 @@ typedef struct sd_bdf {
     double error_next;        /* estimate of the local error at the order chosen next */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations;
+    int64_t orders;           /* sum of the orders of all steps */
     int64_t taken;            /* steps since the last start */
     int32_t cause, bad_row, bad_column;
     sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */

@@ -33,6 +33,7 @@ void sd_bdf_accept(sd_bdf *bdf, const double *norm, int32_t order_next)
     int32_t k = bdf->order, order_change = k - bdf->order_used;
     double error = bdf->error_next, h = bdf->h, h_next = h;
     bdf->steps++;
+    bdf->orders += k;
     bdf->taken++;
     bdf->order_used = k;
     bdf->h_used = h;

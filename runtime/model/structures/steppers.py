@@ -117,6 +117,7 @@ class Bdf(c.Structure):
         ("rejected_steps", L),
         ("newton_failures", L),
         ("newton_iterations", L),
+        ("orders", L),
         ("taken", L),
         ("cause", I),
         ("bad_row", I),
