@@ -459,7 +459,7 @@ class Runs:
         """Whether the bdf would take more steps than the patience with it: on a smooth motion they grow with the power
         1 / (order + 1) of the tolerance at least.
         """
-        if self.patience is None or not self.smooth or not self.samplings:
+        if self.patience is None or self.patience != self.most_steps or not self.smooth or not self.samplings:
             return False
         last = self.samplings[-1]
         return last.steps * (last.tolerance / tolerance) ** (1.0 / (lib.MAX_ORDER + 1)) > self.patience
