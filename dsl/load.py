@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.authors import told
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
-from sysdyn.dsl.elaborate.listing import Instance, Readable, instances, readable
 from sysdyn.dsl.elaborate.scenes import SceneReader
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
@@ -31,6 +31,9 @@ from sysdyn.dsl.rules.floating import floating
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
+
+if TYPE_CHECKING:
+    from sysdyn.dsl.elaborate.listing import Instance, Readable
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +209,8 @@ def listing(
     levels: Sequence[tuple[str, str]] = (),
 ) -> Listing | None:
     """What a model offers: parameters with values, names that can be read, components; None where it has errors."""
+    from sysdyn.dsl.elaborate.listing import instances, readable  # no run asks for it
+
     with deep(), budget.drawn():
         try:
             elaborator, reader = _elaborated(document, model, scene, report, (), levels)

@@ -48,8 +48,8 @@ def check_module(prepared: Prepared, started: Started, until: float) -> None:
 def _compare(prepared: Prepared, started: Started, until: float) -> None:
     system = started.system
     oracle = SampledRows(prepared.compiled.form, prepared.binding)
-    points = _points(system, started, oracle, until)
-    whole = system.another("start")  # it has all families
+    whole = system.of_blocks("start")  # it has all families
+    points = _points(system, whole, started, oracle, until)
     for block in prepared.compiled.form.blocks:
         sample = oracle.sample(block, points)
         module = _module_rows(whole, oracle, block, points, sample.rows)
@@ -74,14 +74,14 @@ def _apart(found: Array, sample: Sample) -> NDArray[np.bool_]:
     return ~both & ~(apart <= ROUNDING * size)
 
 
-def _points(system: System, started: Started, oracle: SampledRows, until: float) -> Points:
-    """The start, and points at which nothing vanishes by chance."""
+def _points(system: System, whole: System, started: Started, oracle: SampledRows, until: float) -> Points:
+    """The start, and points at which nothing vanishes by chance; whole: with all families."""
     t0 = started.state.t
     y, yd = started.state.for_form(system)
     scale, time = magnitudes(system, t0, until, y, yd)
     # the magnitude of what begins at zero is a guess: one far too small would hide its terms behind rounding
     scale = np.maximum(scale, LEAST * group_maximum(system, scale))
-    order = _order(system.another("start"))
+    order = _order(whole)
     number = 1 + len(NEARBY)
     points = Points(np.full(number, t0), np.zeros((number, order.size)), np.zeros((number, order.size)))
     extended = [np.concatenate([x, np.zeros(order.size - x.size)]) for x in (y, yd)]
@@ -115,13 +115,11 @@ def _module_rows(
     system: System, oracle: SampledRows, block: Block, points: Points, rows: NDArray[np.integer]
 ) -> Array:
     """These rows of the block [points, rows] by the carrier; rows: in the order of the form's row families."""
-    number = int(oracle.to[-1])
-    return np.stack(
-        [
-            system.rows_at(block.name, oracle.at[:-1], oracle.to[:-1], number, t, y, yd)[rows]
-            for t, y, yd in zip(points.t, points.y, points.yd, strict=True)
-        ]
-    )
+    room, found = np.zeros(max(int(oracle.to[-1]), 1)), np.zeros((points.t.size, rows.size))
+    for k, point in enumerate(zip(points.t, points.y, points.yd, strict=True)):
+        room[rows] = 0.0  # what is left in others nobody reads
+        found[k] = system.rows_at(block.name, oracle.at[:-1], oracle.to[:-1], point, room)[rows]
+    return found
 
 
 def _told(prepared: Prepared, oracle: SampledRows, block: Block, place: int, values: tuple[float, float]) -> str:

@@ -1,4 +1,5 @@
-"""Frozen values: `dataclass(frozen=True, slots=True)` of the standard library, without compiling each class at import.
+"""Values with slots: `dataclass(slots=True)` of the standard library, frozen or not, without compiling each class at
+import.
 
 The standard decorator writes the methods of every class as text and compiles it whenever it is imported: of 300 classes
 that took 40 % of the start of a command.  Here `__init__` is compiled once for each number of fields, and the names of
@@ -7,6 +8,7 @@ a class are put in; what else a value needs is shared.  Classes that ask for mor
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Callable
 from dataclasses import MISSING
@@ -26,6 +28,9 @@ class _Standard:
     name: str = ""
 
 
+_CHANGING = copy.copy(_Standard.__dataclass_params__)  # type: ignore[attr-defined]
+_CHANGING.frozen = False
+"""Options of a value whose fields may be set again."""
 _NEW = object()
 """Stands where a field's value is made anew for each value."""
 
@@ -71,14 +76,14 @@ def _shown(names: tuple[str, ...]) -> Callable[[object], str]:
     return text
 
 
-SHARED = {
+SHARED = {"__replace__": dataclasses.replace}
+FROZEN = {
     "__setattr__": _refuse_set, "__delattr__": _refuse_delete, "__getstate__": _state, "__setstate__": _restore,
-    "__replace__": dataclasses.replace,
 }  # fmt: skip
 
 
-def _compared(names: tuple[str, ...]) -> dict[str, Callable[..., Any]]:
-    """Values of one class are equal where their fields are."""
+def _compared(names: tuple[str, ...], *, frozen: bool) -> dict[str, Callable[..., Any] | None]:
+    """Values of one class are equal where their fields are; what may change has no hash."""
     held = attrgetter(*names)
 
     def equal(self: object, other: object) -> Any:
@@ -87,13 +92,14 @@ def _compared(names: tuple[str, ...]) -> dict[str, Callable[..., Any]]:
     def hashed(self: object) -> int:
         return hash(held(self))
 
-    return {"__eq__": equal, "__hash__": hashed}
+    return {"__eq__": equal, "__hash__": hashed if frozen else None}
 
 
 def _plain(cls: type, options: dict[str, bool]) -> bool:
-    """Frozen, with slots, of no other class, all its fields by position."""
+    """With slots, of no other class, all its fields by position."""
     return (
-        options in ({"frozen": True, "slots": True}, {"frozen": True, "slots": True, "eq": False})
+        options.keys() <= {"frozen", "slots", "eq", "repr"}
+        and options.get("slots", False)
         and cls.__bases__ == (object,)
         and bool(cls.__annotations__)
         and all(_usual(value) for value in vars(cls).values() if isinstance(value, dataclasses.Field))
@@ -128,7 +134,7 @@ class _Fields:
         return found
 
 
-def _made(cls: type, *, eq: bool) -> Any:
+def _made(cls: type, *, slots: bool, frozen: bool = False, eq: bool = True, repr: bool = True) -> Any:
     """The class anew, with slots and methods; what it writes itself stays."""
     own = {name: value for name, value in vars(cls).items() if name not in ("__dict__", "__weakref__")}
     kinds = cls.__annotations__
@@ -140,9 +146,10 @@ def _made(cls: type, *, eq: bool) -> Any:
     compared, shown = (
         tuple(n for n in names if n not in said or getattr(said[n], what)) for what in ("compare", "repr")
     )
-    own = SHARED | {"__repr__": _shown(shown)} | (_compared(compared) if eq else {}) | own
+    equality = _compared(compared, frozen=frozen) if eq else {}
+    own = SHARED | (FROZEN if frozen else {}) | ({"__repr__": _shown(shown)} if repr else {}) | equality | own
     own |= {"__slots__": names, "__match_args__": names}
-    own["__dataclass_params__"] = _Standard.__dataclass_params__  # type: ignore[attr-defined]
+    own["__dataclass_params__"] = _Standard.__dataclass_params__ if frozen else _CHANGING  # type: ignore[attr-defined]
     own["__dataclass_fields__"] = _Fields(kinds, defaults)
     made = type(cls.__name__, (), own)
     made.__init__ = _initial(made, names, defaults)  # type: ignore[misc]
@@ -178,7 +185,7 @@ else:
 
         def wrap(cls: type) -> Any:
             if _plain(cls, options):
-                return _made(cls, eq=options.get("eq", True))
+                return _made(cls, **options)
             return dataclasses.dataclass(**options)(cls)
 
         return wrap if cls is None else wrap(cls)

@@ -67,12 +67,11 @@ class SampledRows:
         """The rows of a block at the points; careful: sizes count the terms of what cancels inside of terms, too."""
         places = [self._places(kernel) for kernel in block.kernels]
         kept = self._chosen(block, places)
-        number = int(self.to[-1])
-        value, size = np.zeros((points.t.size, number)), np.zeros((points.t.size, number))
-        for kernel, (columns, rows) in zip(block.kernels, places, strict=True):
-            self._add(kernel, columns, rows, kept, points, value, size, careful)
         found = np.flatnonzero(kept)
-        return Sample(found, value[:, found], size[:, found])
+        sample = Sample(found, *(np.zeros((points.t.size, found.size)) for _ in range(2)))
+        for kernel, (columns, rows) in zip(block.kernels, places, strict=True):
+            self._add(kernel, columns, rows, kept, points, sample, careful)
+        return sample
 
     def _places(self, kernel: Kernel) -> tuple[dict[str, Array], list[Whole]]:
         """Loop variables over all iterations, and the row of each summand there."""
@@ -115,8 +114,7 @@ class SampledRows:
         rows: list[Whole],
         kept: NDArray[np.bool_],
         points: Points,
-        value: Array,
-        size: Array,
+        sample: Sample,
         careful: bool,
     ) -> None:
         """What a kernel adds to the rows kept, at all points: iterations times points in one array."""
@@ -138,14 +136,16 @@ class SampledRows:
         found = evaluate(roots, lookup)
         sizes = magnitudes(roots, lookup, self.binding.parameters.table_size) if careful else found
         for (k, c, _), result, large in zip(scaled, found, sizes, strict=True):
-            where = rows[k][some]
-            for target, array in ((value, c * np.asarray(result, dtype=float)), (size, np.abs(c * np.asarray(large)))):
+            own = np.flatnonzero(kept[rows[k][some]])
+            where = np.searchsorted(sample.rows, rows[k][some[own]])
+            value, size = c * np.asarray(result, dtype=float), np.abs(c * np.asarray(large))
+            for target, array in ((sample.value, value), (sample.size, size)):
                 if count == 1:
-                    target[:, where[0]] += array
+                    target[:, where] += np.broadcast_to(array, number)[:, None]
                     continue
                 spread = np.broadcast_to(array, number * count).reshape(number, count)
                 for p in range(number):
-                    np.add.at(target[p], where, spread[p])
+                    np.add.at(target[p], where, spread[p][own])
 
     def _index(self, node: Node, args: list[Value], columns: dict[str, Array]) -> Value:
         if node.op == "index":

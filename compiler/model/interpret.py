@@ -51,7 +51,10 @@ def _evaluate(roots: Sequence[Node], lookup: Lookup) -> list[Value]:
 def _values(nodes: Iterable[Node], lookup: Lookup) -> dict[Node, Value]:
     values: dict[Node, Value] = {}
     for node in nodes:
-        values[node] = _value(node, [values[a] for a in node.args if a in values], lookup)
+        if node.op == "param" and not node.args:  # most of what a netlist asks
+            values[node] = lookup(node, [])
+        else:
+            values[node] = _value(node, [values[a] for a in node.args if a in values], lookup)
     return values
 
 

@@ -8,43 +8,39 @@ count from is chosen by how many elements touch it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
 
 from sysdyn.compiler.network.influence import Link, Quantity
-from sysdyn.dsl.model.network import Branch, Network, Shape
+from sysdyn.dsl.model.network import Branch, Network
 
 STORES = frozenset(("kinetic", "potential", "dissipator"))
 
 
 def dead_branches(network: Network, found: Sequence[Link], asked: frozenset[Quantity]) -> list[frozenset[Quantity]]:
     """Each dead branch with its end node."""
-    touched: dict[Quantity, list[Link]] = {}
+    touched = Counter(q for link in found for q in link.joined)
     read = set(asked)
     for link in found:
-        read |= link.reads - (link.joined if isinstance(link.item, Branch) else frozenset())
-        for q in link.joined:
-            touched.setdefault(q, []).append(link)
-    dead: list[frozenset[Quantity]] = []
+        read |= link.reads - link.joined if isinstance(link.item, Branch) else link.reads
+    alone = {q for q, links in touched.items() if links == 1 and q not in read}
+    ends = [(b, end) for b in network.branches if ("b", b.name) in alone for end in _ends(b, alone)]
+    if not ends:
+        return []
     grounded = _grounded(network)
-    shapes = {n.name: n.shape for n in network.nodes if n.name in grounded}
-    for b in network.branches:
-        if len(touched["b", b.name]) == 1 and ("b", b.name) not in read:
-            dead += [frozenset({("b", b.name), end}) for end in _ends(shapes, b, touched, read)][:1]
-    return dead
+    single = {("n", n.name) for n in network.nodes if n.name in grounded and not n.shape}
+    dead = {b.name: end for b, end in reversed(ends) if end in single}  # of two ends the first
+    return [frozenset({("b", b.name), dead[b.name]}) for b in network.branches if b.name in dead]
 
 
-def _ends(
-    shapes: dict[str, Shape], b: Branch, touched: dict[Quantity, list[Link]], read: set[Quantity]
-) -> Iterator[Quantity]:
-    """End nodes of the branch that nothing else touches or reads; shapes: of all nodes that are joined to a ground."""
+def _ends(b: Branch, alone: Collection[Quantity]) -> Iterator[Quantity]:
+    """End nodes of the branch among those that nothing else touches or reads."""
     balanced = "flow" if b.domain.common == "effort" else "effort"
     allowed = STORES | {"effort", "flow"} - {balanced}
     names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]
     if b.loops or b.kind not in allowed or len(names) != 2 or names[0] == names[1]:
         return
-    for name in names:
-        if shapes.get(name) == () and len(touched["n", name]) == 1 and ("n", name) not in read:
-            yield "n", name
+    yield from (("n", name) for name in names if ("n", name) in alone)
 
 
 def _grounded(network: Network) -> set[str | None]:

@@ -30,6 +30,7 @@ from sysdyn.values import dataclass
 Quantity = tuple[str, str]
 """What it is (x coordinate, n node, b branch, u implicit unknown, s state, c constraint) and its name."""
 MECHANICAL = frozenset("xnb")
+NOTHING = frozenset[Quantity]()
 EVERYTHING: Quantity = ("*", "")
 """What an expression reads that no quantity stands for: a member of the audit."""
 
@@ -51,7 +52,7 @@ class Link:
 def read_by(network: Network, roots: Iterable[Node]) -> frozenset[Quantity]:
     """The quantities that stand in expressions."""
     unknowns = {u.name for u in network.unknowns}
-    return frozenset(_quantity(n, unknowns) for root in roots for n in variables(root) if n.op == "var")
+    return frozenset([_quantity(n, unknowns) for root in roots for n in variables(root) if n.op == "var"])
 
 
 def _quantity(node: Node, unknowns: set[str]) -> Quantity:
@@ -119,9 +120,12 @@ def _held(network: Network, item: Any, root: Node, own: frozenset[Quantity]) -> 
 
 
 def _branch(network: Network, b: Branch) -> Link:
-    ends = {("n", end.node) for end in (b.plus, b.minus) if end is not None and end.node is not None}
-    found = _acting(network, b, [] if b.on is None else [b.on], [] if b.law is None else [b.law])
-    return replace(found, joined=found.joined | ends | {("b", b.name)})
+    ends = [("n", end.node) for end in (b.plus, b.minus) if end is not None and end.node is not None]
+    own, reads = frozenset([*ends, ("b", b.name)]), NOTHING if b.law is None else read_by(network, [b.law])
+    if b.on is None:
+        return Link(b, own, reads)
+    along = _acting(network, b, [b.on], [])
+    return Link(b, along.joined | own, along.reads | reads)
 
 
 def _coupling(network: Network, c: Coupling) -> Link:
@@ -167,14 +171,17 @@ def _whole(c: Constraint, shape: Shape) -> bool:
 
 def reached(found: Sequence[Link], asked: frozenset[Quantity]) -> frozenset[Quantity]:
     """All that influences what is asked: through what is joined both ways, through what is read one way."""
-    of: dict[Quantity, list[Link]] = {}
-    for link in found:
+    of: dict[Quantity, list[int]] = {}
+    for k, link in enumerate(found):
         for q in link.joined:
-            of.setdefault(q, []).append(link)
+            of.setdefault(q, []).append(k)
     kept, ahead = set(asked), list(asked)
+    followed = bytearray(len(found))
     while ahead:
-        for link in of.pop(ahead.pop(), ()):
-            new = (link.joined | link.reads) - kept
-            kept |= new
-            ahead += new
+        for k in of.get(ahead.pop(), ()):
+            if not followed[k]:
+                followed[k] = True
+                new = (found[k].joined | found[k].reads) - kept
+                kept |= new
+                ahead += new
     return frozenset(kept)

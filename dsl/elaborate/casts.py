@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.evaluation import evaluate
+from sysdyn.dsl.model.evaluation import last_of
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.values import Values
 from sysdyn.values import dataclass
@@ -18,11 +18,12 @@ _SAID = frozenset(("const", "time", "sum", "mul", "pow", "cmp", "and", "or", "no
 @dataclass(frozen=True, slots=True)
 class Cast:
     """An expression in the names of its instance; steps: operation, its own name, arguments, as met first; named: the
-    parameters of the first instance.
+    parameters of the first instance; nodes: of the steps.
     """
 
     steps: tuple[tuple[str, str, tuple[int, ...], Node], ...]
     named: Mapping[Node, str]
+    nodes: tuple[Node, ...]
 
     def under(self, path: str) -> Node:
         """The same of another instance."""
@@ -39,8 +40,7 @@ class Cast:
     def truth(self, path: str, known: Values) -> bool:
         """Whether it is true of another instance, whose own node is not made for that."""
         named = self.named
-        root = self.steps[-1][3]
-        return bool(evaluate([root], lambda n: known.element(path + named[n]) if n in named else math.nan)[0])
+        return bool(last_of(self.nodes, lambda n: known.element(path + named[n]) if n in named else math.nan))
 
 
 def cast_of(root: Node, path: str) -> Cast | None:
@@ -57,4 +57,5 @@ def cast_of(root: Node, path: str) -> Cast | None:
             return None
         place[node] = len(steps)
         steps.append((node.op, name, tuple(place[a] for a in node.args), node))
-    return Cast(tuple(steps), {node: name for op, name, _, node in steps if op == "param"})
+    named = {node: name for op, name, _, node in steps if op == "param"}
+    return Cast(tuple(steps), named, tuple(node for *_, node in steps))

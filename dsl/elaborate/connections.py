@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from sysdyn.dsl.elaborate.statements import Statements
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
@@ -21,6 +19,7 @@ from sysdyn.dsl.names.symbols import (
     Unsupported,
 )
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 
 @dataclass(slots=True)

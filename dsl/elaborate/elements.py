@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.connections import Connections, Ends
@@ -23,6 +23,7 @@ from sysdyn.dsl.names.symbols import (
 )
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 
 @dataclass(slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from typing import Any
 
@@ -41,6 +41,7 @@ from sysdyn.dsl.names.symbols import ConstraintSymbol, Scope, Space, Symbol
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 Nested = tuple[syntax.Statement, tuple[syntax.For, ...]]
 

@@ -9,8 +9,8 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-MANY = 1_000_000
-"""Objects of a long text: of 30000 lines."""
+MANY = 200_000
+"""Objects of a long text, of 6000 lines; fewer than a first collection waits for."""
 SELDOM = 250_000, 20, 100
 """Objects made, and younger collections, between two collections of cycles: Python's own (700, 10, 10) takes a sixth
 of the CPU of a short command, and the first after 50 000, which its imports alone make, a twenty-fifth."""

@@ -18,6 +18,14 @@ def evaluate(roots: Sequence[Node], lookup: Callable[[Node], float]) -> list[flo
     return [values[r] for r in roots]
 
 
+def last_of(nodes: Iterable[Node], lookup: Callable[[Node], float]) -> Any:
+    """The value of the last of scalar nodes that stand after those they need."""
+    values: dict[Node, Any] = {}
+    for node in nodes:
+        found = values[node] = lookup(node) if node.op == "param" else _value(node, values, lookup)
+    return found
+
+
 def evaluate_along(
     root: Node, leaf: Node, points: Iterable[float], lookup: Callable[[Node], float]
 ) -> Iterator[float]:

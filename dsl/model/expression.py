@@ -331,6 +331,11 @@ def _ordered(roots: Iterable[Node], *, bodies: bool) -> list[Node]:
     seen: set[Node] = set()
     order: list[Node] = []
     for root in roots:
+        if not root.args:
+            if root not in seen:
+                seen.add(root)
+                order.append(root)
+            continue
         stack: list[Node | None] = [root]
         if root.op != "reduce" and not any(a.args for a in root.args):  # most are no deeper, and need no stack
             order += [node for node in dict.fromkeys((*root.args, root)) if node not in seen]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Any
@@ -338,5 +337,8 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
     """The most similar name, if one is similar at all."""
     among = list(dict.fromkeys(n for n in names if len(n) < 100))
     alike = [n for n in among if n != name and n.lower() == name.lower()]
-    found = alike or difflib.get_close_matches(name[:80], among, 1, 0.6)
-    return found[0] if found else None
+    if not alike:
+        from difflib import get_close_matches  # of mistakes alone
+
+        alike = get_close_matches(name[:80], among, 1, 0.6)
+    return alike[0] if alike else None

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Collection
-from difflib import get_close_matches
 
 # fmt: off
 MODEL_WORDS = frozenset(
@@ -204,6 +203,8 @@ def unknown(word: str, after: str, body: str) -> Complaint:
         return "E113", f"no statement begins with '{word}''", f"dynamic {word}' = ..."
     if after[:1] in "^*/+-" and after and "=" in after.partition("\n")[0]:
         return "E113", f"no statement begins with '{word}'; a constraint has a label", f"phi name: {word} ... = ..."
+    from difflib import get_close_matches
+
     near = get_close_matches(word, sorted(_OWN[body] | MODEL_WORDS | SCENE_WORDS | ITEM_WORDS), 1, 0.7)
     said = _OTHERS.get(word.lower(), "").replace("DOMAIN", word.lower())
     if after.startswith("(") and body == "statement" and not said and (not near or near[0] not in MODEL_WORDS):

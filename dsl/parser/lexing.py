@@ -12,10 +12,10 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Container
-from dataclasses import dataclass
 
 from sysdyn.dsl.text.source import SourceText, Span
 from sysdyn.dsl.tree.syntax import Comment
+from sysdyn.values import dataclass
 
 RESERVED = frozenset({"if", "then", "else", "and", "or", "not", "true", "false"})
 """Words that are no name anywhere."""

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from sysdyn.dsl.text.diagnostics import Edit, Report
 from sysdyn.dsl.text.source import SourceText, Span
 from sysdyn.dsl.tree.syntax import Decl, Number, Quantity, Unit, UnitFactor, Word
+from sysdyn.values import dataclass
 
 PREDEFINED = frozenset({"t", "pi", "ground", "audit"})
 """Names that every model has and none may declare."""

@@ -78,8 +78,8 @@ def _cuts(branches: Sequence[Branch], kinds: tuple[str, str]) -> Iterator[list[B
     root: dict[_Point, _Point] = {}
 
     def part(point: _Point) -> _Point:
-        while root.setdefault(point, point) != point:
-            point = root[point]
+        while (above := root.setdefault(point, point)) != point:
+            root[point] = point = root[above]
         return point
 
     for b in branches:

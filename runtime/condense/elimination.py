@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.condense.composition import ranges
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.forms import FORMS
+from sysdyn.runtime.model.patterns import numbered
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.values import dataclass
@@ -133,6 +134,16 @@ def _numbers(of: Ints) -> set[int]:
     return set(of.tolist()) - {-1} if of.size < FEW else set(np.flatnonzero(np.bincount(of + 1)[1:]).tolist())
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Span:
+    """Entries of some rows, row after row; rows [entries]: counted from the first; of: families of the unknowns."""
+
+    entries: Longs
+    rows: Longs
+    of: Ints
+    families: frozenset[int]
+
+
 class _Search:
     """Unknowns and the rows that define them, as far as they are found; reads[a]: families that define family a; read:
     families that define any.  No family is defined through itself.
@@ -143,8 +154,9 @@ class _Search:
     def __init__(self, system: System, allowed: Mask) -> None:
         self.columns, self.rows = system.pattern.columns_of(), system.pattern.row.astype(np.int64)
         self.of, self.allowed = system.family_of[self.columns], allowed
-        self.start = np.concatenate([[0], np.cumsum(np.bincount(self.rows, minlength=system.rows))])
-        self.entry = np.argsort(self.rows, kind="stable")
+        number = np.arange(self.rows.size, dtype=np.int32)
+        _, self.start, self.entry = numbered(system.pattern.row, number, system.rows, number.size)
+        self.seen: dict[tuple[int, int], _Span] = {}
         self.defined, self.free = np.zeros(system.unknowns, dtype=bool), np.ones(system.rows, dtype=bool)
         self.reads: dict[int, set[int]] = {}
         self.readers: dict[int, set[int]] = {}
@@ -153,24 +165,29 @@ class _Search:
         self.read: set[int] = set()
         self.parts: list[tuple[int, Longs]] = []
         spans = [(first, first + system.description.rows[family].size) for _, family, first in system.form.groups]
-        pairs = [(family, span) for span in spans for family in self._families(*span)]
+        pairs = [(family, span) for span in spans for family in self._span(span).families]
         sizes = {pair: self._candidates(*pair).size for pair in pairs}
         for family, span in sorted(pairs, key=lambda pair: (-sizes[pair], _rank(system, pair[0]), pair)):
             if sizes[family, span]:
                 self._take(family, span)
 
-    def _families(self, first: int, last: int) -> set[int]:
-        return _numbers(self.of[self.entry[self.start[first] : self.start[last]]])
+    def _span(self, span: tuple[int, int]) -> _Span:
+        """The entries of these rows."""
+        if span not in self.seen:
+            entries = self.entry[self.start[span[0]] : self.start[span[1]]].astype(np.int64)
+            of = self.of[entries]
+            self.seen[span] = _Span(entries, self.rows[entries] - span[0], of, frozenset(_numbers(of)))
+        return self.seen[span]
 
     def _candidates(self, family: int, span: tuple[int, int]) -> Longs:
         """Entries through which these rows can define unknowns of a family: alone in their row, and free of circles; of
         several rows that could define an unknown the first.
         """
-        entries = self.entry[self.start[span[0]] : self.start[span[1]]]
-        own, of = self.rows[entries] - span[0], self.of[entries]
+        seen = self._span(span)
+        entries, own, of = seen.entries, seen.rows, seen.of
         here = of == family
         once = np.bincount(own[here], minlength=span[1] - span[0]) == 1
-        blocked = [k for k in self._families(*span) if k != family and self._through(k, family)]
+        blocked = [k for k in seen.families if k != family and self._through(k, family)]
         once[own[np.isin(of, blocked)]] = False
         found = entries[here & once[own]]
         found = found[self.allowed[found] & ~self.defined[self.columns[found]] & self.free[self.rows[found]]]
@@ -193,7 +210,7 @@ class _Search:
         chosen = self._candidates(family, span)
         if not chosen.size:
             return
-        entries = self.entry[self.start[span[0]] : self.start[span[1]]]
+        entries = self._span(span).entries
         taken = entries[np.isin(self.rows[entries], self.rows[chosen])]
         others = _numbers(self.of[taken]) - {family}
         below = 1 + max((self.below[k] for k in others if k in self.reads), default=0)
@@ -246,8 +263,9 @@ class _Search:
         depth = np.concatenate([none, *(np.full(part.size, depths[family]) for family, part in self.parts)])
         pivot = pivot[np.lexsort((self.columns[pivot], depth))]
         row = self.rows[pivot]
-        count = self.start[row + 1] - self.start[row]
-        entry = self.entry[ranges(self.start[row], count)]
+        begin, end = (self.start[row + k].astype(np.int64) for k in (0, 1))
+        count = end - begin
+        entry = self.entry[ranges(begin, count)].astype(np.int64)
         entry = entry[~np.isin(entry, pivot)]
         start = np.concatenate([[0], np.cumsum(count - 1)])
         return Elimination(self.columns[pivot], row, pivot, start, entry, unread)

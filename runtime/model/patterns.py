@@ -67,8 +67,8 @@ def read_only(array: Array) -> Array:
 def _value(index: Index, columns: list[Longs], number: int, ix: Ints) -> Longs:
     """Value of an index in each iteration [number]."""
     loop, slot, constant, *table = index
-    value = np.full(number, constant + (int(ix[slot]) if slot >= 0 else 0), dtype=np.int64)
-    value = value if loop < 0 else value + columns[loop]
+    base = constant + (int(ix[slot]) if slot >= 0 else 0)
+    value = np.full(number, base, dtype=np.int64) if loop < 0 else columns[loop] + base
     for place in table:
         value = ix[ix[place] + value].astype(np.int64)
     return value
@@ -89,7 +89,7 @@ def _iterations(kernel: Kernel, ix: Ints) -> list[Longs]:
 
 def _positions(reference: Reference, shape: Shape, loops: list[Longs], number: int, ix: Ints) -> Longs:
     """Row-major position in its family in each iteration [number]."""
-    position = np.zeros(number, dtype=np.int64)
+    position: Longs | None = None
     if len(reference.indices) != len(shape):
         raise ContractError(
             f"a reference with {len(reference.indices)} indices into a family with {len(shape)}"
@@ -98,8 +98,9 @@ def _positions(reference: Reference, shape: Shape, loops: list[Longs], number: i
         value = _value(index, loops, number, ix)
         if number and (value.min() < first or value.max() > last):
             raise ContractError(f"an index runs over {value.min()}..{value.max()} outside {first}..{last}")
-        position = position * (last - first + 1) + (value - first)
-    return position
+        value -= first
+        position = value if position is None else position * (last - first + 1) + value
+    return np.zeros(number, dtype=np.int64) if position is None else position
 
 
 def _place(reference: Reference, shape: Shape, ix: Ints) -> int:

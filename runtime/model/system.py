@@ -39,9 +39,7 @@ class System(Facts):
         self._make(describe(manifest, binding), carrier, index_form)
 
     @classmethod
-    def of(
-        cls, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()
-    ) -> System:
+    def of(cls, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()) -> System:
         """The same from a description; left_out: multipliers (family, position) of constraints that do not count.
 
         Where the description has the systems of a run before it, one of those, at this one's numbers; else one that
@@ -66,18 +64,23 @@ class System(Facts):
         """The same form, these constraints left out."""
         return System.of(self.description, self.carrier, self.form.name, left_out)
 
-    def _make(
-        self, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()
-    ) -> None:
-        self.left_out = left_out
-        self.description = description
-        self.carrier = carrier
+    def of_blocks(self, index_form: str) -> System:
+        """The same model in another form for `rows_at` alone: nothing of its Jacobian is laid out."""
+        found = System.__new__(System)
+        found._plan(self.description, self.carrier, index_form, self.left_out)
+        return found
+
+    def _plan(self, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut) -> None:
+        self.description, self.carrier, self.left_out = description, carrier, left_out
         key = "plan", index_form
         if key not in description.layouts:
             description.layouts[key] = plan(description, index_form)
         self.form: Form = description.layouts[key]
         self.failure = Failure()
         self._keep: list[Any] = []
+
+    def _make(self, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()) -> None:
+        self._plan(description, carrier, index_form, left_out)
         self._own: dict[Hashable, Any] = {}
         self._layout: Layout | None = None
         self._slots: list[Ints] = []
@@ -220,9 +223,7 @@ class System(Facts):
         idle = (place for place, active in zip(switches.places, switches.active, strict=True) if not active)
         return np.array([self.form.at[family] + position for family, position in idle], dtype=np.int32)
 
-    def call(
-        self, block: str, at: Ints, to: Ints, rows: int, n_dy: int = 0, n_dyd: int = 0
-    ) -> lib.Call:
+    def call(self, block: str, at: Ints, to: Ints, rows: int, n_dy: int = 0, n_dyd: int = 0) -> lib.Call:
         """The core's structure for one block with its tables, and how many entries it writes."""
         tables = Tables(self.description.p, self.description.ix, at, to)
         made = self.carrier.bind(block, tables, Extent(self.form.extended, rows, n_dy, n_dyd), self.failure)
@@ -314,7 +315,7 @@ class System(Facts):
 
     def residual(self, t: float, y: Floats, yd: Floats) -> Floats:
         """F(t, y, yd) [rows]."""
-        r = np.zeros(max(self.rows, 1))
+        r = np.empty(max(self.rows, 1))
         a, b = self._buffer(y), self._buffer(yd)
         lib.core.sd_residual(c.byref(self._core), t, lib.pointer(a), lib.pointer(b), lib.pointer(r))
         self.failure.check()
@@ -322,7 +323,7 @@ class System(Facts):
 
     def jacobian(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
         """Values of dF/dy and dF/dyd [entries] on the pattern."""
-        jy, jyd = np.zeros(self.pattern.entries + 1), np.zeros(self.pattern.entries + 1)
+        jy, jyd = np.empty(self.pattern.entries + 1), np.empty(self.pattern.entries + 1)
         a, b = self._buffer(y), self._buffer(yd)
         lib.core.sd_jacobian(c.byref(self.core), t, *(lib.pointer(item) for item in (a, b, jy, jyd)))
         self.failure.check()
@@ -356,15 +357,15 @@ class System(Facts):
         self.failure.check()
         return out[:number]
 
-    def rows_at(self, block: str, at: Ints, to: Ints, rows: int, t: float, y: Floats, yd: Floats) -> Floats:
-        """R [rows] of one block alone, for places of families (at) and of rows (to) of the caller's choice."""
-        call = self.call(block, np.ascontiguousarray(at), np.ascontiguousarray(to), max(rows, 1))
-        out = np.zeros(max(rows, 1))
+    def rows_at(self, block: str, at: Ints, to: Ints, point: tuple[float, Floats, Floats], out: Floats) -> Floats:
+        """R [rows] of one block alone at t, y, yd, added to out; at, to: places of families and of rows there."""
+        t, y, yd = point
+        call = self.call(block, np.ascontiguousarray(at), np.ascontiguousarray(to), out.size)
         a, b = (x if x.size == self.form.extended else self._buffer(x) for x in (y, yd))
         lib.ROWS(call.rows)(c.addressof(call.frame), t, lib.pointer(a), lib.pointer(b), lib.pointer(out))
         del self._keep[-1]
         self.failure.check()
-        return out[:rows]
+        return out
 
     def observe(self, t: float, y: Floats, yd: Floats, audit: Mapping[str, float] | None = None) -> Floats:
         """Traced quantities (and sides of expects) at a point, in the order of their rows."""

@@ -21,8 +21,11 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import column_order, tall_order
 from sysdyn.runtime.numerics.tall import free_unknowns
 
+LATER = 2000
+"""Unknowns and rates from which the saddle-point matrix is made where a basis is not enough, not before: of a net its
+order of elimination alone costs what a pivoting does."""
 LARGE = 100_000
-"""Unknowns and rates from which the saddle-point matrix is made where a basis is not enough, not before."""
+"""The same from which a state is held within a basis."""
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
 RATES = ("momentum_rate", "gamma_rate", "dynamics_rate")
@@ -130,7 +133,7 @@ class Settler:
         self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
         self.scale = np.concatenate([magnitude, magnitude[self.rates] / time_scale])
         self.linear: Any = None
-        if self._moves <= LARGE:
+        if self._moves <= LATER:
             self._provide()
         self._allocate()
 
@@ -267,7 +270,7 @@ class Settler:
 
     def held(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
         """The same with the state where it is: of large ones within a basis that moves none of it, if there is one."""
-        if self.linear is not None or not self.core.contents.basis:
+        if self._moves <= LARGE or self.linear is not None or not self.core.contents.basis:
             return self.settle(t, y, yd, hold=HELD)
         slack, self.core.contents.slack = self.core.contents.slack, 0.0
         found = self.settle(t, y, yd)

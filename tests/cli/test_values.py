@@ -89,9 +89,47 @@ def test_wrong_calls_name_what_is_wrong():
             b: int
 
 
+def test_values_that_may_change_are_made_as_the_standard_ones_too():
+    @dataclasses.dataclass(slots=True)
+    class Changes:
+        items: list[int] = dataclasses.field(default_factory=list)
+
+    grows, theirs = Grows(), Changes()
+    assert Grows().items is not grows.items
+    grows.items.append(1)
+    theirs.items = [1]
+    assert repr(grows) == repr(theirs).rpartition(".")[2].replace("Changes", "Grows")
+    assert grows == Grows([1]) != Grows()
+    assert pickle.loads(pickle.dumps(grows)) == copy.deepcopy(grows) == grows
+    assert dataclasses.asdict(grows) == dataclasses.asdict(theirs)
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(grows)
+    with pytest.raises(AttributeError):
+        grows.other = 1
+    with pytest.raises(TypeError, match="cannot inherit frozen"):  # as of any value that may change
+
+        @dataclasses.dataclass(frozen=True)
+        class _Frozen(Grows):
+            pass
+
+
+def test_a_value_may_be_shown_by_its_own_text():
+    @values.dataclass(frozen=True, slots=True, repr=False)
+    class Named:
+        name: str
+
+        def __repr__(self) -> str:
+            return f"<{self.name}>"
+
+    assert repr(Named("x")) == "<x>"
+    assert Named("x") == Named("x")
+
+
 def test_other_kinds_are_the_standard_decorators_own():
     assert Alone([1]) != Alone([1])
-    assert Grows().items is not Grows().items
-    grows = Grows()
-    grows.items = [1]
-    assert grows == Grows([1])
+
+    @values.dataclass(frozen=True, slots=True, order=True)
+    class Ordered:
+        key: int
+
+    assert Ordered(1) < Ordered(2)

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from sysdyn.runtime.model import core_library as lib
@@ -116,3 +117,20 @@ def test_parameters_of_one_unit_and_of_several_come_back(tmp_path):
         writer.append(rows([0.0]))
         writer.finish({}, {}, True)
     assert Trace.open(kept.path).parameters == {"m": (2.0, "kg"), "a\u2215b": (3.0, "kg"), "k": (4.0, "N/m")}
+
+
+def test_each_of_many_parameters_keeps_its_own_number_and_unit(tmp_path):
+    units = ("F", "ohm", "kg*m^2/s^2")
+    given = tuple(Parameter(f"C{k}.C", (-1.0) ** k * np.exp(0.37 * k), units[k % 3]) for k in range(300))
+    kept = Files(tmp_path / "trace.h5")
+    with kept.claimed():
+        writer = kept.writer(Layout(LAYOUT.columns, 2, {}, given), True)
+        writer.append(rows([0.0]))
+        writer.finish({}, {}, True)
+    with h5py.File(kept.path) as file:
+        group = file["parameters"]
+        assert sorted(group) == sorted(p.name for p in given)
+        for p in given:
+            assert (group[p.name][()], group[p.name].attrs["units"].decode()) == (p.value, p.unit)
+            assert group[p.name].shape == ()
+            assert group[p.name].dtype == np.float64

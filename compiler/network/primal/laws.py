@@ -15,7 +15,7 @@ Everything is still said in the branches' own variables; `reading` replaces thes
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from sysdyn.compiler.network.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
 from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Causality, Law, conjugate, own
@@ -43,6 +43,7 @@ from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
 from sysdyn.dsl.model.rewriting import EXPRESSIONS, expressions
 from sysdyn.dsl.model.units import Unit, si
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
+from sysdyn.values import dataclass
 
 JOULE = si(ENERGY_DIMENSION)
 
