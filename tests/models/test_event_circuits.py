@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from model_runs import attempt
 from sysdyn.api import simulate
 
 W = 100.0 * np.pi
@@ -270,3 +271,28 @@ def test_what_series_capacitors_hold_besides_their_flow_stays_where_charge_jumps
     behind = trace.time > 0.211
     for name, before, after in (("v0", 2.0, 2 - 5.6), ("v1", 4.0, 4 - 2.8), ("v2", 5.0, 5 - 1.4), ("v3", 3.0, 3 - 4.2)):
         assert np.abs(trace[name].values - np.where(behind, after, before)).max() < 1e-12
+
+
+TWICE = """from std.electrical import capacitor, resistor, switch
+model twice {
+  node a, b: electrical
+  C: capacitor(C = 1 mF) a -> ground
+  S: switch(gate = if t > 0.2 s then 1 else 0) a -> b
+  T: switch(gate = if t > 0.4 s then 1 else 0) a -> b
+  R: resistor(R = 100 ohm) b -> ground
+  init C.e = 10 V
+}
+scene s of twice {
+  time 0 s to 1 s
+  trace C.e every 0.1 s
+}
+"""
+
+
+def test_closed_switches_side_by_side_are_named_with_a_remedy(tmp_path):
+    ran, report = attempt(tmp_path, TWICE)
+    assert ran.exit == 3
+    (found,) = [d for d in report if d.severity == "error"]
+    assert found.code == "E931"
+    assert "T" in found.message
+    assert found.help.startswith("constraints that hold at one time may say the same twice: leave one out")
