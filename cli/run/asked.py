@@ -117,6 +117,8 @@ def options_of(
     wall = instant(request.max_wall, "--max-wall") if request.max_wall else None
     if t1 is None or None in at or report.failed:
         return None
+    if not math.isfinite(t0) or not math.isfinite(t1):
+        raise UsageError(f"the run is from {t0:g} s to {t1:g} s: finite instants are needed")
     if not t1 > t0:
         raise UsageError(f"the run ends at {t1:g} s, but it begins at {t0:g} s")
     every = value(scene.every) if scene.every is not None else None

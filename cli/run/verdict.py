@@ -53,6 +53,9 @@ _REMEDIES_OF_EVENTS = {
 }
 
 
+_TWICE = "constraints that hold at one time may say the same twice: leave one out, or put a resistance between them"
+
+
 _BOUNDED = "a law that keeps it in bounds (an energy with a minimum, a stop), or an earlier end: --until"
 
 
@@ -85,6 +88,8 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     if isinstance(partial, Outcome) and partial.reached > error.time:
         text += "; the trace is that of a coarser run to the end, its error is not known"
     usual = _REMEDIES_OF_EVENTS.get(error.cause, _REMEDIES[code])
+    if error.cause == "singular" and len(started.system.description.switches.places):
+        usual = _TWICE
     remedy = _BOUNDED if why else _RANK if lost else usual
     known = f"last good state at {last.time:.9g} s: {last.listed()}" if last is not None and last.states() else ""
     help_ = "; ".join(filter(None, (remedy, known)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeVar
@@ -191,6 +192,10 @@ class SceneReader:
         start = self._constant(s.start, dim.TIME, f"the start '{self._text(s.start)}'")
         end = self._constant(s.stop, dim.TIME, f"the end '{self._text(s.stop)}'")
         self._once("start", start, s.span, "time")
+        for node, text in ((start, self._text(s.start)), (end, self._text(s.stop))):
+            if node.op == "const" and not math.isfinite(node.data):
+                message = f"'{text}' is no instant: a run begins and ends"
+                raise self.resolver.fail("E912", message, s.span, help="time 0 s to 10 s")
         if start.op == end.op == "const" and end.data < start.data:
             message = f"the time ends before it starts: {self._text(s.start)} to {self._text(s.stop)}"
             help_ = f"time {self._text(s.stop)} to {self._text(s.start)}"

@@ -255,7 +255,8 @@ def values(model: Elaborator, known: Values, report: Report) -> None:
             shown = ", ".join(_valued(n, known.number(n, bound), model) for n in _parameters(node))
             report.error("E322", f"require {text} fails: {shown}", place, help=f"values for which {text}")
     for node, place in _expressions(model):
-        _divisions(model, node, place, known, report)
+        if not _undefined(node, place, report):
+            _divisions(model, node, place, known, report)
     _sizes(model, known, report)
     _elements(model, known, report)
     _indices(model, known, report)
@@ -274,6 +275,21 @@ def _valued(node: Node, value: float, model: Elaborator) -> str:
     """`R = -3 ohm`: a parameter with its value in its own unit."""
     unit = model.parts.parameters[node.data].unit if node.data in model.parts.parameters else None
     return f"{node} = {value:g}" if unit is None else f"{node} = {quantity(value, unit)}"
+
+
+def _undefined(root: Node, place: Place, report: Report) -> bool:
+    """E324 where a constant of an expression is no number, or infinite as a term of a sum."""
+    for node in _always(root) if root.args else (root,):
+        constants = (node.data,) if node.op == "const" else (node.data[0], *node.data[1]) if node.op == "sum" else ()
+        if any(math.isnan(c) for c in constants):
+            message, help_ = "a constant here is no number", "a root, a logarithm or a quotient where it is defined"
+        elif node.op == "sum" and any(math.isinf(c) for c in constants):
+            message, help_ = "a constant here is too large for a number", "a smaller one"
+        else:
+            continue
+        report.error("E324", message, place, help=help_)
+        return True
+    return False
 
 
 def _divisions(model: Elaborator, node: Node, place: Place, known: Values, report: Report) -> None:

@@ -25,6 +25,9 @@ BODIES = 4.0
 UNTOLD = 1e-9
 """Change of a bound by reactions of one that is round-off."""
 
+BEYOND = 1e-6
+"""Of the largest value of a gap: one that is less than nothing by more has jumped, and does not stay where it is."""
+
 
 class Contacts:
     """The active set and the senses of a model; p: its parameters, where senses stand; starting: a start is sought."""
@@ -178,12 +181,18 @@ class Contacts:
             return bool(impulse < -self.impulse(c) or values[c.multiplier] < -zero(c.multiplier))
         if values[c.value] > (0.0 if k in self.open else zero(c.value)):
             return False
+        if c.kind == "phi" and values[c.value] < -self._beyond(c):
+            return True
         if c.kind == "psi":
             return bool(values[c.value] < -zero(c.value) or values[c.rate] < -zero(c.rate))
         closing = values[c.rate] < -zero(c.rate)
         return bool(
             closing or (values[c.rate] <= zero(c.rate) and values[c.acceleration] < -zero(c.acceleration))
         )
+
+    def _beyond(self, c: Contact) -> float:
+        """How much less than nothing a gap cannot be, whatever it does next; one caught in flight is so by little."""
+        return self.observer.zero(c.value) if self.starting else BEYOND * float(self.observer.largest[c.value])
 
     def impulse(self, c: Contact) -> float:
         """Below it an impulse is zero: that of a multiplier over the time in which things change, and what takes a flow

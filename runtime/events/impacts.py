@@ -26,7 +26,9 @@ UNSEEN = 16.0 * float(np.finfo(float).eps)
 """Of the terms of a gap: a flight lower than that."""
 
 Strike = Callable[[float, Floats, Floats, Floats], tuple[Floats, Floats]]
-"""t, y, yd, aims [settled rows] -> y after impulses that bring the flow rows to their aims; the impulses [unknowns]."""
+"""t, y, yd, aims [rows of the system that finds impulses] -> y after impulses that bring the flow rows to their aims;
+the impulses [unknowns].
+"""
 
 
 class _Struck(NamedTuple):
@@ -54,10 +56,13 @@ class _Struck(NamedTuple):
 
 
 class _Blow(NamedTuple):
-    """An instant: t, y, yd before it, how impulses are found, the aims of the flows of the contacts that take part."""
+    """An instant: t, y, yd before it, how impulses are found and in whose rows, the aims of the flows of the contacts
+    that take part.
+    """
 
     point: tuple[float, Floats, Floats]
     strike: Strike
+    system: System
     aim: dict[int, float]
 
 
@@ -68,8 +73,11 @@ class Impacts:
         self.contacts, self.rest = contacts, rest
         self.fastest = np.zeros(len(contacts.contacts))
 
-    def after(self, t: float, y: Floats, yd: Floats, strike: Strike, *, blow: bool) -> Floats:
-        """Y after the impacts of the gaps that close, or after a blow; the active set is then that of the impulses."""
+    def after(self, t: float, y: Floats, yd: Floats, strike: Strike, system: System, *, blow: bool) -> Floats:
+        """Y after the impacts of the gaps that close, or after a blow; the active set is then that of the impulses.
+
+        system: in whose rows `strike` takes its aims.
+        """
         contacts, zero = self.contacts, self.contacts.observer.zero
         values, terms = contacts.observer(t, y, yd), contacts.observer.terms.copy()
         near = [k for k in range(len(contacts.contacts)) if k not in contacts.frozen and self._near(k, values)]
@@ -87,7 +95,7 @@ class Impacts:
         for k in contacts.finite(t, y, yd):
             if contacts.active[k]:
                 contacts.slip(k, 0.0)
-        found = self._among_frictions(_Blow((t, y, yd), strike, aim))
+        found = self._among_frictions(_Blow((t, y, yd), strike, system, aim))
         for k in near:
             contacts.active[k] = aim[k] == 0.0 and found.values[self._flow(k)] <= zero(self._flow(k))
         contacts.apply()
@@ -161,28 +169,24 @@ class Impacts:
     def _of(self, blow: _Blow, struck: list[int]) -> _Struck:
         """What impulses of these alone make."""
         contacts, zero = self.contacts, self.contacts.observer.zero
-        point, strike, aim = blow
+        point, aim = blow.point, blow.aim
         for k in aim:
             contacts.active[k] = k in struck
         contacts.apply()
-        y, impulses = strike(*point, self._aims(aim, struck))
+        y, impulses = blow.strike(*point, self._aims(blow, struck))
         values, now = contacts.observer(point[0], y, point[2]), impulses[contacts.multiplier]
         off = {k: (aim[k] - values[self._flow(k)]) / zero(self._flow(k)) for k in aim}
         pulls = [k for k in struck if now[k] < -contacts.impulse(contacts.contacts[k])]
         own = np.where(np.isin(np.arange(now.size), struck), now, 0.0)
         return _Struck(struck, y, values, own, impulses, off, pulls)
 
-    def _aims(self, aim: dict[int, float], struck: list[int]) -> Floats:
+    def _aims(self, blow: _Blow, struck: list[int]) -> Floats:
         """What the rows phi_rate shall be: -value' there."""
-        settled = self._settled
-        aims = np.zeros(settled.rows)
-        first = {(group, family): row for group, family, row in settled.form.groups}
+        system, aim = blow.system, blow.aim
+        aims = np.zeros(system.rows)
+        first = {(group, family): row for group, family, row in system.form.groups}
         for k in (k for k in struck if aim[k] > 0.0):
             family, position = self.contacts.switches.places[self.contacts.contacts[k].number]
-            row = first["phi_rate", multiplier_row(settled.description, family)] + position
+            row = first["phi_rate", multiplier_row(system.description, family)] + position
             aims[row] = -aim[k]
         return aims
-
-    @property
-    def _settled(self) -> System:
-        return self.contacts.system.another("settled")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
@@ -21,10 +23,25 @@ SPAN = 1.0
 def eventful_start(system: System, t0: float, plan: Plan, until: float | None = None) -> ConsistentState:
     """A state at t0 with the active set and the senses that fit it, which the model then has.
 
+    Constants of integrated constraints are what the text says of displacements, zero of those of which it says nothing.
+    Where fixed values and loops of stores ask for others (of three capacitors on a node two side by side, one of them
+    fixed), they are what follows: the constraint is its own integral, whatever it is at the start.
     until: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
     """
+    try:
+        return _fitting(system, t0, plan, until, constants=False)
+    except InconsistentStart:
+        if not system.description.constants:
+            raise
+        with suppress(InconsistentStart):
+            return _fitting(system, t0, plan, until, constants=True)
+        raise
+
+
+def _fitting(system: System, t0: float, plan: Plan, until: float | None, *, constants: bool) -> ConsistentState:
+    """The same; constants: those of integrated constraints are found too."""
     if not plan.contacts:
-        return consistent_start(system, t0, until=until)
+        return consistent_start(system, t0, until=until, constants=constants)
     contacts = Contacts(plan, system, Observer(system), system.description.p, starting=True)
     contacts.begin()
     zeros = np.zeros(system.form.written)
@@ -37,7 +54,7 @@ def eventful_start(system: System, t0: float, plan: Plan, until: float | None = 
 
     def settle(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         try:
-            found.append(consistent_start(system, t, until=until))
+            found.append(consistent_start(system, t, until=until, constants=constants))
         except InconsistentStart as error:
             errors.append(error)
             return None

@@ -54,7 +54,8 @@ class Succession:
         known = None if stalled else self._remembered(t, (y, yd), (stood, tuple(touched)))
         if known is not None:
             return known, False
-        y, self.blow = self.impacts.after(t, y, yd, self._strike, blow=self.blow), False
+        y = self.impacts.after(t, y, yd, self._strike, restart.instant.system, blow=self.blow)
+        self.blow = False
         values = self.observer(t, y, yd)
         for k in touched:
             if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:

@@ -175,7 +175,8 @@ class Description:
     """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts: what follows from
     the structure of the index forms made so far, found once (System.once); branches: places in p of
     laws that may slide (events/kinks.py); systems: those of runs one after the other that share p, by index form;
-    alive: those that somebody has now, where runs do not share them; room: work of their Jacobians.
+    alive: those that somebody has now, where runs do not share them; room: work of their Jacobians; constants: of
+    integrated constraints, by their family of rows, where they begin in p and how many there are.
     """
 
     families: tuple[Family, ...]
@@ -190,6 +191,7 @@ class Description:
     layouts: dict[Any, Any] = field(default_factory=dict, compare=False)
     alive: WeakValueDictionary[Any, Any] = field(default_factory=WeakValueDictionary, compare=False)
     room: list[Floats] = field(default_factory=list, compare=False)
+    constants: tuple[tuple[int, int, int], ...] = ()
 
     def families_of(self, kind: str) -> tuple[int, ...]:
         """Numbers of the families of one kind."""
@@ -329,6 +331,7 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
         branches=tuple(int(place) for place in structure.get("branches", ())),
         systems={} if binding.get("alone") else None,
         layouts=layouts,
+        constants=tuple((int(row), int(place), int(number)) for row, place, number in binding.get("offsets", ())),
     )
     if binding.get("alone"):
         layouts["last"] = found

@@ -105,15 +105,14 @@ class Instant:
         return acts[self._column]
 
     def displacements(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
-        """Y with the displacements behind the jump at t, as they are where nothing resists an impulse of flow; the
-        impulses of effort on balances with inertia [rows].
+        """Y with the displacements behind the jump at t; the impulses of effort on balances with inertia [rows].
+
+        Where nothing resists an impulse of flow the rows of displacements alone say where they are.
         """
         slope, inertia = self._slopes(t, y, yd, magnitude)
         heavy, carried = self._held
         light, flow = self._now(self._light)[self._row], (self._moved >= 0)[self._column]
         through = np.flatnonzero(((light & flow) | heavy | carried) & (np.where(heavy, inertia, slope) != 0.0))
-        if not through.size:
-            return y, np.zeros(self.system.rows)
         forced = np.flatnonzero(light & self._acting())
         at = np.append(through, forced)
         columns = np.append(2 * self._moved[self._column[through]], 2 * self._column[forced] + 1)
@@ -121,7 +120,8 @@ class Instant:
         ease = np.where(np.isin(self.system.kinds, FOLLOWS), LOOSE, 1.0)
         behind = self._given.copy()
         behind[self.system.held[0]] = True  # they read "multiplier = 0"
-        rows = _Rows(behind, np.ones(y.size, dtype=bool), lambda *_: integrals, ease)
+        # dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
+        rows = _Rows(behind, self.system.kinds != "s", lambda *_: integrals, ease)
         found, impulse = self._jump((t, y, yd), magnitude, rows)
         found = np.where(self.system.kinds == "q", found, y)
         return found, self._pushed(slope, found - y, impulse, inertia * magnitude[self._column])

@@ -25,7 +25,7 @@ from sysdyn.runtime.numerics.gauss_newton import (
 )
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.moved import moved_guesses
-from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
+from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Places, Starter, problem_of
 from sysdyn.runtime.start.strategies import CLOSED, EXACT, OWN, STRATEGIES, first, rescaled
 from sysdyn.values import dataclass
 
@@ -177,23 +177,43 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
 
 
 def consistent_start(
-    system: System, t0: float, near: ConsistentState | None = None, until: float | None = None
+    system: System,
+    t0: float,
+    near: ConsistentState | None = None,
+    until: float | None = None,
+    *,
+    constants: bool = False,
 ) -> ConsistentState:
     """A state at t0 that satisfies all rows and their hidden derivatives.
 
     system: any index form of the model; near: a state to stay close to, else the guesses; until: `time.monotonic()` at
-    which the search is given up.  Raises InconsistentStart; SolverFailure (max_wall).
+    which the search is given up; constants: those of integrated constraints, which the model then has, follow from the
+    rest.  Raises InconsistentStart; SolverFailure (max_wall).
     """
     try:
-        return _consistent(system, t0, near, until)
+        return _consistent(system, t0, near, until, constants=constants)
     except OutOfTimeError as error:
         raise SolverFailure("max_wall", t0, 0.0) from error
 
 
-def _consistent(system: System, t0: float, near: ConsistentState | None, until: float | None) -> ConsistentState:
+def _integrated(starter: Starter) -> tuple[Places, Places]:
+    """Rows of integrated constraints, and where their constants stand in p, which are subtracted there."""
+    first = {family: row for group, family, row in starter.settled.form.groups if group == "phi"}
+    pieces = starter.system.description.constants
+    rows = [first[family] + np.arange(number) for family, _, number in pieces]
+    places = [place + np.arange(number) for _, place, number in pieces]
+    return np.concatenate(rows), np.concatenate(places)
+
+
+def _consistent(
+    system: System, t0: float, near: ConsistentState | None, until: float | None, *, constants: bool
+) -> ConsistentState:
     """The same; OutOfTimeError."""
     system = system if system.form.name == "3" else system.another("3")
     starter = Starter(system)
+    if constants:
+        integrated, places = _integrated(starter)
+        starter.every[integrated] = False
     starter.work = Work(until=until)
     guess = starter.guess
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
@@ -202,6 +222,8 @@ def _consistent(system: System, t0: float, near: ConsistentState | None, until: 
     best, strategy = _attempt(starter, t0, guess, starter.free)
     if not strategy:
         raise _explain(starter, t0, guess, starter.free, best)
+    if constants:
+        system.description.p[places] += starter.residual(t0, best.x)[integrated]
     y, yd = starter.expand(best.x)
     moved = tuple(moved_guesses(starter, t0, best.x, starter.scale(t0, best.x)))
     largest = np.maximum(starter.scale(t0, guess), starter.largest_alike(best.x))

@@ -180,6 +180,19 @@ def test_a_division_by_a_parameter_that_is_zero():
     assert [(c, at) for c, _, at in judged(ratio)] == [("E324", "T: transformer(e2 = 1/r*e1) a -> ground, b -> ground")]
 
 
+@pytest.mark.parametrize("constant", ["sqrt(-1)", "ln(0)", "(-8)^(1/3)", "asin(2)", "mod(3, 0)", "0*inf"])
+def test_a_constant_that_is_no_number(constant):
+    for factor in ("2", "t/(1 s)"):
+        law = f"dynamic s' = {factor}*({constant})/(1 s)"
+        assert judged(f"state s: 1 = 0\n{law}") == [("E324", "a constant here is no number", law)]
+
+
+def test_a_constant_that_is_too_large():
+    body = "state s: 1 = 0\ndynamic s' = (s + 10^400)/(1 s)"
+    assert judged(body) == [("E324", "a constant here is too large for a number", "dynamic s' = (s + 10^400)/(1 s)")]
+    assert judged("state s: 1 = 0\ndynamic s' = clip(s, -inf, inf)/(1 s)") == []
+
+
 def test_what_is_required_is_told_with_its_values():
     body = SPRING.format("k") + "\nparam k = 3 kN/m\nparam limit = 2 N/mm\nrequire k < limit"
     assert judged(body) == [("E322", "require k < limit fails: k = 3 kN/m, limit = 2 N/mm", "require k < limit")]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from model_runs import attempt
 from sysdyn.api import simulate
 
 W = 100.0 * np.pi
@@ -217,3 +218,81 @@ def test_a_gate_whose_transistors_are_off_by_turns(tmp_path):
     begin, end = at[17], at[27]
     fallen = begin / (2.0 * u - begin) * np.exp(-rate * 1e-9)
     assert abs(end - 2.0 * u * fallen / (1.0 + fallen)) < 1e-6
+
+
+SHARED = """from std.electrical import capacitor, switch
+model shared {
+  node a, b: electrical
+  C1: capacitor(C = 1 mF) a -> ground
+  C2: capacitor(C = 2 mF) b -> ground
+  S: switch(gate = if t > 0.37 s then 1 else 0) a -> b
+  init C1.e = 10 V
+  init C2.e = 1 V
+}
+scene s of shared {
+  time 0 s to 0.5 s
+  trace C1.e as v1, C2.e as v2 every 50 ms
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_two_capacitors_and_a_switch_alone(formulation, tmp_path):
+    """One flow through all three, which nothing resists: its row alone says where the charge is behind the jump."""
+    trace = run(SHARED, tmp_path, formulation)
+    behind = trace.time > 0.37
+    assert np.abs(trace["v1"].values - np.where(behind, 4.0, 10.0)).max() < 1e-12
+    assert np.abs(trace["v2"].values - np.where(behind, 4.0, 1.0)).max() < 1e-12
+
+
+GROUNDED = """from std.electrical import capacitor, switch
+model grounded {
+  node n1, n2, n3: electrical
+  C0: capacitor(C = 1 mF) n1 -> ground
+  C1: capacitor(C = 3 mF) n2 -> ground
+  C2: capacitor(C = 4 mF) n3 -> n1
+  C3: capacitor(C = 2 mF) n3 -> n2
+  S: switch(gate = if t > 0.211 s then 1 else 0) ground -> n3
+  init C0.e = 2 V
+  init C1.e = 4 V
+  init C2.e = 5 V
+}
+scene s of grounded {
+  time 0 s to 0.5 s
+  trace C0.e as v0, C1.e as v1, C2.e as v2, C3.e as v3 every 50 ms
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_what_series_capacitors_hold_besides_their_flow_stays_where_charge_jumps(formulation, tmp_path):
+    """n3 at 7 V is grounded: each branch loses it in the inverse proportion of its capacities, its own charge stays."""
+    trace = run(GROUNDED, tmp_path, formulation)
+    behind = trace.time > 0.211
+    for name, before, after in (("v0", 2.0, 2 - 5.6), ("v1", 4.0, 4 - 2.8), ("v2", 5.0, 5 - 1.4), ("v3", 3.0, 3 - 4.2)):
+        assert np.abs(trace[name].values - np.where(behind, after, before)).max() < 1e-12
+
+
+TWICE = """from std.electrical import capacitor, resistor, switch
+model twice {
+  node a, b: electrical
+  C: capacitor(C = 1 mF) a -> ground
+  S: switch(gate = if t > 0.2 s then 1 else 0) a -> b
+  T: switch(gate = if t > 0.4 s then 1 else 0) a -> b
+  R: resistor(R = 100 ohm) b -> ground
+  init C.e = 10 V
+}
+scene s of twice {
+  time 0 s to 1 s
+  trace C.e every 0.1 s
+}
+"""
+
+
+def test_closed_switches_side_by_side_are_named_with_a_remedy(tmp_path):
+    ran, report = attempt(tmp_path, TWICE)
+    assert ran.exit == 3
+    (found,) = [d for d in report if d.severity == "error"]
+    assert found.code == "E931"
+    assert "T" in found.message
+    assert found.help.startswith("constraints that hold at one time may say the same twice: leave one out")

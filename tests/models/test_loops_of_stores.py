@@ -110,3 +110,29 @@ def test_a_winding_of_many_coils(tmp_path, jump):
     }
     for name, values in expected.items():
         assert np.abs(trace[name].values - values).max() < 1e-6 * np.abs(values).max(), name
+
+
+STAR = """
+from std.electrical import capacitor
+model star {
+  node n1, n2: electrical
+  C0: capacitor(C = 1 F) n1 -> ground
+  C2: capacitor(C = 2 F) n1 -> ground
+  C1: capacitor(C = 3 F) n1 -> n2
+  C3: capacitor(C = 4 F) n2 -> ground
+  init C0.e = 1 V
+  init C1.e = 0.25 V
+}
+scene s of star {
+  time 0 s to 1 s
+  trace C0.e as v0, C1.e as v1, C2.e as v2, C3.e as v3 every 0.1 s
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_charge_of_a_node_follows_where_loops_say_what_the_text_does_not(tmp_path, formulation):
+    """C2 and C3 are left to the loops: the charge of n1, a constant of its integrated row, is 6.5 C and not 1.75 C."""
+    trace = trace_of(tmp_path, STAR, formulation=formulation)
+    for name, volts in (("v0", 1.0), ("v1", 0.25), ("v2", 1.0), ("v3", 0.75)):
+        assert np.abs(trace[name].values - volts).max() < 1e-12

@@ -1,4 +1,4 @@
-"""Coordinates without inertia on the underlying equation: resistors, capacitors and inductors at index 0."""
+"""Coordinates without inertia: resistors, capacitors and inductors at index 0, springs at stops."""
 
 import numpy as np
 import pytest
@@ -81,3 +81,35 @@ def test_what_would_need_rates_of_balances_says_so(tmp_path):
     names = [word.rstrip("',") for word in listed.split(": ")[1].split() if word.rstrip(",").endswith("'")]
     assert advised.split(", constraints")[0].split(", ") == list(dict.fromkeys(names))[:3]  # in one order
     assert trace_of(tmp_path, text, scene="run", formulation="co_lagrangian", method="dopri").attributes["index"] == "0"
+
+
+STOPPED = """from std.mechanical import spring, force
+model stopped {{
+  node x, y: translation
+  K: spring(k = 50 N/m, l0 = {free}) x -> ground
+  L: spring(k = 50 N/m) y -> x
+  F: force(F = {force}) ground -> y
+  phi stop: y.q <= 30 mm
+}}
+scene go of stopped {{
+  time 0 s to 1 s
+  trace x.q as x, y.q as y, stop.multiplier as s every 50 ms
+}}
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR[:2])
+def test_springs_without_masses_begin_at_the_stop_that_they_press_on(tmp_path, formulation):
+    """Springs of 0.11 m and none push to 0.11 m: nothing moves there, and still it is beyond the stop."""
+    trace = trace_of(tmp_path, STOPPED.format(free="0.11 m", force="0 N"), formulation=formulation)
+    for name, value in (("x", 0.07), ("y", 0.03), ("s", 2.0)):
+        assert np.abs(trace[name].values - value).max() < 1e-12
+
+
+@pytest.mark.parametrize("formulation", FOUR[:2])
+def test_a_force_that_jumps_takes_massless_springs_to_the_stop_and_not_beyond(tmp_path, formulation):
+    text = STOPPED.format(free="0 m", force="if t < 0.42 s then -1 N else 2 N")
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    behind = trace.time > 0.42
+    for name, before, after in (("x", -0.02, 0.015), ("y", -0.04, 0.03), ("s", 0.0, 2.0 - 0.75)):
+        assert np.abs(trace[name].values - np.where(behind, after, before)).max() < 1e-12

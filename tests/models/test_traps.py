@@ -328,3 +328,14 @@ def test_signs_do_not_depend_on_the_formulation(tmp_path, formulation):
     x, v = 0.3 * np.cos(2 * t) + 0.25 * np.sin(2 * t), -0.6 * np.sin(2 * t) + 0.5 * np.cos(2 * t)
     for name, exact in (("S.q", x), ("S.e", 8 * x), ("M.p", 2 * v), ("v", v)):
         np.testing.assert_allclose(trace[name].values, exact, atol=2e-6)
+
+
+# Not of the seed: a number that is none.
+
+
+def test_an_infinite_term_is_told_at_the_start(tmp_path):
+    """The ledgers combine balances by exact fractions: what is no number is left to the start, which names it."""
+    text = "model m {\n  state s: 1 = 0\n  dynamic s' = exp(1000)/(1 s)\n}\nscene go of m {\n  time 0 s to 1 s\n}\n"
+    ran, report = attempt(tmp_path, text)
+    assert ran is None
+    assert [d.code for d in report] == ["E519"]

@@ -136,6 +136,22 @@ ROWS = (
         {"C.y": lambda t: 4.0 * (((t > pi / 6) & (t < 7 * pi / 6)) | (t > 13 * pi / 6))},
     ),
     Row(
+        "hysteresis",
+        """
+  C: hysteresis(on_at = 1 V, off_at = -1 V, lo = 0 A, hi = 4 A) u = 2 V*cos(1 rad/s*t)
+""",
+        8.0,
+        {"C.y": lambda t: 4.0 * ((t < 2 * pi / 3) | ((t > 5 * pi / 3) & (t < 8 * pi / 3)))},
+    ),
+    Row(
+        "hysteresis",
+        """
+  C: hysteresis(on_at = 1 V, off_at = -1 V, lo = 0 A, hi = 4 A, begins = 1) u = -2 V*cos(1 rad/s*t)
+""",
+        8.0,
+        {"C.y": lambda t: 4.0 * (((t > 2 * pi / 3) & (t < 5 * pi / 3)) | (t > 8 * pi / 3))},
+    ),
+    Row(
         "sample_hold",
         """
   C: sample_hold(Ts = 0.1 s) u = 2 V*sin(1 rad/s*t)

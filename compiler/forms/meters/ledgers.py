@@ -11,6 +11,7 @@ Received: an EnergyModel and the audit's entries.  Returned: ledgers, each with 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -240,6 +241,8 @@ def _coefficients(expressions: Iterable[Node]) -> dict[Node | None, Fraction]:
     for expression in expressions:
         for piece in summands(expression):
             factor, node = (piece.data, None) if is_const(piece) else _split(piece)
+            if not math.isfinite(factor):  # what the start says is no number: no part of a combination
+                factor, node = 1.0, piece
             found[node] = found.get(node, Fraction(0)) + Fraction(factor)
     return {node: c for node, c in found.items() if c}
 
