@@ -462,7 +462,8 @@ class Runs:
         if self.patience is None or self.patience != self.most_steps or not self.smooth or not self.samplings:
             return False
         last = self.samplings[-1]
-        return last.steps * (last.tolerance / tolerance) ** (1.0 / (lib.MAX_ORDER + 1)) > self.patience
+        steps: float = last.steps * (last.tolerance / tolerance) ** (1.0 / (lib.MAX_ORDER + 1))
+        return steps > self.patience
 
     def _left_open(self, finished: Finished) -> LeftOpen:
         """Asked of the equations once a run: of its quantities, and of each of its ledgers."""
