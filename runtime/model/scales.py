@@ -2,7 +2,8 @@
 
 A magnitude is the nominal value of the manifest where it names one.  Else the largest of |y| at the start, |y'| times
 the time scale of the start (never the span alone: a long run would call everything small), and a thousandth of these
-among unknowns of the same kind and unit.
+among unknowns of the same kind and unit.  That time is the shortest in which anything gets as far as it is, or as its
+like are where it is zero, unless it goes a thousand times as far (a particle near the speed of light beside a ball).
 Unknowns that are zero with all of that take the magnitude that balances the rows they stand in: the other terms
 of the row, and how far the row itself moves with t over the span (sources that start at zero).  Such a row knows
 nothing of what relieves it (the whole of a source on a diode would drive 1e8 A), and balances little where what drives

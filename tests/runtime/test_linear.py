@@ -474,3 +474,25 @@ def test_chains_are_solved_and_refactorised_as_any_matrix(steps, seed):
             error = (solver.solve(full @ x) - x) / (1.0 if scale is None else scale)
             assert np.abs(error).max() < 1e-12
     assert solver.linear.contents.pivotings == 1
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_fill_of_a_column_order_is_that_of_rows_merged_by_hand(seed):
+    """Also behind the column whose merged row holds all that are left: the rest stands in one row."""
+    rng = np.random.default_rng(seed)
+    m, n = 14 + seed, 12 + seed
+    there = rng.random((m, n)) < 0.08 + 0.03 * (seed % 4)
+    there[np.arange(n), np.arange(n)] = True
+    pattern = csc_array(there.astype(float))
+    pattern.sort_indices()
+    order, filled = np.zeros(n, dtype=np.int32), np.zeros(1, dtype=np.int64)
+    places = (np.ascontiguousarray(a, dtype=np.int32) for a in (pattern.indptr, pattern.indices))
+    arrays = [lib.pointer(a) for a in (*places, order, filled)]
+    assert lib.core.sd_column_order(m, n, *arrays) == 0
+    assert sorted(order) == list(range(n))
+    rows, wanted = [set(np.flatnonzero(row)) for row in there], 0
+    for c in order:
+        merged = set().union(*(r for r in rows if c in r)) - {c}
+        rows = [r for r in rows if c not in r] + [merged]
+        wanted += len(merged)
+    assert filled[0] == wanted

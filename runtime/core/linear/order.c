@@ -139,9 +139,10 @@ static void rescore(graph *g, int32_t pivot, int32_t left)
     }
 }
 
-static int eliminate(graph *g, int32_t *order, int32_t place)
+/* order [last]: the columns that are listed, in the order of their elimination.  0; -1: no memory */
+static int eliminate(graph *g, int32_t *order, int32_t last)
 {
-    int32_t least = 0;
+    int32_t least = 0, place = 0;
     for (int32_t pivot = 0;; pivot++) {
         while (least <= g->columns && g->first[least] == NONE)
             least++;
@@ -161,6 +162,13 @@ static int eliminate(graph *g, int32_t *order, int32_t place)
             continue;
         if (!merge(g, c, pivot))
             return -1;
+        int32_t left = g->length[g->made - 1];
+        if (place + left == last) { /* it stands in for all rows: the last of its columns comes first, each time anew */
+            g->filled += (int64_t)left * (left - 1) / 2;
+            while (left)
+                order[place++] = g->member[g->start[g->made - 1] + --left];
+            return 0;
+        }
         rescore(g, pivot, g->columns - 1);
         for (int64_t at = g->start[g->made - 1]; at < g->start[g->made - 1] + g->length[g->made - 1]; at++)
             least = g->score[g->member[at]] < least ? g->score[g->member[at]] : least;
@@ -192,7 +200,7 @@ int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const 
             g.first[k] = g.mark[k] = NONE;
         for (size_t k = 0; k < m; k++)
             g.seen[k] = NONE;
-        int32_t place = 0, last = columns, long_row = (int32_t)fmax(16.0, DENSE * sqrt((double)columns));
+        int32_t last = columns, long_row = (int32_t)fmax(16.0, DENSE * sqrt((double)columns));
         int32_t long_column = (int32_t)fmax(16.0, DENSE * sqrt((double)rows));
         for (int32_t c = 0; c < columns; c++) {
             if (column[c + 1] - column[c] > long_column) {
@@ -230,7 +238,7 @@ int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const 
                 score += g.length[g.of[g.own[c] + k]] - 1;
             enlist(&g, c, (int32_t)(score < columns ? score : columns));
         }
-        failed = eliminate(&g, order, place);
+        failed = eliminate(&g, order, last);
         *filled = g.filled;
     }
     free(g.start);

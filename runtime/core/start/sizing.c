@@ -11,12 +11,19 @@
 #define ROUND_OFF 1e-12 /* of the largest of the same unit: smaller ones are what is left of a zero */
 #define NOTHING 1e-14   /* of the largest of the same kind and unit: less is what arithmetic leaves of a zero */
 #define FRESH 1e-9      /* of what a rate makes of a quantity in the time scale so far: a start below it is round-off */
+#define OUTLYING 1e3    /* times the largest of its like: a state that begins at zero and gets so far is none of them */
 #define UNKNOWN 1.0     /* magnitude of what is zero with all that could size it (scales.py) */
 #define GROUP 1e-3      /* of their like: the least that zeros count as (scales.py) */
 #define PART 1e-2       /* of the span: the time scale at most */
 #define NOISE 1e-6      /* values below this part of what balances their rows are round-off, or zero by chance */
 #define QUIET 1e-9      /* efforts below this part of (largest energy) / q are round-off, and flows of their like */
 #define TINY (DBL_MIN * 1e30) /* less is no magnitude */
+
+/* The motion linearised at a start: entries of dF/dy, dF/dyd, rates (NULL: none of it is known), order of columns. */
+typedef struct sd_motion {
+    const double *jy, *jyd, *rate;
+    const sd_order *order;
+} sd_motion;
 
 /* most [kinds] := the largest of each kind and unit */
 static void group_largest(const sd_balance *b, const double *x, double *most)
@@ -67,18 +74,42 @@ int sd_relaxed(const sd_system *system, const sd_order *order, int32_t rungs, co
     return 0;
 }
 
-/* the shortest of: a part of the span, y / y', sqrt(q / f'), what moves with t; size [n], most [kinds]: room */
-static double time_scale(const sd_sizing *s, const sd_system *system, double span, double quick, const double *y,
-                         const double *yd, double *size, double *most)
+/* size [n] := the largest |y| of the like of each unknown; of a state that is zero, and gets OUTLYING times as far within
+ * `time`, how far that is (reach, by the motion linearised: sd_relaxed).  most [kinds]: room.  0; -1: no memory */
+static int like_sizes(const sd_sizing *s, const sd_system *system, double time, const double *y, const double *yd,
+                      const sd_motion *motion, double *size, double *reach, double *most)
 {
     const sd_balance *b = s->balance;
-    double found = sd_smaller(PART * span, quick), least = INFINITY;
+    int outlying = 0;
     for (int32_t k = 0; k < b->unknowns; k++)
         size[k] = fabs(y[k]);
     group_largest(b, size, most);
     for (int32_t k = 0; k < b->unknowns; k++) {
+        double like = most[b->kind[k]];
+        int far = (s->kind[k] & SD_STATE) && size[k] <= NOTHING * like && OUTLYING * like < fabs(yd[k]) * time;
+        outlying |= far;
+        size[k] = far ? -like : like;
+    }
+    if (outlying && motion->rate &&
+        sd_relaxed(system, motion->order, s->rungs, s->rung, motion->jy, motion->jyd, motion->rate, time, reach))
+        return -1;
+    for (int32_t k = 0; k < b->unknowns && outlying; k++)
+        if (size[k] < 0.0)
+            size[k] = motion->rate && reach[k] > -OUTLYING * size[k] ? reach[k] : -size[k];
+    return 0;
+}
+
+/* the shortest of: a part of the span, y / y', sqrt(q / f'), what moves with t; size, reach [n], most [kinds]: room; -1: no
+ * memory */
+static double time_scale(const sd_sizing *s, const sd_system *system, double span, double quick, const double *y,
+                         const double *yd, const sd_motion *motion, double *size, double *reach, double *most)
+{
+    const sd_balance *b = s->balance;
+    double found = sd_smaller(PART * span, quick), least = INFINITY;
+    if (like_sizes(s, system, found, y, yd, motion, size, reach, most))
+        return -1.0;
+    for (int32_t k = 0; k < b->unknowns; k++) {
         double rate = fabs(yd[k]);
-        size[k] = most[b->kind[k]];
         /* values that are nothing beside what their rate makes of them are round-off */
         if ((s->kind[k] & SD_STATE) && size[k] > FRESH * rate * found && rate > 0.0)
             least = sd_smaller(least, size[k] / rate);
@@ -282,11 +313,11 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     double *own_jy = row + 2 * rows, *own_jyd = own_jy + entries + 1, *size = own_jyd + entries + 1;
     double *least = size + entries;
     double quick = sd_excitation(system, t0, t0 + span - t0, y, yd, s->part, s->parts, NOISE, excited);
-    *tau = time_scale(s, system, span, quick, y, yd, room, most);
+    *tau = time_scale(s, system, span, quick, y, yd, &(sd_motion){jy, jyd, rate, order}, room, moves, most);
     sd_jacobian(system, t0, y, yd, own_jy, own_jyd);
     carriers(s, own_jyd, carries);
-    int failed = quick < 0.0;
-    if (rate)
+    int failed = quick < 0.0 || *tau < 0.0;
+    if (rate && !failed)
         failed |= sd_relaxed(system, order, s->rungs, s->rung, jy, jyd, rate, *tau, moves);
     for (size_t k = 0; k < n; k++)
         moves[k] = !carries[k] ? 0.0 : rate ? moves[k] : *tau * fabs(yd[k]);
