@@ -13,11 +13,14 @@ from sysdyn.runtime.model.inertia import own_inertia
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 
+SQUARED = 1e-70, 1e70
+"""Magnitudes whose squares, and quotients of these, are numbers."""
+
 
 def kinematic_scale(system: System, magnitude: Floats, jy: Floats, jyd: Floats) -> Floats:
     """Factor of each row q' - f; 1 where all displacements have one unit."""
     form = system.form
     size = group_maximum(system, np.abs(own_inertia(system, jy, jyd)))[form.k_f]
     if not (size > 0.0).all() or not np.isfinite(size).all():
-        size = group_maximum(system, magnitude)[form.k_q] ** -2.0
+        size = np.clip(group_maximum(system, magnitude)[form.k_q], *SQUARED) ** -2.0
     return np.asarray(size / size.min(initial=np.inf))
