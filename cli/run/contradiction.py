@@ -57,6 +57,9 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             left = f"{names}: residual {_residual(prepared, error)}"
             message = f"fixed initial values of {fixed} contradict {left}"
             report.error("E903", message, where, help=f"free one of {fixed}: '~' for '='", related=related)
+        case "fixed" if any(row.kind == "initial" for row in error.rows):
+            message = f"an initial value contradicts the constraints: residual {_residual(prepared, error)}"
+            report.error("E903", message, where, help="the value that they leave, or '~' for '='")
         case "fixed":
             left = _residual(prepared, error)
             report.error(

@@ -4,6 +4,7 @@ import json
 import math
 
 import pytest
+from model_runs import attempt, trace_of
 from sysdyn.cli.main import run
 
 CRANK = """
@@ -138,3 +139,28 @@ def test_consistent_guesses_of_stores_come_back_in_both_families(tmp_path, capsy
     trace = Trace.open(out)
     first = [float(trace[name][0]) for name in ("C1.e", "C2.e", "L.f")]
     assert first == pytest.approx([1.25, -0.5, 3e-3], rel=1e-12)
+
+
+@pytest.mark.parametrize("sign", ["=", "~"])
+@pytest.mark.parametrize("where", ["node a: electrical {} 5 V", "node a: electrical\n  init a.e {} 5 V"])
+def test_the_effort_of_a_node_that_a_source_holds_agrees_or_is_a_guess(tmp_path, where, sign):
+    """Rule 24 of the language: a value that is not the source's is E903, one that is guessed moves to it."""
+    text = f"""from std.electrical import voltage, resistor
+model held {{
+  {where.format(sign)}
+  node b: electrical
+  V: voltage(v = 1 V) a -> ground
+  R: resistor(R = 2 ohm) a -> b
+  S: resistor(R = 3 ohm) b -> ground
+}}
+scene s of held {{ time 0 s to 1 s; trace a.e, R.f }}
+"""
+    if sign == "~":
+        trace = trace_of(tmp_path, text)
+        assert [trace["a.e"][0], trace["R.f"][0]] == pytest.approx([1.0, 0.2], rel=1e-12)
+        return
+    ran, report = attempt(tmp_path, text)
+    assert ran is None
+    assert [(d.code, d.message) for d in report] == [
+        ("E903", "an initial value contradicts the constraints: residual 4")
+    ]
