@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Difference allowed, of the terms of a row: sums are ordered apart, and functions differ in their last digits."""
+FEW_DIGITS = float(np.finfo(float).tiny)
+"""Numbers below it have few digits (the kinetic energy behind the tail of a pulse: 6.7e-322 J)."""
 NEARBY = (1e-2, 0.3)
 """Distances of the points from the start, of the unknowns' magnitudes."""
 
@@ -71,7 +73,7 @@ def _apart(found: Array, sample: Sample) -> NDArray[np.bool_]:
     both = ~np.isfinite(found) & ~np.isfinite(sample.value)  # a point outside the range of a root
     # the size of terms in which something overflows (one over cosh) is no number
     size = np.where(np.isfinite(sample.size), sample.size, np.abs(sample.value))
-    return ~both & ~(apart <= ROUNDING * size)
+    return ~both & ~(apart <= ROUNDING * size + FEW_DIGITS)
 
 
 def _points(system: System, whole: System, started: Started, oracle: SampledRows, until: float) -> Points:
