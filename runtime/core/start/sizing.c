@@ -86,16 +86,16 @@ static int like_sizes(const sd_sizing *s, const sd_system *system, double time, 
     group_largest(b, size, most);
     for (int32_t k = 0; k < b->unknowns; k++) {
         double like = most[b->kind[k]];
-        int far = (s->kind[k] & SD_STATE) && size[k] <= NOTHING * like && OUTLYING * like < fabs(yd[k]) * time;
+        int far = motion->rate && (s->kind[k] & SD_STATE) && size[k] <= NOTHING * like && OUTLYING * like < fabs(yd[k]) * time;
         outlying |= far;
         size[k] = far ? -like : like;
     }
-    if (outlying && motion->rate &&
+    if (outlying &&
         sd_relaxed(system, motion->order, s->rungs, s->rung, motion->jy, motion->jyd, motion->rate, time, reach))
         return -1;
     for (int32_t k = 0; k < b->unknowns && outlying; k++)
         if (size[k] < 0.0)
-            size[k] = motion->rate && reach[k] > -OUTLYING * size[k] ? reach[k] : -size[k];
+            size[k] = reach[k] > -OUTLYING * size[k] ? reach[k] : -size[k];
     return 0;
 }
 
