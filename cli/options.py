@@ -89,7 +89,7 @@ def solved(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options that say how a scene is solved, and for how long."""
     for option in reversed(
         [
-            click.option("--method", type=click.Choice(["auto", "bdf", "radau", "dopri", "energy", "euler"])),
+            click.option("--method", type=click.Choice(["auto", "bdf", "radau", "rosenbrock", "dopri", "energy", "euler"])),
             click.option("--redundancy", type=click.Choice(["error", "drop", "minimum_norm"])),
             click.option(
                 "--accuracy", type=float, metavar="R", help="Relative accuracy of the traced quantities. Default 1e-4."

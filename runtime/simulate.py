@@ -43,6 +43,9 @@ SMALL = 100
 """Unknowns up to which steep laws are the bdf's: where they turn, Newton's method holds the steps of any method, and a
 step of the bdf is the cheapest; of larger systems factors and rows are dear, and radau takes the fewest steps."""
 
+COARSE = 1e-6
+"""Accuracies below which more stages, whose orders are higher, cost less than the method without Newton's iteration."""
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -139,10 +142,10 @@ def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Es
 
 
 def _achieved(
-    runs: Runs, options: Options, *, doubted: bool = False, lighter: Lighter | None = None
+    runs: Runs, options: Options, *, doubted: bool = False, tame: bool = False, lighter: Lighter | None = None
 ) -> Achieved:
-    target = _targets(runs, options)
-    return control(runs.sampled, target, runs.way.law, doubted=doubted, first=options.first, lighter=lighter)
+    target, first = _targets(runs, options), options.first
+    return control(runs.sampled, target, runs.way.law, doubted=doubted, tame=tame, first=first, lighter=lighter)
 
 
 def _lighter(runs: Runs, options: Options, others: tuple[Way, ...]) -> Lighter | None:
@@ -209,13 +212,14 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
     alone, and efforts that blocked diodes leave to a source may bend between its steps.  Where the bdf is held back at
     its highest order the motion is smooth, and radau takes all its stages (ring modulator at 1e-6: 5.3 s -> 1.3).
     """
-    doubted, smooth, steep = False, False, bool(runs.system.form.scales)
+    doubted, smooth, tame, steep = False, False, False, bool(runs.system.form.scales)
     missed: Achieved | None = None
     stopped: SolverFailure | None = None
     while True:
         runs.patience = (LONG_STEEP if steep else LONG) if runs.method == "bdf" and others else None
         try:
-            achieved = _achieved(runs, options, doubted=doubted, lighter=_lighter(runs, options, others))
+            lighter = _lighter(runs, options, others)
+            achieved = _achieved(runs, options, doubted=doubted, tame=tame, lighter=lighter)
         except SolverFailure as failure:
             if not others or _bounded(failure, runs):
                 if missed is None:
@@ -225,9 +229,10 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
             smooth = failure.smooth and failure.cause == "max_steps"
             stopped = failure if doubted else stopped
         else:
-            short = _short(runs, options, achieved) if steep and others else None
+            short = _short(runs, options, achieved) if (steep or runs.way.law.brief) and others else None
             if short is None:
                 return achieved
+            tame = achieved.lost
             why, missed = short, replace(achieved, error_estimate=None, below_round_off=False, met=False)
         runs.take(replace(others[0], reason=why, smooth=smooth and steep))
         others = others[1:]
@@ -304,6 +309,13 @@ def simulate(
         return _runs(runs, ways[1:], written, facts, warnings)
 
 
+def _without_newton(way: Way, options: Options) -> tuple[Way, ...]:
+    """The method that solves a few linear systems a step and iterates for nothing, where it is the cheapest."""
+    wanted = [a for a in (options.accuracy, *(w for _, w in options.accuracy_on)) if a is not None]
+    serves = way.index <= 1 and way.system.unknowns <= SMALL and min(wanted, default=1.0) >= COARSE
+    return (replace(way, method="rosenbrock"),) if serves else ()
+
+
 def alternatives(way: Way, written: System, start: ConsistentState, options: Options) -> tuple[Way, ...]:
     """What method auto tries, in this order; `way` among it.
 
@@ -320,15 +332,16 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     if options.events and not options.events.bends:
         return replace(way, reason="events"), other
     if way.system.form.scales:
-        steep = replace(way, reason="steep laws")
-        return (replace(other, reason="steep laws"), way) if way.system.unknowns <= SMALL else (steep, other)
+        first, *others = *_without_newton(way, options), *((other, way) if way.system.unknowns <= SMALL else (way, other))
+        return replace(first, reason="steep laws"), *others
     system = written.another("0")
     missing = rateless(system, start)
     if missing:
         if system.unknowns > LARGE:
             system.forget()
-        return replace(way, reason=f"no explicit equation for {missing[0]}"), other
-    return Way("dopri", system, 1, "0", NOT_STIFF), way, other
+        first, *others = *_without_newton(way, options), way, other
+        return replace(first, reason=f"no explicit equation for {missing[0]}"), *others
+    return Way("dopri", system, 1, "0", NOT_STIFF), *_without_newton(way, options), way, other
 
 
 def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure, warnings: tuple[str, ...]) -> Outcome:

@@ -28,7 +28,7 @@ from sysdyn.dsl.tree import syntax
 _Said = TypeVar("_Said", syntax.Set, syntax.Trace)
 RESERVED = ("time", "audit", "parameters", "events", "derivatives")
 FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "co_kane", "auto")
-SOLVERS = ("auto", "bdf", "radau", "dopri", "energy", "euler")
+SOLVERS = ("auto", "bdf", "radau", "rosenbrock", "dopri", "energy", "euler")
 REDUNDANCY = ("error", "drop", "minimum_norm")
 FINEST_ACCURACY = 1e-13
 """Relative; what doubles resolve, and the estimate must be seen too."""

@@ -248,7 +248,7 @@ class Integration:
             method.max_order = request.max_order
         elif request.method == "radau":
             method.stages, method.balances = first, int(self._steep_balances)
-        else:
+        elif self.underlying is not None:
             method.patience = request.stiff_steps
         if request.method == "dopri":
             method.spare, method.opening = request.spare_steps, request.opening

@@ -18,7 +18,7 @@ from sysdyn.runtime.numerics.ordering import Order
 
 
 class Method:
-    """One of "bdf", "radau", "dopri", "energy" on one system.
+    """One of "bdf", "radau", "rosenbrock", "dopri", "energy" on one system.
 
     linear: the core's real factorisation; factors, order: where complex ones come from, of their matrices; underlying:
     for dopri and energy; stages: of radau, at most.
@@ -53,6 +53,8 @@ class Method:
             )
         elif underlying is not None:
             self._core = lib.core.sd_dopri_new(c.byref(system.core), underlying.core)
+        elif name == "rosenbrock":
+            self._core = lib.core.sd_rosenbrock_new(c.byref(system.core), linear)
         else:
             self._core = lib.core.sd_bdf_new(c.byref(system.core), linear)
         if not self._core:

@@ -9,13 +9,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.plan import Plan
-from sysdyn.runtime.integrate.request import ON_UNDERLYING, STEP, TRACE
+from sysdyn.runtime.integrate.request import OF_INDEX_ONE, ON_UNDERLYING, STEP, TRACE
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import NoSuchForm, WrongOption
 from sysdyn.runtime.numerics.points import distinct
 from sysdyn.runtime.structure.structure import Structure
 from sysdyn.runtime.trace.trace import Parameter
 from sysdyn.values import dataclass
+
+METHODS = ("bdf", "radau", "rosenbrock", "dopri", "energy", "euler")
+"""What may be named instead of auto."""
 
 Progress = Callable[[float, float | None], None]
 """Fraction of the span done, seconds left (None: not known yet)."""
@@ -80,6 +83,10 @@ def choose_index(wanted: str, facts: Structure, method: str = "auto") -> tuple[s
         )
     if wanted == "0":
         return "0", 1, ()
+    if method in OF_INDEX_ONE:
+        if wanted not in ("auto", "1") and (written is None or written > 1):
+            raise NoSuchForm(f"method {method} integrates equations of index 1, and index {wanted} was asked for")
+        return ("3", written, ()) if written is not None and written <= 1 else ("1", 1, ())
     if written is None:
         return "3", 2, ("the model's index could not be determined: integrated as written",)
     if wanted == "auto":
@@ -112,9 +119,9 @@ def choose_method(options: Options) -> str:
     if options.method == "auto":
         own = options.rtol is not None or options.atol is not None
         return "bdf" if own else "radau"
-    if options.method in ("bdf", "radau", "dopri", "energy", "euler"):
+    if options.method in METHODS:
         return options.method
-    raise WrongOption(f"method {options.method}: auto, bdf, radau, dopri, energy or euler")
+    raise WrongOption(f"method {options.method}: auto, {', '.join(METHODS[:-1])} or {METHODS[-1]}")
 
 
 def instants(options: Options) -> tuple[Floats, Ints]:

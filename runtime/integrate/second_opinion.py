@@ -17,7 +17,7 @@ from sysdyn.runtime.integrate.runs import Runs, Way
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 
-OTHER = {"bdf": "radau", "radau": "bdf", "dopri": "radau", "energy": "dopri"}
+OTHER = {"bdf": "radau", "radau": "bdf", "rosenbrock": "radau", "dopri": "radau", "energy": "dopri"}
 
 
 def confirmed(runs: Runs, achieved: Achieved, target: Floats) -> Achieved:

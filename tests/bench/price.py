@@ -21,7 +21,7 @@ from measuring import Bench, Measured, Reference, names
 from sysdyn.runtime.model.failures import NoSuchForm
 
 TOLERANCES = tuple(10.0 ** (-0.5 * k) for k in range(2, 25))
-METHODS = ("bdf", "radau", "dopri")
+METHODS = ("bdf", "radau", "rosenbrock", "dopri")
 NEAR, REPEATED = 1.3, 1.0
 """Times the least CPU time of single runs that will do: those within it are timed again with the run, for so long (s).
 """

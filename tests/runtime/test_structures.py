@@ -20,7 +20,7 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs += [("Many", "sd_many"), ("Pass", "sd_pass"), ("Region", "sd_region"), ("RunClaim", "sd_claim")]
     pairs += [("RunSamples", "sd_samples"), ("Modes", "sd_modes"), ("Mode", "sd_mode"), ("Held", "sd_held")]
     pairs += [("Transition", "sd_transition"), ("Contact", "sd_contact"), ("Kink", "sd_kink")]
-    pairs += [("Underlying", "sd_underlying"), ("Dopri", "sd_dopri"), ("Energy", "sd_energy")]
+    pairs += [("Underlying", "sd_underlying"), ("Dopri", "sd_dopri"), ("Energy", "sd_energy"), ("Rosenbrock", "sd_rosenbrock")]
     pairs += [("Balance", "sd_balance"), ("Sizing", "sd_sizing"), ("Order", "sd_order")]
     pairs += [("RowsOfStart", "sd_rows_of_start"), ("Search", "sd_search")]
     pairs += [("Condensed", "sd_condensed"), ("Expanded", "sd_expanded"), ("Span", "sd_span")]

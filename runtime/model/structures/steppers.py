@@ -13,6 +13,8 @@ POINTS = 3
 DOPRI_STAGES = 16
 DOPRI_DENSE = 7
 ENERGY_STAGES = 6
+ROSENBROCK_STAGES = 8
+ROSENBROCK_DENSE = 3
 _ORDERS = D * (MAX_ORDER + 2)
 
 
@@ -219,6 +221,30 @@ class Dopri(c.Structure):
         *[(name, P) for name in ["ee", "weight", "moved", "moved_d", "memory"]],
         *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
         *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
+        ("stepper", Stepper),
+    ]
+
+
+class Rosenbrock(c.Structure):
+    """sd_rosenbrock."""
+
+    _fields_ = [
+        ("system", P),
+        ("linear", P),
+        *[(name, I) for name in ["n", "tested"]],
+        *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
+        *[(name, P) for name in ["atol", "magnitude", "met", "test", "power"]],
+        *[(name, D) for name in ["t", "h", "h_used", "h_accepted", "error_accepted"]],
+        ("rejected", I),
+        *[(name, P) for name in ["phi", "yd", "last", "y", "rate", "drift", "begin"]],
+        *[(name, P) for name in ["end", "within", "within_d", "inner"]],
+        *[(name, P * ROSENBROCK_STAGES) for name in ["u", "v"]],
+        ("bend", P * ROSENBROCK_DENSE),
+        *[(name, P) for name in ["ee", "weight", "jy", "jyd", "g", "e", "memory", "rate_row", "rate_column"]],
+        ("rates", I),
+        *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
+        *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
+        ("project", P),
         ("stepper", Stepper),
     ]
 

@@ -1,0 +1,425 @@
+/* The step of Rodas5P: stages, error, step size, values within (see rosenbrock.h). */
+#include "steppers/rosenbrock.h"
+#include "linear/lanes.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define STAGES SD_ROSENBROCK_STAGES
+#define POWER 0.2          /* 1 / order of the estimate's error in the step */
+#define SAFE 0.9
+#define GROW 6.0           /* of the step at most */
+#define CUT 0.2            /* what a refused one is cut to at least */
+#define OPENS 1e-2         /* of the span: the first step at most */
+#define SLOPE 1e-6         /* of the step: over which dF/dt is taken */
+#define RESOLVED 64.0      /* of what t resolves: at least that */
+#define WITHIN 0.75        /* of the step: where values within are looked at; those of what is slaved are furthest off there */
+#define FAILS 12           /* matrices and stages of a step that may fail */
+
+static int step(void *rosenbrock)
+{
+    return sd_rosenbrock_step(rosenbrock);
+}
+
+static void start(void *rosenbrock, double t, const double *y, const double *yd, double h)
+{
+    sd_rosenbrock_start(rosenbrock, t, y, yd, h);
+}
+
+/* out [n] := sum_j weight[j] x[j] of the first `terms`, in whole lanes, for which all vectors have room */
+static inline __attribute__((always_inline)) void sum(int32_t n, int terms, const double *weight, double *const *x, double *out)
+{
+    for (int32_t i = 0; i < n; i += SD_LANES) {
+        sd_lanes total = weight[0] * SD_FROM(x[0], i);
+        for (int j = 1; j < terms; j++)
+            total += weight[j] * SD_FROM(x[j], i);
+        SD_AT(out, i) = total;
+    }
+}
+
+/* the polynomial of the last step */
+static SD_WIDE void prepare(sd_rosenbrock *rosenbrock)
+{
+    for (int k = 0; k < SD_ROSENBROCK_DENSE; k++)
+        sum(rosenbrock->n, STAGES, sd_rosenbrock_dense_weight[k], rosenbrock->u, rosenbrock->bend[k]);
+}
+
+/* y(x) = y0 + x (change + (1 - x) (b0 + x (b1 + x b2))) and its slope, x: part of a step of size h from y0 to y1.  yd NULL: y
+ * alone. */
+static void polynomial(const sd_rosenbrock *rosenbrock, const double *y0, const double *y1, double h, double x, double *y, double *yd)
+{
+    double left = 1.0 - x, *const *b = rosenbrock->bend;
+    for (int32_t i = 0; i < rosenbrock->n; i++) {
+        double change = y1[i] - y0[i];
+        double inner = b[0][i] + x * (b[1][i] + x * b[2][i]), inner_d = b[1][i] + 2.0 * x * b[2][i];
+        y[i] = y0[i] + x * (change + left * inner);
+        if (yd)
+            yd[i] = (change + (left - x) * inner + x * left * inner_d) / h;
+    }
+}
+
+static void within(const void *self, double t, double *y, double *yd)
+{
+    const sd_rosenbrock *rosenbrock = self;
+    size_t size = (size_t)rosenbrock->n * sizeof *y;
+    if (rosenbrock->taken == 0 || t >= rosenbrock->t) {
+        memcpy(y, rosenbrock->phi, size);
+        if (yd)
+            memcpy(yd, rosenbrock->yd, size);
+        return;
+    }
+    double h = rosenbrock->h_used;
+    polynomial(rosenbrock, rosenbrock->last, rosenbrock->phi, h, (t - (rosenbrock->t - h)) / h, y, yd);
+}
+
+static void values(const void *self, double t, double *y)
+{
+    within(self, t, y, NULL);
+}
+
+sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
+{
+    sd_rosenbrock *rosenbrock = calloc(1, sizeof *rosenbrock);
+    if (!rosenbrock)
+        return NULL;
+    size_t m = (size_t)sd_whole_lanes(system->unknowns + 1), nnz = (size_t)system->entries + 1;
+    double **vectors[] = {&rosenbrock->phi, &rosenbrock->yd, &rosenbrock->last, &rosenbrock->y, &rosenbrock->rate,
+                          &rosenbrock->drift, &rosenbrock->begin, &rosenbrock->ee, &rosenbrock->weight, &rosenbrock->end,
+                          &rosenbrock->within, &rosenbrock->within_d, &rosenbrock->inner};
+    size_t number = sizeof vectors / sizeof *vectors;
+    rosenbrock->memory = calloc((number + 2 * STAGES + SD_ROSENBROCK_DENSE) * m + 4 * nnz, sizeof(double));
+    rosenbrock->rate_row = calloc(2 * nnz, sizeof *rosenbrock->rate_row);
+    if (!rosenbrock->memory || !rosenbrock->rate_row) {
+        sd_rosenbrock_free(rosenbrock);
+        return NULL;
+    }
+    rosenbrock->rate_column = rosenbrock->rate_row + nnz;
+    double *next = rosenbrock->memory;
+    for (size_t i = 0; i < number; i++, next += m)
+        *vectors[i] = next;
+    for (int i = 0; i < STAGES; i++, next += 2 * m) {
+        rosenbrock->u[i] = next;
+        rosenbrock->v[i] = next + m;
+    }
+    for (int i = 0; i < SD_ROSENBROCK_DENSE; i++, next += m)
+        rosenbrock->bend[i] = next;
+    rosenbrock->jy = next;
+    rosenbrock->jyd = rosenbrock->jy + nnz;
+    rosenbrock->g = rosenbrock->jyd + nnz;
+    rosenbrock->e = rosenbrock->g + nnz;
+    rosenbrock->system = system;
+    rosenbrock->linear = linear;
+    sd_linear_replayed(linear);
+    rosenbrock->n = system->unknowns;
+    rosenbrock->stepper = (sd_stepper){
+        .self = rosenbrock, .system = system, .n = rosenbrock->n, .t = &rosenbrock->t, .t_end = &rosenbrock->t_end,
+        .y = rosenbrock->phi, .yd = rosenbrock->yd, .taken = &rosenbrock->taken, .step = step, .dense = within,
+        .values = values, .start = start};
+    return rosenbrock;
+}
+
+void sd_rosenbrock_free(sd_rosenbrock *rosenbrock)
+{
+    if (!rosenbrock)
+        return;
+    free(rosenbrock->memory);
+    free(rosenbrock->rate_row);
+    free(rosenbrock);
+}
+
+sd_stepper *sd_rosenbrock_stepper(sd_rosenbrock *rosenbrock)
+{
+    return &rosenbrock->stepper;
+}
+
+/* weights of the error test at the last accepted point; of what is not tested 0 */
+static void set_weights(sd_rosenbrock *rosenbrock)
+{
+    for (int32_t i = 0; i < rosenbrock->n; i++) {
+        double size = fabs(rosenbrock->phi[i]);
+        sd_met(size, &rosenbrock->met[i], &rosenbrock->magnitude[i]);
+        int state = rosenbrock->test[i] >= 0;
+        double atol = rosenbrock->atol && state ? rosenbrock->atol[i] : rosenbrock->rtol * rosenbrock->magnitude[i];
+        rosenbrock->weight[i] = state || rosenbrock->power[i] == 0 ? 1.0 / (atol + rosenbrock->rtol * size) : 0.0;
+    }
+}
+
+/* root mean square over the tested unknowns in the error weights; h: of those that count with it */
+static double norm(const sd_rosenbrock *rosenbrock, const double *x, double h)
+{
+    double all = 0.0;
+    for (int32_t i = 0; i < rosenbrock->n; i++) {
+        double part = x[i] * rosenbrock->weight[i] * (rosenbrock->test[i] > 0 ? h : 1.0);
+        all += part * part;
+    }
+    return rosenbrock->tested ? sqrt(all / rosenbrock->tested) : 0.0;
+}
+
+void sd_rosenbrock_start(sd_rosenbrock *rosenbrock, double t, const double *y, const double *yd, double h)
+{
+    size_t size = (size_t)rosenbrock->n * sizeof *y;
+    rosenbrock->t = t;
+    rosenbrock->taken = 0;
+    rosenbrock->tested = 0;
+    for (int32_t i = 0; i < rosenbrock->n; i++)
+        rosenbrock->tested += rosenbrock->test[i] >= 0;
+    memmove(rosenbrock->phi, y, size);
+    memmove(rosenbrock->yd, yd, size);
+    rosenbrock->linear->null_pivot = rosenbrock->linear->idle ? SD_LEAST_PIVOT : 0.0;
+    set_weights(rosenbrock);
+    double span = rosenbrock->t_end - t, part = pow(rosenbrock->rtol, POWER);
+    if (!(h > 0.0)) { /* local error (h y'/y)^5 within tolerance */
+        double change = rosenbrock->rtol * norm(rosenbrock, yd, 1.0);
+        h = OPENS * span * fmin(1.0, 10.0 * part); /* runs that are compared begin apart */
+        if (isfinite(change) && change > 0.0)
+            h = fmin(h, 0.1 * part / change);
+        h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), SD_SHORT * span), span));
+    }
+    rosenbrock->h = fmin(rosenbrock->fixed_h > 0.0 ? rosenbrock->fixed_h : h, rosenbrock->h_max);
+    rosenbrock->h_used = 0.0;
+    rosenbrock->error_accepted = 0.0;
+    rosenbrock->rejected = 0;
+}
+
+/* the step ends at t_end exactly, and never leaves less than its half for the last one */
+static void fit_end(sd_rosenbrock *rosenbrock)
+{
+    double left = rosenbrock->t_end - rosenbrock->t;
+    if (rosenbrock->h >= left * (1.0 - 1e-12))
+        rosenbrock->h = left;
+    else if (2.0 * rosenbrock->h > left && rosenbrock->taken > 0 && !(rosenbrock->fixed_h > 0.0))
+        rosenbrock->h = 0.5 * left;
+}
+
+/* F at (t, y, yd) into r: SD_NONFINITE with its row where it is none */
+static int residual(sd_rosenbrock *rosenbrock, double t, const double *y, const double *yd, double *r)
+{
+    sd_residual(rosenbrock->system, t, y, yd, r);
+    if (*rosenbrock->system->stop)
+        return SD_STOPPED;
+    if (sd_finite(rosenbrock->n, r))
+        return SD_FINE;
+    rosenbrock->bad_row = sd_first_bad(rosenbrock->n, r);
+    return SD_NONFINITE;
+}
+
+/* J, E, F and T at the last accepted point, for steps of about the size at hand */
+static int linearise(sd_rosenbrock *rosenbrock)
+{
+    sd_system *system = rosenbrock->system;
+    double t = rosenbrock->t, *drift = rosenbrock->drift;
+    sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->jy, rosenbrock->jyd);
+    if (*system->stop)
+        return SD_STOPPED;
+    if (!sd_finite(system->entries, rosenbrock->jy) || !sd_finite(system->entries, rosenbrock->jyd)) {
+        int32_t e = sd_first_bad(system->entries, rosenbrock->jy);
+        rosenbrock->bad_row = system->row[e >= 0 ? e : sd_first_bad(system->entries, rosenbrock->jyd)];
+        return SD_NONFINITE;
+    }
+    rosenbrock->rates = 0;
+    for (int32_t j = 0; j < rosenbrock->n; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            if (rosenbrock->jyd[e] != 0.0) {
+                rosenbrock->e[rosenbrock->rates] = rosenbrock->jyd[e];
+                rosenbrock->rate_row[rosenbrock->rates] = system->row[e];
+                rosenbrock->rate_column[rosenbrock->rates++] = j;
+            }
+    double later = t + fmax(SLOPE * rosenbrock->h, RESOLVED * DBL_EPSILON * fabs(t));
+    int cause = residual(rosenbrock, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->begin);
+    if (cause == SD_FINE)
+        cause = residual(rosenbrock, later, rosenbrock->phi, rosenbrock->yd, drift);
+    for (int32_t i = 0; i < rosenbrock->n; i++)
+        drift[i] = (drift[i] - rosenbrock->begin[i]) / (later - t);
+    return cause;
+}
+
+/* the factors of J + E / (gamma h) */
+static int factorise(sd_rosenbrock *rosenbrock)
+{
+    double lead = 1.0 / (sd_rosenbrock_gamma * rosenbrock->h);
+    for (int32_t e = 0; e < rosenbrock->system->entries; e++)
+        rosenbrock->g[e] = rosenbrock->jy[e] + lead * rosenbrock->jyd[e];
+    int failed = sd_linear_factor(rosenbrock->linear, rosenbrock->g, rosenbrock->magnitude);
+    rosenbrock->bad_row = rosenbrock->linear->bad_row;
+    rosenbrock->bad_column = rosenbrock->linear->bad_column;
+    return failed == 2 ? SD_MEMORY : failed ? SD_SINGULAR : SD_FINE;
+}
+
+/* y, rate [n] := Y_s, Z_s;  v[s] := Z_s + s_s */
+static SD_WIDE void place(sd_rosenbrock *rosenbrock, int s)
+{
+    const double *a = sd_rosenbrock_a[s], *c = sd_rosenbrock_coupling[s], over = 1.0 / rosenbrock->h;
+    for (int32_t i = 0; i < rosenbrock->n; i += SD_LANES) {
+        sd_lanes y = SD_FROM(rosenbrock->phi, i), z = SD_FROM(rosenbrock->yd, i), lag = {0.0};
+        for (int j = 0; j < s; j++) {
+            y += a[j] * SD_FROM(rosenbrock->u[j], i);
+            z += a[j] * SD_FROM(rosenbrock->v[j], i);
+            lag += c[j] * SD_FROM(rosenbrock->u[j], i);
+        }
+        SD_AT(rosenbrock->y, i) = y;
+        SD_AT(rosenbrock->rate, i) = z;
+        SD_AT(rosenbrock->v[s], i) = z + over * lag;
+    }
+}
+
+/* u[s] := -F_s - d_s h T, where u[s] is F_s */
+static SD_WIDE void turn(sd_rosenbrock *rosenbrock, int s)
+{
+    double *u = rosenbrock->u[s], dt = sd_rosenbrock_d[s] * rosenbrock->h;
+    for (int32_t i = 0; i < rosenbrock->n; i += SD_LANES)
+        SD_AT(u, i) = -SD_FROM(u, i) - dt * SD_FROM(rosenbrock->drift, i);
+}
+
+/* u[s] += E v[s] */
+static void add_moved(sd_rosenbrock *rosenbrock, int s)
+{
+    double *u = rosenbrock->u[s], *v = rosenbrock->v[s];
+    for (int32_t k = 0; k < rosenbrock->rates; k++)
+        u[rosenbrock->rate_row[k]] += rosenbrock->e[k] * v[rosenbrock->rate_column[k]];
+}
+
+/* v[s] := u[s] / (gamma h) - v[s] */
+static SD_WIDE void close(sd_rosenbrock *rosenbrock, int s)
+{
+    double *u = rosenbrock->u[s], *v = rosenbrock->v[s], lead = 1.0 / (sd_rosenbrock_gamma * rosenbrock->h);
+    for (int32_t i = 0; i < rosenbrock->n; i += SD_LANES)
+        SD_AT(v, i) = lead * SD_FROM(u, i) - SD_FROM(v, i);
+}
+
+/* all stages of a step */
+static int take_stages(sd_rosenbrock *rosenbrock)
+{
+    for (int s = 0; s < STAGES; s++) {
+        double *u = rosenbrock->u[s], t = rosenbrock->t + sd_rosenbrock_c[s] * rosenbrock->h;
+        place(rosenbrock, s);
+        int cause = SD_FINE;
+        if (s == 0)
+            memcpy(u, rosenbrock->begin, (size_t)rosenbrock->n * sizeof *u);
+        else if ((cause = residual(rosenbrock, t, rosenbrock->y, rosenbrock->rate, u)))
+            return cause;
+        turn(rosenbrock, s);
+        add_moved(rosenbrock, s);
+        sd_linear_solve(rosenbrock->linear, u);
+        close(rosenbrock, s);
+    }
+    return SD_FINE;
+}
+
+/* the new point, and the next step's size */
+static void accept(sd_rosenbrock *rosenbrock, double error)
+{
+    double h = rosenbrock->h, t = rosenbrock->t + h, ratio = pow(error, POWER) / SAFE;
+    if (rosenbrock->error_accepted > 0.0) { /* Gustafsson's predictive controller (Hairer & Wanner, IV.8.25) */
+        double predicted = rosenbrock->h_accepted / h * pow(error * error / rosenbrock->error_accepted, POWER) / SAFE;
+        ratio = fmax(ratio, predicted);
+    }
+    double next = h / fmax(1.0 / GROW, fmin(1.0 / CUT, ratio));
+    if (rosenbrock->rejected)
+        next = fmin(next, h);
+    rosenbrock->h_accepted = h;
+    rosenbrock->error_accepted = fmax(1e-2, error);
+    double *before = rosenbrock->last;
+    memcpy(before, rosenbrock->phi, (size_t)rosenbrock->n * sizeof *before);
+    for (int32_t i = 0; i < rosenbrock->n; i++) {
+        rosenbrock->phi[i] = rosenbrock->y[i] + rosenbrock->u[STAGES - 1][i];
+        rosenbrock->yd[i] = rosenbrock->rate[i] + rosenbrock->v[STAGES - 1][i];
+    }
+    rosenbrock->t = fabs(rosenbrock->t_end - t) <= 1e-12 * h ? rosenbrock->t_end : t;
+    rosenbrock->h_used = h;
+    rosenbrock->steps++;
+    rosenbrock->taken++;
+    rosenbrock->rejected = 0;
+    rosenbrock->h = rosenbrock->fixed_h > 0.0 ? rosenbrock->fixed_h : fmin(next, rosenbrock->h_max);
+}
+
+/* the new point moved onto every constraint */
+static void project(sd_rosenbrock *rosenbrock)
+{
+    size_t size = (size_t)rosenbrock->n * sizeof(double);
+    memcpy(rosenbrock->y, rosenbrock->phi, size);
+    memcpy(rosenbrock->rate, rosenbrock->yd, size);
+    if (sd_settle_point(rosenbrock->project, rosenbrock->t, rosenbrock->y, rosenbrock->rate))
+        return;
+    memcpy(rosenbrock->phi, rosenbrock->y, size);
+    memcpy(rosenbrock->yd, rosenbrock->rate, size);
+}
+
+/* what values within the step are off, where what is pulled back at once hides it from the error of the end: a Newton
+ * correction at WITHIN of the step; in the weights, in `error` */
+static int look_within(sd_rosenbrock *rosenbrock, double *error)
+{
+    double *end = rosenbrock->end, *r = rosenbrock->inner;
+    for (int32_t i = 0; i < rosenbrock->n; i++)
+        end[i] = rosenbrock->y[i] + rosenbrock->u[STAGES - 1][i];
+    prepare(rosenbrock);
+    polynomial(rosenbrock, rosenbrock->phi, end, rosenbrock->h, WITHIN, rosenbrock->within, rosenbrock->within_d);
+    int cause = residual(rosenbrock, rosenbrock->t + WITHIN * rosenbrock->h, rosenbrock->within, rosenbrock->within_d, r);
+    if (cause != SD_FINE)
+        return cause;
+    sd_linear_solve(rosenbrock->linear, r);
+    *error = fmax(*error, norm(rosenbrock, r, rosenbrock->h));
+    return SD_FINE;
+}
+
+/* factors and stages of a step, and its error in `error`; SD_ERROR_TEST where it is too large */
+static int attempt(sd_rosenbrock *rosenbrock, double *error)
+{
+    int cause = factorise(rosenbrock);
+    if (cause == SD_FINE)
+        cause = take_stages(rosenbrock);
+    if (cause != SD_FINE)
+        return cause;
+    *error = norm(rosenbrock, rosenbrock->u[STAGES - 1], rosenbrock->h);
+    memcpy(rosenbrock->ee, rosenbrock->u[STAGES - 1], (size_t)rosenbrock->n * sizeof(double));
+    if (*error < 1.0 || rosenbrock->fixed_h > 0.0)
+        cause = look_within(rosenbrock, error);
+    if (rosenbrock->fixed_h > 0.0)
+        return isfinite(*error) ? SD_FINE : SD_NONFINITE;
+    if (cause != SD_FINE)
+        return cause;
+    *error = isfinite(*error) ? fmax(*error, 1e-10) : INFINITY;
+    return *error < 1.0 ? SD_FINE : SD_ERROR_TEST;
+}
+
+int sd_rosenbrock_step(sd_rosenbrock *rosenbrock)
+{
+    int failures = 0, known = 0;
+    double error = 0.0;
+    set_weights(rosenbrock);
+    rosenbrock->cause = SD_FINE;
+    for (;;) {
+        fit_end(rosenbrock);
+        double left = rosenbrock->t_end - rosenbrock->t;
+        if (rosenbrock->h < 4.0 * DBL_EPSILON * fmax(fabs(rosenbrock->t), SD_SHORT * left) && rosenbrock->h < left) {
+            rosenbrock->cause = rosenbrock->cause ? rosenbrock->cause : SD_STEP;
+            return rosenbrock->cause;
+        }
+        int cause = known ? SD_FINE : linearise(rosenbrock);
+        known = cause == SD_FINE;
+        if (cause == SD_FINE)
+            cause = attempt(rosenbrock, &error);
+        if (cause == SD_FINE)
+            break;
+        rosenbrock->cause = cause;
+        rosenbrock->rejected = 1;
+        if (cause == SD_STOPPED || cause == SD_MEMORY || rosenbrock->fixed_h > 0.0)
+            return cause;
+        if (cause == SD_ERROR_TEST) {
+            rosenbrock->rejected_steps++;
+            double ratio = pow(error, POWER) / SAFE;
+            rosenbrock->h *= rosenbrock->taken == 0 ? 0.1 : isfinite(ratio) ? fmax(CUT, fmin(1.0, 1.0 / ratio)) : CUT;
+        } else {
+            rosenbrock->newton_failures++;
+            if (++failures > FAILS)
+                return cause;
+            rosenbrock->h *= 0.25;
+        }
+    }
+    rosenbrock->cause = SD_FINE;
+    accept(rosenbrock, error);
+    if (rosenbrock->project)
+        project(rosenbrock);
+    return SD_FINE;
+}
