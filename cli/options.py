@@ -17,6 +17,7 @@ EVERY = tuple(name for name in FORMULATIONS if name != "auto")
 TRIED = tuple(name for name in EVERY if name != "co_kane")
 """What `trade` measures by itself: co_kane has co_lagrangian's rows but those of effort constraints."""
 INDICES = ["auto", "3", "2", "2v", "1", "0"]
+METHODS = ["auto", "bdf", "radau", "rosenbrock", "dopri", "energy", "euler"]
 
 
 class Setting(click.ParamType):  # type: ignore[type-arg]  # generic since click 8.3
@@ -89,7 +90,7 @@ def solved(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options that say how a scene is solved, and for how long."""
     for option in reversed(
         [
-            click.option("--method", type=click.Choice(["auto", "bdf", "radau", "rosenbrock", "dopri", "energy", "euler"])),
+            click.option("--method", type=click.Choice(METHODS)),
             click.option("--redundancy", type=click.Choice(["error", "drop", "minimum_norm"])),
             click.option(
                 "--accuracy", type=float, metavar="R", help="Relative accuracy of the traced quantities. Default 1e-4."

@@ -14,7 +14,7 @@ import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.accuracy import Achieved, Lighter, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
-from sysdyn.runtime.integrate.runs import LONG, LONG_STEEP, Runs, Samples, Way
+from sysdyn.runtime.integrate.runs import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Runs, Samples, Way
 from sysdyn.runtime.integrate.second_opinion import confirmed
 from sysdyn.runtime.integrate.underlying import rateless, underlying_form
 from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge, own_tolerances
@@ -42,6 +42,9 @@ LIGHT = 200
 SMALL = 100
 """Unknowns up to which steep laws are the bdf's: where they turn, Newton's method holds the steps of any method, and a
 step of the bdf is the cheapest; of larger systems factors and rows are dear, and radau takes the fewest steps."""
+
+PATIENCE = {"bdf": (LONG, LONG_STEEP), "rosenbrock": (BRIEF, BRIEF_STEEP)}
+"""Steps after which the next method is tried, of laws that are not steep and of those that are."""
 
 COARSE = 1e-6
 """Accuracies below which more stages, whose orders are higher, cost less than the method without Newton's iteration."""
@@ -216,7 +219,7 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
     missed: Achieved | None = None
     stopped: SolverFailure | None = None
     while True:
-        runs.patience = (LONG_STEEP if steep else LONG) if runs.method == "bdf" and others else None
+        runs.patience = PATIENCE.get(runs.method, (None, None))[steep] if others else None
         try:
             lighter = _lighter(runs, options, others)
             achieved = _achieved(runs, options, doubted=doubted, tame=tame, lighter=lighter)
@@ -332,7 +335,8 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     if options.events and not options.events.bends:
         return replace(way, reason="events"), other
     if way.system.form.scales:
-        first, *others = *_without_newton(way, options), *((other, way) if way.system.unknowns <= SMALL else (way, other))
+        iterating = (other, way) if way.system.unknowns <= SMALL else (way, other)
+        first, *others = *_without_newton(way, options), *iterating
         return replace(first, reason="steep laws"), *others
     system = written.another("0")
     missing = rateless(system, start)

@@ -23,7 +23,7 @@ from sysdyn.values import dataclass
 
 SUFFIX = ".lock"
 FORMAT = 1
-METHODS = ("bdf", "radau", "dopri")
+METHODS = ("bdf", "radau", "rosenbrock", "dopri")
 UNREADABLE = (OSError, ValueError, TypeError, KeyError, AttributeError)
 """What reading a lock that is no lock may raise (those of TOML and of decoding are ValueErrors)."""
 

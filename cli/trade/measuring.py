@@ -29,11 +29,11 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.integrate.options import Options, choose_index
-from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
-METHODS = ("dopri", "radau", "bdf")
+METHODS = ("dopri", "rosenbrock", "radau", "bdf")
 LARGE = 20_000
 """Unknowns of a model of which other formulations are not kept beside its own: gigabytes each."""
 MOST = 32
@@ -182,8 +182,17 @@ class Bench:
                 seen.add(form)
                 for method in METHODS:
                     fits = self.request.method in (None, "auto", method)
-                    if fits and (method != "dopri" or index == "0"):
+                    if fits and self._exists(method, index, carried):
                         yield Combination(formulation, index, method, level)
+
+    @staticmethod
+    def _exists(method: str, index: str, carried: Carried) -> bool:
+        """Whether the method integrates that form."""
+        try:
+            choose_index(index, carried.started.facts, method)
+        except NoSuchForm:
+            return False
+        return True
 
     # --- runs ---------------------------------------------------------------------------------------------------
 

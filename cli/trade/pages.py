@@ -19,7 +19,7 @@ from sysdyn.cli.page.picture import drawing
 from sysdyn.cli.page.plots import SCRIPT, hint
 from sysdyn.cli.trade.traded import Combination, Measured, Traded
 
-MARKERS = {"dopri": "o", "radau": "s", "bdf": "^"}
+MARKERS = {"dopri": "o", "radau": "s", "bdf": "^", "rosenbrock": "D"}
 STROKES: dict[str, Any] = {"2": "-", "3": ":", "2v": "-.", "1": "--", "0": (0, (1, 1))}
 LEAST = 1e-16
 """Errors below are drawn there."""

@@ -17,7 +17,7 @@ from sysdyn.cli.trade.traded import Combination, Measured, cheapest, meets
 
 LOOSEST, FIRST, TIGHTEST = 2, 4, 24
 """Numbers of the tolerances 1e-1, 1e-2, 1e-12."""
-ORDER = {"bdf": 4.0, "radau": 5.0, "dopri": 8.0}
+ORDER = {"bdf": 4.0, "radau": 5.0, "rosenbrock": 5.0, "dopri": 8.0}
 """Error ~ work^-order at best: what a combination of two runs may still hope for."""
 EARLY = 1.6
 """Times that order for one with a single run: loose ones take steps for kinks and corners that tight ones need too."""

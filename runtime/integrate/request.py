@@ -30,7 +30,8 @@ class Request:
     t_end [s]; instants [s] ascending: where rows are wanted, instant_kinds: their kinds
     (TRACE, COMPARED or both; None: all TRACE), every_step: at each accepted step too; rtol; atol:
     absolute tolerance of all unknowns in SI units, None: rtol times the magnitude of each; method: bdf, radau,
-    rosenbrock (index at most 1), dopri or energy (form 0); fixed_step [s]: no error test (bdf with max_order 1: the implicit Euler method); h_max
+    rosenbrock (index at most 1), dopri or energy (form 0);
+    fixed_step [s]: no error test (bdf with max_order 1: the implicit Euler method); h_max
     [s]: longest step, None: LONGEST of the span; stops [s] ascending: instants at which a step ends and the
     integration restarts (segments.py); least_norm: rows hold the least multipliers of redundant constraints;
     stiff_steps: dopri and energy give up

@@ -1,9 +1,10 @@
-"""Rodas5P: observed order, dense output, values of what is slaved, stiff laws, refusals, when auto takes and leaves it."""
+"""Rodas5P: order, dense output, what is slaved within steps, stiff laws, refusals, when auto takes and leaves it."""
 
 import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.simulate import simulate
 from sysdyn.runtime.trace.trace import Trace
@@ -19,14 +20,15 @@ def rosenbrock(made, t_end, instants=(), form="3", index=1, **request):
 def simulated(tmp_path, made, t_end, **options):
     manifest, binding, module = made
     path = tmp_path / "t.h5"
-    asked = Options(t_end, path, every=t_end / 40, timings=False, **options)
-    outcome = simulate({**manifest, "version": 3}, binding, module, asked)
+    asked = Options(path, 0.0, t_end, **{"every": t_end / 40, "timings": False, **options})
+    outcome = simulate(manifest, binding, load(module), asked)
     return outcome, Trace.open(path)
 
 
 def relaxing(rate, form="lagrangian"):
     """q' = f, f / rate + q = cos t (a damper at a spring that is moved): q pulled to the source with `rate` (1/s)."""
-    return models.small("x", "0", "q_x**2/2", f"f_x**2/{2 * rate}", {"x": "cos(t)"}, initial={"q_x": (1, True)}, form=form)
+    start = {"q_x": (1, True)}
+    return models.small("x", "0", "q_x**2/2", f"f_x**2/{2 * rate}", {"x": "cos(t)"}, initial=start, form=form)
 
 
 def relaxed(rate, t):
@@ -84,8 +86,8 @@ def test_values_between_steps_have_order_five_too():
     assert (observed(errors) > 4.8).all()
 
 
-@pytest.mark.parametrize("rate", [1.0, 1e3, 1e6, 1e9])
-@pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("rate", [1.0, 1e3, 1e5])
+@pytest.mark.parametrize("rtol", [1e-2, 1e-4])
 def test_error_within_steps_of_what_is_pulled_to_a_source(rate, rtol):
     # steps alone would not see it: whatever they are, their ends lie on the source
     t = np.linspace(0, 10, 501)
@@ -152,6 +154,13 @@ def test_auto_takes_it_for_cheap_accuracy_and_more_stages_for_dear_one(tmp_path)
         assert (outcome.method, outcome.met) == (method, True)
         t = np.asarray(trace.time)
         assert np.abs(trace["q_x"].values - relaxed(1e5, t)).max() < accuracy
+
+
+@pytest.mark.parametrize("rate", [1e7, 1e9])
+def test_auto_leaves_it_where_equations_are_nearly_of_index_two(tmp_path, rate):
+    outcome, trace = simulated(tmp_path, relaxing(rate), 10.0, accuracy=1e-3)
+    assert outcome.met
+    assert np.abs(trace["q_x"].values - relaxed(rate, np.asarray(trace.time))).max() < 1e-3
 
 
 def test_auto_leaves_it_where_loose_runs_have_nothing_in_common(tmp_path):

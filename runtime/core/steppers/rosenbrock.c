@@ -14,8 +14,9 @@
 #define CUT 0.2            /* what a refused one is cut to at least */
 #define OPENS 1e-2         /* of the span: the first step at most */
 #define SLOPE 1e-6         /* of the step: over which dF/dt is taken */
+#define TELLS 1e-8         /* of the longest step: over that, or the step, at least, for differences over less are round-off */
 #define RESOLVED 64.0      /* of what t resolves: at least that */
-#define WITHIN 0.75        /* of the step: where values within are looked at; those of what is slaved are furthest off there */
+#define INSIDE 0.75        /* of the step: where values within are looked at; those of what is slaved are furthest off there */
 #define FAILS 12           /* matrices and stages of a step that may fail */
 
 static int step(void *rosenbrock)
@@ -226,7 +227,8 @@ static int linearise(sd_rosenbrock *rosenbrock)
                 rosenbrock->rate_row[rosenbrock->rates] = system->row[e];
                 rosenbrock->rate_column[rosenbrock->rates++] = j;
             }
-    double later = t + fmax(SLOPE * rosenbrock->h, RESOLVED * DBL_EPSILON * fabs(t));
+    double over = fmax(SLOPE * rosenbrock->h, fmin(rosenbrock->h, TELLS * rosenbrock->h_max));
+    double later = t + fmax(over, RESOLVED * DBL_EPSILON * fabs(t));
     int cause = residual(rosenbrock, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->begin);
     if (cause == SD_FINE)
         cause = residual(rosenbrock, later, rosenbrock->phi, rosenbrock->yd, drift);
@@ -347,15 +349,15 @@ static void project(sd_rosenbrock *rosenbrock)
 }
 
 /* what values within the step are off, where what is pulled back at once hides it from the error of the end: a Newton
- * correction at WITHIN of the step; in the weights, in `error` */
+ * correction at INSIDE of the step; in the weights, in `error` */
 static int look_within(sd_rosenbrock *rosenbrock, double *error)
 {
     double *end = rosenbrock->end, *r = rosenbrock->inner;
     for (int32_t i = 0; i < rosenbrock->n; i++)
         end[i] = rosenbrock->y[i] + rosenbrock->u[STAGES - 1][i];
     prepare(rosenbrock);
-    polynomial(rosenbrock, rosenbrock->phi, end, rosenbrock->h, WITHIN, rosenbrock->within, rosenbrock->within_d);
-    int cause = residual(rosenbrock, rosenbrock->t + WITHIN * rosenbrock->h, rosenbrock->within, rosenbrock->within_d, r);
+    polynomial(rosenbrock, rosenbrock->phi, end, rosenbrock->h, INSIDE, rosenbrock->within, rosenbrock->within_d);
+    int cause = residual(rosenbrock, rosenbrock->t + INSIDE * rosenbrock->h, rosenbrock->within, rosenbrock->within_d, r);
     if (cause != SD_FINE)
         return cause;
     sd_linear_solve(rosenbrock->linear, r);
