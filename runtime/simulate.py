@@ -319,6 +319,10 @@ def _without_newton(way: Way, options: Options) -> tuple[Way, ...]:
     return (replace(way, method="rosenbrock"),) if serves else ()
 
 
+def _because(reason: str, ways: tuple[Way, ...]) -> tuple[Way, ...]:
+    return replace(ways[0], reason=reason), *ways[1:]
+
+
 def alternatives(way: Way, written: System, start: ConsistentState, options: Options) -> tuple[Way, ...]:
     """What method auto tries, in this order; `way` among it.
 
@@ -336,15 +340,13 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
         return replace(way, reason="events"), other
     if way.system.form.scales:
         iterating = (other, way) if way.system.unknowns <= SMALL else (way, other)
-        first, *others = *_without_newton(way, options), *iterating
-        return replace(first, reason="steep laws"), *others
+        return _because("steep laws", _without_newton(way, options) + iterating)
     system = written.another("0")
     missing = rateless(system, start)
     if missing:
         if system.unknowns > LARGE:
             system.forget()
-        first, *others = *_without_newton(way, options), way, other
-        return replace(first, reason=f"no explicit equation for {missing[0]}"), *others
+        return _because(f"no explicit equation for {missing[0]}", (*_without_newton(way, options), way, other))
     return Way("dopri", system, 1, "0", NOT_STIFF), *_without_newton(way, options), way, other
 
 
