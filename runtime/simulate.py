@@ -228,7 +228,8 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
                 if missed is None:
                     raise _told(stopped, failure) from None
                 return missed
-            doubted, why = failure.cause not in ("max_steps", "stiff"), _left(runs, failure)
+            doubted = failure.cause not in ("max_steps", "stiff") and not runs.way.law.brief
+            why = _left(runs, failure)
             smooth = failure.smooth and failure.cause == "max_steps"
             stopped = failure if doubted else stopped
         else:
