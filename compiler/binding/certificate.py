@@ -15,6 +15,7 @@ Received: a network with its branches, numbers bound.  Returned: a Certificate.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 
 import numpy as np
 from sysdyn.compiler.binding.binding import Binding
@@ -134,7 +135,8 @@ class _Judge:
         """A law and its own variable: e f >= 0?"""
         if self._sliding(law):
             return Finding(name, "dissipates", "structure", "dry friction, against its own sliding", place)
-        above, below = (enclose_over(law, {own: r}, self._fixed) for r in ((0.0, np.inf), (-np.inf, 0.0)))
+        fixed = cache(self._fixed)
+        above, below = (enclose_over(law, {own: r}, fixed) for r in ((0.0, np.inf), (-np.inf, 0.0)))
         if above[0] >= 0.0 and below[1] <= 0.0:
             none = above[1] == 0.0 and below[0] == 0.0
             said = "no effort" if none else "e f >= 0 over all values"
@@ -296,6 +298,8 @@ class _Judge:
             return float(np.ravel(found)[0])
 
     def _fixed(self, root: Node) -> float:
+        if root.op == "param" and not root.args:  # most of what a netlist asks
+            return float(np.ravel(self._leaf(root, []))[0])
         return self._value(root, {})
 
     def _leaf(self, node: Node, args: list[Value]) -> Value:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from sysdyn.compiler.binding.enclosures import enclose, enclose_over
+from sysdyn.compiler.binding.enclosures import _as_arrays, _single, enclose, enclose_over
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression_text import to_text
@@ -160,3 +160,29 @@ def test_bounds_shrink_to_the_values_as_intervals_do():
         assert (high >= values.max(axis=0) - 1e-12).all()
         excess.append(np.abs((high - low) - np.ptp(values, axis=0)).max())
     assert 5.0 < excess[0] / excess[1] < 20.0
+
+
+ENDS = (-INF, -1e308, -2.0, -1e-200, -0.0, 0.0, 5e-324, 1e-200, 0.75, 3.0, 1e308, INF)
+SINGLE = {
+    "a product": x.mul(V, W),
+    "a quotient": x.div(V, W),
+    "one over both": x.div(x.const(1.0), x.mul(V, W)),
+    "three factors": x.mul(V, W, N),
+    "a difference": x.linear(0.0, [(1.0, V), (-3.0, W)]),
+    "a sum with a constant": x.linear(-1.0, [(1e10, V), (1e308, W)]),
+    "exp": called("exp", V),
+}
+
+
+@pytest.mark.parametrize("name", SINGLE)
+def test_plain_numbers_bound_an_operation_as_arrays_do(name):
+    root = SINGLE[name]
+    ranges = [(low, high) for low in ENDS for high in ENDS if low <= high] + [(math.nan, math.nan)]
+    alone = 0
+    for a in ranges:
+        for b in ranges:
+            args = [a, b, (1e-200, 1e200)][: len(root.args)]
+            found = _single(root, args)
+            alone += found is not None
+            assert found is None or found == _as_arrays(root, args)
+    assert alone
