@@ -358,7 +358,7 @@ class Handler:
     def _assign(
         self, t: float, y: Floats, yd: Floats, events: list[tuple[str, tuple[Assignment, ...]]]
     ) -> Floats:
-        """All values are read, then all assigned."""
+        """All values are read, then all assigned; a law driven back to where it came from is no longer so for that."""
         values = self.observer(t, y, yd)
         y, set_by = y.copy(), dict[tuple[str, int], str]()
         for name, assignments in events:
@@ -373,6 +373,7 @@ class Handler:
                 now.append(f"{a.name} = {values[a.row]:.9g}")
             element = assignments[0].name.rpartition(".")[0] if assignments else ""
             self.happened.append(Happened(t, name, element, ", ".join(said), ", ".join(now)))
+        self.kinks.anew()
         if any(a.kind == "flow" for _, assignments in events for a in assignments):
             settled = self.restart.instant.system if self.restart else self.system
             y = with_momenta(settled, t, y, yd)

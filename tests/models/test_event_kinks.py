@@ -155,3 +155,40 @@ def test_a_long_step_that_crosses_what_the_point_does_not_is_taken_in_parts(tmp_
     for name in traces["bdf"].names:
         one, two = (t[name].values[np.searchsorted(t.time, [1.0, 2.0, 4.0])] for t in traces.values())
         assert np.abs(one - two).max() <= 1e-2 * traces["radau"][name].nominal
+
+
+CHARGED = """
+from std.electrical import resistor, voltage
+from std.control import hysteresis
+
+component store {
+  branch: electrical
+  law q = (1 mF)*e + (0.1 mF/V^2)*e*e*e
+}
+model m {
+  node a, b: electrical
+  V: voltage(v = H.y) a -> ground
+  R: resistor(R = 100 ohm) a -> b
+  C: store() b -> ground
+  H: hysteresis(on_at = -4 V, off_at = -6 V, lo = 0 V, hi = 10 V) u = -b.e
+}
+scene s of m { time 0 s to 1.5 s; trace b.e as u; init C.q = 0 C; accuracy 1e-6 }
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_a_switch_with_memory_that_drives_what_it_reads(tmp_path, formulation):
+    """R C(u) u' = E - u, C = 1 mF + 0.3 mF/V^2 u^2: the switch turns a law that the same instant's assignment turns back."""
+
+    def passed(u, e):
+        logarithm = math.log(abs(e - u))
+        return 0.1 * (-logarithm + 0.3 * (-e * e * logarithm - e * u - u * u / 2))
+
+    path = tmp_path / "m.sd"
+    path.write_text(CHARGED)
+    trace = simulate(path, formulation=formulation, output=str(tmp_path / "t.h5"))
+    off = passed(6, 10) - passed(0, 10)
+    on = off + passed(4, 0) - passed(6, 0)
+    again = on + passed(6, 10) - passed(4, 10)
+    switched = [event.time for event in trace.events if event.name.startswith("when") and event.time > 0.2]
+    assert switched[:3] == pytest.approx([off, on, again], rel=1e-5)
