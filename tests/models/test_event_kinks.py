@@ -178,7 +178,7 @@ scene s of m { time 0 s to 1.5 s; trace b.e as u; init C.q = 0 C; accuracy 1e-6 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 def test_a_switch_with_memory_that_drives_what_it_reads(tmp_path, formulation):
-    """R C(u) u' = E - u, C = 1 mF + 0.3 mF/V^2 u^2: the switch turns a law that the same instant's assignment turns back."""
+    """R C(u) u' = E - u, C = 1 mF + 0.3 mF/V^2 u^2: what the instant assigns turns the law back that turned there."""
 
     def passed(u, e):
         logarithm = math.log(abs(e - u))
