@@ -52,7 +52,9 @@ as co_hamiltonian (200) takes 0.4 to 0.7 of radau's CPU at 1e-2 to 1e-6, rc_ladd
 """
 
 COARSE, COARSER = 1e-6, 1e-3
-"""Accuracies (of small systems, of medium ones: a beam of 160 at 1e-2 0.5 of radau's CPU, at 1e-4 1.4) below which more stages, whose orders are higher, cost less than the method without Newton's iteration."""
+"""Accuracies, of small systems and of medium ones (a beam of 160 takes 0.5 of radau's CPU at 1e-2, 1.4 at 1e-4), below
+which more stages, whose orders are higher, cost less than the method without Newton's iteration.
+"""
 
 
 @dataclass(frozen=True, slots=True)
