@@ -133,12 +133,12 @@ class Declarations(Parameters):
     def _own_initial(
         self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, init: syntax.Initial
     ) -> None:
-        """The initial value in a declaration: for all elements of the family."""
+        """The initial value in a declaration: for all elements of the family, in a `for` for those of its variables."""
         message = f"'{decl.name}' is in {dim.show(dimension)} but starts at {{}}"
         with ExitStack() as stack:
             at = tuple(
-                ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", first, last)).index)
-                for k, (first, last) in enumerate(family.shape)
+                self.looped(index) or ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", *bounds)).index)
+                for k, (index, bounds) in enumerate(zip(decl.indices, family.shape, strict=True))
             )
             value = self.resolver.wanted(init.value, dimension, "E207", message)
             target = ex.var(family.name, kind, *family.prefix, *at)

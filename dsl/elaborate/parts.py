@@ -241,13 +241,22 @@ class ElaborationContext:
                 index.upper, "a bound"
             )
         node = self.resolver.whole_number(index, "an index")
-        inside = {ex.index(loop.index): loop for loop in self.resolver.loops}
-        used = [n for n in ex.topological([node]) if n in inside]
+        used = self._loops_of(node)
         if not used:
             return ex.const(1), node
-        lows = {n: inside[n].first for n in used}
-        highs = {n: inside[n].last for n in used}
+        lows = {n: loop.first for n, loop in used.items()}
+        highs = {n: loop.last for n, loop in used.items()}
         return ex.substitute(node, lows), ex.substitute(node, highs)
+
+    def looped(self, index: syntax.Index) -> Node | None:
+        """An index that varies with the loops around; None of `1..n` and `3`, which declare all elements at once."""
+        node = None if isinstance(index, syntax.Range) else self.resolver.whole_number(index, "an index")
+        return node if node is not None and self._loops_of(node) else None
+
+    def _loops_of(self, node: Node) -> dict[Node, Loop]:
+        """The loops around whose variables occur, by these."""
+        inside = {ex.index(loop.index): loop for loop in self.resolver.loops}
+        return {n: inside[n] for n in ex.topological([node]) if n in inside}
 
 
 def flatten(body: Sequence[syntax.Statement], loops: tuple[syntax.For, ...] = ()) -> Iterator[Nested]:

@@ -74,10 +74,28 @@ def _call_partials(node: Node) -> tuple[Node, ...]:
             return div(a, node), div(b, node)
         case "mod":
             return const(1.0), neg(call("floor", div(a, b)))
-        case "min" | "max":
-            first = compare("<=" if name == "min" else ">=", a, b)
-            return conditional(first, const(1.0), const(0.0)), conditional(first, const(0.0), const(1.0))
     raise AssertionError(name)
+
+
+def _along(dot: Node, scaled: Callable[[Node], Node]) -> Node:
+    """A linear function of a differential; of one that conditions make zero, within these: sqrt(max(x, 0)) is flat
+    below 0, and not infinity times zero.
+    """
+    zero = const(0.0)
+    branches, waiting = {dot}, [dot]
+    while waiting:
+        node = waiting.pop()
+        new = [a for a in node.args[1:] if a not in branches] if node.op == "cond" else []
+        branches.update(new)
+        waiting += new
+    if zero not in branches:
+        return scaled(dot)
+    done: dict[Node, Node] = {zero: zero}
+    for node in topological([dot]):
+        if node in branches and node is not zero:
+            inner = node.op == "cond"
+            done[node] = conditional(node.args[0], *(done[a] for a in node.args[1:])) if inner else scaled(node)
+    return done[dot]
 
 
 def _chain(node: Node, dots: Sequence[Node]) -> Node:
@@ -85,22 +103,29 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
     zero = const(0.0)
     match node.op:
         case "sum":
-            return linear(0.0, zip(node.data[1], dots, strict=True))
+            moving = [(w, d) for w, d in zip(node.data[1], dots, strict=True) if d is not zero]
+            if len(moving) == 1:
+                return _along(moving[0][1], lambda d: linear(0.0, ((moving[0][0], d),)))
+            return linear(0.0, moving)
         case "mul":
             parts: list[tuple[float, Node]] = []
             for k, dot in enumerate(dots):
                 if dot is not zero:
                     factors = [(e - (j == k), a) for j, (e, a) in enumerate(zip(node.data, node.args, strict=True))]
-                    parts.append((node.data[k], product(1.0, [*factors, (1.0, dot)])))
+                    parts.append((node.data[k], _along(dot, lambda d, f=factors: product(1.0, [*f, (1.0, d)]))))
             return linear(0.0, parts)
         case "pow":
             base, exponent = node.args
+            slope = mul(exponent, power(base, linear(-1.0, ((1.0, exponent),))))
             return add(
-                mul(exponent, power(base, linear(-1.0, ((1.0, exponent),))), dots[0]) if dots[0] is not zero else zero,
+                _along(dots[0], lambda d: mul(slope, d)) if dots[0] is not zero else zero,
                 mul(node, call("ln", base), dots[1]) if dots[1] is not zero else zero,
             )
+        case "call" if node.data in ("min", "max"):
+            return conditional(compare("<=" if node.data == "min" else ">=", *node.args), *dots)
         case "call":
-            return add(*(mul(p, d) for p, d in zip(_call_partials(node), dots, strict=True) if d is not zero))
+            moving = [(p, d) for p, d in zip(_call_partials(node), dots, strict=True) if d is not zero]
+            return add(*(_along(d, lambda d, p=p: mul(p, d)) for p, d in moving))
         case "cond":
             return conditional(node.args[0], dots[1], dots[2])
         case "table":

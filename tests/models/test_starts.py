@@ -81,3 +81,53 @@ def test_random_networks_partly_said_begin_with_the_contents_of_the_closed_form(
     differ = {seed: verdict for seed, verdict in verdicts.items() if verdict not in {"agree", "refused"}}
     assert not differ
     assert [*verdicts.values()].count("agree") > 0.75 * len(verdicts)
+
+
+ROD = """model rod {{
+  param n = 7
+  {declared}
+  for i in 2..n - 1 {{ dynamic u[i]' = 3 Hz*(u[i - 1] - 2*u[i] + u[i + 1]) }}
+  dynamic u[1]' = 3 Hz*(u[2] - 2*u[1])
+  dynamic u[n]' = 3 Hz*(u[n - 1] - 2*u[n])
+}}
+scene cool of rod {{ time 0 s to 1 s; trace u[1], u[3], u[7] every 0.1 s; accuracy 1e-6 }}
+"""
+
+
+@pytest.mark.parametrize(
+    "declared",
+    [
+        "for i in 1..n { state u[i]: K = 2 K*sin(pi*i/(n + 1)) }",
+        "for i in 0..n - 1 { state u[i + 1]: K = 2 K*sin(pi*(i + 1)/(n + 1)) }",
+        "state u[1..n]: K\n  for i in 1..n { init u[i] = 2 K*sin(pi*i/(n + 1)) }",
+    ],
+)
+def test_states_declared_in_a_loop_start_where_each_says(tmp_path, declared):
+    """The first mode of a rod between two cold ends: it falls with 2 - 2 cos(pi/8) times 3 Hz."""
+    trace = trace_of(tmp_path, ROD.format(declared=declared))
+    fall = 2.0 * np.exp(-3.0 * (2.0 - 2.0 * np.cos(np.pi / 8.0)) * np.array(trace.time))
+    for i in (1, 3, 7):
+        np.testing.assert_allclose(trace[f"u[{i}]"].values, np.sin(np.pi * i / 8.0) * fall, atol=4e-6)
+
+
+LATTICE = """model lattice {
+  param n = 4
+  for i in 1..n { for j in 1..n {
+    coord z[i, j]: translation = 1 mm*sin(pi*i/(n + 1))*sin(2*pi*j/(n + 1))
+    init z[i, j]' = 0 m/s
+  } }
+  energy T* = sum(i in 1..n: sum(j in 1..n: 1/2*1 kg*z[i, j]'^2))
+  energy V = sum(i in 1..n - 1: sum(j in 1..n: 1/2*9 N/m*((z[i + 1, j] - z[i, j])^2 + (z[j, i + 1] - z[j, i])^2)))
+  energy V edge = sum(j in 1..n: 1/2*9 N/m*(z[1, j]^2 + z[n, j]^2 + z[j, 1]^2 + z[j, n]^2))
+}
+scene swing of lattice { time 0 s to 2 s; trace z[2, 3] in mm as z every 0.1 s; accuracy 1e-6 }
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR[:2])
+def test_coordinates_declared_in_two_loops(tmp_path, formulation):
+    """A mode of a membrane of masses: w^2 = 9 (4 - 2 cos(pi/5) - 2 cos(2 pi/5))."""
+    trace = trace_of(tmp_path, LATTICE, formulation=formulation)
+    rate = 3.0 * np.sqrt(4.0 - 2.0 * np.cos(np.pi / 5.0) - 2.0 * np.cos(2.0 * np.pi / 5.0))
+    shape = np.sin(2.0 * np.pi / 5.0) * np.sin(6.0 * np.pi / 5.0)
+    np.testing.assert_allclose(trace["z"].values, shape * np.cos(rate * np.array(trace.time)), atol=2e-6)

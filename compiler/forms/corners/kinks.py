@@ -4,7 +4,8 @@
     table of straight pieces     u = x - node, one for each node between two pieces (broken.py)
 
 Where u is zero the text has a kink, or jumps; a text with two continuous derivatives of its value there (f abs(f)) has
-neither for a method and is left alone.  Which of the three it is, is asked of the expressions on the surface u = 0, at
+neither for a method and is left alone, and so is one whose branch ends there (sqrt(max(h, 0)), sign(x) sqrt(abs(x))),
+for none can be held across.  Which of the three it is, is asked of the expressions on the surface u = 0, at
 sampled values of everything else; of what stands beside other conditions (raw > hi and err > 0) on both sides of these.
 Received: a descriptor form; returned: its `Surface`s, in the order of the text.
 Loops keep what they have (a family is one row here): what stands in one is integrated through.
@@ -31,7 +32,7 @@ JUMPS, KINK, SMOOTH = 0, 1, 2
 SAMPLES = 5
 TOUCHES = 1e-7
 """Of the magnitudes of both sides: what differs by less does not jump."""
-BESIDE = 0.5
+BESIDE, NEAR = 0.5, 1e-3
 DRAWS, MANY = 8, 8
 """Further samples for each other condition, and of how many conditions at most."""
 SIDES = (-1.0, -1.0, 0.0, 1.0, 1.0)
@@ -150,6 +151,8 @@ def smoothness(root: Node, u: Node) -> int:
     if moved is None:
         return SMOOTH
     slopes = [derivative(node, moved) for node in (u, above, below)]
+    if _ends((above, below), u, slopes[0], moved):
+        return SMOOTH
     others, found, known = _others((above, below), u), SMOOTH, False
     for k in range(SAMPLES + DRAWS * min(len(others), MANY)):
         asked = k < SAMPLES
@@ -172,6 +175,26 @@ def smoothness(root: Node, u: Node) -> int:
     if known:
         return found
     return KINK if _continuous(root, u) else JUMPS  # what the operation itself does
+
+
+def _ends(sides: tuple[Node, Node], u: Node, slope: Node, moved: Node) -> bool:
+    """Whether one of the branches (above, below) is no number beyond u = 0 where it is one on its own side."""
+    values = _on_surface(u, slope, moved, _drawn((u,), 0))
+    if values is None:
+        return False
+    up = math.copysign(1.0, evaluate((slope,), lambda node: _look(node, values))[0])
+    for branch, own in zip(sides, (up, -up), strict=True):
+        within, beyond = (_finite(branch, {**values, moved: values[moved] + away}) for away in (own * NEAR, -own * NEAR))
+        if within and not beyond:
+            return True
+    return False
+
+
+def _finite(node: Node, values: Mapping[Node, float]) -> bool:
+    try:
+        return math.isfinite(_values((node,), values)[0])
+    except (ArithmeticError, ValueError, KeyError, TypeError):
+        return False
 
 
 def _others(sides: tuple[Node, ...], u: Node) -> tuple[Node, ...]:

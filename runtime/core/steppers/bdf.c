@@ -133,15 +133,14 @@ void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, doub
 static int factorise(sd_bdf *bdf, double t, int fresh)
 {
     if (fresh) {
-        sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->jy, bdf->jyd);
+        int32_t bad = sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->jy, bdf->jyd);
         bdf->jacobian_age = 0;
         bdf->fresh_jacobian = 1;
         if (*bdf->system->stop)
             return SD_STOPPED;
-        if (sd_first_bad(bdf->system->entries, bdf->jy) >= 0 || sd_first_bad(bdf->system->entries, bdf->jyd) >= 0) {
+        if (bad >= 0) {
             bdf->ready = 0;
-            int32_t e = sd_first_bad(bdf->system->entries, bdf->jy);
-            bdf->bad_row = bdf->system->row[e >= 0 ? e : sd_first_bad(bdf->system->entries, bdf->jyd)];
+            bdf->bad_row = bad;
             return SD_NONFINITE;
         }
     }

@@ -112,13 +112,12 @@ int sd_radau_factorise(sd_radau *radau, int at_end)
     if (!radau->old_jacobian) {
         if (at_end)
             sd_radau_stage(radau, radau->method->stages - 1, radau->y, radau->rate);
-        sd_jacobian(system, at_end ? radau->t + radau->h : radau->t, at_end ? radau->y : radau->phi,
-                    at_end ? radau->rate : radau->yd, radau->jy, radau->jyd);
+        int32_t bad = sd_jacobian(system, at_end ? radau->t + radau->h : radau->t, at_end ? radau->y : radau->phi,
+                                  at_end ? radau->rate : radau->yd, radau->jy, radau->jyd);
         if (*system->stop)
             return SD_STOPPED;
-        int32_t a = sd_first_bad(system->entries, radau->jy), b = sd_first_bad(system->entries, radau->jyd);
-        if (a >= 0 || b >= 0) {
-            radau->bad_row = system->row[a >= 0 ? a : b];
+        if (bad >= 0) {
+            radau->bad_row = bad;
             return SD_NONFINITE;
         }
         radau->old_jacobian = 1;

@@ -211,12 +211,11 @@ static int linearise(sd_rosenbrock *rosenbrock)
 {
     sd_system *system = rosenbrock->system;
     double t = rosenbrock->t, *drift = rosenbrock->drift;
-    sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->jy, rosenbrock->jyd);
+    int32_t bad = sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->jy, rosenbrock->jyd);
     if (*system->stop)
         return SD_STOPPED;
-    if (!sd_finite(system->entries, rosenbrock->jy) || !sd_finite(system->entries, rosenbrock->jyd)) {
-        int32_t e = sd_first_bad(system->entries, rosenbrock->jy);
-        rosenbrock->bad_row = system->row[e >= 0 ? e : sd_first_bad(system->entries, rosenbrock->jyd)];
+    if (bad >= 0) {
+        rosenbrock->bad_row = bad;
         return SD_NONFINITE;
     }
     rosenbrock->rates = 0;

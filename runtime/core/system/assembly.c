@@ -5,12 +5,18 @@
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define FAINT 1e-9 /* of the magnitude of an unknown that happens to be zero */
 /* of the terms of a row, as the magnitudes of its unknowns make them: round-off of round-off.  A law that is zero (a
  * transistor that is off) leaves a row whose only term is its residual */
 #define NOTHING (DBL_EPSILON * DBL_EPSILON)
+
+/* how far beside a root at zero its slope is taken: of an unknown's value, and at least; the golden ratio's part */
+#define ROOT_BESIDE 1e-8
+#define ROOT_LEAST 1e-12
+#define ROOT_SPREAD 0.6180339887498949
 
 static inline void add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r)
 {
@@ -70,9 +76,8 @@ void sd_slopes(const sd_system *system, double t, const double *y, const double 
         values[system->held_slot[i]] = (system->held_rate[i] != 0) == rate ? 1.0 : 0.0;
 }
 
-void sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd)
+static void evaluate_slopes(const sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd)
 {
-    system->jacobian_evaluations++;
     if (system->left) {
         memset(jy, 0, (size_t)system->entries * sizeof *jy);
         memset(jyd, 0, (size_t)system->entries * sizeof *jyd);
@@ -81,6 +86,34 @@ void sd_jacobian(sd_system *system, double t, const double *y, const double *yd,
     }
     sd_slopes(system, t, y, yd, 0, jy);
     sd_slopes(system, t, y, yd, 1, jyd);
+}
+
+/* the first row with a slope that is no number; -1: none */
+static int32_t steep_beyond(const sd_system *system, const double *jy, const double *jyd)
+{
+    if (sd_finite(system->entries, jy) && sd_finite(system->entries, jyd))
+        return -1;
+    int32_t e = sd_first_bad(system->entries, jy);
+    return system->row[e >= 0 ? e : sd_first_bad(system->entries, jyd)];
+}
+
+int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd)
+{
+    system->jacobian_evaluations++;
+    evaluate_slopes(system, t, y, yd, jy, jyd);
+    int32_t bad = steep_beyond(system, jy, jyd);
+    double *beside = bad < 0 ? NULL : malloc(((size_t)system->unknowns + SD_LANES) * sizeof *beside);
+    for (int way = 1; way >= -1 && bad >= 0 && beside; way -= 2) {
+        double apart = 0.0; /* all by different parts, so that no difference of two stays at zero */
+        for (int32_t j = 0; j < system->unknowns; j++) {
+            apart = fmod(apart + ROOT_SPREAD, 1.0);
+            beside[j] = y[j] + way * (1.0 + apart) * (ROOT_BESIDE * fabs(y[j]) + ROOT_LEAST);
+        }
+        evaluate_slopes(system, t, beside, yd, jy, jyd);
+        bad = steep_beyond(system, jy, jyd);
+    }
+    free(beside);
+    return bad;
 }
 
 /* s := magnitudes of the terms of steep rows, zero in others */
