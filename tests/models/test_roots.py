@@ -1,4 +1,4 @@
-"""Laws with a root at zero, where the slope is infinite: orifices, from rest and until they run dry, by closed forms."""
+"""Laws with a root at zero, where the slope is infinite: orifices from rest, and until they run dry; closed forms."""
 
 import numpy as np
 import pytest

@@ -184,8 +184,8 @@ def _ends(sides: tuple[Node, Node], u: Node, slope: Node, moved: Node) -> bool:
         return False
     up = math.copysign(1.0, evaluate((slope,), lambda node: _look(node, values))[0])
     for branch, own in zip(sides, (up, -up), strict=True):
-        within, beyond = (_finite(branch, {**values, moved: values[moved] + away}) for away in (own * NEAR, -own * NEAR))
-        if within and not beyond:
+        within, beyond = ({**values, moved: values[moved] + away} for away in (own * NEAR, -own * NEAR))
+        if _finite(branch, within) and not _finite(branch, beyond):
             return True
     return False
 
