@@ -133,7 +133,7 @@ def _load() -> Any:
     core = c.CDLL(str(_core.__file__))
     signatures: dict[str, tuple[Any, list[Any]]] = {
         "sd_residual": (None, [_P, _D, _P, _P, _P]),
-        "sd_jacobian": (c.c_int32, [_P, _D, _P, _P, _P, _P]),
+        "sd_jacobian": (c.c_int32, [_P, _D, _P, _P, _P, _P, _P]),
         "sd_linear_new": (c.POINTER(Linear), [_I, _P, _P, _P]),
         "sd_linear_ordered": (c.POINTER(Linear), [_I, _P, _P, _P]),
         "sd_linear_free": (None, [_P]),

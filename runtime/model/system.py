@@ -325,7 +325,8 @@ class System(Facts):
         """Values of dF/dy and dF/dyd [entries] on the pattern."""
         jy, jyd = np.empty(self.pattern.entries + 1), np.empty(self.pattern.entries + 1)
         a, b = self._buffer(y), self._buffer(yd)
-        lib.core.sd_jacobian(c.byref(self.core), t, *(lib.pointer(item) for item in (a, b, jy, jyd)))
+        at, slopes = ([lib.pointer(item) for item in pair] for pair in ((a, b), (jy, jyd)))
+        lib.core.sd_jacobian(c.byref(self.core), t, *at, None, *slopes)
         self.failure.check()
         return jy[:-1], jyd[:-1]
 

@@ -31,6 +31,8 @@ from sysdyn.values import dataclass
 
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
+NOTHING = 1e-100
+"""Of any unit: what an iteration down a steep law leaves of zero."""
 SHARPER = 60
 """Corrections in which what follows from the state is found, or left as it was."""
 EXPLAINED = 0.1
@@ -224,7 +226,7 @@ def _consistent(
         raise _explain(starter, t0, guess, starter.free, best)
     if constants:
         system.description.p[places] += starter.residual(t0, best.x)[integrated]
-    y, yd = starter.expand(best.x)
+    y, yd = (np.where(np.abs(values) < NOTHING, 0.0, values) for values in starter.expand(best.x))
     moved = tuple(moved_guesses(starter, t0, best.x, starter.scale(t0, best.x)))
     largest = np.maximum(starter.scale(t0, guess), starter.largest_alike(best.x))
     zeros = (np.abs(best.x) <= EXACT * largest)[: y.size]

@@ -136,7 +136,7 @@ static int sized(sd_many *many)
     for (int32_t i = 0; i < pass->n; i++)
         if (pass->differential[i])
             pass->yd[i] = pass->start_rate[i];
-    sd_jacobian(many->system, many->t0, pass->y, pass->start_rate, many->form_jy, many->form_jyd);
+    sd_jacobian(many->system, many->t0, pass->y, pass->start_rate, NULL, many->form_jy, many->form_jyd);
     return sd_magnitudes(many->sizing, many->system, many->t0, many->t1 - many->t0, pass->y, pass->yd, many->form_jy,
                          many->form_jyd, pass->yd, many->order, many->found, &many->tau);
 }
@@ -153,7 +153,7 @@ int sd_many_begin(sd_many *many, const double *anchor)
             y[i] = anchor[i];
     if (!settled(many, anchor, NULL, y, yd) || !guessed(many, anchor, y, yd))
         return SD_MANY_START;
-    sd_jacobian(many->start->system, many->t0, y, yd, many->jy, many->jyd);
+    sd_jacobian(many->start->system, many->t0, y, yd, NULL, many->jy, many->jyd);
     if (other_pattern(many) || !(many->start->linear->smallest >= VANISHED * many->smallest) || negative_inertia(many))
         return SD_MANY_STRUCTURE;
     return sized(many) || !settled(many, anchor, many->found, y, yd) ? SD_MANY_START : SD_MANY_DONE;

@@ -203,7 +203,7 @@ int sd_row_sizes(sd_system *system, double t, int32_t points, int32_t extended, 
         return -1;
     memset(size, 0, (size_t)points * (size_t)sizes * sizeof *size);
     for (int32_t k = 0; k < points; k++, size += sizes) {
-        sd_jacobian(system, t, y + (size_t)k * (size_t)extended, yd, jy, jy + system->entries);
+        sd_jacobian(system, t, y + (size_t)k * (size_t)extended, yd, NULL, jy, jy + system->entries);
         for (int32_t e = 0; e < entries; e++)
             size[of[e]] = sd_larger(size[of[e]], fabs(jy[entry[e]]));
     }

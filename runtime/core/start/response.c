@@ -48,7 +48,7 @@ static int factored(path *p, double t, double h)
 {
     sd_system *s = p->system;
     p->factors++;
-    sd_jacobian(s, t, p->at, p->rate, p->jy, p->jyd);
+    sd_jacobian(s, t, p->at, p->rate, NULL, p->jy, p->jyd);
     for (int32_t e = 0; e < s->entries; e++)
         p->jy[e] += p->jyd[e] / h;
     return sd_first_bad(s->entries, p->jy) < 0 && sd_linear_factor(p->linear, p->jy, p->scale) == 0;

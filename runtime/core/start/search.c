@@ -48,7 +48,7 @@ int sd_start_jacobian(const sd_rows_of_start *s, double t, const double *x, doub
         return -2;
     double *jyd = y + 2 * (size_t)s->extended;
     expand(s, x, y, y + s->extended);
-    sd_jacobian(s->system, t, y, y + s->extended, values, jyd);
+    sd_jacobian(s->system, t, y, y + s->extended, NULL, values, jyd);
     for (int32_t k = 0; k < s->rated; k++)
         values[entries + k] = jyd[s->entry[k]];
     free(y);

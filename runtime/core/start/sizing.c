@@ -314,7 +314,7 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     double *least = size + entries;
     double quick = sd_excitation(system, t0, t0 + span - t0, y, yd, s->part, s->parts, NOISE, excited);
     *tau = time_scale(s, system, span, quick, y, yd, &(sd_motion){jy, jyd, rate, order}, room, moves, most);
-    sd_jacobian(system, t0, y, yd, own_jy, own_jyd);
+    sd_jacobian(system, t0, y, yd, NULL, own_jy, own_jyd);
     carriers(s, own_jyd, carries);
     int failed = quick < 0.0 || *tau < 0.0;
     if (rate && !failed)

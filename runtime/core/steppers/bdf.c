@@ -133,7 +133,7 @@ void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, doub
 static int factorise(sd_bdf *bdf, double t, int fresh)
 {
     if (fresh) {
-        int32_t bad = sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->jy, bdf->jyd);
+        int32_t bad = sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->magnitude, bdf->jy, bdf->jyd);
         bdf->jacobian_age = 0;
         bdf->fresh_jacobian = 1;
         if (*bdf->system->stop)
@@ -180,7 +180,7 @@ static int rows_hold(sd_bdf *bdf, double t)
  * radau_newton.c) */
 static int rows_at_round_off(sd_bdf *bdf, double t)
 {
-    sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->jy, bdf->jyd);
+    sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->magnitude, bdf->jy, bdf->jyd);
     return sd_first_astray(bdf->system, t, bdf->y, bdf->yd, bdf->delta, row_limit(bdf), bdf->jy, bdf->jyd,
                            1.0 / bdf->cj, bdf->moved, bdf->linear->rank < bdf->n, bdf->terms) < 0;
 }

@@ -75,7 +75,7 @@ static int rows_at_round_off(sd_radau *radau, double newton_tolerance)
     for (int s = 0; s < radau->method->stages; s++) {
         double t = radau->t + radau->method->c[s] * radau->h;
         sd_radau_stage(radau, s, radau->y, radau->rate);
-        sd_jacobian(radau->system, t, radau->y, radau->rate, radau->jy, radau->jyd);
+        sd_jacobian(radau->system, t, radau->y, radau->rate, radau->magnitude, radau->jy, radau->jyd);
         for (int32_t i = 0; i < radau->n; i++)
             radau->first[i] = sd_open(radau->full[s][i], radau->y[i], radau->met[i]);
         if (sd_first_astray(radau->system, t, radau->y, radau->rate, radau->d[s], limit, radau->jy, radau->jyd,

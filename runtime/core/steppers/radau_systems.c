@@ -113,7 +113,7 @@ int sd_radau_factorise(sd_radau *radau, int at_end)
         if (at_end)
             sd_radau_stage(radau, radau->method->stages - 1, radau->y, radau->rate);
         int32_t bad = sd_jacobian(system, at_end ? radau->t + radau->h : radau->t, at_end ? radau->y : radau->phi,
-                                  at_end ? radau->rate : radau->yd, radau->jy, radau->jyd);
+                                  at_end ? radau->rate : radau->yd, radau->magnitude, radau->jy, radau->jyd);
         if (*system->stop)
             return SD_STOPPED;
         if (bad >= 0) {

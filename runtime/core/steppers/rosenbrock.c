@@ -211,7 +211,8 @@ static int linearise(sd_rosenbrock *rosenbrock)
 {
     sd_system *system = rosenbrock->system;
     double t = rosenbrock->t, *drift = rosenbrock->drift;
-    int32_t bad = sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->jy, rosenbrock->jyd);
+    int32_t bad = sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->magnitude,
+                              rosenbrock->jy, rosenbrock->jyd);
     if (*system->stop)
         return SD_STOPPED;
     if (bad >= 0) {

@@ -13,7 +13,7 @@
  * transistor that is off) leaves a row whose only term is its residual */
 #define NOTHING (DBL_EPSILON * DBL_EPSILON)
 
-/* how far beside a root at zero its slope is taken: of an unknown's value, and at least; the golden ratio's part */
+/* how far beside a root at zero its slope is taken: of an unknown's magnitude, and at least; the golden ratio's part */
 #define ROOT_BESIDE 1e-8
 #define ROOT_LEAST 1e-12
 #define ROOT_SPREAD 0.6180339887498949
@@ -97,7 +97,8 @@ static int32_t steep_beyond(const sd_system *system, const double *jy, const dou
     return system->row[e >= 0 ? e : sd_first_bad(system->entries, jyd)];
 }
 
-int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd)
+int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *yd, const double *size, double *jy,
+                    double *jyd)
 {
     system->jacobian_evaluations++;
     evaluate_slopes(system, t, y, yd, jy, jyd);
@@ -107,7 +108,7 @@ int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *
         double apart = 0.0; /* all by different parts, so that no difference of two stays at zero */
         for (int32_t j = 0; j < system->unknowns; j++) {
             apart = fmod(apart + ROOT_SPREAD, 1.0);
-            beside[j] = y[j] + way * (1.0 + apart) * (ROOT_BESIDE * fabs(y[j]) + ROOT_LEAST);
+            beside[j] = y[j] + way * (1.0 + apart) * (ROOT_BESIDE * fmax(fabs(y[j]), size ? size[j] : 0.0) + ROOT_LEAST);
         }
         evaluate_slopes(system, t, beside, yd, jy, jyd);
         bad = steep_beyond(system, jy, jyd);

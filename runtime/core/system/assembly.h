@@ -67,8 +67,10 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
 /* the same added to r, rows q' - f and held ones put there, of a system that is not condensed */
 void sd_add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r);
 /* jy := dF/dy, jyd := dF/dyd; where a slope is no number at the point itself (the root of an orifice at rest), at one so
- * near that it is steeper than any step resolves.  Returns the first row with a slope that is none there either, or -1. */
-int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd);
+ * near that it is steeper than any step resolves.  size: magnitudes of the unknowns, NULL where they are
+ * not known.  Returns the first row with a slope that is none there either, or -1. */
+int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *yd, const double *size, double *jy,
+                    double *jyd);
 /* one of them, of a system that is not condensed; rate: dF/dyd */
 void sd_slopes(const sd_system *system, double t, const double *y, const double *yd, int rate, double *values);
 /* The first steep row whose residual r is more than `limit` of the magnitudes of its terms at (t, y), -1 where every one

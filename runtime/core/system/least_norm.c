@@ -41,7 +41,7 @@ void sd_least_norm_free(sd_least_norm *least)
 int sd_least_norm_apply(sd_least_norm *least, double t, double *y, const double *yd)
 {
     int32_t m = least->multipliers, n = least->coordinates;
-    sd_jacobian(least->system, t, y, yd, least->jy, least->jyd);
+    sd_jacobian(least->system, t, y, yd, NULL, least->jy, least->jyd);
     memset(least->size, 0, (size_t)n * sizeof(double));
     memset(least->matrix, 0, (size_t)least->linear->entries * sizeof(double));
     for (int32_t e = 0; e < least->entries; e++)

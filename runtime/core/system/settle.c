@@ -130,7 +130,7 @@ static void slopes(sd_settle *settle, double t, const double *y, const double *y
 {
     sd_system *system = settle->system;
     int32_t n = settle->unknowns, rates = settle->rates;
-    sd_jacobian(system, t, y, yd, settle->jy, settle->jyd);
+    sd_jacobian(system, t, y, yd, settle->scale, settle->jy, settle->jyd);
     memset(settle->row_scale, 0, (size_t)settle->rows * sizeof(double));
     settle->ready = NONE;
     for (int32_t j = 0; j < n + rates && met; j++) {
