@@ -350,7 +350,7 @@ class Runs:
         """After a failure: the rows so far stay if there is no finished run to keep."""
         assert self.writer is not None
         if first:
-            nominal = self.nominal(integration.largest(), integration.magnitude)
+            nominal = self.nominal(integration.driver.largest(), integration.sizes.magnitude)
             attributes: dict[str, str | float | int] = {**self.last_attributes(None), "met": 0, "judged": ""}
             self.writer.finish(nominal, attributes, final=False, events=integration.happened())
             return

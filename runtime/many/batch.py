@@ -26,7 +26,7 @@ from sysdyn.runtime.many.mass_matrix import mass_matrix
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
-from sysdyn.runtime.model.scales import confirmed, sizing
+from sysdyn.runtime.model.scales import sizing
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.simulate import close
@@ -177,8 +177,8 @@ class Batch:
         """Pass k of the core."""
         made, system = self.passes[k], self.system
         core = made.method.contents
-        states = [(c.addressof(core), c.sizeof(core)), (c.addressof(made.run_.contents), c.sizeof(lib.Run))]
-        settlers = [made.settler, *([made._project] if made._project is not None else [])]
+        states = [(c.addressof(core), c.sizeof(core)), (c.addressof(made.driver.run), c.sizeof(lib.Run))]
+        settlers = [made.settler, *([made.projection] if made.projection is not None else [])]
         zero = [lib.core.sd_linear_pivoted(made.linear)]
         for settler in settlers:
             states += self._settled(settler)
@@ -188,17 +188,17 @@ class Batch:
         zero += [lib.core.sd_linear_z_pivoted(item) for item in made.method.complex]
         # observers read the audit's families behind the unknowns
         rooms = [np.zeros(max(system.form.extended, system.unknowns) + 8) for _ in range(3)]
-        made.run_.contents.start_rate = lib.pointer(rooms[2])
+        made.driver.run.start_rate = lib.pointer(rooms[2])
         regions, number = self._regions(states, zero)
         kind = type(core)
         field = self.core.passes[k]
-        field.run, field.region, field.regions = c.addressof(made.run_.contents), c.addressof(regions), number
+        field.run, field.region, field.regions = c.addressof(made.driver.run), c.addressof(regions), number
         field.n = system.unknowns
         field.y, field.yd, field.start_rate = (self._kept(room) for room in rooms)
         field.differential = self._kept(made.roles.differential.astype(np.int32))
-        field.magnitude, field.met = lib.pointer(made.magnitude), lib.pointer(made._met)
-        field.least = self._kept(np.ascontiguousarray(made._least))
-        field.project = None if made._project is None else c.addressof(made._project.core.contents)
+        field.magnitude, field.met = lib.pointer(made.sizes.magnitude), lib.pointer(made.sizes.met)
+        field.least = self._kept(np.ascontiguousarray(made.sizes.least))
+        field.project = None if made.projection is None else c.addressof(made.projection.core.contents)
         field.rtol = c.addressof(core) + kind.rtol.offset
         field.h_max = c.addressof(core) + kind.h_max.offset
         field.opening = c.addressof(core) + kind.opening.offset if hasattr(kind, "opening") else None
@@ -222,11 +222,11 @@ class Batch:
         many, system, made = self.core, self.system, self.passes[1]
         n = system.form.written
         y, yd = (np.ascontiguousarray(item[:n]) for item in (self.start.y, self.start.yd))
-        found = anchors(made.settler, system, self.start.t, (y, yd), made.magnitude)
+        found = anchors(made.settler, system, self.start.t, (y, yd), made.sizes.magnitude)
         if found is None:
             raise NotApplicableError("initial values of the text leave the start open, or move for its sake")
         self.anchored = found
-        settler = made._settler("settled", found)
+        settler = made.settlers.of("settled", found)
         settled = settler.system
         # rows written with room for what settles: the buffers of both passes are used
         extended = np.zeros(settled.form.extended), np.zeros(settled.form.extended)
@@ -249,7 +249,7 @@ class Batch:
         many.anchored = self._kept(found.astype(np.int32))
         guess, said = guesses(system.form.at, n, system.description.initial)
         many.guessed, many.guess = self._kept((said & ~found).astype(np.int32)), self._kept(guess)
-        many.size = self._kept(made.magnitude[:n].copy())
+        many.size = self._kept(made.sizes.magnitude[:n].copy())
         many.jy0, many.jyd0 = self._kept(np.append(jy, 0.0)), self._kept(np.append(jyd, 0.0))
         counts = 1 * _counts(settled, jy, settler.scale[:n]) + 2 * _counts(settled, jyd, self._rates(settler, n))
         many.counts = self._kept(np.append(counts, 0).astype(np.int32))
@@ -278,7 +278,7 @@ class Batch:
         n, columns = system.form.written, len(self.columns)
         span = options.t_end - options.t_start
         many.p, many.parameters = lib.pointer(system.description.p), system.description.p.size
-        many.written, many.columns, many.observed = n, columns, self.passes[1].observed
+        many.written, many.columns, many.observed = n, columns, self.passes[1].driver.observed
         many.t0, many.t1 = options.t_start, options.t_end
         sizes = sizing(system)
         self._alive.append(sizes)
@@ -367,17 +367,16 @@ class Batch:
         steps, rejected, newton, factorisations, *evaluated = core.counted
         residuals, jacobians = (evaluated[k] + evaluated[k + 2] for k in (0, 1))
         runs.statistics = Statistics(steps, rejected, residuals, jacobians, factorisations, newton)
-        magnitude = confirmed(self.system, self.options.t_end - self.options.t_start, *made._sizes())
         finished = Finished(
             self.options.t_end,
             runs.statistics,
-            magnitude[: self.system.form.written],
-            made.largest(),
+            made.confirmed(),
+            made.driver.largest(),
             core.spent,
             made.settler.core.contents.failures,
-            made.ledgers,
+            made.driver.ledgers,
         )
-        rows = made._rows[: core.held]
+        rows = made.driver.rows[: core.held]
         writer = Held(replace(runs.layout(made.method.contents.rtol, None), parameters=parameters))
         writer.append(rows[(rows[:, 1].astype(np.int32) & TRACE) > 0])
         runs.done = finished, [], writer
