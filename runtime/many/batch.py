@@ -18,7 +18,8 @@ from sysdyn.runtime.integrate.accuracy import DRAFT, FEW_STEPS, Achieved, Law
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
-from sysdyn.runtime.integrate.runs import APART, ROUGH, Runs, Way
+from sysdyn.runtime.integrate.runs import APART, ROUGH, Runs
+from sysdyn.runtime.integrate.way import Way
 from sysdyn.runtime.judgement import allowed, judge
 from sysdyn.runtime.many.anchors import anchors, guesses
 from sysdyn.runtime.many.asked import DONE, END, ROWS, TRACES, WHY, Claim, NotApplicableError, Results, obstacle
@@ -76,8 +77,9 @@ class Batch:
         self.options, self.way = options, way
         self._alive: list[Any] = []  # what the core has addresses of
         self.runs = Runs(start, self.options, way)
-        if self.runs.meters or not self.runs.columns:
-            raise NotApplicableError("accuracy is asked of a meter" if self.runs.meters else "nothing is traced")
+        meters = self.runs.quantities.meters
+        if meters or not self.runs.columns:
+            raise NotApplicableError("accuracy is asked of a meter" if meters else "nothing is traced")
         self.system, self.start = way.system, start
         self.columns = tuple(column.name for column in self.runs.columns)
         self._thin = np.ascontiguousarray([] if thin is None or keep != TRACES else thin, dtype=np.int32)
@@ -125,7 +127,7 @@ class Batch:
         return lib.pointer(array)
 
     def _wanted(self) -> Floats:
-        options, names = self.options, list(self.runs.compared)
+        options, names = self.options, list(self.runs.quantities.compared)
         target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)
         for name, wanted in options.accuracy_on:
             target[names.index(name)] = wanted
@@ -134,11 +136,9 @@ class Batch:
     def _pass(self, number: int, tolerance: float, longest: float) -> Integration:
         """The structures of the draft (0), or of the runs behind it (1)."""
         runs, options = self.runs, self.options
-        runs.controlled, runs.open = True, False  # every run is compared at instants of the draft
+        runs.controlled, runs.instants.open = True, False  # every run is compared at instants of the draft
         request: Request = runs.request(tolerance, None, longest)
-        instants, kinds = runs.instants, runs.kinds
-        if runs.common is not None:
-            instants, kinds = runs.with_common(runs.common, draft=not number)
+        instants, kinds = runs.instants.rows(compared=True, draft=not number)
         request = replace(
             request,
             instants=instants,
@@ -146,7 +146,7 @@ class Batch:
             h_max=min(longest * (options.t_end - options.t_start), options.longest or np.inf),
             settled_to=ROUGH * tolerance,
             draft=not number,
-            apart=APART if runs.common is not None and not number else 0.0,
+            apart=APART if runs.instants.common is not None and not number else 0.0,
             condense=False,
             max_wall=None,
         )
@@ -298,7 +298,7 @@ class Batch:
             if family.size and first + family.size <= n and family.unit in units:
                 of[first : first + family.size] = units[family.unit]
         many.unit, many.unit_of = self._kept(np.array(own, dtype=np.int32)), self._kept(of)
-        many.units, many.known = len(units), int(runs.common is not None)
+        many.units, many.known = len(units), int(runs.instants.common is not None)
         asked = float(np.min(self._targets[np.isfinite(self._targets)], initial=1.0))
         many.late = min(pairs.TIMING, pairs.SHARE * asked) * span
         for name in ("power", "credit", "finest", "far", "ratio", "little", "growth"):
@@ -308,7 +308,7 @@ class Batch:
         many.max_steps = min(options.max_steps or 2**62, 2**62)
         many.energy = allowed(options)
         many.thin, many.thins = self._kept(np.append(self._thin, np.int32(-1))), self._thin.size
-        room = max(2 * MOST + 4, 0 if runs.common is None else runs.common.size + 4)
+        room = max(2 * MOST + 4, 0 if runs.instants.common is None else runs.instants.common.size + 4)
         for k in range(3):
             many.sample[k] = lib.RunSamples(
                 time=self._kept(np.zeros(room)),
@@ -359,17 +359,17 @@ class Batch:
         own; None where it has no result here.  parameters: as the trace lists them.
         """
         runs, core, made = self.runs, self.core, self.passes[1]
-        runs.began = time.monotonic()
+        runs.accounts.began = time.monotonic()
         found = self.run(p[None, :], anchor[None, :])
         if found.state[0] != DONE:
             return None
-        runs.cpu, runs.wall = core.spent, time.monotonic() - runs.began
+        runs.accounts.cpu, runs.accounts.wall = core.spent, time.monotonic() - runs.accounts.began
         steps, rejected, newton, factorisations, *evaluated = core.counted
         residuals, jacobians = (evaluated[k] + evaluated[k + 2] for k in (0, 1))
-        runs.statistics = Statistics(steps, rejected, residuals, jacobians, factorisations, newton)
+        runs.accounts.statistics = Statistics(steps, rejected, residuals, jacobians, factorisations, newton)
         finished = Finished(
             self.options.t_end,
-            runs.statistics,
+            runs.accounts.statistics,
             made.confirmed(),
             made.driver.largest(),
             core.spent,
