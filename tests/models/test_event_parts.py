@@ -1,7 +1,7 @@
 """Parts of what happens at an event, each asked by itself, against closed forms and linear complementarity problems."""
 
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -59,9 +59,7 @@ def row_of(masses, restitution=0.5):
     names = "abcde"[: len(masses)]
     coords = "".join(f"  coord {n}: translation = {k} m\n" for k, n in enumerate(names))
     kinetic = " + ".join(f"1/2*({m!r} kg)*{n}'^2" for n, m in zip(names, masses, strict=True))
-    gaps = "".join(
-        f"  phi {p}{q}: {q} - {p} >= 1 m restitution {restitution}\n" for p, q in zip(names, names[1:], strict=False)
-    )
+    gaps = "".join(f"  phi {p}{q}: {q} - {p} >= 1 m restitution {restitution}\n" for p, q in pairwise(names))
     still = "".join(f"  init {n}' = 0 m/s\n" for n in names)
     trace = f"scene s of row {{ time 0 s to 1 s; trace {', '.join(names)} }}"
     return f"model row {{\n{coords}  energy T* = {kinetic}\n{gaps}{still}}}\n{trace}\n"
