@@ -14,9 +14,10 @@ import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.accuracy import Achieved, Lighter, control
 from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
-from sysdyn.runtime.integrate.runs import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Runs, Samples, Way
+from sysdyn.runtime.integrate.runs import Runs, Samples
 from sysdyn.runtime.integrate.second_opinion import confirmed
 from sysdyn.runtime.integrate.underlying import rateless, underlying_form
+from sysdyn.runtime.integrate.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
 from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge, own_tolerances
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
@@ -119,7 +120,7 @@ def _left(runs: Runs, failure: SolverFailure) -> str:
 
 def _targets(runs: Runs, options: Options) -> Floats:
     """Accuracy wanted of each compared quantity; infinite where none is."""
-    names = list(runs.compared)
+    names = list(runs.quantities.compared)
     target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)
     for name, wanted in options.accuracy_on:
         if name not in names:
@@ -147,7 +148,7 @@ def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Es
     """The quantity that misses most what was asked, where the accuracy was not reached."""
     if achieved is None or achieved.met:
         return ()
-    name, asked, time = runs.worst(_targets(runs, options))
+    name, asked, time = runs.compared.worst(runs.quantities.compared, _targets(runs, options))
     return (Estimate(name, achieved.error_estimate, asked, time),)
 
 
@@ -185,7 +186,7 @@ def _balanced(runs: Runs, options: Options, achieved: Achieved) -> Achieved:
         if off <= 1.0:
             break
         try:
-            runs.sampled(achieved.tolerance, REFINE / max(runs.last_statistics.steps, 1))
+            runs.sampled(achieved.tolerance, REFINE / max(runs.accounts.last.steps, 1))
         except SolverFailure:  # the run before stands, with what it misses
             break
         before, off = off, _unbalanced(runs, options)
@@ -373,8 +374,8 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
             runs.keeping.path,
             final,
             reached,
-            runs.statistics_object(estimate),
-            runs.timings(),
+            runs.accounts.statistics_object(estimate),
+            runs.accounts.timings(),
             estimate,
             runs.method,
             runs.way.name,
@@ -407,7 +408,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     if finished.unsettled and not options.events:
         warnings = (*warnings, f"{finished.unsettled} rows do not meet the equations: they are the integrator's own")
     estimate = achieved.error_estimate if achieved is not None else None
-    lost = tuple(cancelled(runs.terms(finished.largest), writer.seen(), options.accuracy, estimate))
+    lost = tuple(cancelled(runs.quantities.terms(finished.largest), writer.seen(), options.accuracy, estimate))
     below = achieved is not None and achieved.below_round_off
     told = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
     return outcome(True, options.t_end, achieved, None, steps=finished.statistics.steps, **told)
@@ -420,6 +421,6 @@ def close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) ->
     finished, _, writer = runs.done
     estimate = achieved.error_estimate if achieved is not None else None
     verdict = UNJUDGED if judgement is None else judgement.attributes()
-    attributes = {**runs.last_attributes(estimate), **verdict}
-    nominal = runs.nominal(finished.largest, finished.magnitude)
+    attributes = {**runs.accounts.attributes(estimate), **verdict}
+    nominal = runs.quantities.nominal(finished.largest, finished.magnitude)
     writer.finish(nominal, attributes, judgement is not None, finished.events)

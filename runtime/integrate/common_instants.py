@@ -7,12 +7,15 @@ interval its own rows are compared; where that stores few, instants of an irregu
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.integrate.options import Options, instants
 from sysdyn.runtime.integrate.request import COMPARED
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.numerics.points import distinct
+from sysdyn.values import dataclass
 
 MOST = 24
 """Instants at which runs are compared, at most twice that; of a long run this part of its steps, at most twice MANY."""
@@ -24,8 +27,8 @@ GOLDEN = 0.6180339887498949
 """Multiples of it modulo 1 fill an interval evenly and never regularly (Weyl's sequence)."""
 NEAR = 1e-9
 """Of the span: nearer to an instant at which the text jumps nothing is compared, for sides may differ by round-off."""
-
-
+KEPT = 10_000
+"""Instants of rows up to which they are kept for the next run."""
 APART = 0.1
 """Of the time between two events: where two runs differ by more in the instant of one, they are compared there too."""
 
@@ -69,12 +72,12 @@ class Thinned:
         return found[place] if np.array_equal(found[place, 0], instants) else found[:0]
 
 
-def known(instants: Floats, options: Options) -> Floats | None:
+def known(times: Floats, options: Options) -> Floats | None:
     """Instants of comparison [s] where those of the trace are known before a run; None where they are its steps."""
     if options.every is None:
         return None
-    if instants.size >= FEW:
-        return distinct(np.append(instants[:: -(-instants.size // GRID)], instants[-1]))
+    if times.size >= FEW:
+        return distinct(np.append(times[:: -(-times.size // GRID)], times[-1]))
     span = options.t_end - options.t_start
     return distinct(np.append(options.t_start + span * (np.arange(1, MOST + 1) * GOLDEN % 1.0), options.t_end))
 
@@ -115,3 +118,55 @@ def joined(instants: Floats, kinds: Ints, compared: Floats) -> tuple[Floats, Int
     found[np.searchsorted(every, instants)] = kinds
     found[np.searchsorted(every, compared)] |= COMPARED
     return every, found
+
+
+@dataclass(frozen=True, slots=True)
+class _Joined:
+    """Instants of comparison [s]; instants and kinds of rows with these among them; of a draft these alone."""
+
+    compared: Floats
+    every: tuple[Floats, Ints]
+    draft: tuple[Floats, Ints]
+
+    @classmethod
+    def of(cls, times: Floats, kinds: Ints, compared: Floats) -> _Joined:
+        """Of instants and kinds of rows."""
+        every = joined(times, kinds, compared)
+        use = (every[1] & COMPARED) > 0
+        return cls(compared, every, (every[0][use], every[1][use]))
+
+
+class Instants:
+    """Where the runs of a simulation write rows and are compared: times [s] and kinds of rows as asked; common [s]: of
+    comparison, None while they are not known; open: while those are of the trace, from which a draft takes its own.
+    """
+
+    def __init__(self, options: Options, kept: dict[str, Any]) -> None:
+        """kept: by the model; the run before had the same instants, or others."""
+        asked = options.t_start, options.t_end, options.every, options.at, options.sampled_at
+        before = kept.get("instants")
+        if before is None or before[0] != asked:
+            times, kinds = instants(options)
+            compared = known(times, options)
+            both = None if compared is None else _Joined.of(times, kinds, compared)
+            before = asked, (times, kinds, compared, both)
+            if times.size <= KEPT:
+                kept["instants"] = before
+        self.times: Floats
+        self.kinds: Ints
+        self.common: Floats | None
+        self._joined: _Joined | None
+        self.times, self.kinds, self.common, self._joined = before[1]
+        self.open = options.every is not None
+
+    def close(self, common: Floats | None) -> None:
+        """From now on runs are compared at these (s)."""
+        self.common, self.open = common, False
+
+    def rows(self, *, compared: bool, draft: bool) -> tuple[Floats, Ints]:
+        """Instants and kinds of a run's rows; compared: with those of comparison, of a draft these alone."""
+        if not compared or self.common is None:
+            return self.times, self.kinds
+        if self._joined is None or self._joined.compared is not self.common:
+            self._joined = _Joined.of(self.times, self.kinds, self.common)
+        return self._joined.draft if draft else self._joined.every

@@ -57,7 +57,7 @@ def serves(plan: Plan, run: Integration) -> bool:
     """Whether the core can take transitions of this run."""
     equal = any(_equal(w.condition, plan) for w in plan.whens)
     kinds = all(k.kind in KINDS and (k.kind == "guarded" or k.guard < 0) for k in plan.contacts)
-    return kinds and not equal and run._calls["observe"] is not None and not run.request.least_norm
+    return kinds and not equal and run.driver.calls["observe"] is not None and not run.request.least_norm
 
 
 def _equal(condition: tuple[Any, ...], plan: Plan) -> bool:
@@ -78,14 +78,14 @@ class Modes:
         self._told: list[Told] = []
         self._tried: dict[str, int] = {}
         self._modes, self._transitions = (lib.Mode * 8)(), (lib.Transition * 16)()
-        settled = [run.system, run.settler.system, *([run._project.system] if run._project else [])]
+        settled = [run.system, run.settler.system, *([run.projection.system] if run.projection else [])]
         self._systems = list({id(s): s for s in settled}.values())
         self._fixed = [k.sense for k in plan.contacts if k.sense >= 0] + [k.branch for k in plan.kinks]
         self.core = lib.Modes(now=-1, last=-np.inf, begin=run.start.t, longest=longest, left=UNLIMITED)
         self._sizes(plan)
         self._plan(plan)
         self._run()
-        run.run_.contents.modes = c.addressof(self.core)
+        run.driver.run.modes = c.addressof(self.core)
 
     # -- the core's structure ------------------------------------------------------------------------------------
 
@@ -101,7 +101,7 @@ class Modes:
         core.parameters, core.places = self.handler.p.size, len(self._fixed)
         core.relations, core.contacts, core.kinks = len(plan.relations), len(plan.contacts), len(plan.kinks)
         core.systems, core.samples = len(self._systems), len(plan.sampled)
-        core.observed, core.unknowns = run.observed, run.system.unknowns
+        core.observed, core.unknowns = run.driver.observed, run.system.unknowns
 
     def _plan(self, plan: Plan) -> None:
         core, handler = self.core, self.handler
@@ -135,14 +135,14 @@ class Modes:
         core.still, core.unknown_size, core.round_off = STILL, UNKNOWN, ROUND_OFF
         core.state = self._array(run.roles.state[: run.system.form.written], np.int32)
         core.differential = self._array(run.roles.differential, np.int32)
-        core.unnamed, core.met = self._array(run._unnamed, np.int32), lib.pointer(run._met)
-        core.magnitude, core.resolved = lib.pointer(run.magnitude), lib.pointer(run._resolved)
-        core.rate = lib.pointer(run._start_rate)
+        core.unnamed, core.met = self._array(run.sizes.unnamed, np.int32), lib.pointer(run.sizes.met)
+        core.magnitude, core.resolved = lib.pointer(run.sizes.magnitude), lib.pointer(run.sizes.resolved)
+        core.rate = lib.pointer(run.start_rate)
         core.t_end, core.h_max = (c.addressof(method) + getattr(type(method), f).offset for f in ("t_end", "h_max"))
         for name in ("y", "yd", "before", "before_d", "restart", "restart_d"):
             setattr(core, name, self._array(np.zeros(extended)))
         for name in ("values", "low", "high"):
-            setattr(core, name, self._array(np.zeros(run.observed + 1)))
+            setattr(core, name, self._array(np.zeros(run.driver.observed + 1)))
         for name in ("p_before", "p_after"):
             setattr(core, name, self._array(np.zeros(core.parameters + 1)))
         core.exact = self._array(np.zeros(core.relations + 1), np.int32)

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from sysdyn.runtime.events.handler import Handler, Point, Watched
 from sysdyn.runtime.events.plan import Happened, Plan
+from sysdyn.runtime.integrate.crossing import go_on
+from sysdyn.runtime.integrate.driver import Sink
 from sysdyn.runtime.integrate.modes import Modes, serves
 from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.integrate.round_off import left_open
@@ -20,7 +22,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
 if TYPE_CHECKING:
-    from sysdyn.runtime.integrate.integrate import Integration, Sink
+    from sysdyn.runtime.integrate.integrate import Integration
 
 UNSEEN = 100.0
 """Times a run's tolerance: of a bounce that rises less, the error test of the bdf hardly sees that it falls."""
@@ -42,13 +44,13 @@ class Pieces:
         start = run.start
         assert run.request.begin is not None
         self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin, run.request.rtol)
-        self.handler.restart = run.restart
-        self.handler.contacts.size(run.magnitude, run._time)
+        self.handler.restart = run.settlers.restart
+        self.handler.contacts.size(run.sizes.magnitude, run.sizes.time)
         self._longest, self._landing, self._end = run.method.contents.h_max, np.inf, run.segments[0].end
         n = run.system.form.written
-        self._first(self.handler.begin(start.t, run.y[:n].copy(), run._start_rate[:n].copy()))
+        self._first(self.handler.begin(start.t, run.y[:n].copy(), run.start_rate[:n].copy()))
         self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
-        self._mode, self._open = -1, np.full(run.observed, np.inf)
+        self._mode, self._open = -1, np.full(run.driver.observed, np.inf)
         self._watch()
 
     def _first(self, point: tuple[Floats, Floats] | None) -> None:
@@ -56,15 +58,15 @@ class Pieces:
         if point is None:
             return
         run, n = self.run, self.run.system.form.written
-        run.y[:n], run._start_rate[:n] = point
-        run.yd = np.where(run.roles.differential, run._start_rate, 0.0)
-        run.begin_to_move(run.start.t)
+        run.y[:n], run.start_rate[:n] = point
+        run.yd = np.where(run.roles.differential, run.start_rate, 0.0)
+        run.sizes.begin_to_move(run.start.t, run.y, run.start_rate)
         run.method.start(run.start.t, run.y, run.yd)
 
     def _watch(self) -> None:
-        self.handler.observer.know(self.run.largest())
+        self.handler.observer.know(self.run.driver.largest())
         self._array = self.handler.core()
-        core = self.run.run_.contents
+        core = self.run.driver.run
         core.watch, core.watches = c.addressof(self._array), len(self.handler.watched())
         if self.modes is not None:
             self._mode = self.modes.stands()
@@ -106,7 +108,7 @@ class Pieces:
         if self.modes is not None:
             self.modes.core.segment = end
         self.run.method.contents.t_end = min(sample if sample < end - near else end, self._landing)
-        self.run.run_.contents.end_kind = TRACE if sample <= min(end + near, self._landing) else 0
+        self.run.driver.run.end_kind = TRACE if sample <= min(end + near, self._landing) else 0
 
     def _bounce(self, t: float) -> None:
         """Steps short enough for a bounce that begins at t (s), until it must have ended."""
@@ -139,14 +141,14 @@ class Pieces:
 
     def _values(self, t: float) -> Floats:
         """Values [observed] at t within the last step, settled: what an event is located by."""
-        values = np.zeros(max(self.run.observed, 1))
-        lib.core.sd_run_observe(self.run.run_, t, lib.pointer(values))
-        return values[: self.run.observed]
+        values = np.zeros(max(self.run.driver.observed, 1))
+        lib.core.sd_run_observe(self.run.driver.core, t, lib.pointer(values))
+        return values[: self.run.driver.observed]
 
     def event(self, sink: Sink) -> float:
         """What changes within the last step, which is counted up to there; CPU seconds spent."""
         began = time.process_time()
-        run, core, method = self.run, self.run.run_.contents, self.run.method.contents
+        run, core, method = self.run, self.run.driver.run, self.run.method.contents
         stepper = method.stepper
         self._told()
         self.handler.before = self.handler.now()
@@ -187,23 +189,23 @@ class Pieces:
         """The last step counts up to t; rows of before the event are written with the parameters of before."""
         after = self.handler.now()
         self.handler.back(self.handler.before)
-        full = lib.core.sd_run_accept(self.run.run_, t, kind)
+        full = lib.core.sd_run_accept(self.run.driver.core, t, kind)
         while full:
-            self.run.drain(sink)
-            full = lib.core.sd_run_drain(self.run.run_)
-        self.run.drain(sink)
+            self.run.driver.drain(sink)
+            full = lib.core.sd_run_drain(self.run.driver.core)
+        self.run.driver.drain(sink)
         self.handler.back(after)
 
     def _go_on(
         self, t: float, point: tuple[Floats, Floats], before: tuple[Floats, Floats], *, misled: float = 0.0
     ) -> None:
         """From a point behind an event; misled (s): by a step whose dense output crossed what the point does not."""
-        core = self.run.run_.contents
+        core = self.run.driver.run
         core.start_kind = TRACE
         self._bounce(t)
         if misled:
             self._short(t, misled)
-        self.run.go_on(t, t, point, before)
+        go_on(self.run, t, t, point, before)
         core.start_kind = 0
         self._watch()
 
@@ -223,7 +225,7 @@ class Pieces:
             y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
             self.handler.before = self.handler.now()
             point = self._fire(method.t, (y, yd), due, [])
-            run.drain(sink)
+            run.driver.drain(sink)
             self.aim(end)
             if point is not None:
                 self._go_on(method.t, point, (y, yd))
@@ -235,7 +237,7 @@ class Pieces:
         due, which = self.handler.due(t), self.handler.turned(t, y, yd)
         found = self.handler.fire(t, y, yd, samples=due, which=which) if due or which else None
         point = found or self.handler.anew(t, y, yd)
-        self.run.run_.contents.start_kind = TRACE if due else 0
+        self.run.driver.run.start_kind = TRACE if due else 0
         self._bounce(t)
         self._watch()
         return point

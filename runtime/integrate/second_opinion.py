@@ -13,7 +13,8 @@ import numpy as np
 from sysdyn.runtime.integrate.accuracy import Achieved
 from sysdyn.runtime.integrate.pairs import difference
 from sysdyn.runtime.integrate.request import LONGEST
-from sysdyn.runtime.integrate.runs import Runs, Way
+from sysdyn.runtime.integrate.runs import Runs
+from sysdyn.runtime.integrate.way import Way
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 
@@ -32,17 +33,17 @@ def confirmed(runs: Runs, achieved: Achieved, target: Floats) -> Achieved:
     with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
         options = replace(runs.options, output=Path(folder) / "second.h5", watch=None)
         second = Runs(runs.start, options, way)
-        second.columns, second.common, second.open = runs.columns, runs.common, False
-        second.jumps, second.begin = runs.jumps, runs.begin
+        second.columns, second.begin = runs.columns, runs.begin
+        second.instants.close(runs.instants.common)
+        second.compared.jumps = runs.compared.jumps
         try:
-            apart, over = difference(runs.samplings[-1], second.sampled(tolerance, LONGEST), target)
+            apart, over = difference(runs.compared.samplings[-1], second.sampled(tolerance, LONGEST), target)
         except SolverFailure as failure:
             if failure.cause == "max_wall":
                 raise
             return replace(achieved, error_estimate=None, met=False)
         finally:
-            runs.statistics, runs.cpu = runs.statistics + second.statistics, runs.cpu + second.cpu
-            runs.wall += second.wall
+            runs.accounts.take(second.accounts)
             if second.writer is not None:
                 second.writer.discard()
     estimate = max(achieved.error_estimate or 0.0, apart)

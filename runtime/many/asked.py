@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.runtime.integrate.options import Options, choose_method
-from sysdyn.runtime.integrate.runs import Way
+from sysdyn.runtime.integrate.way import Way
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.simulate import alternatives, counted, form_name, formed

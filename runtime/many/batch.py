@@ -18,7 +18,8 @@ from sysdyn.runtime.integrate.accuracy import DRAFT, FEW_STEPS, Achieved, Law
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
-from sysdyn.runtime.integrate.runs import APART, ROUGH, Runs, Way
+from sysdyn.runtime.integrate.runs import APART, ROUGH, Runs
+from sysdyn.runtime.integrate.way import Way
 from sysdyn.runtime.judgement import allowed, judge
 from sysdyn.runtime.many.anchors import anchors, guesses
 from sysdyn.runtime.many.asked import DONE, END, ROWS, TRACES, WHY, Claim, NotApplicableError, Results, obstacle
@@ -26,7 +27,7 @@ from sysdyn.runtime.many.mass_matrix import mass_matrix
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
-from sysdyn.runtime.model.scales import confirmed, sizing
+from sysdyn.runtime.model.scales import sizing
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.simulate import close
@@ -76,8 +77,9 @@ class Batch:
         self.options, self.way = options, way
         self._alive: list[Any] = []  # what the core has addresses of
         self.runs = Runs(start, self.options, way)
-        if self.runs.meters or not self.runs.columns:
-            raise NotApplicableError("accuracy is asked of a meter" if self.runs.meters else "nothing is traced")
+        meters = self.runs.quantities.meters
+        if meters or not self.runs.columns:
+            raise NotApplicableError("accuracy is asked of a meter" if meters else "nothing is traced")
         self.system, self.start = way.system, start
         self.columns = tuple(column.name for column in self.runs.columns)
         self._thin = np.ascontiguousarray([] if thin is None or keep != TRACES else thin, dtype=np.int32)
@@ -125,7 +127,7 @@ class Batch:
         return lib.pointer(array)
 
     def _wanted(self) -> Floats:
-        options, names = self.options, list(self.runs.compared)
+        options, names = self.options, list(self.runs.quantities.compared)
         target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)
         for name, wanted in options.accuracy_on:
             target[names.index(name)] = wanted
@@ -134,11 +136,9 @@ class Batch:
     def _pass(self, number: int, tolerance: float, longest: float) -> Integration:
         """The structures of the draft (0), or of the runs behind it (1)."""
         runs, options = self.runs, self.options
-        runs.controlled, runs.open = True, False  # every run is compared at instants of the draft
+        runs.controlled, runs.instants.open = True, False  # every run is compared at instants of the draft
         request: Request = runs.request(tolerance, None, longest)
-        instants, kinds = runs.instants, runs.kinds
-        if runs.common is not None:
-            instants, kinds = runs.with_common(runs.common, draft=not number)
+        instants, kinds = runs.instants.rows(compared=True, draft=not number)
         request = replace(
             request,
             instants=instants,
@@ -146,7 +146,7 @@ class Batch:
             h_max=min(longest * (options.t_end - options.t_start), options.longest or np.inf),
             settled_to=ROUGH * tolerance,
             draft=not number,
-            apart=APART if runs.common is not None and not number else 0.0,
+            apart=APART if runs.instants.common is not None and not number else 0.0,
             condense=False,
             max_wall=None,
         )
@@ -177,8 +177,8 @@ class Batch:
         """Pass k of the core."""
         made, system = self.passes[k], self.system
         core = made.method.contents
-        states = [(c.addressof(core), c.sizeof(core)), (c.addressof(made.run_.contents), c.sizeof(lib.Run))]
-        settlers = [made.settler, *([made._project] if made._project is not None else [])]
+        states = [(c.addressof(core), c.sizeof(core)), (c.addressof(made.driver.run), c.sizeof(lib.Run))]
+        settlers = [made.settler, *([made.projection] if made.projection is not None else [])]
         zero = [lib.core.sd_linear_pivoted(made.linear)]
         for settler in settlers:
             states += self._settled(settler)
@@ -188,17 +188,17 @@ class Batch:
         zero += [lib.core.sd_linear_z_pivoted(item) for item in made.method.complex]
         # observers read the audit's families behind the unknowns
         rooms = [np.zeros(max(system.form.extended, system.unknowns) + 8) for _ in range(3)]
-        made.run_.contents.start_rate = lib.pointer(rooms[2])
+        made.driver.run.start_rate = lib.pointer(rooms[2])
         regions, number = self._regions(states, zero)
         kind = type(core)
         field = self.core.passes[k]
-        field.run, field.region, field.regions = c.addressof(made.run_.contents), c.addressof(regions), number
+        field.run, field.region, field.regions = c.addressof(made.driver.run), c.addressof(regions), number
         field.n = system.unknowns
         field.y, field.yd, field.start_rate = (self._kept(room) for room in rooms)
         field.differential = self._kept(made.roles.differential.astype(np.int32))
-        field.magnitude, field.met = lib.pointer(made.magnitude), lib.pointer(made._met)
-        field.least = self._kept(np.ascontiguousarray(made._least))
-        field.project = None if made._project is None else c.addressof(made._project.core.contents)
+        field.magnitude, field.met = lib.pointer(made.sizes.magnitude), lib.pointer(made.sizes.met)
+        field.least = self._kept(np.ascontiguousarray(made.sizes.least))
+        field.project = None if made.projection is None else c.addressof(made.projection.core.contents)
         field.rtol = c.addressof(core) + kind.rtol.offset
         field.h_max = c.addressof(core) + kind.h_max.offset
         field.opening = c.addressof(core) + kind.opening.offset if hasattr(kind, "opening") else None
@@ -222,11 +222,11 @@ class Batch:
         many, system, made = self.core, self.system, self.passes[1]
         n = system.form.written
         y, yd = (np.ascontiguousarray(item[:n]) for item in (self.start.y, self.start.yd))
-        found = anchors(made.settler, system, self.start.t, (y, yd), made.magnitude)
+        found = anchors(made.settler, system, self.start.t, (y, yd), made.sizes.magnitude)
         if found is None:
             raise NotApplicableError("initial values of the text leave the start open, or move for its sake")
         self.anchored = found
-        settler = made._settler("settled", found)
+        settler = made.settlers.of("settled", found)
         settled = settler.system
         # rows written with room for what settles: the buffers of both passes are used
         extended = np.zeros(settled.form.extended), np.zeros(settled.form.extended)
@@ -249,7 +249,7 @@ class Batch:
         many.anchored = self._kept(found.astype(np.int32))
         guess, said = guesses(system.form.at, n, system.description.initial)
         many.guessed, many.guess = self._kept((said & ~found).astype(np.int32)), self._kept(guess)
-        many.size = self._kept(made.magnitude[:n].copy())
+        many.size = self._kept(made.sizes.magnitude[:n].copy())
         many.jy0, many.jyd0 = self._kept(np.append(jy, 0.0)), self._kept(np.append(jyd, 0.0))
         counts = 1 * _counts(settled, jy, settler.scale[:n]) + 2 * _counts(settled, jyd, self._rates(settler, n))
         many.counts = self._kept(np.append(counts, 0).astype(np.int32))
@@ -278,7 +278,7 @@ class Batch:
         n, columns = system.form.written, len(self.columns)
         span = options.t_end - options.t_start
         many.p, many.parameters = lib.pointer(system.description.p), system.description.p.size
-        many.written, many.columns, many.observed = n, columns, self.passes[1].observed
+        many.written, many.columns, many.observed = n, columns, self.passes[1].driver.observed
         many.t0, many.t1 = options.t_start, options.t_end
         sizes = sizing(system)
         self._alive.append(sizes)
@@ -298,7 +298,7 @@ class Batch:
             if family.size and first + family.size <= n and family.unit in units:
                 of[first : first + family.size] = units[family.unit]
         many.unit, many.unit_of = self._kept(np.array(own, dtype=np.int32)), self._kept(of)
-        many.units, many.known = len(units), int(runs.common is not None)
+        many.units, many.known = len(units), int(runs.instants.common is not None)
         asked = float(np.min(self._targets[np.isfinite(self._targets)], initial=1.0))
         many.late = min(pairs.TIMING, pairs.SHARE * asked) * span
         for name in ("power", "credit", "finest", "far", "ratio", "little", "growth"):
@@ -308,7 +308,7 @@ class Batch:
         many.max_steps = min(options.max_steps or 2**62, 2**62)
         many.energy = allowed(options)
         many.thin, many.thins = self._kept(np.append(self._thin, np.int32(-1))), self._thin.size
-        room = max(2 * MOST + 4, 0 if runs.common is None else runs.common.size + 4)
+        room = max(2 * MOST + 4, 0 if runs.instants.common is None else runs.instants.common.size + 4)
         for k in range(3):
             many.sample[k] = lib.RunSamples(
                 time=self._kept(np.zeros(room)),
@@ -359,25 +359,24 @@ class Batch:
         own; None where it has no result here.  parameters: as the trace lists them.
         """
         runs, core, made = self.runs, self.core, self.passes[1]
-        runs.began = time.monotonic()
+        runs.accounts.began = time.monotonic()
         found = self.run(p[None, :], anchor[None, :])
         if found.state[0] != DONE:
             return None
-        runs.cpu, runs.wall = core.spent, time.monotonic() - runs.began
+        runs.accounts.cpu, runs.accounts.wall = core.spent, time.monotonic() - runs.accounts.began
         steps, rejected, newton, factorisations, *evaluated = core.counted
         residuals, jacobians = (evaluated[k] + evaluated[k + 2] for k in (0, 1))
-        runs.statistics = Statistics(steps, rejected, residuals, jacobians, factorisations, newton)
-        magnitude = confirmed(self.system, self.options.t_end - self.options.t_start, *made._sizes())
+        runs.accounts.statistics = Statistics(steps, rejected, residuals, jacobians, factorisations, newton)
         finished = Finished(
             self.options.t_end,
-            runs.statistics,
-            magnitude[: self.system.form.written],
-            made.largest(),
+            runs.accounts.statistics,
+            made.confirmed(),
+            made.driver.largest(),
             core.spent,
             made.settler.core.contents.failures,
-            made.ledgers,
+            made.driver.ledgers,
         )
-        rows = made._rows[: core.held]
+        rows = made.driver.rows[: core.held]
         writer = Held(replace(runs.layout(made.method.contents.rtol, None), parameters=parameters))
         writer.append(rows[(rows[:, 1].astype(np.int32) & TRACE) > 0])
         runs.done = finished, [], writer

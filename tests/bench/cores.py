@@ -63,8 +63,8 @@ def stepped(line: Line, method: str, steps: int) -> str:
         for threads in (1, 2):
             core.sd_threads_use(threads)
             made = line.integration(method, 1e-6)
-            made.run_.contents.every_step = 0
-            found = measured(time.process_time, partial(core.sd_run_advance, made.run_, steps, 1e9))
+            made.driver.run.every_step = 0
+            found = measured(time.process_time, partial(core.sd_run_advance, made.driver.core, steps, 1e9))
             each = 1e3 / made.method.contents.steps
             before = best.get(threads, (float("inf"), float("inf")))
             best[threads] = min(before[0], found[0] * each), min(before[1], found[1] * each)

@@ -88,9 +88,9 @@ class Line:
         least = float("inf")
         for _ in range(repeated):
             made = self.integration(method, rtol)
-            made.run_.contents.every_step = 0
+            made.driver.run.every_step = 0
             began = time.process_time()
-            lib.core.sd_run_advance(made.run_, most, 1e9)
+            lib.core.sd_run_advance(made.driver.core, most, 1e9)
             least = min(least, time.process_time() - began)
         return least, made.method.contents.steps, made
 

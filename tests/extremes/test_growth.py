@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from running import ran
 from scipy.integrate import solve_ivp
-from sysdyn.runtime.integrate import integrate
+from sysdyn.runtime.integrate import origin
 from sysdyn.runtime.model import scales
 
 FILE = Path(__file__).with_name("growth.sd")
@@ -89,9 +89,10 @@ def test_zeros_at_the_start_count_as_a_part_of_their_like(tmp_path, monkeypatch)
         found.append(magnitude.copy())  # a run's own grow
         return magnitude, time
 
-    monkeypatch.setattr(integrate, "magnitudes", magnitudes)
+    monkeypatch.setattr(origin, "magnitudes", magnitudes)
     run = ran(tmp_path, ROD)
     assert run.met
+    assert found
     for magnitude in found:
         assert magnitude[0] == pytest.approx(0.7, rel=1e-12)
         assert 0.7e-3 <= magnitude[1] <= 0.7

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from sysdyn.api import load, simulate
 from sysdyn.cli.main import run
 from sysdyn.runtime.condense import condensed as condensing
-from sysdyn.runtime.integrate import integrate
+from sysdyn.runtime.integrate import integrate, settlers
 
 N = 30
 LINE = """
@@ -229,7 +229,7 @@ def _after_jump(matrix, drive):
 def test_pieces_between_kinks_and_jumps_are_condensed(tmp_path, monkeypatch, source, exact, method):
     """One unknown a node on both sides of it; no structure of all unknowns is made where no state jumps."""
     seen, whole = [], []
-    made, settled = integrate.Integration._condensed, integrate.Integration._settler
+    made, settled = integrate.Integration._condensed, settlers.Settlers.of
 
     def watched(self):
         found = made(self)
@@ -241,7 +241,7 @@ def test_pieces_between_kinks_and_jumps_are_condensed(tmp_path, monkeypatch, sou
         return settled(self, *rows, **asked)
 
     monkeypatch.setattr(integrate.Integration, "_condensed", watched)
-    monkeypatch.setattr(integrate.Integration, "_settler", counted)
+    monkeypatch.setattr(settlers.Settlers, "of", counted)
     trace = trace_of(tmp_path, LADDER.replace("1 V*sin(5 rad/s*t)", source), method=method)
     c, r = _capacitors(), (1.0 + np.arange(1, N + 1) / N) / N
     flow = np.diag(1.0 / r) @ (np.eye(N, k=-1) - np.eye(N))

@@ -155,3 +155,31 @@ def test_families_behind_a_cut_step_as_small_ones(tmp_path, case, formulation):
     """The sum of the balances is a row of its own: without it the steps are ten times as many."""
     trace = compared(tmp_path, case, 30, formulation)
     assert json.loads(trace.attributes["statistics"])["steps"] < 60
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_a_mass_on_a_lever_between_springs(tmp_path, formulation):
+    """The sum of balances that reads no inertia weighs them 2 to 1: its rates ask for y' at the start."""
+    text = """
+    model lever {
+      param m = 1 kg
+      coord x: translation = 1 m
+      coord y: translation ~ 0.5 m
+      energy T* = 1/2*m*(x' - 2*y')^2
+      energy V = 1/2*(1 N/m)*x^2 + 1/2*(3 N/m)*y^2
+      init x' = 0.7 m/s
+    }
+    scene go of lever {
+      time 0 s to 3 s
+      accuracy 1e-6
+      trace x, y, x' as v, y' as w every 0.1 s
+    }
+    """
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    # 2 x + 3 y = 0, so x' - 2 y' = 7/3 x', whose rate is -x
+    rate = np.sqrt(3 / 7)
+    x, v = (np.cos(rate * trace.time - shift) for shift in (0.0, -np.pi / 2))
+    x, v = x - 0.7 / rate * v, 0.7 * x + rate * v
+    for name, value in {"x": x, "y": -2 / 3 * x, "v": v, "w": -2 / 3 * v}.items():
+        assert trace[name].values == pytest.approx(value, abs=2e-6), name
+    assert trace["w"].values[0] == pytest.approx(-1.4 / 3, rel=1e-12)

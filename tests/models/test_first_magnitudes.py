@@ -20,14 +20,14 @@ def watched(monkeypatch, folder, name, **options):
     class Watched(runs.Integration):
         def __init__(self, *given):
             super().__init__(*given)
-            seen.append((self, self.magnitude.copy()))
+            seen.append((self, self.sizes.magnitude.copy()))
 
     monkeypatch.setattr(runs, "Integration", Watched)
     report = Report()
     found = run(Request(str(MODELS / f"{name}.sd"), output=str(folder / "trace.h5"), **options), report)
     assert found is not None, [d.message for d in report.diagnostics]
     last, first = seen[-1]
-    met, system = last._sizes()[0], last.system
+    met, system = last.last()[2], last.system
     carried = last.roles.state & (system.nominal == 0.0) & (met > 0.0)
     return found.outcome, np.array(system.unknown_names)[carried], first[carried], met[carried]
 

@@ -4,7 +4,7 @@ import chain_model as chain
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.integrate import integrate
+from sysdyn.runtime.integrate import settlers
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import Request
@@ -99,7 +99,7 @@ def test_no_drift_over_a_long_span(family):
 @pytest.mark.parametrize("form", ["1", "0"])
 def test_differentiated_rows_are_projected_after_each_step(monkeypatch, method, form):
     assert drift(models.pendulum(angle=2.0), 40.0, form, method, 1e-4) < 1e-12
-    monkeypatch.setattr(integrate, "PROJECTED", ())
+    monkeypatch.setattr(settlers, "PROJECTED", ())
     assert drift(models.pendulum(angle=2.0), 40.0, form, method, 1e-4) > 1e-3
 
 

@@ -25,7 +25,7 @@ int sd_mode_sides_fit(const sd_modes *m, const double *side, const double *befor
 /* Whether every contact, law and relation is as the present mode says, relations coming from `before`. */
 int sd_mode_fits(const sd_modes *m, const double *before, const double *v);
 
-/* Whether the stepper may go on from the point as the driver restarts: no size shows first here (integrate.py). */
+/* Whether the stepper may go on from the point as the driver restarts: no size shows first here (integrate/sizes.py). */
 int sd_mode_ordinary(const sd_modes *m);
 
 #endif

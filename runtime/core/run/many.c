@@ -22,7 +22,7 @@
 #define FIRST_DROP 1e-2
 #define LOOSE 1e-5
 #define TAME 1e-6
-#define BEYOND 100.0     /* an unknown within a step, in magnitudes of steps (integrate/runs.py) */
+#define BEYOND 100.0     /* an unknown within a step, in magnitudes of steps (integrate/compared.py) */
 #define SAME 1e-12       /* of an instant: a claim's */
 #define TRACE 1
 #define STEP 2

@@ -1,0 +1,132 @@
+"""What the runs of one simulation are compared by: their rows at common instants.
+
+Received: rows as a run writes them, and what it hands over at its end.  Handed on: `Sampled`, one beside the other in
+`pairs.py`; where the last two differed most.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.integrate import pairs
+from sysdyn.runtime.integrate.common_instants import Instants, Thinned, beside, common
+from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.integrate.pairs import Sampled
+from sysdyn.runtime.integrate.quantities import Quantities
+from sysdyn.runtime.integrate.request import COMPARED, TRACE, Finished
+from sysdyn.runtime.integrate.round_off import LeftOpen, left_open
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.system import System
+
+BEYOND = 100.0
+"""Times its magnitude at steps: an unknown that is more within a step shows that the step passed over something."""
+
+
+class Compared:
+    """samplings: of the last two runs; jumps (s): events of the last; observed: how many values a row has."""
+
+    def __init__(self, options: Options, instants: Instants, observed: int) -> None:
+        self.options, self.instants, self._observed = options, instants, observed
+        self.samplings: tuple[Sampled, ...] = ()
+        self.jumps: Floats | None = None
+        self._at: Floats | None = None
+        self._opened: tuple[Finished, LeftOpen] | None = None
+        self.begin()
+
+    def begin(self) -> None:
+        """A run begins."""
+        self._rows: list[Floats] = []
+        self._thinned = Thinned()
+
+    def take(self, rows: Floats, kind: Ints) -> None:
+        """Keeps what runs are compared by: rows at the instants of the run before, and its own, thinned."""
+        if self.options.every is None:
+            self._thinned.take(rows[(kind & TRACE) > 0])
+        if (kind & COMPARED).any():
+            self._rows.append(rows[(kind & COMPARED) > 0])
+
+    def sampled(self, tolerance: float, finished: Finished, quantities: Quantities) -> Sampled:
+        """Of the run that has ended; the next is compared at its instants."""
+        width = lib.ROW_HEAD + 2 * self._observed
+        rows = np.concatenate(self._rows) if self._rows else np.zeros((0, width))
+        if self.instants.open:
+            self.instants.close(rows[:, 0])
+        instants, there = self.instants.common, None
+        if self.options.every is None:
+            self.instants.common = common(self._thinned.time, self.options)
+            own = self._thinned.rows(self.instants.common)
+            there = _values(own, finished, quantities), self._late(own, quantities, steps=True)
+        self._at = instants if instants is not None else self.instants.common
+        values = there[0] if there is not None and instants is None else _values(rows, finished, quantities)
+        noise = pairs.ROUND_OFF * quantities.beside(finished.largest, finished.magnitude)
+        noise = np.append(noise, np.zeros(len(quantities.meters)))
+        late = self._late(rows, quantities) if instants is not None else 0.0
+        open_ = partial(self._open_quantities, finished, quantities)
+        sizes, steps = quantities.of_run(finished), finished.statistics.steps
+        found = Sampled(tolerance, values, sizes, steps, noise, open_, self._between(finished), late, there)
+        self.samplings = (*self.samplings[-1:], found)
+        return found
+
+    def _between(self, finished: Finished) -> NDArray[np.bool_]:
+        """Instants of comparison between an event of this run and the same one of the run before it."""
+        jumps = np.unique([e.time for e in finished.events]) if finished.events else np.zeros(0)
+        last, self.jumps = self.jumps, jumps
+        assert self._at is not None
+        span = self.options.t_end - self.options.t_start
+        return beside(self._at, jumps if last is None else last, jumps, span)
+
+    def _late(self, rows: Floats, quantities: Quantities, *, steps: bool = False) -> Floats:
+        """What the compared quantities move by within the time tolerance at these rows [k, quantities]; steps: rows of
+        the run's own steps, whose rates are those of the equations.
+        """
+        places, options = lib.ROW_HEAD + quantities.places, self.options
+        asked = min((a for a in (options.accuracy, *(w for _, w in options.accuracy_on)) if a is not None), default=0.0)
+        tau = min(pairs.TIMING, pairs.SHARE * asked) * (options.t_end - options.t_start)
+        rates = rows[:, places + self._observed]
+        late = pairs.lateness(rows[:, 0], rows[:, places], rates, tau) if steps else tau * np.abs(rates)
+        meters = len(quantities.meters)
+        return np.hstack([late, np.zeros((len(rows), meters))]) if meters else late
+
+    def left_open(self, finished: Finished, system: System) -> LeftOpen:
+        """Asked of the equations once a run: of its quantities, and of each of its ledgers."""
+        if self._opened is None or self._opened[0] is not finished:
+            assert finished.last is not None
+            step = (finished.reached - self.options.t_start) / max(finished.statistics.steps, 1)
+            self._opened = finished, left_open(system, finished.reached, finished.last, step)
+        return self._opened[1]
+
+    def _open_quantities(self, finished: Finished, quantities: Quantities) -> Floats:
+        """What the equations of a run leave open of each compared quantity by round-off."""
+        found = self.left_open(finished, quantities.system).quantities[quantities.places]
+        return np.append(found, np.zeros(len(quantities.meters)))
+
+    def worst(self, names: tuple[str, ...], target: Floats) -> tuple[str, float, float | None]:
+        """Of the last two runs: the quantity whose difference is largest beside what is asked of it (target
+        [compared]), that, and the first instant [s] at which it differs by more.
+        """
+        asked = {name: float(wanted) for name, wanted in zip(names, target, strict=True)}
+        name = min(asked, key=lambda n: asked[n], default="")
+        if len(self.samplings) < 2 or self.samplings[0].own[0].shape != self.samplings[1].values.shape:
+            return name, asked.get(name, 0.0), None
+        one, two = self.samplings
+        assert self._at is not None
+        size = (one if one.tolerance < two.tolerance else two).largest
+        with np.errstate(all="ignore"):
+            ratio = pairs.apart(one, two) / (size * target)
+        ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
+        ratio = np.where((one.own[0] == two.values) | pairs.zero(one, two, target), 0.0, ratio)
+        ratio[two.between] = 0.0
+        k = int(np.argmax(ratio.max(axis=0)))
+        beyond = np.flatnonzero(ratio[:, k] > 1.0)
+        name = names[k]
+        return name, asked[name], float(self._at[beyond[0]]) if beyond.size else None
+
+
+def _values(rows: Floats, finished: Finished, quantities: Quantities) -> Floats:
+    """The compared quantities [k, quantities] at rows."""
+    if finished.beyond > BEYOND:
+        rows = np.full_like(rows, np.nan)
+    return rows[:, quantities.row]

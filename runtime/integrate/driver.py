@@ -1,0 +1,129 @@
+"""The core's driver of one run (core/run/run.h): rows at instants and steps, what observes them, what ledgers count."""
+
+from __future__ import annotations
+
+import ctypes as c
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.integrate.least_norm import LeastNorm
+from sysdyn.runtime.integrate.ledgers import Ledgers
+from sysdyn.runtime.integrate.methods import Method
+from sysdyn.runtime.integrate.request import TRACE, Request
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.settled import Settler
+
+ROOM = 4096
+"""Rows of the ring (blocks of at least 1024 rows are written at once)."""
+
+Sink = Callable[[Floats], None]
+
+
+def _audited(system: System) -> Ints:
+    """Places of the members of the audit in y, in the order of core/run/run.h; -1 where there is none."""
+    found = np.full(7, -1, dtype=np.int32)
+    order = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints", "drift")
+    for k in system.description.families_of("audit"):
+        name = system.description.families[k].name.rsplit(".", 1)[-1]
+        if name in order:
+            found[order.index(name)] = system.form.at[k]
+    return found
+
+
+class Driver:
+    """settler: of its rows; keeps [unknowns as written]: the state; start_rate [unknowns]; drift: address of what the
+    last step was off the constraints before its method projected it.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        request: Request,
+        method: Method,
+        settler: Settler,
+        keeps: NDArray[np.bool_],
+        start_rate: Floats,
+        drift: int | None,
+    ) -> None:
+        self.system = system
+        self.observed = system.observed_rows("observe")[1]
+        self.core = lib.core.sd_run_new(
+            method.stepper,
+            settler.core,
+            system.form.written,
+            system.form.extended,
+            self.observed,
+            system.observed_rows("audit")[1],
+        )
+        if not self.core:
+            raise MemoryError
+        self.ledgers = Ledgers(system)
+        run = self.run = self.core.contents
+        run.ledgers = self.ledgers.address
+        self._least_norm = LeastNorm(settler.system) if request.least_norm else None
+        if self._least_norm is not None:
+            run.least_norm = self._least_norm.address
+        self._observers(start_rate)
+        self._asked(request)
+        run.rough, run.bare = request.settled_to, int(self._bare(keeps) and not request.audited)
+        unread = not request.audited and request.events is None and self._unread
+        run.unsummed = 1 + request.draft if unread else 0
+        run.projected = drift
+
+    def _observers(self, start_rate: Floats) -> None:
+        """What is read at a point: the compiled blocks, the members of the audit."""
+        system, run = self.system, self.run
+        self.calls = {name: system.observer(name) for name in ("audit", "observe", "observe_rate", "observe_scale")}
+        self.calls["powers"] = system.powers()
+        audited = [k for name in ("audit", "ledger") for k in system.description.blocks.get(name, ())]
+        run.rated = int(any(k.rates is None or k.rates for k in audited))
+        for name, call in self.calls.items():
+            setattr(run, name, None if call is None else c.addressof(call))
+        self._audit_at = system.once("audited", lambda: _audited(system))
+        run.audit_at, run.start_rate = lib.pointer(self._audit_at), lib.pointer(start_rate)
+
+    def _asked(self, request: Request) -> None:
+        """Where rows are wanted, and the room for them."""
+        run, width = self.run, lib.ROW_HEAD + 2 * self.observed
+        self._instants = np.ascontiguousarray(request.instants, dtype=np.float64)
+        kinds = request.instant_kinds
+        kinds = np.full(self._instants.size, TRACE) if kinds is None else kinds
+        self._kinds = np.ascontiguousarray(kinds, dtype=np.int32)
+        run.instant, run.instant_kind = lib.pointer(self._instants), lib.pointer(self._kinds)
+        run.instants, run.every_step = self._instants.size, int(request.every_step)
+        run.sample_steps, run.apart = int(request.sample_steps), request.apart
+        self.rows = np.empty((ROOM if width < ROOM else 64, width))
+        run.row, run.room = lib.pointer(self.rows), self.rows.shape[0]
+
+    def _bare(self, keeps: NDArray[np.bool_]) -> bool:
+        """Whether all that is observed follows from the state: nothing that a row has to be settled for."""
+        description, written = self.system.description, self.system.family_of[: self.system.form.written]
+        follows = frozenset(written[~keeps].tolist())
+        read = [(kernel.reads, kernel.rates) for kernel in description.blocks.get("observe", ())]
+        return all(reads is not None and not (reads & follows) and rates == frozenset() for reads, rates in read)
+
+    @property
+    def _unread(self) -> bool:
+        """Whether nothing that is observed reads the audit, whose integrals are then for the run that is kept."""
+        audit = frozenset(self.system.description.families_of("audit"))
+        blocks = [self.system.description.blocks.get(name, ()) for name in ("observe", "observe_scale")]
+        return all(k.reads is not None and not (k.reads & audit) for block in blocks for k in block)
+
+    def drain(self, sink: Sink) -> None:
+        """Rows so far go to the sink."""
+        run = self.run
+        if run.rows:
+            rows = self.rows[: run.rows].copy()
+            run.rows = 0  # first: an interruption in between must not hand them over twice
+            sink(rows)
+
+    def largest(self) -> Floats:
+        """Largest magnitude so far of each observed quantity and of the terms of its expression [observed]."""
+        return lib.reader(self.run.largest, max(self.observed, 1))[: self.observed].copy()
+
+    def __del__(self) -> None:
+        if getattr(self, "core", None):
+            lib.core.sd_run_free(self.core)

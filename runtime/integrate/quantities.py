@@ -1,0 +1,97 @@
+"""The quantities that a simulation stores and compares, and what their errors are relative to.
+
+Received: the columns of the trace; the largest values and magnitudes that a run met.  Handed on: a size for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.integrate.request import Finished
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.scales import ROUND_OFF
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.trace.trace import Column
+
+PURE = 1e-8
+"""Angles and other pure numbers: what is round-off beside this is nothing, whatever the largest that occurs."""
+
+METERS = {
+    "audit.kinetic": 2, "audit.potential": 3, "audit.dissipated": 4, "audit.supplied": 5, "audit.energy": 6,
+    "audit.constraints": 7,
+}  # fmt: skip
+"""Places of the audit's members in a row."""
+
+
+class Quantities:
+    """places [columns]: of the observed value that each stores; names of columns, meters (members of the audit of which
+    accuracy is asked, though they are not traced) and compared, which are both.
+    """
+
+    def __init__(self, system: System, columns: Sequence[Column], options: Options) -> None:
+        self.system, self._columns = system, columns
+        self.places: Ints = np.array([column.place for column in columns], dtype=np.int64)
+        self.names = tuple(column.name for column in columns)
+        traced = set(self.names)
+        self.meters = tuple(name for name, _ in options.accuracy_on if name in METERS and name not in traced)
+        self.compared = (*self.names, *self.meters)
+        self._beside: tuple[Floats, Floats, Floats] | None = None
+
+    @property
+    def row(self) -> list[int]:
+        """Places in a row of the compared quantities."""
+        return [*(lib.ROW_HEAD + self.places).tolist(), *(METERS[name] for name in self.meters)]
+
+    def sizes(self, largest: Floats, magnitude: Floats) -> Floats:
+        """What errors of the stored quantities are relative to [columns]: the largest met (largest [observed]), but no
+        less than round-off of the largest of the same unit, unknowns (magnitude [unknowns]) among them.
+        """
+        return np.asarray(np.maximum(largest[self.places], ROUND_OFF * self.beside(largest, magnitude)))
+
+    def beside(self, largest: Floats, magnitude: Floats) -> Floats:
+        """The largest of the unit of each stored quantity [columns], unknowns among them."""
+        last = self._beside
+        if last is not None and last[0] is largest and last[1] is magnitude:
+            return last[2]
+        of_unknowns, of_columns, number = self.system.once("units", self._units)
+        found = np.zeros(number)
+        found[0] = PURE
+        np.fmax.at(found, of_unknowns, magnitude[: of_unknowns.size])
+        np.fmax.at(found, of_columns, largest[self.places])
+        self._beside = largest, magnitude, np.asarray(found[of_columns])
+        return self._beside[2]
+
+    def _units(self) -> tuple[Ints, Ints, int]:
+        """Number of the unit of each unknown as written and of each stored quantity, and how many units there are; 0:
+        pure numbers.
+        """
+        system, number = self.system, {"1": 0}
+        of_family = [number.setdefault(family.unit, len(number)) for family in system.description.families]
+        of_columns = [number.setdefault(column.unit, len(number)) for column in self._columns]
+        of_unknowns = np.array([*of_family, 0], dtype=np.int32)[system.family_of[: system.form.written]]
+        return of_unknowns, np.array(of_columns, dtype=np.int32), len(number)
+
+    def nominal(self, largest: Floats, magnitude: Floats) -> dict[str, float]:
+        """Nominal magnitude of each stored quantity."""
+        return self._named(self.sizes(largest, magnitude))
+
+    def terms(self, largest: Floats) -> dict[str, float]:
+        """Largest terms of each stored quantity, where it is a difference; largest [observed]."""
+        return self._named(largest[self.places])
+
+    def _named(self, values: Floats) -> dict[str, float]:
+        return dict(zip(self.names, values.tolist(), strict=True))
+
+    def of_run(self, finished: Finished) -> Floats:
+        """What errors of the compared quantities of a run are relative to [compared]."""
+        met = self.sizes(finished.largest, finished.magnitude)
+        return np.append(met, [_turned_over(meter, finished) for meter in self.meters])
+
+
+def _turned_over(meter: str, finished: Finished) -> float:
+    """What an error of a meter is relative to: the norm of constraints is scaled, energies are what went round."""
+    turnover = sum(b.turnover for b in finished.balances if b.kind == "energy" and b.unit == "J")
+    return 1.0 if meter == "audit.constraints" else turnover

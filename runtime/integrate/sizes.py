@@ -1,0 +1,103 @@
+"""How large the unknowns of one run are: what tolerances, round-off and the rows within a step are relative to.
+
+Received: the start's sizes; what the method and the crossings meet.  A method of fewer unknowns (condense/) goes by
+sizes of its own, which are shared at crossings and at the end.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
+from sysdyn.runtime.integrate.request import Request
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, magnitudes, noise
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import ConsistentState
+
+
+class Sizes:
+    """magnitude [unknowns] in SI units, time (s): the scale of the start."""
+
+    def __init__(self, system: System, start: ConsistentState, request: Request, origin: Origin) -> None:
+        self.system, self._start, self._request = system, start, request
+        self._origin: Origin | None = origin
+        found, self.time = origin.sized(request.t_end)
+        self.magnitude: Floats = np.maximum(found, self.least)
+        self.unnamed: NDArray[np.bool_] = system.are("q", "f", "p", "s") & (system.nominal == 0.0)
+        self._own: tuple[Ints, Floats, Floats] | None = None
+
+    @cached_property
+    def least(self) -> Floats:
+        """Magnitudes below which a tolerance is less than round-off leaves open: no step meets it [unknowns]."""
+        origin = self._origin or Origin(self.system, self._start, self._request.index)
+        return origin.least / max(self._request.rtol, 1e-15)
+
+    @cached_property
+    def met(self) -> Floats:
+        """Largest |y| met [unknowns]; of a condensed form as far as it is shared (`share`)."""
+        return np.zeros(self.system.unknowns)
+
+    @cached_property
+    def resolved(self) -> Floats:
+        """|y| of which is known what round-off leaves open [unknowns]."""
+        return np.zeros(self.system.unknowns)
+
+    def let_go(self) -> None:
+        """Of what the start knows: found again if asked."""
+        self._origin = None
+        self.__dict__.pop("least", None)
+
+    def stepped(self, kept: Ints | None) -> tuple[Floats, Floats]:
+        """Magnitude and |y| met of the unknowns that the method steps; kept: their places, None: all."""
+        if kept is None:
+            return self.magnitude, self.met
+        self._own = kept, self.magnitude[kept], np.zeros(kept.size)
+        return self._own[1:]
+
+    def share(self, y: Floats) -> None:
+        """What a method of fewer unknowns knows of their sizes becomes known of all at a point y."""
+        if self._own is None:
+            return
+        kept, magnitude, met = self._own
+        for sizes in (self.met, self.magnitude):
+            np.maximum(sizes, np.abs(y), out=sizes)
+        self.magnitude[kept], self.met[kept] = magnitude, met
+
+    def hand_down(self) -> None:
+        """The magnitudes that the method of fewer unknowns goes by, from those of all."""
+        if self._own is not None:
+            self._own[1][:] = self.magnitude[self._own[0]]
+
+    def at(self, y: Floats) -> tuple[Floats, Floats]:
+        """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point y."""
+        if self._own is None:
+            return self.met, self.magnitude
+        kept, magnitude, met = self._own
+        largest = np.maximum(self.met, np.abs(y))
+        largest[kept] = met
+        sizes = np.maximum(self.magnitude, largest)
+        sizes[kept] = magnitude
+        return largest, sizes
+
+    def begin_to_move(self, t: float, y: Floats, rate: Floats) -> None:
+        """Unknowns that stood at zero so far, of unknown size, and whose rates say only now how large they will be."""
+        begin = (self.met <= ROUND_OFF) & (self.magnitude == UNKNOWN) & (rate != 0.0) & self.unnamed
+        if begin.any():
+            with np.errstate(over="ignore"):
+                found, _ = magnitudes(self.system, t, self._request.t_end, y, rate)
+            self.magnitude[begin] = np.maximum(found, self.least)[begin]
+
+    def resolve(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
+        """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; carries
+        [unknowns]: the state.
+        """
+        if (np.abs(y) <= 2.0 * self.resolved).all():
+            return
+        np.maximum(self.resolved, np.abs(y), out=self.resolved)
+        jy, _ = self.system.jacobian(t, y, yd)
+        open_ = np.where(carries, 0.0, noise(self.system, y, jy, self.time))
+        least = UNRESOLVED * open_ / max(self._request.rtol, 1e-15)
+        np.maximum(self.magnitude, least, out=self.magnitude)
