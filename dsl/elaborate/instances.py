@@ -155,6 +155,7 @@ class Instances(Elements):
             loops=self.resolver.loops,
             prefix=(*self.current.prefix, *at),
             around=(*self.current.around, *shape),
+            own=len(shape),
             component=component.name,
             chain=chain,
         )

@@ -176,12 +176,12 @@ class Parameters(ElaborationContext):
 
     def fits(self, shape: Shape, count: int) -> bool:
         """Whether a list of that length fills a shape."""
-        first, last = (self._given(node) for node in shape[0])
+        first, last = (self.given(node) for node in shape[0])
         if not (ex.is_const(first) and ex.is_const(last)):
             return False
         return int(last.data) - int(first.data) + 1 == count
 
-    def _given(self, node: Node) -> Node:
+    def given(self, node: Node) -> Node:
         """A bound with the parameters that the instance gives."""
         parameters = self.parts.parameters
         while True:

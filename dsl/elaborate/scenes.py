@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -9,7 +10,9 @@ from typing import TypeVar
 
 from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.elaborate.slices import element_of, ranges_of
 from sysdyn.dsl.format.format import format_expression
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
@@ -274,7 +277,25 @@ class SceneReader:
                 raise self.resolver.fail("E912", message, s.every.span, help="every 10 ms")
             self._once("every", every, s.every.span)
         for item in s.items:
-            self.guarded(self._item, item)
+            self.guarded(self._items, item)
+
+    def _items(self, item: syntax.TraceItem) -> None:
+        """A traced expression; of `x[1..n].e` each element."""
+        ranges = ranges_of(item.expr)
+        numbers = [range(self._bound(r.lower), self._bound(r.upper) + 1) for r in ranges]
+        budget.charge(budget.NODE * math.prod(map(len, numbers)), f"each element of '{self._text(item.expr)}'")
+        for at in itertools.product(*numbers):
+            index = f"[{', '.join(map(str, at))}]" if at else ""
+            alias = item.alias and replace(item.alias, name=item.alias.name + index)
+            expr = element_of(item.expr, dict(zip(ranges, at, strict=True))) if at else item.expr
+            self._item(replace(item, expr=expr, alias=alias))
+
+    def _bound(self, bound: syntax.Expr) -> int:
+        """A bound of a slice, with the sizes that the scene and the command give."""
+        node = self.model.given(self.resolver.whole_number(bound, "a bound"))
+        if not ex.is_const(node):
+            raise self.resolver.fail("E807", "the bound of a slice depends on something without a value", bound.span)
+        return int(node.data)
 
     def _item(self, item: syntax.TraceItem) -> None:
         """One traced expression under its name; E905 where it does not exist or is an array."""

@@ -313,9 +313,20 @@ class Names(Context):
             raise self.index_count(symbol.name, len(symbol.shape), len(indices), span)
         if any(isinstance(i, syntax.Range) for i in indices):
             if len(indices) == 1 and isinstance(indices[0], syntax.Range):
-                return self.slice(self._expanded(symbol, span), indices[0])
+                return self._part(symbol, indices[0], span)
             raise self.fail("E806", "a slice of an array with several indices", span)
         return self.element(symbol, self.indices(symbol.name, symbol.shape, indices))
+
+    def _part(self, symbol: ParameterSymbol | UnknownSymbol, index: syntax.Range, span: syntax.Span) -> Vector:
+        """`x[1..3]`: the elements between two numbers, whatever size the array has."""
+        bounds = [self.index(b) for b in (index.lower, index.upper)]
+        if not all(ex.is_const(b) for b in bounds):
+            return self.slice(self._expanded(symbol, span), index)
+        first, last = (int(b.data) for b in bounds)
+        for bound in bounds:
+            self.uses.append(Use(symbol.shape[0], bound, self.loops, symbol.name, self.place(index.span)))
+        budget.charge(budget.NODE * max(last - first, 0), f"the elements of '{symbol.name}' one by one")
+        return Vector(tuple(self.element(symbol, (ex.const(k),)) for k in range(first, last + 1)), first)
 
     def indices(
         self, name: str, shape: tuple[tuple[Node, Node], ...], indices: tuple[syntax.Index, ...]

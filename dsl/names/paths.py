@@ -65,7 +65,7 @@ class Paths(Names):
             self.awaken(symbol)
         if not symbol.spaces:
             raise Failed
-        count = len(symbol.spaces[0].around) - len(base.change)
+        count = symbol.spaces[0].own
         if len(base.indices) != count:
             raise self.index_count(symbol.name, count, len(base.indices), span)
         at = tuple(self.index(i) for i in base.indices)

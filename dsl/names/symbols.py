@@ -206,6 +206,7 @@ class Space:
     loops: tuple[Loop, ...] = ()
     prefix: tuple[Node, ...] = ()
     around: Shape = ()
+    own: int = 0  # how many of these indices its label has; the others are of the instances around
     component: str = ""
     chain: tuple[str, ...] = ()  # components around, for the check against recursion
     level: str | None = None

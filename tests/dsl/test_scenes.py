@@ -211,3 +211,36 @@ def test_units_that_are_open_or_contradict_each_other():
     with pytest.raises(RefusedError) as error:
         solved(({"$u": 1}, "m"), ({"$u": 2}, "m s"))
     assert error.value.args == ("E209", "the unit variables of 'pid' contradict each other at 'p1' (off by s/m)")
+
+
+ARRAYS = """model a {
+  param n = 3
+  coord x[1..n]: translation
+  coord z[1..2, 1..n]: translation
+  energy T* = sum(i in 1..n: 1/2*1 kg*(x[i]'^2 + z[1, i]'^2 + z[2, i]'^2))
+  energy V = 1/2*10 N/m*norm(x[1..2])^2
+}
+scene s of a { time 0 s to 1 s; TRACE }
+"""
+
+
+def traced(items, *settings):
+    """Names of what a scene traces, what is said (code, message)."""
+    report = Report()
+    document = load.document(SourceText("m.sd", ARRAYS.replace("TRACE", f"trace {items}")), report)
+    scene = document.scenes["s"]
+    _, reader = load._elaborated(document, document.models["a"], scene, report, settings, ())
+    reader.read(scene, Place(document.file.source, scene.span))
+    return [o.name for o in reader.observations], [(d.code, d.message) for d in report]
+
+
+def test_ranges_are_traced_element_by_element():
+    assert traced("x[1..n] in mm, x[2..n]' as v") == (["x[1]", "x[2]", "x[3]", "v[2]", "v[3]"], [])
+    assert traced("z[1..2, n - 1..n]") == (["z[1, 2]", "z[1, 3]", "z[2, 2]", "z[2, 3]"], [])
+    assert traced("z[1..2, 1] as far") == (["far[1]", "far[2]"], [])
+
+
+def test_a_range_beyond_its_array_is_said():
+    _, said = traced("x[1..5]")
+    assert said == []  # bounds are judged with the sizes of a run
+    assert traced("x[1..n]", ("n", "5"))[0] == [f"x[{k}]" for k in range(1, 6)]

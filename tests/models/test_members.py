@@ -206,3 +206,87 @@ def test_all_four_variables_of_a_coordinate(tmp_path, formulation):
     np.testing.assert_allclose(rate, v, atol=1e-6)
     np.testing.assert_allclose(held, 1.5 * v, atol=1e-6)
     np.testing.assert_allclose(other, -6 * x, atol=1e-5)
+
+
+CELLS = """from std.electrical import resistor, capacitor, voltage
+component stage {
+  port a, b: electrical
+  param k = 1
+  node m: electrical
+  r: resistor(R = 1 kohm) a -> m
+  c: capacitor(C = 1 uF) m -> ground
+  let charge = c.q
+  leak: flow(f = 1e-4 A/V*c.e*k) m -> ground
+  out_: resistor(R = 100 ohm) m -> b
+}
+component cell {
+  port a, b: electrical
+  node m[0..2]: electrical
+  for i in 1..2 {
+    s[i]: stage(k = 0.5*i) a = m[i - 1], b = m[i]
+    init s[i].c.e = 0.1 V*i
+  }
+  let total = s[1].charge + s[2].c.q
+  in_: resistor(R = 1 ohm) a -> m[0]
+  out_: resistor(R = 1 ohm) m[2] -> b
+  output seen = s[2].c.e
+}
+model chain {
+  node v[0..3]: electrical
+  S: voltage(v = 1 V) v[0] -> ground
+  x[1]: cell() a = v[0], b = v[1]
+  for k in 2..3 { x[k]: cell() a = v[k - 1], b = v[k] }
+  load: resistor(R = 10 kohm) v[3] -> ground
+  let whole = x[1].total + sum(k in 2..3: x[k].total)
+}
+scene run of chain {
+  time 0 s to 10 ms
+  trace x[1..3].s[1..2].c.e as u, x[3].seen as seen, x[1].total as total, whole every 1 ms
+  accuracy 1e-7
+}
+"""
+
+
+def stages():
+    """Conductances [6, 6] between the capacitors of all cells, currents of the source into them (A), first voltages."""
+    edges, places = [], {}
+    for cell in (1, 2, 3):
+        edges.append((f"v{cell - 1}", f"{cell}m0", 1.0))
+        for i in (1, 2):
+            places[f"{cell}s{i}"] = (0.5e-4 * i, 0.1 * i)
+            edges += [(f"{cell}m{i - 1}", f"{cell}s{i}", 1e3), (f"{cell}s{i}", f"{cell}m{i}", 100.0)]
+        edges.append((f"{cell}m2", f"v{cell}", 1.0))
+    edges.append(("v3", "ground", 1e4))
+    known = ("v0", "ground")
+    names = [*places, *sorted({end for edge in edges for end in edge[:2]} - {*places, *known})]
+    at = {name: k for k, name in enumerate(names)}
+    matrix, given = np.zeros((len(names), len(names))), np.zeros(len(names))
+    for a, b, ohm in edges:
+        for here, there in ((a, b), (b, a)):
+            if here not in known:
+                matrix[at[here], at[here]] += 1 / ohm
+                if there == "v0":
+                    given[at[here]] += 1 / ohm
+                elif there != "ground":
+                    matrix[at[here], at[there]] -= 1 / ohm
+    for name, (leak, _) in places.items():
+        matrix[at[name], at[name]] += leak
+    own, rest = slice(0, 6), slice(6, None)
+    reach = matrix[own, rest] @ np.linalg.inv(matrix[rest, rest])
+    return matrix[own, own] - reach @ matrix[rest, own], given[own] - reach @ given[rest], [v for _, v in places.values()]
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_components_within_components_within_an_array(tmp_path, formulation):
+    """Read from within by a law, a let, an output and an init, and from outside; against the circuit's own matrix."""
+    trace = trace_of(tmp_path, CELLS, formulation=formulation)
+    between, given, first = stages()
+    rates, modes = np.linalg.eigh(between / 1e-6)
+    still = np.linalg.solve(between, given)
+    parts = modes.T @ (np.array(first) - still)
+    exact = still + (np.exp(-np.outer(trace.time, rates)) * parts) @ modes.T
+    for k, name in enumerate(f"u[{cell}, {i}]" for cell in (1, 2, 3) for i in (1, 2)):
+        np.testing.assert_allclose(trace[name].values, exact[:, k], atol=2e-7)
+    np.testing.assert_allclose(trace["seen"].values, exact[:, 5], atol=2e-7)
+    np.testing.assert_allclose(trace["total"].values, 1e-6 * exact[:, :2].sum(1), atol=4e-13)
+    np.testing.assert_allclose(trace["whole"].values, 1e-6 * exact.sum(1), atol=1.2e-12)
