@@ -273,7 +273,8 @@ def stages():
         matrix[at[name], at[name]] += leak
     own, rest = slice(0, 6), slice(6, None)
     reach = matrix[own, rest] @ np.linalg.inv(matrix[rest, rest])
-    return matrix[own, own] - reach @ matrix[rest, own], given[own] - reach @ given[rest], [v for _, v in places.values()]
+    first = [volt for _, volt in places.values()]
+    return matrix[own, own] - reach @ matrix[rest, own], given[own] - reach @ given[rest], first
 
 
 @pytest.mark.parametrize("formulation", FOUR)
