@@ -77,6 +77,11 @@ def _call_partials(node: Node) -> tuple[Node, ...]:
     raise AssertionError(name)
 
 
+def _times(factors: Sequence[tuple[float, Node]]) -> Callable[[Node], Node]:
+    """Multiplication by powers of nodes."""
+    return lambda node: product(1.0, [*factors, (1.0, node)])
+
+
 def _along(dot: Node, scaled: Callable[[Node], Node]) -> Node:
     """A linear function of a differential; of one that conditions make zero, within these: sqrt(max(x, 0)) is flat
     below 0, and not infinity times zero.
@@ -91,10 +96,16 @@ def _along(dot: Node, scaled: Callable[[Node], Node]) -> Node:
     if zero not in branches:
         return scaled(dot)
     done: dict[Node, Node] = {zero: zero}
-    for node in topological([dot]):
-        if node in branches and node is not zero:
-            inner = node.op == "cond"
-            done[node] = conditional(node.args[0], *(done[a] for a in node.args[1:])) if inner else scaled(node)
+    waiting = [dot]
+    while waiting:
+        node = waiting[-1]
+        inner = node.args[1:] if node.op == "cond" else ()
+        first = [a for a in inner if a not in done]
+        if not first:
+            if node not in done:
+                done[node] = conditional(node.args[0], *(done[a] for a in inner)) if inner else scaled(node)
+            waiting.pop()
+        waiting += first
     return done[dot]
 
 
@@ -112,7 +123,7 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
             for k, dot in enumerate(dots):
                 if dot is not zero:
                     factors = [(e - (j == k), a) for j, (e, a) in enumerate(zip(node.data, node.args, strict=True))]
-                    parts.append((node.data[k], _along(dot, lambda d, f=factors: product(1.0, [*f, (1.0, d)]))))
+                    parts.append((node.data[k], _along(dot, _times(factors))))
             return linear(0.0, parts)
         case "pow":
             base, exponent = node.args
@@ -125,7 +136,7 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
             return conditional(compare("<=" if node.data == "min" else ">=", *node.args), *dots)
         case "call":
             moving = [(p, d) for p, d in zip(_call_partials(node), dots, strict=True) if d is not zero]
-            return add(*(_along(d, lambda d, p=p: mul(p, d)) for p, d in moving))
+            return add(*(_along(d, _times([(1.0, p)])) for p, d in moving))
         case "cond":
             return conditional(node.args[0], dots[1], dots[2])
         case "table":
