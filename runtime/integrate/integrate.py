@@ -34,7 +34,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, confirmed, magnitudes, noise
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.ordering import Order, order_of
+from sysdyn.runtime.numerics.ordering import Order, net_order_of
 from sysdyn.runtime.start.restart import Restart, still
 from sysdyn.runtime.start.settled import Settler, flows_open
 from sysdyn.runtime.start.start import ConsistentState
@@ -192,7 +192,7 @@ class Integration:
             self.underlying = Underlying(self._solved, self.magnitude, self._factors)
             self.linear, self._order = self.underlying.linear, Order(None)
             return
-        self._order = order_of(self.system) if self.forms is None else self.forms.order()
+        self._order = net_order_of(self.system) if self.forms is None else self.forms.order()
         self._taken = self._factors.take(self.stepped.pattern, self._order)
         self.linear = self._taken.linear
 
