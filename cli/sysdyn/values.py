@@ -36,17 +36,23 @@ _NEW = object()
 
 
 @cache
-def _setting(count: int, after: bool, anew: tuple[int, ...]) -> CodeType:
-    """`__init__` of a value of so many fields, set each by its slot; after: `__post_init__` follows; anew: the fields
-    that have a default factory.
-    """
+def _setting(count: int, after: bool) -> CodeType:
+    """`__init__` of a value of so many fields, set each by its slot; after: `__post_init__` follows."""
     names = [f"a{k}" for k in range(count)]
-    values = [f"_new{k}() if a{k} is _NEW else a{k}" if k in anew else f"a{k}" for k in range(count)]
-    lines = [f"_a{k}(self, {value})" for k, value in enumerate(values)] + ["_after(self)"] * after
+    lines = [f"_a{k}(self, a{k})" for k in range(count)] + ["_after(self)"] * after
     made: dict[str, Any] = {}
     exec(f"def __init__({', '.join(['self', *names])}):\n " + "\n ".join(lines), made)  # noqa: S102 (numbers alone)
     code: CodeType = made["__init__"].__code__
     return code
+
+
+def _setter(store: Callable[..., None], factory: Callable[[], Any]) -> Callable[..., None]:
+    """Sets a field that has a default factory."""
+
+    def set_or_make(self: object, value: object) -> None:
+        store(self, factory() if value is _NEW else value)
+
+    return set_or_make
 
 
 def _refuse_set(self: object, name: str, _value: object) -> None:
@@ -160,11 +166,13 @@ def _initial(made: Any, names: tuple[str, ...], defaults: dict[str, Any]) -> Fun
     """`__init__` of a class with slots."""
     first = [_first(default) for default in defaults.values()]
     head, after = len(names) - len(first), getattr(made, "__post_init__", None)
-    anew = {head + k: defaults[names[head + k]].default_factory for k, value in enumerate(first) if value is _NEW}
-    code = _setting(len(names), after is not None, tuple(anew))
+    code = _setting(len(names), after is not None)
     code = code.replace(co_varnames=("self", *names), co_qualname=f"{made.__qualname__}.__init__")
-    known = {f"_a{k}": vars(made)[name].__set__ for k, name in enumerate(names)} | {"_after": after, "_NEW": _NEW}
-    init = FunctionType(code, known | {f"_new{k}": factory for k, factory in anew.items()}, "__init__", tuple(first))
+    known = {f"_a{k}": vars(made)[name].__set__ for k, name in enumerate(names)} | {"_after": after}
+    for k, value in enumerate(first, head):
+        if value is _NEW:
+            known[f"_a{k}"] = _setter(known[f"_a{k}"], defaults[names[k]].default_factory)
+    init = FunctionType(code, known, "__init__", tuple(first))
     init.__annotations__ = made.__annotations__ | {"return": None}
     return init
 

@@ -7,6 +7,7 @@ made only where all its factors are units.
 from __future__ import annotations
 
 import re
+from functools import cache
 
 from sysdyn.dsl.model.units import NONE, Dimension, known, multiply, names, si_text
 from sysdyn.values import dataclass
@@ -180,11 +181,14 @@ def scaled(text: str) -> str | None:
     return f"{number}{'.' + behind if behind else ''}{_SUFFIXES[suffix]}"
 
 
-_QUANTITY = re.compile(
-    r"(?<![\w.])([0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?)[ \t]+("
-    r"[^\W\d]\w*(?:\^-?[0-9]+)?(?:[ \t]*[.*/·][ \t]*[^\W\d]\w*(?:\*?\*?\^?-?[0-9]+)?)+"
-    r"|[^\W\d]\w*(?:\^-?[0-9]+)?(?:[ \t]+[^\W\d]\w*(?:\^-?[0-9]+)?)+(?:/[^\W\d]\w*(?:\^-?[0-9]+)?)*)"
-)
+@cache
+def _quantity() -> re.Pattern[str]:
+    """A number and what may be its unit; compiled when it is first asked for, 1 ms of each command."""
+    return re.compile(
+        r"(?<![\w.])([0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?)[ \t]+("
+        r"[^\W\d]\w*(?:\^-?[0-9]+)?(?:[ \t]*[.*/·][ \t]*[^\W\d]\w*(?:\*?\*?\^?-?[0-9]+)?)+"
+        r"|[^\W\d]\w*(?:\^-?[0-9]+)?(?:[ \t]+[^\W\d]\w*(?:\^-?[0-9]+)?)+(?:/[^\W\d]\w*(?:\^-?[0-9]+)?)*)"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +205,7 @@ def chained(text: str, offset: int) -> Chained | None:
     first = text.rfind("\n", 0, offset) + 1
     last = text.find("\n", offset)
     line = text[first : last if last >= 0 else len(text)]
-    for match in _QUANTITY.finditer(line):
+    for match in _quantity().finditer(line):
         if match.start() + first <= offset < match.end() + first:
             unit = re.sub(r"[ \t]*([.*/·])[ \t]*", r"\1", match.group(2))
             unit = re.sub(r"[ \t]+", ".", unit)

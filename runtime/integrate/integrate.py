@@ -33,7 +33,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import confirmed
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.ordering import Order, order_of
+from sysdyn.runtime.numerics.ordering import Order, net_order_of
 from sysdyn.runtime.start.settled import Settler
 from sysdyn.runtime.start.start import ConsistentState
 
@@ -139,7 +139,7 @@ class Integration:
             self.underlying = Underlying(self._solved, self.sizes.magnitude, self._factors)
             self.linear, self._order = self.underlying.linear, Order(None)
             return
-        self._order = order_of(self.system) if self.forms is None else self.forms.order()
+        self._order = net_order_of(self.system) if self.forms is None else self.forms.order()
         self._taken = self._factors.take(self.stepped.pattern, self._order)
         self.linear = self._taken.linear
 

@@ -152,7 +152,7 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
         inverse = np.linalg.inv(full)
         apply, back = full.dot, inverse.dot
     else:
-        matrix = Symmetric(unknowns + rows, places, values)
+        matrix = Symmetric(unknowns + rows, places, values, definite=True)
         apply, back = matrix.times, matrix.solve
     found = np.zeros(unknowns + rows)
     for _ in range(_PROXIMAL):

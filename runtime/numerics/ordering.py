@@ -43,7 +43,7 @@ class Order:
 
     filled: entries of a factor at most.  paired: row own[k] (None: k) pivots in column k wherever its entry will do;
     where such factors have more than `most` entries (0: however many) the columns are taken as in `otherwise`, for any
-    pivots.
+    pivots.  faint: its entry does however small it is, of quasi-definite matrices, whose solutions are then refined.
     """
 
     columns: Ints | None
@@ -52,11 +52,13 @@ class Order:
     own: Ints | None = None
     otherwise: Ints | None = None
     most: int = 0
+    faint: bool = False
 
     @cached_property
     def core(self) -> lib.Order:
         """As the core has it."""
-        return lib.Order(*map(lib.pointer, (self.columns, self.own, self.otherwise)), self.most, self.paired)
+        arrays = map(lib.pointer, (self.columns, self.own, self.otherwise))
+        return lib.Order(*arrays, self.most, self.paired + self.faint)
 
     @property
     def address(self) -> int:
@@ -141,9 +143,9 @@ def paired_order(pattern: Pattern) -> Ints | None:
     return order
 
 
-def symmetric_order(pattern: Pattern) -> Order:
+def symmetric_order(pattern: Pattern, *, faint: bool = False) -> Order:
     """Of a large matrix whose pattern is symmetric: least fill of A + A^T, every row in its own column."""
-    return Order(*_large(neighbours(pattern)), paired=True)
+    return Order(*_large(neighbours(pattern)), paired=True, faint=faint)
 
 
 def neighbours(pattern: Pattern) -> Pattern:

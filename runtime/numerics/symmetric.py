@@ -21,19 +21,22 @@ SINGULAR = 1
 
 
 class Symmetric:
-    """number: of rows; places: rows and columns of values, which add up where they meet.
+    """number: of rows; places: rows and columns of values, which add up where they meet; definite: [H, A^T; A, -K] of
+    positive definite H and K, which has factors on its diagonal in any order: `solve` then wants to be refined.
 
     NotFiniteError where values are no numbers or leave no pivot.
     """
 
-    def __init__(self, number: int, places: tuple[NDArray[Any], NDArray[Any]], values: Floats) -> None:
+    def __init__(
+        self, number: int, places: tuple[NDArray[Any], NDArray[Any]], values: Floats, *, definite: bool = False
+    ) -> None:
         rows, columns = (item.astype(np.int32) for item in places)
         self._pattern, (slot,) = compress(number, number, [Places(rows, columns)])
         self._values = np.bincount(slot, weights=values, minlength=self._pattern.entries).astype(np.float64)
         if not np.isfinite(self._values).all():
             raise NotFiniteError
         self._columns = self._pattern.columns_of()
-        self._order = symmetric_order(self._pattern)
+        self._order = symmetric_order(self._pattern, faint=definite)
         self._linear = self._order.linear(self._pattern)
         failed = lib.core.sd_linear_factor(self._linear, lib.pointer(self._values), None)
         if failed:

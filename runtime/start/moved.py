@@ -22,8 +22,9 @@ def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
     found: list[str] = []
     values = starter.jacobian(t, x)
     silent = starter.rows[starter.moves("unsaid")[starter.columns]]
-    for row in np.setdiff1d(starter.rows[(starter.columns == place) & (values != 0.0)], silent):
-        label = starter.settled.row_label(int(row))
+    mine = starter.rows[(starter.columns == place) & (values != 0.0)]
+    for row in sorted(set(mine.tolist()).difference(silent.tolist())):  # without numpy.ma, 7 ms of a short command
+        label = starter.settled.row_label(row)
         base = label.kind.split("_")[0]
         text = f"{base} {label.label}"
         if base in ("phi", "psi", "gamma", "momentum", "initial") and text not in found:

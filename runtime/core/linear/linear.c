@@ -56,7 +56,7 @@ sd_linear *sd_linear_ordered(int32_t n, const int32_t *column, const int32_t *ro
 {
     sd_linear *linear = sd_linear_new(n, column, row, order ? order->columns : NULL);
     if (linear && linear->sparse && order->paired) {
-        linear->sparse->paired = 1;
+        linear->sparse->paired = order->paired;
         linear->sparse->own = order->own;
         linear->sparse->most = order->most;
         linear->otherwise = order->otherwise;

@@ -20,7 +20,8 @@ typedef struct sd_sparse sd_sparse;
 
 /* An order of elimination: columns [n], NULL: dense; paired: row own[c] (NULL: c) pivots in column c wherever its entry will do,
  * and where such factors get longer than `most` entries (0: however long) the columns are taken as in `otherwise` [n], for any
- * pivots.  Arrays of the caller. */
+ * pivots.  2: of matrices that are quasi-definite (Vanderbei, SIAM J. Optim. 5, 1995) that row pivots however faint it is, and
+ * the caller refines what it solves.  Arrays of the caller. */
 typedef struct sd_order {
     const int32_t *columns, *own, *otherwise;
     int64_t most;

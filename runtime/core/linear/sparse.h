@@ -34,7 +34,8 @@ typedef struct sd_sparse {
     char *pulled;                /* [n] which substitutions take what a column makes of another position within a chain */
     sd_number *x;                /* [the larger of n and rows, + 1] */
     int pivoted;                 /* a valid pattern exists */
-    int paired;                  /* row own[c] pivots in column c wherever its entry will do: the order is one of A + A^T */
+    int paired;                  /* row own[c] pivots in column c wherever its entry will do: the order is one of A + A^T;
+                                    2: however faint that is, of quasi-definite matrices */
     const int32_t *own;          /* [n] of the caller; NULL: row c */
     double smallest, null_pivot; /* least pivot as part of its column; below null_pivot a column is left out */
     const int32_t *idle;         /* [n] 1: which may be, of the caller; NULL: any */
