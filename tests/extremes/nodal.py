@@ -1,8 +1,8 @@
 """Random rectifiers of one or three phases and their node potentials by other equations.
 
-Modified nodal analysis, A x' + G x + B i(B' x) = s(t), with x the potentials, the currents of sources and of coils (index 1
-or 2), by Radau IIA of three stages (Hairer and Wanner, Solving Ordinary Differential Equations II, IV.8); Newton's steps
-are limited at the junctions (Nagel, SPICE2, 1975).  No word of sysdyn in it.
+Modified nodal analysis, A x' + G x + B i(B' x) = s(t), with x the potentials, the currents of sources and of coils
+(index 1 or 2), by Radau IIA of three stages (Hairer and Wanner, Solving Ordinary Differential Equations II, IV.8);
+Newton's steps are limited at the junctions (Nagel, SPICE2, 1975).  No word of sysdyn in it.
 """
 
 from dataclasses import dataclass, field
@@ -253,7 +253,7 @@ class Nodal:
         amplitude = sum(abs(v[0]) for _, v, *_ in branches["V"]) + sum(abs(v) for _, v, *_ in branches["E"])
         size = np.full(self.size, 0.01 * amplitude)
         size[len(self.place) :] /= max([v for _, v, *_ in branches["R"]], default=1.0)
-        u, h, poly, rows, last = np.tile(self.b @ x, (3, 1)), 1e-4 * longest, None, [], 1.0
+        h, poly, rows = 1e-4 * longest, None, []
         due = list(times)
         while due and due[0] <= 0.0:
             rows.append(x)
