@@ -115,7 +115,7 @@ static int state_jacobian(double t, const double *y, const double *p, double slo
         return -1;
     double *jyd = jy + form.entries + 1, *x = jyd + form.entries + 1, *column = x + FULL;
     if (!code) {
-        sd_core_jacobian(&s.system, t, s.y, s.yd, jy, jyd);
+        sd_core_jacobian(&s.system, t, s.y, s.yd, NULL, jy, jyd);
         for (int32_t e = 0; e < matrix_form.entries; e++)
             s.underlying->values[e] = matrix_form.from_rate[e] ? jyd[matrix_form.source[e]] : jy[matrix_form.source[e]];
         code = sd_linear_factor(s.linear, s.underlying->values, NULL) ? 1 : 0;
@@ -180,7 +180,7 @@ static int combined(double t, const double *y, const double *yd, const double *p
     if (!jy)
         return -1;
     sd_system system = bound(&form, p, calls, jyd + form.entries);
-    sd_core_jacobian(&system, t, y, yd, jy, jyd);
+    sd_core_jacobian(&system, t, y, yd, NULL, jy, jyd);
     for (int32_t e = 0; e < form.entries; e++)
         values[e] = by_y ? jy[e] + cj * jyd[e] : jyd[e];
     free(jy);

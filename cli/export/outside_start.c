@@ -162,7 +162,7 @@ static double step_of(seeking *s, const sd_trial *trial)
     memset(s->a, 0, (size_t)trial->rows * START_X * sizeof *s->a);
     memset(s->size, 0, (size_t)trial->rows * sizeof *s->size);
     start_rows(s, s->x);
-    sd_core_jacobian(&s->system, sd_t0, s->y, s->yd, s->jy, s->jyd);
+    sd_core_jacobian(&s->system, sd_t0, s->y, s->yd, NULL, s->jy, s->jyd);
     enter_all(s, 1);
     enter_all(s, 0);
     for (int32_t i = 0; i < trial->rows; i++) {

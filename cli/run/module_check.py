@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 ROUNDING = 1e-9
 """Difference allowed, of the terms of a row: sums are ordered apart, and functions differ in their last digits."""
 FEW_DIGITS = float(np.finfo(float).tiny)
-"""Numbers below it have few digits (the kinetic energy behind the tail of a pulse: 6.7e-322 J)."""
+"""Numbers below it have few digits (the kinetic energy behind the tail of a pulse: 6.7e-322 J), and so has what they
+are multiplied with (a diode that blocks: 1e-320 S times 1e162 V/s)."""
 NEARBY = (1e-2, 0.3)
 """Distances of the points from the start, of the unknowns' magnitudes."""
 
@@ -55,10 +56,10 @@ def _compare(prepared: Prepared, started: Started, until: float) -> None:
     for block in prepared.compiled.form.blocks:
         sample = oracle.sample(block, points)
         module = _module_rows(whole, oracle, block, points, sample.rows)
-        wrong = _apart(module, sample)
+        wrong = _apart(module, sample, points)
         if wrong.any():  # perhaps terms of terms cancel: their rounding is no difference
             sample = oracle.sample(block, points, careful=True)
-            wrong = _apart(module, sample)
+            wrong = _apart(module, sample, points)
         if wrong.any():
             k, row = np.argwhere(wrong)[0]
             place = int(sample.rows[row])
@@ -66,14 +67,15 @@ def _compare(prepared: Prepared, started: Started, until: float) -> None:
             raise ModuleFault(_told(prepared, oracle, block, place, values))
 
 
-def _apart(found: Array, sample: Sample) -> NDArray[np.bool_]:
+def _apart(found: Array, sample: Sample, points: Points) -> NDArray[np.bool_]:
     """Where both differ by more than rounding [points, rows of the sample]; found: the module's rows there."""
     with np.errstate(invalid="ignore"):
         apart = np.abs(found - sample.value)
     both = ~np.isfinite(found) & ~np.isfinite(sample.value)  # a point outside the range of a root
     # the size of terms in which something overflows (one over cosh) is no number
     size = np.where(np.isfinite(sample.size), sample.size, np.abs(sample.value))
-    return ~both & ~(apart <= ROUNDING * size + FEW_DIGITS)
+    largest = np.maximum(*(np.abs(x).max(axis=1, initial=1.0) for x in (points.y, points.yd)))[:, None]
+    return ~both & ~(apart <= ROUNDING * size + FEW_DIGITS * largest)
 
 
 def _points(system: System, whole: System, started: Started, oracle: SampledRows, until: float) -> Points:

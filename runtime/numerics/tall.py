@@ -112,5 +112,7 @@ def free_unknowns(shape: tuple[int, int], entries: Entries) -> NDArray[np.bool_]
         open_[j] = False
         return open_
     row, column = sparse_factors(i, j, np.abs(v), shape)
-    free = left_open(shape, (i, j, v * row[i] * column[j]))
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = v * row[i] * column[j]
+    free = left_open(shape, (i, j, np.where(np.isfinite(scaled), scaled, 1.0)))  # what no factor scales is there
     return None if free is None else np.abs(free) > OPEN

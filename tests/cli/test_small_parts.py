@@ -20,7 +20,7 @@ from sysdyn.cli.spice.writing import Unreadable
 from sysdyn.cli.streams import Closed, standing_streams
 from sysdyn.cli.trade import work
 from sysdyn.cli.trade.errors import error_of
-from sysdyn.compiler.binding.sampled import Sample
+from sysdyn.compiler.binding.sampled import Points, Sample
 from sysdyn.dsl.text.source import SourceText
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.events.plan import Happened
@@ -286,4 +286,7 @@ def test_numbers_of_a_few_digits_are_no_fault_of_a_module():
     rows, least = np.arange(4), 2.0**-1074
     said = np.array([[136.0 * least, 1.0, 3e-300, 0.0]])
     found = np.array([[137.0 * least, 1.0 + 3e-9, 3e-300 * (1.0 + 1e-8), least]])
-    assert module_check._apart(found, Sample(rows, said, np.abs(said))).tolist() == [[False, True, True, False]]
+    still, fast = (Points(np.zeros(1), np.ones((1, 1)), np.full((1, 1), rate)) for rate in (0.0, 1e162))
+    sample = Sample(rows, said, np.abs(said))
+    assert module_check._apart(found, sample, still).tolist() == [[False, True, True, False]]
+    assert module_check._apart(found, sample, fast).tolist() == [[False, True, False, False]]
