@@ -101,6 +101,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     keep()
     code = run(arguments)
     gc.freeze()
+    if arguments is not None:  # called from Python, which goes on
+        sys.exit(code)
     _leave(code)
 
 

@@ -139,13 +139,14 @@ class SampledRows:
             own = np.flatnonzero(kept[rows[k][some]])
             where = np.searchsorted(sample.rows, rows[k][some[own]])
             value, size = c * np.asarray(result, dtype=float), np.abs(c * np.asarray(large))
-            for target, array in ((sample.value, value), (sample.size, size)):
-                if count == 1:
-                    target[:, where] += np.broadcast_to(array, number)[:, None]
-                    continue
-                spread = np.broadcast_to(array, number * count).reshape(number, count)
-                for p in range(number):
-                    np.add.at(target[p], where, spread[p][own])
+            with np.errstate(over="ignore", invalid="ignore"):  # a point may lie where terms overflow
+                for target, array in ((sample.value, value), (sample.size, size)):
+                    if count == 1:
+                        target[:, where] += np.broadcast_to(array, number)[:, None]
+                        continue
+                    spread = np.broadcast_to(array, number * count).reshape(number, count)
+                    for p in range(number):
+                        np.add.at(target[p], where, spread[p][own])
 
     def _index(self, node: Node, args: list[Value], columns: dict[str, Array]) -> Value:
         if node.op == "index":

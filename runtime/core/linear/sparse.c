@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define THRESHOLD 0.1   /* a sparser row may pivot if its entry is this close to the largest */
-#define FAINT 1e-7      /* and a column's own one of quasi-definite matrices, whose factors any of them has: refined once or
+#define FAINT_PIVOT 1e-7      /* and a column's own one of quasi-definite matrices, whose factors any of them has: refined once or
                            twice their solutions are as good (those of 4650 masses at random: a fifth of the time) */
 #define ROOM 2          /* entries of a factor for each of the matrix: room for them */
 #define SMALL 10000     /* columns up to which room that was not taken is kept for the next pivoting */
@@ -116,7 +116,7 @@ static int grow(int64_t need, int64_t *room, int32_t **rows, sd_number **values)
 /* part of the largest entry from which a row will do that a column has for its own */
 static double own_threshold(const sd_sparse *lu, double threshold)
 {
-    return lu->paired > 1 && threshold > FAINT ? FAINT : threshold;
+    return lu->paired > 1 && threshold > FAINT_PIVOT ? FAINT_PIVOT : threshold;
 }
 
 /* the row that pivots in column c: the sparsest among those whose entry is near the largest; -1 where all are zero */

@@ -21,8 +21,8 @@
 #define REFUSALS 3      /* of the basis in a row, behind which it is not tried any more */
 #define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
-#define HOLDS 1e-3      /* part of its own terms that a steep row may be off: a scaled residual far up an exponential is small */
-#define RESOLVED 1e-12  /* scaled residual of a steep row that round-off of its unknowns leaves */
+#define STEEP_HOLDS 1e-3      /* part of its own terms that a steep row may be off: a scaled residual far up an exponential is small */
+#define STEEP_RESOLVED 1e-12  /* scaled residual of a steep row that round-off of its unknowns leaves */
 
 enum { NONE, MATRIX, BASIS };
 
@@ -147,7 +147,7 @@ static int steep_rows_hold(sd_settle *settle, double t, const double *y, const d
     for (int32_t i = 0; i < settle->rows; i++) {
         double r = fabs(settle->r[i]);
         int judged = settle->sort[i] != SD_RATE && settle->sort[i] != SD_LEFT_OUT && terms[i] != 0.0;
-        if (judged && !(r <= HOLDS * terms[i]) && !(r * settle->row_scale[i] <= RESOLVED))
+        if (judged && !(r <= STEEP_HOLDS * terms[i]) && !(r * settle->row_scale[i] <= STEEP_RESOLVED))
             return 0;
     }
     grow(settle, y, yd);
