@@ -74,8 +74,9 @@ def _apart(found: Array, sample: Sample, points: Points) -> NDArray[np.bool_]:
     both = ~np.isfinite(found) & ~np.isfinite(sample.value)  # a point outside the range of a root
     # the size of terms in which something overflows (one over cosh) is no number
     size = np.where(np.isfinite(sample.size), sample.size, np.abs(sample.value))
-    largest = np.maximum(*(np.abs(x).max(axis=1, initial=1.0) for x in (points.y, points.yd)))[:, None]
-    return ~both & ~(apart <= ROUNDING * size + FEW_DIGITS * largest)
+    largest: Array = np.abs(np.hstack([points.y, points.yd])).max(axis=1, initial=1.0)[:, None]
+    wrong: NDArray[np.bool_] = ~both & ~(apart <= ROUNDING * size + FEW_DIGITS * largest)
+    return wrong
 
 
 def _points(system: System, whole: System, started: Started, oracle: SampledRows, until: float) -> Points:

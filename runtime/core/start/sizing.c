@@ -220,19 +220,10 @@ static void efforts(const sd_sizing *s, const double *found, const double *row, 
     }
 }
 
-/* Zeros of balanced [n] by the rows that are not steep, and by these where nothing else sizes them: the slope of a diode that
- * blocks makes 1e50 V of a current, and it needs a fraction of one. */
-static int propagated(const sd_balance *b, const double *size, const char *small, const double *excited,
-                      const int32_t *steep, int32_t flags, double *balanced)
-{
-    int failed = steep ? sd_propagate_beside(b, size, small, excited, steep, flags, balanced) : 0;
-    return failed | sd_propagate_beside(b, size, small, excited, NULL, flags, balanced);
-}
-
-/* found [n]: what is too small beside what balances the rows is taken from these; size [entries], excited [rows]; steep
- * [rows]: rows with a steep law, or NULL; kept [n], balanced [n], row [rows]: room */
-static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const double *size, double *excited,
-                          const int32_t *steep, double *found, double *kept, double *balanced, double *row)
+/* found [n]: what is too small beside what balances the rows is taken from these; size [entries], excited [rows]; kept [n],
+ * balanced [n], row [rows]: room */
+static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const double *size, double *excited, double *found,
+                          double *kept, double *balanced, double *row)
 {
     const sd_balance *b = s->balance;
     int32_t n = b->unknowns;
@@ -241,13 +232,13 @@ static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const doub
     char *small = sd_small(b, size);
     if (!small)
         return -1;
-    int failed = propagated(b, size, small, excited, steep, SD_CAPPED, balanced);
+    int failed = sd_propagate_beside(b, size, small, excited, NULL, SD_CAPPED, balanced);
     for (int32_t k = 0; k < n; k++)
         found[k] = carries[k] && found[k] < ROUND_OFF * balanced[k] ? balanced[k] : found[k];
     /* momenta and dynamic variables are balanced against flows, what follows from the state against all of it */
     for (int32_t k = 0; k < n; k++)
         balanced[k] = carries[k] && (s->kind[k] & (SD_DISPLACEMENT | SD_FLOW)) ? found[k] : 0.0;
-    failed |= propagated(b, size, small, excited, steep, SD_LARGEST | SD_CAPPED, balanced);
+    failed |= sd_propagate_beside(b, size, small, excited, NULL, SD_LARGEST | SD_CAPPED, balanced);
     for (int32_t k = 0; k < n; k++) {
         int whole = !(s->kind[k] & (SD_MOMENTUM | SD_DYNAMIC)) || found[k] > NOISE * balanced[k];
         found[k] = whole ? found[k] : balanced[k];
@@ -257,7 +248,7 @@ static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const doub
     for (int32_t e = 0; e < b->entries; e++)
         row[b->row[e]] = sd_larger(row[b->row[e]], size[e] * kept[b->column[e]]);
     efforts(s, found, row, excited);
-    failed |= propagated(b, size, small, excited, steep, SD_CAPPED, balanced);
+    failed |= sd_propagate_beside(b, size, small, excited, NULL, SD_CAPPED, balanced);
     free(small);
     for (int32_t k = 0; k < n; k++)
         found[k] = found[k] > NOISE * balanced[k] ? found[k] : balanced[k];
@@ -311,7 +302,7 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     const sd_balance *b = s->balance;
     size_t n = (size_t)b->unknowns, rows = (size_t)b->rows, entries = (size_t)b->entries, kinds = (size_t)b->kinds;
     double *memory = calloc(7 * n + 3 * rows + 3 * entries + 2 * kinds + (size_t)system->kinematics + 3, sizeof(double));
-    int32_t *carries = calloc(n + rows + 1, sizeof *carries), *steep = carries + n;
+    int32_t *carries = calloc(n + 1, sizeof *carries);
     if (!memory || !carries) {
         free(memory);
         free(carries);
@@ -337,11 +328,7 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
         size[e] = fabs(own_jy[e]) + fabs(own_jyd[e]) / *tau;
         size[e] = isfinite(size[e]) ? size[e] : 0.0;
     }
-    if (system->scales > 0)
-        sd_steep_terms(system, t0, y, yd, row);
-    for (size_t i = 0; i < rows && system->scales > 0; i++)
-        steep[i] = row[i] != 0.0;
-    failed |= balanced_sizes(s, carries, size, excited, system->scales > 0 ? steep : NULL, found, kept, balanced, row);
+    failed |= balanced_sizes(s, carries, size, excited, found, kept, balanced, row);
     group_largest(b, found, most);
     for (size_t k = 0; k < n; k++)
         found[k] = found[k] == 0.0 ? most[b->kind[k]] : found[k];

@@ -21,8 +21,6 @@
 #define REFUSALS 3      /* of the basis in a row, behind which it is not tried any more */
 #define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
-#define STEEP_HOLDS 1e-3      /* part of its own terms that a steep row may be off: a scaled residual far up an exponential is small */
-#define STEEP_RESOLVED 1e-12  /* scaled residual of a steep row that round-off of its unknowns leaves */
 
 enum { NONE, MATRIX, BASIS };
 
@@ -126,37 +124,8 @@ static double measure(sd_settle *settle, double t, const double *y, const double
     return worst;
 }
 
-/* magnitudes grow with a point of the motion */
-static void grow(sd_settle *settle, const double *y, const double *yd)
-{
-    int32_t n = settle->unknowns;
-    for (int32_t j = 0; j < n + settle->rates; j++) {
-        double size = fabs(j < n ? y[j] : yd[settle->rate[j - n]]);
-        if (size > settle->scale[j] && isfinite(size))
-            settle->scale[j] = size;
-    }
-}
-
-/* Whether every steep row is small beside its own terms at a point that was just measured; magnitudes grow with it. */
-static int steep_rows_hold(sd_settle *settle, double t, const double *y, const double *yd)
-{
-    if (settle->system->scales == 0)
-        return 1;
-    double *terms = settle->step;
-    sd_steep_terms(settle->system, t, y, yd, terms);
-    for (int32_t i = 0; i < settle->rows; i++) {
-        double r = fabs(settle->r[i]);
-        int judged = settle->sort[i] != SD_RATE && settle->sort[i] != SD_LEFT_OUT && terms[i] != 0.0;
-        if (judged && !(r <= STEEP_HOLDS * terms[i]) && !(r * settle->row_scale[i] <= STEEP_RESOLVED))
-            return 0;
-    }
-    grow(settle, y, yd);
-    return 1;
-}
-
 /* Slopes at (t, y, yd) in scaled unknowns, and row scales from the magnitudes of the terms.  met: the point is one of
- * the motion, with which magnitudes grow; an iterate may be anywhere, and between steps that steep laws allow a
- * polynomial is. */
+ * the motion, with which magnitudes grow; an iterate may be anywhere. */
 static void slopes(sd_settle *settle, double t, const double *y, const double *yd, int met)
 {
     sd_system *system = settle->system;
@@ -164,8 +133,11 @@ static void slopes(sd_settle *settle, double t, const double *y, const double *y
     sd_jacobian(system, t, y, yd, settle->scale, settle->jy, settle->jyd);
     memset(settle->row_scale, 0, (size_t)settle->rows * sizeof(double));
     settle->ready = NONE;
-    if (met && system->scales == 0)
-        grow(settle, y, yd);
+    for (int32_t j = 0; j < n + rates && met; j++) {
+        double size = fabs(j < n ? y[j] : yd[settle->rate[j - n]]);
+        if (size > settle->scale[j] && isfinite(size))
+            settle->scale[j] = size;
+    }
     for (int32_t j = 0; j < n; j++) /* scale of yd at [step] for the moment */
         settle->step[j] = 0.0;
     for (int32_t k = 0; k < rates; k++)
@@ -303,7 +275,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
         before = now;
     }
     *best = before;
-    if (!failed && before <= fmax(bound, settle->enough) && steep_rows_hold(settle, t, y, yd)) {
+    if (!failed && before <= fmax(bound, settle->enough)) {
         settle->refused = 0;
         return 1;
     }
@@ -445,10 +417,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     }
     /* the best point met, or the given one; a rate may have no bound */
     put(settle, settle->x, y, yd);
-    int done = best <= CLOSE;
-    if (!done || settle->system->scales > 0)
-        measure(settle, t, y, yd);
-    done = (done || settle->own <= CLOSE) && steep_rows_hold(settle, t, y, yd);
+    int done = best <= CLOSE || (measure(settle, t, y, yd), settle->own <= CLOSE);
     if (done)
         take(settle, y, yd, settle->met);
     else
