@@ -282,12 +282,14 @@ class SceneReader:
     def _items(self, item: syntax.TraceItem) -> None:
         """A traced expression; of `x[1..n].e` each element."""
         ranges = ranges_of(item.expr)
+        if not ranges:
+            self._item(item)
+            return
         numbers = [range(self._bound(r.lower), self._bound(r.upper) + 1) for r in ranges]
         budget.charge(budget.NODE * math.prod(map(len, numbers)), f"each element of '{self._text(item.expr)}'")
         for at in itertools.product(*numbers):
-            index = f"[{', '.join(map(str, at))}]" if at else ""
-            alias = item.alias and replace(item.alias, name=item.alias.name + index)
-            expr = element_of(item.expr, dict(zip(ranges, at, strict=True))) if at else item.expr
+            alias = item.alias and replace(item.alias, name=f"{item.alias.name}[{', '.join(map(str, at))}]")
+            expr = element_of(item.expr, dict(zip(ranges, at, strict=True)))
             self._item(replace(item, expr=expr, alias=alias))
 
     def _bound(self, bound: syntax.Expr) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
 
@@ -197,7 +198,11 @@ class Names(Context):
         """A whole array as a value: only where its bounds are written as numbers."""
         if len(symbol.shape) != 1 or not all(ex.is_const(b) for b in symbol.shape[0]):
             raise self._unnamed(symbol.name, span)
-        first, last = (int(b.data) for b in symbol.shape[0])
+        return self._elements(symbol, symbol.shape[0])
+
+    def _elements(self, symbol: ParameterSymbol | UnknownSymbol, bounds: Sequence[Node]) -> Vector:
+        """The elements between two constants."""
+        first, last = (int(b.data) for b in bounds)
         budget.charge(budget.NODE * max(last - first, 0), f"the elements of '{symbol.name}' one by one")
         return Vector(tuple(self.element(symbol, (ex.const(i),)) for i in range(first, last + 1)), first)
 
@@ -322,11 +327,9 @@ class Names(Context):
         bounds = [self.index(b) for b in (index.lower, index.upper)]
         if not all(ex.is_const(b) for b in bounds):
             return self.slice(self._expanded(symbol, span), index)
-        first, last = (int(b.data) for b in bounds)
         for bound in bounds:
             self.uses.append(Use(symbol.shape[0], bound, self.loops, symbol.name, self.place(index.span)))
-        budget.charge(budget.NODE * max(last - first, 0), f"the elements of '{symbol.name}' one by one")
-        return Vector(tuple(self.element(symbol, (ex.const(k),)) for k in range(first, last + 1)), first)
+        return self._elements(symbol, bounds)
 
     def indices(
         self, name: str, shape: tuple[tuple[Node, Node], ...], indices: tuple[syntax.Index, ...]
