@@ -7,6 +7,10 @@
 #define SMALL 1e-3      /* of the largest coefficient of its row and kind: it proposes much, and is asked last */
 #define DUST 1e-11      /* the same: what is left of a zero, and is never asked */
 #define NOTHING 1e-280  /* less is no magnitude */
+#define BORNE 1e3       /* times what balances a steep row, or what it is at the point: what a proposal may make of it */
+#define TENTH 0.1       /* of a proposal that a steep law does not bear: the next one */
+#define SHORTER 320     /* of them: from the largest double to one */
+#define SPREAD 0.6180339887498949
 
 /* small [entries] := 1 where a coefficient is small beside the largest of its row and kind, 2 where it is none; line [rows]: room.  Entries of
  * a kind lie beside each other, for unknowns do. */
@@ -69,19 +73,60 @@ static int closed(const sd_balance *m, const double *found)
     return 1;
 }
 
+/* slopes [entries] at the point, moved by the proposals for what is not found yet: all by different parts, so that
+ * differences of two move too; way: 1 or -1 */
+static void slopes_beside(const sd_balance *m, const sd_bearing *bearing, int way, const double *found,
+                          const double *best, double *moved, double *slopes)
+{
+    double apart = 0.0;
+    for (int32_t k = 0; k < m->unknowns; k++) {
+        apart = fmod(apart + SPREAD, 1.0);
+        int proposed = found[k] == 0.0 && isfinite(best[k]);
+        moved[k] = bearing->y[k] + (proposed ? way * (1.0 + apart) * best[k] : 0.0);
+    }
+    sd_slopes(bearing->system, bearing->t, moved, bearing->yd, 0, slopes);
+}
+
+/* Proposals best [unknowns] of a sweep are shortened until none, by the slopes that it leads to, makes BORNE times what
+ * balances a steep row (line [rows], where it is known), or of its terms at the point. */
+static void bear(const sd_balance *m, const sd_bearing *bearing, const double *size, const double *line,
+                 const double *found, double *best)
+{
+    double *limit = bearing->work, *moved = limit + m->rows, *slopes = moved + m->unknowns + SD_LANES;
+    char *heavy = (char *)(slopes + m->entries); /* [unknowns] */
+    sd_steep_terms(bearing->system, bearing->t, bearing->y, bearing->yd, limit);
+    for (int32_t r = 0; r < m->rows; r++)
+        limit[r] = limit[r] != 0.0 && line[r] > 0.0 ? BORNE * sd_larger(limit[r], line[r]) : INFINITY;
+    for (int pass = 0, changed = 1; pass < SHORTER && changed; pass++) {
+        memset(heavy, 0, (size_t)m->unknowns);
+        for (int way = 1; way >= -1; way -= 2) {
+            slopes_beside(m, bearing, way, found, best, moved, slopes);
+            for (int32_t e = 0; e < m->entries; e++)
+                if (size[e] > 0.0 && isfinite(limit[m->row[e]]))
+                    heavy[m->column[e]] |= !(fabs(slopes[e]) * best[m->column[e]] <= limit[m->row[e]]);
+        }
+        changed = 0;
+        for (int32_t k = 0; k < m->unknowns; k++)
+            if (heavy[k] && found[k] == 0.0 && isfinite(best[k]) && best[k] != 0.0) {
+                best[k] *= TENTH;
+                changed = 1;
+            }
+    }
+}
+
 int sd_propagate(const sd_balance *m, const double *size, const double *excited, const int32_t *silent, int32_t flags,
                  double *found)
 {
     if (closed(m, found))
         return 0;
     char *small = sd_small(m, size);
-    int failed = small ? sd_propagate_beside(m, size, small, excited, silent, flags, found) : -1;
+    int failed = small ? sd_propagate_beside(m, size, small, excited, silent, NULL, flags, found) : -1;
     free(small);
     return failed;
 }
 
 int sd_propagate_beside(const sd_balance *m, const double *size, const char *small, const double *excited,
-                        const int32_t *silent, int32_t flags, double *found)
+                        const int32_t *silent, const sd_bearing *bearing, int32_t flags, double *found)
 {
     size_t n = (size_t)m->unknowns, rows = (size_t)m->rows;
     int open = !closed(m, found);
@@ -121,6 +166,8 @@ int sd_propagate_beside(const sd_balance *m, const double *size, const char *sma
                 if (known[m->kind[k]] > 0.0)
                     best[k] = sd_smaller(best[k], known[m->kind[k]]);
         }
+        if (bearing)
+            bear(m, bearing, size, line, found, best);
         int changed = 0;
         open = 0;
         for (size_t k = 0; k < n; k++)
@@ -152,7 +199,7 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const in
     for (int32_t e = 0; e < m->entries; e++)
         jacobian[e] = isfinite(jacobian[e]) ? fabs(jacobian[e]) : 0.0;
     char *small = sd_small(m, jacobian);
-    int failed = small ? sd_propagate_beside(m, jacobian, small, residual, rated, flags, scale) : -1;
+    int failed = small ? sd_propagate_beside(m, jacobian, small, residual, rated, NULL, flags, scale) : -1;
     /* unknowns of y are no less than a thousandth of their like */
     for (int32_t k = 0; k < first; k++)
         most[member[k]] = sd_larger(most[member[k]], scale[k]);
@@ -160,7 +207,7 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const in
         scale[k] = sd_larger(scale[k], SMALL * most[member[k]]);
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
     }
-    failed |= small ? sd_propagate_beside(m, jacobian, small, residual, NULL, flags, scale) : -1;
+    failed |= small ? sd_propagate_beside(m, jacobian, small, residual, NULL, NULL, flags, scale) : -1;
     free(small);
     for (int32_t k = 0; k < m->unknowns; k++)
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;

@@ -37,12 +37,23 @@ enum { SD_LARGEST = 1, SD_CAPPED = 2 };
 int sd_propagate(const sd_balance *balance, const double *size, const double *excited, const int32_t *silent,
                  int32_t flags, double *found);
 
+/* A point at which steep laws are asked what they make of a proposal, and room: [rows + 2 unknowns +
+ * entries + SD_LANES] */
+typedef struct sd_bearing {
+    sd_system *system;
+    double t;
+    const double *y, *yd;
+    double *work;
+} sd_bearing;
+
 /* small [entries]: 1 where a coefficient is small beside the largest of its row and kind, 2 where that is what is left of a
  * zero, which proposes nothing; freed by the caller, NULL: no
  * memory.  Several propagations with one `size` have it together. */
 char *sd_small(const sd_balance *balance, const double *size);
+/* bearing: proposals are what steep laws bear (NULL: as slopes say): by the slope of a diode that blocks 1e50 V balance a
+ * current, and a fraction of one volt does */
 int sd_propagate_beside(const sd_balance *balance, const double *size, const char *small, const double *excited,
-                        const int32_t *silent, int32_t flags, double *found);
+                        const int32_t *silent, const sd_bearing *bearing, int32_t flags, double *found);
 
 /* scale [unknowns] := magnitudes of x, by the entries of a Jacobian and a residual at x, which are overwritten by their
  * magnitudes (what is no number counts as 0).  nominal [first]: 0 where there is none; first: unknowns before the rates; rated [rows]: rows that say nothing of sizes

@@ -220,10 +220,10 @@ static void efforts(const sd_sizing *s, const double *found, const double *row, 
     }
 }
 
-/* found [n]: what is too small beside what balances the rows is taken from these; size [entries], excited [rows]; kept [n],
- * balanced [n], row [rows]: room */
-static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const double *size, double *excited, double *found,
-                          double *kept, double *balanced, double *row)
+/* found [n]: what is too small beside what balances the rows is taken from these; size [entries], excited [rows]; bearing:
+ * where laws are steep, or NULL; kept [n], balanced [n], row [rows]: room */
+static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const double *size, double *excited,
+                          const sd_bearing *bearing, double *found, double *kept, double *balanced, double *row)
 {
     const sd_balance *b = s->balance;
     int32_t n = b->unknowns;
@@ -232,13 +232,13 @@ static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const doub
     char *small = sd_small(b, size);
     if (!small)
         return -1;
-    int failed = sd_propagate_beside(b, size, small, excited, NULL, SD_CAPPED, balanced);
+    int failed = sd_propagate_beside(b, size, small, excited, NULL, bearing, SD_CAPPED, balanced);
     for (int32_t k = 0; k < n; k++)
         found[k] = carries[k] && found[k] < ROUND_OFF * balanced[k] ? balanced[k] : found[k];
     /* momenta and dynamic variables are balanced against flows, what follows from the state against all of it */
     for (int32_t k = 0; k < n; k++)
         balanced[k] = carries[k] && (s->kind[k] & (SD_DISPLACEMENT | SD_FLOW)) ? found[k] : 0.0;
-    failed |= sd_propagate_beside(b, size, small, excited, NULL, SD_LARGEST | SD_CAPPED, balanced);
+    failed |= sd_propagate_beside(b, size, small, excited, NULL, bearing, SD_LARGEST | SD_CAPPED, balanced);
     for (int32_t k = 0; k < n; k++) {
         int whole = !(s->kind[k] & (SD_MOMENTUM | SD_DYNAMIC)) || found[k] > NOISE * balanced[k];
         found[k] = whole ? found[k] : balanced[k];
@@ -248,7 +248,7 @@ static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const doub
     for (int32_t e = 0; e < b->entries; e++)
         row[b->row[e]] = sd_larger(row[b->row[e]], size[e] * kept[b->column[e]]);
     efforts(s, found, row, excited);
-    failed |= sd_propagate_beside(b, size, small, excited, NULL, SD_CAPPED, balanced);
+    failed |= sd_propagate_beside(b, size, small, excited, NULL, bearing, SD_CAPPED, balanced);
     free(small);
     for (int32_t k = 0; k < n; k++)
         found[k] = found[k] > NOISE * balanced[k] ? found[k] : balanced[k];
@@ -301,7 +301,8 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
 {
     const sd_balance *b = s->balance;
     size_t n = (size_t)b->unknowns, rows = (size_t)b->rows, entries = (size_t)b->entries, kinds = (size_t)b->kinds;
-    double *memory = calloc(7 * n + 3 * rows + 3 * entries + 2 * kinds + (size_t)system->kinematics + 3, sizeof(double));
+    size_t borne = system->scales > 0 ? 2 * n + rows + entries + SD_LANES : 0;
+    double *memory = calloc(7 * n + 3 * rows + 3 * entries + 2 * kinds + (size_t)system->kinematics + 3 + borne, sizeof(double));
     int32_t *carries = calloc(n + 1, sizeof *carries);
     if (!memory || !carries) {
         free(memory);
@@ -328,7 +329,8 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
         size[e] = fabs(own_jy[e]) + fabs(own_jyd[e]) / *tau;
         size[e] = isfinite(size[e]) ? size[e] : 0.0;
     }
-    failed |= balanced_sizes(s, carries, size, excited, found, kept, balanced, row);
+    sd_bearing bearing = {system, t0, y, yd, least + system->kinematics};
+    failed |= balanced_sizes(s, carries, size, excited, borne ? &bearing : NULL, found, kept, balanced, row);
     group_largest(b, found, most);
     for (size_t k = 0; k < n; k++)
         found[k] = found[k] == 0.0 ? most[b->kind[k]] : found[k];

@@ -117,11 +117,10 @@ int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *
     return bad;
 }
 
-/* s := magnitudes of the terms of steep rows, zero in others */
-static void steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s)
+void sd_steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s)
 {
     if (system->left) {
-        system->left->steep(system->left, t, y, rate, s, steep_terms);
+        system->left->steep(system->left, t, y, rate, s, sd_steep_terms);
         return;
     }
     memset(s, 0, (size_t)system->rows * sizeof *s);
@@ -143,7 +142,7 @@ static int32_t first_beyond(int32_t rows, const double *r, double limit, const d
 int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
                        const double *g, const double *scale, int all, double *s)
 {
-    steep_terms(system, t, y, rate, s);
+    sd_steep_terms(system, t, y, rate, s);
     if (!all && first_beyond(system->rows, r, limit, s) < 0)
         return -1; /* what follows adds to the terms */
     for (int32_t i = 0; i < system->rows; i++)
@@ -162,7 +161,7 @@ int32_t sd_first_unmet(sd_system *system, double t, const double *y, const doubl
 int32_t sd_first_astray(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
                         const double *jy, const double *jyd, double h, const double *open, int all, double *s)
 {
-    steep_terms(system, t, y, rate, s);
+    sd_steep_terms(system, t, y, rate, s);
     for (int32_t j = 0; j < system->unknowns && all; j++) /* of the other rows, below zero */
         for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
             if (s[system->row[e]] <= 0.0)

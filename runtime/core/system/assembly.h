@@ -73,6 +73,8 @@ int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *
                     double *jyd);
 /* one of them, of a system that is not condensed; rate: dF/dyd */
 void sd_slopes(const sd_system *system, double t, const double *y, const double *yd, int rate, double *values);
+/* s := magnitudes of the terms of steep rows at (t, y), zero in others; rate as below */
+void sd_steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s);
 /* The first steep row whose residual r is more than `limit` of the magnitudes of its terms at (t, y), -1 where every one
  * holds.  rate [unknowns]: magnitudes of the derivatives, as the method makes them of values; s [rows]: work.
  * g [entries], scale [unknowns]: slopes, magnitudes of y; all: the other rows are judged too, by the terms |g y| of the
