@@ -230,12 +230,14 @@ def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
 
 
 class _Estimate:
-    """The estimate of the last of two runs, and the power with which the errors fall."""
+    """The estimate of the last of two runs, and the power with which the errors fall.  alone: no pair before says how they
+    do.
+    """
 
     def __init__(self, law: Law, target: Floats) -> None:
         self.law, self.target = law, target
         self.over = self.apart = np.inf
-        self._deep, self.lost, self._unknown = 1.0, False, False
+        self._deep, self.lost, self._unknown, self.alone = 1.0, False, False, True
         self._before: tuple[float, float] | None = None
         self._power: float | None = None
 
@@ -245,6 +247,7 @@ class _Estimate:
         """
         step = float(np.log10(coarse.tolerance / fine.tolerance))
         apart, over = difference(coarse, fine, self.target)
+        self.alone = shorter is None and self._before is None
         lost = apart > DIFFER and over > FAR_OFF
         self._unknown = lost and (step >= DEEP or self.lost)
         self._deep = _affordable(coarse, fine) if lost and not self._unknown else 1.0
@@ -332,7 +335,7 @@ def control(
 ) -> Achieved:
     """Runs until the last one's estimated error meets `target` [quantities], at most RUNS times.
 
-    doubted: another method failed here, and the first pair of runs is not believed on its own; tame: loose runs are
+    doubted: another method failed here, and a pair of runs is not believed on its own; tame: loose runs are
     known to have nothing in common here; first: the tolerance of the run behind the draft, where one is known that
     does; lighter: takes over where little happens.
 
@@ -362,7 +365,7 @@ def control(
         if now.steps == last.steps and apart < ROUND_OFF:
             return _shifted(run, now, target, number)
         away = parted(last, now, target)
-        if estimate.over <= 1.0 and not (doubted and number == 2) and not away:
+        if estimate.over <= 1.0 and not (doubted and estimate.alone) and not away:
             return _achieved(estimate.apart, True, number, now.tolerance)
         if law.brief and (estimate.lost or estimate.next_tolerance(now.tolerance) <= law.finest):
             return _achieved(estimate.apart, False, number, now.tolerance, lost=estimate.lost)

@@ -175,6 +175,14 @@ static void dense_solve(const sd_linear *linear, sd_number *x, sd_number *work)
     }
 }
 
+void sd_linear_left(const sd_linear *linear, char *left)
+{
+    memset(left, 0, (size_t)linear->n);
+    for (int32_t k = 0; k < linear->n && linear->rank < linear->n; k++)
+        if (linear->dense ? k >= linear->rank : linear->sparse->source[k] < 0)
+            left[linear->dense ? linear->place[k] : linear->sparse->order[k]] = 1;
+}
+
 /* by the list of operations, if there is one and it serves; columns that steep laws may leave open want exchanges */
 static int replay(sd_linear *linear, const sd_number *values, const double *scale)
 {

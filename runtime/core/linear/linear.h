@@ -64,6 +64,8 @@ void sd_linear_free(sd_linear *linear);
 int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale);
 /* x [n]: right side in, solution out */
 void sd_linear_solve(sd_linear *linear, sd_number *x);
+/* left [n] := 1 for the columns that the last factors left */
+void sd_linear_left(const sd_linear *linear, char *left);
 /* set to 0: the next factorisation chooses its pivots anew, and nothing is known of those before */
 int32_t *sd_linear_pivoted(sd_linear *linear);
 /* small matrices, of which there will be many, are eliminated by a list of operations (elimination.h) where it serves; the

@@ -53,6 +53,7 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_linear_ordered sd_linear_z_ordered
 #define sd_linear_replayed sd_linear_z_replayed
 #define sd_linear_again sd_linear_z_again
+#define sd_linear_left sd_linear_z_left
 #define sd_elimination sd_elimination_z
 #define sd_elimination_new sd_elimination_z_new
 #define sd_elimination_free sd_elimination_z_free

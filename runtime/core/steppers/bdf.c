@@ -173,7 +173,7 @@ static int rows_hold(sd_bdf *bdf, double t)
         bdf->rate[i] = bdf->cj * (fabs(bdf->y[i]) + bdf->magnitude[i]);
     double limit = row_limit(bdf);
     int all = bdf->linear->rank < bdf->n;
-    return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, all, bdf->terms) < 0;
+    return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, bdf->met, all, bdf->terms) < 0;
 }
 
 /* Every steep row is as small as round-off of the unknowns (`moved`), by slopes at the point itself, lets it be (see

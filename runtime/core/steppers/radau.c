@@ -113,6 +113,8 @@ void sd_radau_free(sd_radau *radau)
     free(radau->right);
     free(radau->gap);
     free(radau->beside);
+    free(radau->at_zero);
+    free(radau->open);
     free(radau->point_y);
     free(radau);
 }

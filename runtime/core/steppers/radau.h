@@ -30,6 +30,8 @@
 #define SD_PAIRS 3
 #define SD_POINTS 3
 #define SD_UNPULLED 2
+/* columns of sd_radau_lean: those that the factors left, those that may be left */
+enum { SD_WHERE_LEFT = 1, SD_WHERE_IDLE };
 /* of the control of steps */
 #define SD_SAFETY 0.9
 #define SD_GROWTH 8.0         /* of the step at most; it shrinks to 1/5 at most */
@@ -90,6 +92,8 @@ typedef struct sd_radau {
     double (*gap)[SD_STAGES + 1][SD_STAGES + 1]; /* [methods]: sd_radau_gaps */
     double apart[SD_POINTS], bend[SD_POINTS]; /* of each of the last points x_i: the product of all 1 / (x_i - x_j), twice
                                                * their sum */
+    double *at_zero;          /* [entries] dF/dy where all unknowns are zero, of steep laws; made when first needed */
+    char *open;               /* [n] columns that factors left */
     double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
     double complex *w[SD_PAIRS], *right; /* right sides and solutions; their memory */
     struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
@@ -131,6 +135,7 @@ double sd_radau_strictness(const sd_radau *radau, const sd_radau_method *method)
 void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out);
 void sd_radau_stage(sd_radau *radau, int s, double *y, double *rate);
 int sd_radau_factorise(sd_radau *radau, int at_end);
+int sd_radau_lean(sd_radau *radau, int where);
 int sd_radau_residuals(sd_radau *radau);
 double sd_radau_correct(sd_radau *radau);
 /* radau_newton.c */

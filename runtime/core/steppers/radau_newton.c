@@ -17,8 +17,12 @@
 #define FAINT_ROW 1e-6     /* the same where slopes are too faint to move an unknown */
 #define FINEST_ROW 1e-9    /* part of a steep row's terms that round-off of its unknowns leaves */
 
-/* Parts of their column below which pivots determine nothing: no better than Newton's test asks, then ever fainter */
-static const double null_pivots[] = {1e-10, 1e-13, 1e-16, SD_LEAST_PIVOT};
+/* Parts of their column below which pivots determine nothing: no better than Newton's test asks, then ever fainter; then
+ * slopes lean on those at zero, where columns were left, and of all that may be (sd_radau_lean) */
+static const struct {
+    double null_pivot;
+    int lean;
+} ways[] = {{1e-10, 0}, {1e-13, 0}, {1e-16, 0}, {SD_LEAST_PIVOT, 0}, {1e-10, SD_WHERE_LEFT}, {1e-10, SD_WHERE_IDLE}};
 
 /* the part of its column below which a pivot is none; columns of multipliers and states always have one */
 void sd_radau_leave_below(sd_radau *radau, double null_pivot)
@@ -59,7 +63,7 @@ static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
             radau->rate[i] = (fabs(radau->y[i]) + radau->magnitude[i]) / radau->h;
         }
         if (sd_first_unmet(radau->system, radau->t + radau->method->c[s] * radau->h, radau->y, radau->rate, radau->d[s], limit,
-                           radau->g, radau->scale, judged, radau->terms) >= 0)
+                           radau->g, radau->scale, radau->met, judged, radau->terms) >= 0)
             return 0;
     }
     return 1;
@@ -202,12 +206,12 @@ static double damped_part(sd_radau *radau, double size)
 }
 
 /* The full correction at the present stages, with fresh slopes: base and full, its size; z has it.  known: d holds the
- * residuals there. */
-static int full_correction(sd_radau *radau, int known, double *size)
+ * residuals there; lean: of sd_radau_lean, 0: slopes are as they are. */
+static int full_correction(sd_radau *radau, int known, int lean, double *size)
 {
     radau->old_jacobian = 0;
     int cause = sd_radau_factorise(radau, 1);
-    if (cause)
+    if (cause || (lean && (cause = sd_radau_lean(radau, lean))))
         return cause;
     if (!known && (cause = sd_radau_residuals(radau)))
         return cause;
@@ -222,14 +226,14 @@ static void take_back(sd_radau *radau)
         memcpy(radau->z[s], radau->base[s], (size_t)radau->n * sizeof(double));
 }
 
-/* The part of a correction that is taken, whose factors leave columns below `null_pivot`; 0: none, or `cause` says why; -1:
+/* The part of a correction that is taken, whose factors leave columns as this way does; 0: none, or `cause` says why; -1:
  * the stages hold, or as well as round-off of unknowns to SD_NOISE lets them, the slopes being those of the point.  known: d
  * holds the residuals. */
-static double walk(sd_radau *radau, double null_pivot, double tolerance, int known, int *cause)
+static double walk(sd_radau *radau, size_t way, double tolerance, int known, int *cause)
 {
     double size;
-    sd_radau_leave_below(radau, null_pivot);
-    *cause = full_correction(radau, known, &size);
+    sd_radau_leave_below(radau, ways[way].null_pivot);
+    *cause = full_correction(radau, known, ways[way].lean, &size);
     sd_radau_leave_below(radau, SD_LEAST_PIVOT);
     if (*cause)
         return 0.0;
@@ -255,13 +259,15 @@ int sd_radau_iterate_damped(sd_radau *radau, int *used)
         double part = 0.0;
         *used = m;
         keep(radau);
-        for (size_t k = 0; k < sizeof null_pivots / sizeof *null_pivots && part == 0.0; k++) {
+        for (size_t k = 0; k < sizeof ways / sizeof *ways && part == 0.0; k++) {
             int cause;
             if (k > 0)
                 take_back(radau);
-            part = walk(radau, null_pivots[k], tolerance, m > 1 && k == 0, &cause);
-            if (part < 0.0)
+            part = walk(radau, k, tolerance, m > 1 && k == 0, &cause);
+            if (part < 0.0) {
+                radau->theta = 1.0; /* slopes that lean are of this step alone */
                 return SD_FINE;
+            }
             if (cause == SD_STOPPED || cause == SD_MEMORY)
                 return cause;
         }

@@ -7,6 +7,9 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
+
+#define LEAN 0.01 /* part of the slope at zero that a faint one gets */
 
 /* out [n] := sum_j weight[j] v[j], in whole lanes, for which all vectors have room */
 static inline __attribute__((always_inline)) void sum(int stages, int32_t n, const double *weight, double *const *v, double *out)
@@ -130,6 +133,57 @@ int sd_radau_factorise(sd_radau *radau, int at_end)
     radau->h_factored = radau->h;
     radau->ready = 1;
     return SD_FINE;
+}
+
+/* dF/dy where all unknowns are zero; 0: no memory, or slopes that are no numbers there */
+static int find_at_zero(sd_radau *radau)
+{
+    if (radau->at_zero)
+        return radau->open != NULL;
+    size_t entries = (size_t)radau->system->entries;
+    radau->at_zero = malloc((2 * entries + 1) * sizeof *radau->at_zero);
+    radau->open = malloc((size_t)radau->n + 1);
+    if (!radau->at_zero || !radau->open)
+        return 0;
+    memset(radau->y, 0, (size_t)radau->n * sizeof(double));
+    memset(radau->rate, 0, (size_t)radau->n * sizeof(double));
+    if (sd_jacobian(radau->system, radau->t, radau->y, radau->rate, radau->magnitude, radau->at_zero, radau->at_zero + entries) < 0)
+        return 1;
+    free(radau->open);
+    radau->open = NULL;
+    return 0;
+}
+
+/* radau->open := the columns `where` slopes lean; 0: none */
+static int mark_open(sd_radau *radau, int where)
+{
+    const sd_linear *linear = radau->linear;
+    if (where == SD_WHERE_LEFT && linear->rank == radau->n)
+        return 0;
+    if (!linear->idle || !find_at_zero(radau))
+        return 0;
+    if (where == SD_WHERE_LEFT)
+        sd_linear_left(linear, radau->open);
+    for (int32_t j = 0; j < radau->n && where == SD_WHERE_IDLE; j++)
+        radau->open[j] = linear->idle[j] != 0;
+    return 1;
+}
+
+/* Where slopes are so faint that nothing determines a column, those of steep rows lean on what they are at zero, in these
+ * columns alone: the node between two diodes that block moves by their leakage, and rows without a steep law hold.  (A column
+ * that is left leaves a row over, and any: charges of a node did not add up.)  The residuals are as before. */
+int sd_radau_lean(sd_radau *radau, int where)
+{
+    if (!mark_open(radau, where))
+        return SD_FINE;
+    const sd_system *system = radau->system;
+    sd_steep_terms(radau->system, radau->t, radau->phi, radau->yd, radau->terms);
+    for (int32_t j = 0; j < radau->n; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1] && radau->open[j]; e++)
+            if (radau->terms[system->row[e]] != 0.0)
+                radau->jy[e] += LEAN * (radau->at_zero[e] - radau->jy[e]);
+    sd_radau_leave_below(radau, SD_LEAST_PIVOT);
+    return sd_radau_factorise(radau, 1);
 }
 
 /* d of stage s := its residual, of `system`, by way of y and rate */

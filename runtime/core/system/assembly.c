@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FAINT 1e-9 /* of the magnitude of an unknown that happens to be zero */
+#define FAINT 1e-9 /* of the largest so far of an unknown that happens to be zero */
 /* of the terms of a row, as the magnitudes of its unknowns make them: round-off of round-off.  A law that is zero (a
  * transistor that is off) leaves a row whose only term is its residual */
 #define NOTHING (DBL_EPSILON * DBL_EPSILON)
@@ -140,7 +140,7 @@ static int32_t first_beyond(int32_t rows, const double *r, double limit, const d
 }
 
 int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
-                       const double *g, const double *scale, int all, double *s)
+                       const double *g, const double *scale, const double *met, int all, double *s)
 {
     sd_steep_terms(system, t, y, rate, s);
     if (!all && first_beyond(system->rows, r, limit, s) < 0)
@@ -152,7 +152,7 @@ int32_t sd_first_unmet(sd_system *system, double t, const double *y, const doubl
             if (s[system->row[e]] < 0.0)
                 s[system->row[e]] -= NOTHING * fabs(g[e]) * scale[j];
             else if (all)
-                s[system->row[e]] += fabs(g[e]) * (fabs(y[j]) + FAINT * scale[j]);
+                s[system->row[e]] += fabs(g[e]) * (fabs(y[j]) + FAINT * met[j]);
     for (int32_t i = 0; i < system->rows; i++)
         s[i] = fabs(s[i]);
     return first_beyond(system->rows, r, limit, s);

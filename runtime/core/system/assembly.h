@@ -77,10 +77,10 @@ void sd_slopes(const sd_system *system, double t, const double *y, const double 
 void sd_steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s);
 /* The first steep row whose residual r is more than `limit` of the magnitudes of its terms at (t, y), -1 where every one
  * holds.  rate [unknowns]: magnitudes of the derivatives, as the method makes them of values; s [rows]: work.
- * g [entries], scale [unknowns]: slopes, magnitudes of y; all: the other rows are judged too, by the terms |g y| of the
- * linear model. */
+ * g [entries], scale, met [unknowns]: slopes, magnitudes of y, the largest |y| so far; all: the other rows are judged too, by
+ * the terms |g y| of the linear model. */
 int32_t sd_first_unmet(sd_system *system, double t, const double *y, const double *rate, const double *r, double limit,
-                       const double *g, const double *scale, int all, double *s);
+                       const double *g, const double *scale, const double *met, int all, double *s);
 /* The first steep row whose residual r at (t, y) is more than `limit` of the magnitudes of its terms and what is open of the
  * unknowns [n], and of their changes in a step h, makes of it, the entries jy and jyd being those of the point, or of one
  * nearby; -1 where there is none.  rate, s, all: as above. */

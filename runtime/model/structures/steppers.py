@@ -174,6 +174,7 @@ class Radau(c.Structure):
         *[(name, P * STAGES) for name in ["z", "kept", "d", "base", "full"]],
         *[(name, P) for name in ["first", "pull", "gap"]],
         *[(name, D * POINTS) for name in ["apart", "bend"]],
+        *[(name, P) for name in ["at_zero", "open"]],
         *[(name, P) for name in ["y", "rate", "ee", "weight"]],
         *[(name, P) for name in ["newton_weight", "scale", "terms", "jy", "jyd", "g", "memory"]],
         ("w", P * PAIRS),
