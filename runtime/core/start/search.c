@@ -43,14 +43,16 @@ int sd_start_residual(const sd_rows_of_start *s, double t, const double *x, doub
 int sd_start_jacobian(const sd_rows_of_start *s, double t, const double *x, double *values)
 {
     int32_t entries = s->system->entries;
-    double *y = malloc((2 * (size_t)s->extended + (size_t)entries + 1) * sizeof *y);
+    double *y = malloc(2 * ((size_t)s->extended + (size_t)entries + 1) * sizeof *y);
     if (!y)
         return -2;
-    double *jyd = y + 2 * (size_t)s->extended;
+    double *jy = y + 2 * (size_t)s->extended, *jyd = jy + entries;
     expand(s, x, y, y + s->extended);
-    sd_jacobian(s->system, t, y, y + s->extended, NULL, values, jyd);
-    for (int32_t k = 0; k < s->rated; k++)
-        values[entries + k] = jyd[s->entry[k]];
+    sd_jacobian(s->system, t, y, y + s->extended, NULL, jy, jyd);
+    for (int32_t k = 0; k < s->plain; k++)
+        values[k] = jy[s->entry[k]];
+    for (int32_t k = s->plain; k < s->plain + s->rated; k++)
+        values[k] = jyd[s->entry[k]];
     free(y);
     return 0;
 }
