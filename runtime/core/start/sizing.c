@@ -301,24 +301,28 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
 {
     const sd_balance *b = s->balance;
     size_t n = (size_t)b->unknowns, rows = (size_t)b->rows, entries = (size_t)b->entries, kinds = (size_t)b->kinds;
-    double *memory = calloc(7 * n + 3 * rows + 3 * entries + 2 * kinds + (size_t)system->kinematics + 3, sizeof(double));
+    double *first = calloc(4 * n + rows + 2 * kinds + 1, sizeof *first);
+    if (!first)
+        return -1;
+    double *moves = first, *excited = moves + n, *most = excited + rows, *room = most + kinds; /* room [3 n + kinds] */
+    double quick = sd_excitation(system, t0, t0 + span - t0, y, yd, s->part, s->parts, NOISE, excited);
+    *tau = time_scale(s, system, span, quick, y, yd, &(sd_motion){jy, jyd, rate, order}, room, moves, most);
+    int failed = quick < 0.0 || *tau < 0.0;
+    if (rate && !failed)
+        failed |= sd_relaxed(system, order, s->rungs, s->rung, jy, jyd, rate, *tau, moves);
+    /* of a large system the room counts: what factors do not need follows them */
+    double *memory = calloc(3 * n + rows + 2 * entries + (size_t)system->kinematics + 2, sizeof *memory);
     int32_t *carries = calloc(n + 1, sizeof *carries);
     if (!memory || !carries) {
+        free(first);
         free(memory);
         free(carries);
         return -1;
     }
-    double *moves = memory, *divisor = moves + n, *kept = divisor + n, *room = kept + n; /* room [3 n + kinds] */
-    double *most = room + 3 * n + kinds, *balanced = most + kinds, *excited = balanced + n, *row = excited + rows;
-    double *own_jy = row + 2 * rows, *own_jyd = own_jy + entries + 1, *size = own_jyd + entries + 1;
-    double *least = size + entries;
-    double quick = sd_excitation(system, t0, t0 + span - t0, y, yd, s->part, s->parts, NOISE, excited);
-    *tau = time_scale(s, system, span, quick, y, yd, &(sd_motion){jy, jyd, rate, order}, room, moves, most);
+    double *divisor = memory, *kept = divisor + n, *balanced = kept + n, *row = balanced + n;
+    double *own_jy = row + rows, *own_jyd = own_jy + entries + 1, *least = own_jyd + entries + 1, *size = own_jy;
     sd_jacobian(system, t0, y, yd, NULL, own_jy, own_jyd);
     carriers(s, own_jyd, carries);
-    int failed = quick < 0.0 || *tau < 0.0;
-    if (rate && !failed)
-        failed |= sd_relaxed(system, order, s->rungs, s->rung, jy, jyd, rate, *tau, moves);
     for (size_t k = 0; k < n; k++)
         moves[k] = !carries[k] ? 0.0 : rate ? moves[k] : *tau * fabs(yd[k]);
     compliance(s, own_jy, own_jyd, divisor, room);
@@ -339,6 +343,7 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
         found[k] = found[k] > TINY ? found[k] : UNKNOWN;
     if (rate)
         failed |= bounded(s, system, order, t0, quick, span, y, moves, carries, divisor, found, kept, balanced, most);
+    free(first);
     free(memory);
     free(carries);
     return failed ? -1 : 0;
