@@ -143,9 +143,7 @@ class _Linear:
         return self.problem.rows[take], self.problem.columns[take], self._values[take]
 
     def entries(self) -> tuple[Any, Any, Floats]:
-        """A by its entries, made when they are asked for: a point that holds needs none.  Asked once: of a large one the
-        room counts.
-        """
+        """A by its entries, asked for once where a point does not hold: of a large one the room counts."""
         rows, columns, values = self._taken()
         del self._values
         values *= self.unit[columns]
@@ -180,8 +178,9 @@ class _Linear:
                 return only
         i, j, v = self.entries()
         # what costs nothing stays where it is as far as it may
-        stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else np.zeros_like(u)
+        stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else 0.0
         aim = add_product(i, j, v, u - stays, -r)
+        del r
         if ordered:
             return stays + in_order(self.shape, (i, j, v), aim, levels)
         return stays + least_norm(self.shape, (i, j, v), aim, spent=True)

@@ -74,7 +74,7 @@ def least_norm(
 
 
 def _to_size_one(i: Any, v: Floats, rows: int) -> Floats:
-    """Divides entries v in rows i by the sizes [rows] of these: one of small coefficients must not pass for redundant."""
+    """Divides entries v in rows i by the sizes [rows] of these: a row of small coefficients is no redundant one."""
     # by a power of two before squares are formed, which could overflow
     largest = np.zeros(rows)
     np.maximum.at(largest, i, np.abs(v))

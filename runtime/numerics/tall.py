@@ -63,9 +63,17 @@ def _columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> _Colum
             return None
         rows = unknowns
     number = np.cumsum(used, dtype=np.int32) - 1
+    if _in_order(i, j):
+        begin = np.append(np.int32(0), np.cumsum(np.bincount(j, minlength=shape[1])[used], dtype=np.int32))
+        return _Columns(used, Pattern(rows, unknowns, begin, np.ascontiguousarray(i, dtype=np.int32)), v)
     pattern, (slot,) = compress(rows, unknowns, [Places(i, number[j])])
     values: Floats = np.bincount(slot, weights=v, minlength=pattern.entries).astype(np.float64, copy=False)
     return _Columns(used, pattern, values)
+
+
+def _in_order(i: Any, j: Any) -> bool:
+    """Whether entries stand by columns, and by rows in each, as those of a pattern do: they need not be copied."""
+    return bool(((j[1:] > j[:-1]) | ((j[1:] == j[:-1]) & (i[1:] > i[:-1]))).all())
 
 
 def determined(

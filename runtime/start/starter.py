@@ -113,6 +113,8 @@ class Starter:
         self.given = _given(settled)
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
+        if known.unknowns > LARGE:
+            settled.put_away(whole=False)
         self.n, self.rates, self.measured = known.n, known.rates, known.measured
         self._momentum, self._flow = known.momentum, known.flow
         self.every = ~known.unsettled  # rows that must hold

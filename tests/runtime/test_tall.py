@@ -158,7 +158,7 @@ def test_what_is_free_does_not_depend_on_units():
 
 
 def _sums(n=N):
-    """Row k: x_k less a third of x_(k-1) and of x_(k-7); each fifth row once more; the rows in an order of their own."""
+    """Row k: x_k less a third of x_(k-1) and of x_(k-7); each fifth row once more; rows in an order of their own."""
     rows, columns, values = [], [], []
     for at, k in enumerate((*np.random.default_rng(3).permutation(n).tolist(), *range(0, n, 5))):
         for j, v in ((k, 1.0 + 1e-3 * k), (k - 1, -1.0 / 3.0), (k - 7, -1.0 / 3.0)):
@@ -173,10 +173,15 @@ def test_what_follows_row_by_row_needs_no_factors(monkeypatch):
     aim = _times(shape, entries, exact)
     monkeypatch.setattr(tall, "_factored", lambda *_: pytest.fail("rows follow one after the other"))
     assert tall.determined(shape, entries, aim) == pytest.approx(exact, rel=1e-12, abs=1e-13)
+    i, j, v = entries
+    by_columns = np.lexsort((i, j))  # as a pattern has them: taken as they stand
+    in_order = i[by_columns], j[by_columns], v[by_columns]
+    assert tall._columns(shape, in_order, fewer=False).values is in_order[2]
+    assert (tall.determined(shape, in_order, aim) == tall.determined(shape, entries, aim)).all()
 
 
 def test_rows_in_excess_that_substitution_misses_are_left_to_factors():
-    """x_(k+1) = 4 x_k - x_(k-1) from both first values: what round-off brings grows by 3.7 each, and the last row says so."""
+    """x_(k+1) = 4 x_k - x_(k-1) from both first values: round-off grows by 3.7 each, and the last row says so."""
     n = 200
     k = np.arange(1, n - 1)
     i = np.concatenate([[0, 1], k + 1, k + 1, k + 1, [n]])
