@@ -50,10 +50,8 @@ class Room:
 
     def __init__(self, *systems: System) -> None:
         unknowns = max(max(system.form.extended, system.unknowns) for system in systems) + 8
-        entries = max(system.pattern.entries for system in systems) + 1
         self.y, self.yd = np.zeros(unknowns), np.zeros(unknowns)
-        self.r = np.zeros(max(system.rows for system in systems) + 1)
-        self.slope = np.zeros(entries)
+        self.r = self.slope = np.zeros(max(max(system.pattern.entries, system.rows) for system in systems) + 1)
 
 
 class Condensed:

@@ -128,5 +128,7 @@ class Straights:
             self.array[number].alike = int((factor == factor[:, :1]).all())
 
     def fix(self) -> None:
-        """Lets go of what only other numbers would need."""
+        """Lets go of what only other numbers would need, and of constants that are all zero."""
         self._order = self._order[:0].copy()
+        if not self._some.any():
+            self._constants = self._constants[:0].copy()

@@ -24,8 +24,8 @@ class Equations:
     """system: as written; settled: its form "start".
 
     guessed: (rows of block initial that are guesses, the unknowns that they miss); unsettled [rows]: they need not
-    hold; rows, columns [entries]: of what some block writes in the matrix; alike [unknowns]: number of the kind and unit
-    of each; member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them.
+    hold; rows, columns [entries]: of what some block writes in the matrix; alike [unknowns]: number of the kind and
+    unit of each; member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them.
     """
 
     def __init__(self, system: System, settled: System) -> None:
