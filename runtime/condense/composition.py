@@ -12,8 +12,6 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import numbered
 from sysdyn.values import dataclass
 
-Longs = NDArray[np.int64]
-
 
 @dataclass(frozen=True, slots=True)
 class Composition:
@@ -23,10 +21,10 @@ class Composition:
     through an unknown whose row is complete by then.
     """
 
-    start: Longs
-    source: Longs
-    direct: tuple[Longs, Longs]
-    levels: tuple[tuple[Longs, Longs, Longs], ...]
+    start: Ints
+    source: Ints
+    direct: tuple[Ints, Ints]
+    levels: tuple[tuple[Ints, Ints, Ints], ...]
 
     def values(self, factor: Floats) -> Floats:
         """The entries of T [entries] by the factors of the terms."""
@@ -38,25 +36,33 @@ class Composition:
         return found
 
 
-def ranges(first: Longs, count: NDArray[np.integer]) -> Longs:
+def places_of(mask: NDArray[np.bool_]) -> Ints:
+    """Where a mask holds, in numbers half as long as NumPy's own: of a large system the room counts."""
+    return np.flatnonzero(mask).astype(np.int32)
+
+
+def ranges(first: Ints, count: NDArray[np.integer]) -> Ints:
     """first[k], first[k] + 1, ... of each k, one behind the other."""
-    return np.repeat(first - (np.cumsum(count) - count), count) + np.arange(count.sum())
+    begin = np.asarray(first - (np.cumsum(count) - count), dtype=np.int32)
+    found = np.repeat(begin, count)
+    found += np.arange(found.size, dtype=np.int32)
+    return found
 
 
-def composed(start: Longs, kept: Ints, through: Ints) -> Composition:
+def composed(start: Ints, kept: Ints, through: Ints) -> Composition:
     """Start [eliminated + 1]: the terms of each row; kept, through [terms]: the kept unknown that a term reads, or the
     eliminated one, whose row stands before; -1.
     """
     number = start.size - 1
-    owner = np.repeat(np.arange(number), np.diff(start))
+    owner = np.repeat(np.arange(number, dtype=np.int32), np.diff(start))
     depth = _depth(number, owner, through)
-    rows, columns, terms, read = ([np.zeros(0, dtype=np.int64)] for _ in range(4))
-    first, count = np.zeros(number, dtype=np.int64), np.zeros(number, dtype=np.int64)
-    level: list[Longs] = [np.zeros(0, dtype=np.int64)]
+    rows, columns, terms, read = ([np.zeros(0, dtype=np.int32)] for _ in range(4))
+    first, count = np.zeros(number, dtype=np.int32), np.zeros(number, dtype=np.int32)
+    level: list[Ints] = [np.zeros(0, dtype=np.int32)]
     at = 0
     for k in range(int(depth.max(initial=-1)) + 1):
         mine = depth[owner] == k
-        direct, indirect = np.flatnonzero(mine & (kept >= 0)), np.flatnonzero(mine & (through >= 0))
+        direct, indirect = places_of(mine & (kept >= 0)), places_of(mine & (through >= 0))
         many = count[through[indirect]]
         entry = ranges(first[through[indirect]], many)
         term = np.concatenate([direct, np.repeat(indirect, many)])
@@ -65,18 +71,18 @@ def composed(start: Longs, kept: Ints, through: Ints) -> Composition:
         # one entry of T for each kept unknown that a row reads
         slot, begin, each = numbered(row, column, number, int(column.max(initial=-1)) + 1)
         size = np.diff(begin)
-        own = np.flatnonzero(size)
+        own = places_of(size > 0)
         rows.append(np.repeat(own, size[own]))
-        columns.append(each.astype(np.int64))
+        columns.append(each)
         first[own], count[own] = at + begin[own], size[own]
         terms.append(term)
-        read.append(np.concatenate([np.full(direct.size, -1), entry]))
-        level.append(at + slot.astype(np.int64))
+        read.append(np.concatenate([np.full(direct.size, -1, dtype=np.int32), entry]))
+        slot += at
+        level.append(slot)
         at += each.size
     row, column = np.concatenate(rows), np.concatenate(columns)
-    final, starts, source = (
-        item.astype(np.int64) for item in numbered(row, column, number, int(column.max(initial=-1)) + 1)
-    )
+    final, starts, source = numbered(row, column, number, int(column.max(initial=-1)) + 1)
+    del row, column, rows, columns
     parts = [(final[slot], term, by) for slot, term, by in zip(level, terms, read, strict=True)]
     direct_entry = np.concatenate([entry[by < 0] for entry, _, by in parts])
     direct_term = np.concatenate([term[by < 0] for _, term, by in parts])
@@ -84,9 +90,9 @@ def composed(start: Longs, kept: Ints, through: Ints) -> Composition:
     return Composition(starts, source, (direct_entry, direct_term), levels)
 
 
-def _depth(number: int, owner: Longs, through: Ints) -> Longs:
+def _depth(number: int, owner: Ints, through: Ints) -> Ints:
     """How many rows stand between each row and kept unknowns alone [eliminated]."""
-    depth, use = np.zeros(number, dtype=np.int64), through >= 0
+    depth, use = np.zeros(number, dtype=np.int32), through >= 0
     while True:
         before = depth.copy()
         np.maximum.at(depth, owner[use], 1 + depth[through[use]])

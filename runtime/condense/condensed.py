@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.condense.composition import Composition, ranges
-from sysdyn.runtime.condense.elimination import Elimination, Longs, Mask, definable, eliminate, steady
+from sysdyn.runtime.condense.composition import Composition, places_of, ranges
+from sysdyn.runtime.condense.elimination import Elimination, Mask, definable, eliminate, steady
 from sysdyn.runtime.condense.settled_rows import settled_rows
 from sysdyn.runtime.condense.sums import Straights, Sums, numbers_of, sums
 from sysdyn.runtime.model import core_library as lib
@@ -50,10 +50,8 @@ class Room:
 
     def __init__(self, *systems: System) -> None:
         unknowns = max(max(system.form.extended, system.unknowns) for system in systems) + 8
-        entries = max(system.pattern.entries for system in systems) + 1
         self.y, self.yd = np.zeros(unknowns), np.zeros(unknowns)
-        self.r = np.zeros(max(system.rows for system in systems) + 1)
-        self.slope = np.zeros(entries)
+        self.r = self.slope = np.zeros(max(max(system.pattern.entries, system.rows) for system in systems) + 1)
 
 
 class Condensed:
@@ -64,12 +62,12 @@ class Condensed:
     """
 
     def __init__(
-        self, system: System, found: Sums, terms: Composition, straights: Straights, kept_rows: Longs, room: Room
+        self, system: System, found: Sums, terms: Composition, straights: Straights, kept_rows: Ints, room: Room
     ) -> None:
         """found: the structure, and the first numbers; terms: as sums of kept unknowns; straights: of found."""
         self._room, self._composition, self._straights = room, terms, straights
         self.whole, self.sums = system, found
-        self.kept, self.kept_rows = found.kept, kept_rows.astype(np.int32)
+        self.kept, self.kept_rows = found.kept, kept_rows
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
         self.paired = False
         self.own_rows: Ints | None = None
@@ -121,14 +119,14 @@ class Condensed:
         at, place = numbers_of(system.unknowns, self.kept)[columns], numbers_of(system.unknowns, found.place)[columns]
         kept = np.zeros(system.rows, dtype=bool)
         kept[self.kept_rows] = True
-        entry = np.flatnonzero(kept[system.pattern.row] & ((at >= 0) | (place >= 0))).astype(np.int32)
+        entry = places_of(kept[system.pattern.row] & ((at >= 0) | (place >= 0)))
         at, place = at[entry], place[entry]
         # an entry of a kept unknown is a product, one of an eliminated unknown as many as that has terms
         gone = place >= 0
         count = np.ones(entry.size, dtype=np.int32)
         count[gone] = np.diff(terms.start)[place[gone]]
         term = ranges(terms.start[place[gone]], count[gone])
-        through = np.flatnonzero(np.repeat(gone, count))
+        through = places_of(np.repeat(gone, count))
         column = np.repeat(at, count)
         column[through] = terms.source[term]
         self._shared = through, term
@@ -162,7 +160,7 @@ class Condensed:
         """Lets go of what only other numbers would need: `renew` is not asked again."""
         del self._composition, self._shared
         self._straights.fix()
-        found, nothing = self.sums, np.zeros(0, dtype=np.int64)
+        found, nothing = self.sums, np.zeros(0, dtype=np.int32)
         self.sums = Sums(found.place, np.zeros(0), nothing, nothing, np.zeros(0), found.kept, found.unread)
 
     def _observed_rates(self) -> bool:
@@ -357,6 +355,7 @@ class _Condenser:
         if few or not np.isfinite(jy[found.entry]).all():
             return None
         numbers = sums(whole, found, jy, constant)
+        del jy, zero, constant
         if not np.isfinite(numbers.constant).all():
             return None
         if self._forms is None:
@@ -382,7 +381,7 @@ class _Condenser:
         kept = settled_rows(whole, self.settled, ~rows, numbers)
         if kept is None:
             return None
-        places = np.flatnonzero(rows), np.flatnonzero(kept)
+        places = places_of(rows), places_of(kept)
         room, terms, straights = Room(whole, self.settled), numbers.composed(whole.unknowns), Straights(numbers)
         stepped, settled = (
             Condensed(system, numbers, terms, straights, rows, room)

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.condense.composition import ranges
+from sysdyn.runtime.condense.composition import places_of, ranges
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.forms import FORMS
 from sysdyn.runtime.model.patterns import numbered
@@ -24,7 +24,6 @@ from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
-Longs = NDArray[np.int64]
 HEALTHY = 1e-7
 """Least pivot, in the largest entry of its row with equilibrated columns: what it defines has these digits less.  Where
 a row reads one unknown else, which carries the state, and no constant, it is a multiple of that and has all its digits
@@ -47,12 +46,12 @@ class Elimination:
     out with their rows q' = f.
     """
 
-    place: Longs
-    row: Longs
-    pivot: Longs
-    start: Longs
-    entry: Longs
-    unread: Longs
+    place: Ints
+    row: Ints
+    pivot: Ints
+    start: Ints
+    entry: Ints
+    unread: Ints
 
 
 def unread_families(description: Description, blocks: Iterable[str]) -> tuple[int, ...]:
@@ -83,11 +82,11 @@ def steady(description: Description, blocks: tuple[str, ...] = ("phi", "phi_rate
     return all(kernel.curved is not None and not kernel.curved for kernel in kernels)
 
 
-def _candidates(system: System) -> tuple[Longs, Mask, Mask]:
+def _candidates(system: System) -> tuple[Ints, Mask, Mask]:
     """Entries of the rows that might define an unknown, whatever the numbers; what is unread [unknowns]; the unknowns
     that stay because rows read their derivatives [unknowns].
     """
-    columns, rows = system.pattern.columns_of(), system.pattern.row.astype(np.int64)
+    columns, rows = system.pattern.columns_of(), system.pattern.row
     moving = system.structural()[1]
     unread = unread_families(system.description, (call.block for call in system.form.calls))
     gone = np.isin(system.family_of, unread) & system.are("q")
@@ -95,7 +94,7 @@ def _candidates(system: System) -> tuple[Longs, Mask, Mask]:
     usable[rows[moving]] = False
     carried = np.zeros(system.unknowns, dtype=bool)
     carried[columns[moving]] = carried[system.form.k_q] = True
-    return np.flatnonzero(usable[rows]), gone, carried & ~gone
+    return places_of(usable[rows]), gone, carried & ~gone
 
 
 def definable(system: System, jy: Floats, constant: Floats) -> Mask:
@@ -121,7 +120,7 @@ def definable(system: System, jy: Floats, constant: Floats) -> Mask:
 def eliminate(system: System, allowed: Mask) -> Elimination:
     """What can leave a form; allowed [entries]: `definable`."""
     gone = system.once("may leave", lambda: _candidates(system))[1]
-    return _Search(system, allowed).found(np.flatnonzero(gone))
+    return _Search(system, allowed).found(places_of(gone))
 
 
 def _rank(system: System, family: int) -> int:
@@ -138,8 +137,8 @@ def _numbers(of: Ints) -> set[int]:
 class _Span:
     """Entries of some rows, row after row; rows [entries]: counted from the first; of: families of the unknowns."""
 
-    entries: Longs
-    rows: Longs
+    entries: Ints
+    rows: Ints
     of: Ints
     families: frozenset[int]
 
@@ -152,7 +151,7 @@ class _Search:
     """
 
     def __init__(self, system: System, allowed: Mask) -> None:
-        self.columns, self.rows = system.pattern.columns_of(), system.pattern.row.astype(np.int64)
+        self.columns, self.rows = system.pattern.columns_of(), system.pattern.row
         self.of, self.allowed = system.family_of[self.columns], allowed
         number = np.arange(self.rows.size, dtype=np.int32)
         _, self.start, self.entry = numbered(system.pattern.row, number, system.rows, number.size)
@@ -163,7 +162,7 @@ class _Search:
         self.below: dict[int, int] = {}
         self.above: dict[int, int] = {}
         self.read: set[int] = set()
-        self.parts: list[tuple[int, Longs]] = []
+        self.parts: list[tuple[int, Ints]] = []
         spans = [(first, first + system.description.rows[family].size) for _, family, first in system.form.groups]
         pairs = [(family, span) for span in spans for family in self._span(span).families]
         sizes = {pair: self._candidates(*pair).size for pair in pairs}
@@ -174,12 +173,12 @@ class _Search:
     def _span(self, span: tuple[int, int]) -> _Span:
         """The entries of these rows."""
         if span not in self.seen:
-            entries = self.entry[self.start[span[0]] : self.start[span[1]]].astype(np.int64)
+            entries = self.entry[self.start[span[0]] : self.start[span[1]]]
             of = self.of[entries]
             self.seen[span] = _Span(entries, self.rows[entries] - span[0], of, frozenset(_numbers(of)))
         return self.seen[span]
 
-    def _candidates(self, family: int, span: tuple[int, int]) -> Longs:
+    def _candidates(self, family: int, span: tuple[int, int]) -> Ints:
         """Entries through which these rows can define unknowns of a family: alone in their row, and free of circles; of
         several rows that could define an unknown the first.
         """
@@ -255,17 +254,18 @@ class _Search:
                 path += new
         return found
 
-    def found(self, unread: Longs) -> Elimination:
+    def found(self, unread: Ints) -> Elimination:
         """The unknowns, families that others read first, each in the order of its places."""
-        none = np.zeros(0, dtype=np.int64)
+        none = np.zeros(0, dtype=np.int32)
         pivot = np.concatenate([none, *(part for _, part in self.parts)])
         depths = self._depths()
-        depth = np.concatenate([none, *(np.full(part.size, depths[family]) for family, part in self.parts)])
+        depth = np.concatenate([none, *(np.full(part.size, depths[f], dtype=np.int32) for f, part in self.parts)])
         pivot = pivot[np.lexsort((self.columns[pivot], depth))]
         row = self.rows[pivot]
-        begin, end = (self.start[row + k].astype(np.int64) for k in (0, 1))
-        count = end - begin
-        entry = self.entry[ranges(begin, count)].astype(np.int64)
-        entry = entry[~np.isin(entry, pivot)]
-        start = np.concatenate([[0], np.cumsum(count - 1)])
+        begin, count = self.start[row], self.start[row + 1] - self.start[row]
+        others = np.ones(self.rows.size, dtype=bool)
+        others[pivot] = False
+        entry = self.entry[ranges(begin, count)]
+        entry = entry[others[entry]]
+        start = np.append(np.int32(0), np.cumsum(count - 1, dtype=np.int32))
         return Elimination(self.columns[pivot], row, pivot, start, entry, unread)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.condense.composition import Composition, composed, ranges
-from sysdyn.runtime.condense.elimination import Elimination, Longs, Mask
+from sysdyn.runtime.condense.composition import Composition, composed, places_of, ranges
+from sysdyn.runtime.condense.elimination import Elimination, Mask
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
@@ -24,13 +24,13 @@ class Sums:
     unknowns kept or before it; kept: places of z; unread: of what is neither.
     """
 
-    place: Longs
+    place: Ints
     constant: Floats
-    start: Longs
-    source: Longs
+    start: Ints
+    source: Ints
     factor: Floats
     kept: Ints
-    unread: Longs
+    unread: Ints
 
     def composed(self, unknowns: int) -> Composition:
         """T by rows, of z."""
@@ -49,8 +49,8 @@ def sums(system: System, found: Elimination, jy: Floats, constant: Floats) -> Su
     factor = -jy[found.entry] / np.repeat(pivot, np.diff(found.start))
     left = np.ones(system.unknowns, dtype=bool)
     left[found.place] = left[found.unread] = False
-    source = system.pattern.columns_of()[found.entry].astype(np.int64)
-    kept = np.flatnonzero(left).astype(np.int32)
+    source = system.pattern.columns_of()[found.entry]
+    kept = places_of(left)
     return Sums(found.place, -rest / pivot, found.start, source, factor, kept, found.unread)
 
 
@@ -70,18 +70,20 @@ class Straights:
         same &= np.diff(count) == 0
         # within a stretch each term reads one further than the term above it
         inner = np.repeat(np.concatenate([[False], same]), count)
-        above = np.arange(found.source.size) - np.repeat(np.concatenate([[0], count[:-1]]), count)
+        above = np.arange(found.source.size, dtype=np.int32)
+        above -= np.repeat(np.append(np.int32(0), count[:-1]), count)
         steps = np.ones(found.source.size, dtype=bool)
         steps[inner] = found.source[inner] == found.source[above[inner]] + 1
         broken = np.zeros(number, dtype=bool)
-        broken[np.repeat(np.arange(number), count)[~steps]] = True
+        owner = np.repeat(np.arange(number, dtype=np.int32), count)
+        broken[owner[~steps]] = True
         begin = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
         unlike = np.zeros(number, dtype=bool)
-        unlike[np.repeat(np.arange(number), count)[inner][found.factor[inner] != found.factor[above[inner]]]] = True
+        unlike[owner[inner][found.factor[inner] != found.factor[above[inner]]]] = True
         begin = self._cut(begin, unlike)
-        ends = np.concatenate([begin[1:], [number]]).astype(np.int64)
+        ends = np.append(begin[1:], number)
         made = (lib.Straight * max(begin.size, 1))()
-        order = np.arange(found.factor.size)
+        order = np.arange(found.factor.size, dtype=np.int32)
         for low, high in zip(begin.tolist(), ends.tolist(), strict=True):
             terms, entry = int(count[low]), int(found.start[low])
             block = order[entry : entry + terms * (high - low)]
@@ -89,7 +91,7 @@ class Straights:
         self._begin, self._order, self._some = begin, order, np.zeros(begin.size, dtype=bool)
         self._factors, self._constants = np.zeros(order.size), np.zeros(number)
         terms_of, offset = count[begin], np.cumsum(count[begin]) - count[begin]
-        self._source = found.source[ranges(found.start[begin], terms_of)].astype(np.int32)
+        self._source = found.source[ranges(found.start[begin], terms_of)]
         at, first = lib.pointer(self._factors), lib.pointer(self._source)
         assert at is not None
         assert first is not None
@@ -103,7 +105,7 @@ class Straights:
         self._long = [tuple(map(int, line)) for line in zip(long, entries, sizes, strict=True)]
 
     @staticmethod
-    def _cut(begin: Longs, unlike: Mask) -> Longs:
+    def _cut(begin: Ints, unlike: Mask) -> Ints:
         """Where stretches begin, once long ones are cut where factors change, if these are few: an end of a line."""
         unlike[begin] = False
         changes = np.add.reduceat(unlike, begin, dtype=np.int64) if begin.size else begin
@@ -126,5 +128,7 @@ class Straights:
             self.array[number].alike = int((factor == factor[:, :1]).all())
 
     def fix(self) -> None:
-        """Lets go of what only other numbers would need."""
+        """Lets go of what only other numbers would need, and of constants that are all zero."""
         self._order = self._order[:0].copy()
+        if not self._some.any():
+            self._constants = self._constants[:0].copy()

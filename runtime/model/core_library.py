@@ -208,6 +208,8 @@ def _load() -> Any:
         "sd_threads": (c.c_int, []),
         "sd_threads_use": (None, [c.c_int]),
         "sd_determined": (c.c_int, [_I, _I, *[_P] * 4, _D, _L, _P, _P]),
+        "sd_substituted": (c.c_int, [_I, _I, *[_P] * 3, _D, _P, _P]),
+        "sd_add_product": (None, [_I, *[_P] * 5]),
         "sd_left_open": (c.c_int, [_I, _I, *[_P] * 4, _D, _L, _P]),
         "sd_match": (_I, [_I, _I, _P, _P, _I, _P, _P]),
         "sd_peel": (_I, [_I, _I, _I, _P, _P, _P, _D, _P]),

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES, Mask, in_order, least_norm
+from sysdyn.runtime.numerics.products import add_product
 from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
 from sysdyn.values import dataclass
 
@@ -128,25 +129,23 @@ class _Linear:
     def __init__(self, problem: Problem, x: Floats) -> None:
         self.unit, self.problem = problem.scale / problem.weight, problem
         self._values = problem.jacobian(x)
-        rows, columns, values = self._taken()
+        taken = problem.use[problem.rows] & problem.free[problem.columns] & np.isfinite(self._values)
+        self._values = np.where(taken, self._values, 0.0)
         # a row is as large as its terms are, in magnitudes
         size = np.zeros(problem.number)
-        np.add.at(size, rows, np.abs(values) * problem.scale[columns])
+        add_product(problem.rows, problem.columns, np.abs(self._values), problem.scale, size)
         self.row_scale = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
         self.shape = int(problem.use.sum()), int(problem.free.sum())
 
     def _taken(self) -> tuple[Any, Any, Floats]:
         """Rows, columns and values of the entries in use; factors would fill from zeros too."""
-        problem = self.problem
-        take = problem.use[problem.rows] & problem.free[problem.columns] & (self._values != 0.0)
-        values = self._values[take]
-        values[~np.isfinite(values)] = 0.0
-        return problem.rows[take], problem.columns[take], values
+        take = self._values != 0.0
+        return self.problem.rows[take], self.problem.columns[take], self._values[take]
 
-    @property
     def entries(self) -> tuple[Any, Any, Floats]:
-        """A by its entries, made when they are asked for: a point that holds needs none."""
+        """A by its entries, asked for once where a point does not hold: of a large one the room counts."""
         rows, columns, values = self._taken()
+        del self._values
         values *= self.unit[columns]
         values *= self.row_scale[rows]
         return *self._numbered(rows, columns), values
@@ -177,14 +176,14 @@ class _Linear:
             only = self.determined(u, r, beside=beside)
             if only is not None:
                 return only
-        i, j, v = self.entries
+        i, j, v = self.entries()
         # what costs nothing stays where it is as far as it may
-        stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else np.zeros_like(u)
-        aim = -r
-        np.add.at(aim, i, v * (u - stays)[j])
+        stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else 0.0
+        aim = add_product(i, j, v, u - stays, -r)
+        del r
         if ordered:
             return stays + in_order(self.shape, (i, j, v), aim, levels)
-        return stays + least_norm(self.shape, (i, j, v), aim)
+        return stays + least_norm(self.shape, (i, j, v), aim, spent=True)
 
 
 def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) -> Solution:
@@ -197,6 +196,7 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) 
         found = _in_core(problem, problem.core, x, (most, folds), measure=not small)
         if small or found.residual <= _ROUND_OFF:  # a large one that holds is not linearised
             return found
+        del found
     with np.errstate(all="ignore"):  # what overflows is seen as not finite
         return _solve(problem, x, most, folds)
 
@@ -240,7 +240,7 @@ def _solve(problem: Problem, x: Floats, most: int, folds: int) -> Solution:
         size, scaled = measure(x)
         if size < best.residual:
             stale = stale if size > 0.5 * best.residual else 0
-            best = Solution(x.copy(), size, np.abs(scaled))
+            best = Solution(x, size, np.abs(scaled))
         stale += 1
         if size <= _ROUND_OFF or not np.isfinite(size) or stale > (4 if best.residual < 1e-12 else 15):
             break
@@ -311,7 +311,7 @@ def least_residual(problem: Problem, x: Floats) -> Floats:
         r = measure(x)
         for _ in range(_ITERATIONS):
             linear = _Linear(problem, x)
-            i, j, v = linear.entries
+            i, j, v = linear.entries()
             a = np.zeros(linear.shape)
             np.add.at(a, (i, j), v / linear.row_scale[problem.use][i] * scale[problem.use][i])
             for _ in range(2 * _HALVINGS):

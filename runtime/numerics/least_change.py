@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors, sparse_factors
+from sysdyn.runtime.numerics.products import add_product
 from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
 from sysdyn.runtime.numerics.symmetric import Symmetric
 from sysdyn.runtime.numerics.tall import determined
@@ -39,33 +40,28 @@ EMPTY = 1e-160
 _PROXIMAL = 6
 
 
-def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
-    """The u of least norm with A u = aim; A [rows, unknowns] by its entries (row, column, value)."""
+def least_norm(
+    shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats, *, spent: bool = False
+) -> Floats:
+    """The u of least norm with A u = aim; A [rows, unknowns] by its entries (row, column, value).  spent: nobody else
+    needs the values, which are overwritten: of a large matrix the room counts.
+    """
     i, j, v = entries
     if not (np.isfinite(v).all() and np.isfinite(aim).all()):
         raise NotFiniteError
-    # by a power of two before squares are formed, which could overflow
-    largest = np.zeros(shape[0])
-    np.maximum.at(largest, i, np.abs(v))
-    power = np.ldexp(1.0, np.frexp(np.where(largest > EMPTY, largest, 1.0))[1])
-    v, aim = v / power[i], aim / power
-    # rows of equal size: a row of small coefficients must not pass for a redundant one
-    size = np.zeros(shape[0])
-    np.add.at(size, i, v * v)
-    size = np.where(size > 0.0, np.sqrt(size), 1.0)
-    v, aim = v / size[i], aim / size
-    back = size * power
+    v = v if spent else v.copy()
+    back = _to_size_one(i, v, shape[0])
+    aim = aim / back
     small = MET * float(np.abs(aim * back).max(initial=0.0))
     tried: list[tuple[float, Floats]] = []
 
     def missed_by(found: Floats) -> float:
-        miss = -aim
-        np.add.at(miss, i, v * found[j])
+        miss = add_product(i, j, v, found, -aim)
         return float(np.abs(miss * back).max(initial=0.0))
 
     if max(shape) > SINGULAR_VALUES:
-        only = determined(shape, (i, j, v), aim)
-        if only is not None and missed_by(only) <= small:
+        only = determined(shape, (i, j, v), aim, lambda found: missed_by(found) <= small)
+        if only is not None:
             return only
     for way in _DENSE if max(shape) <= SINGULAR_VALUES else _SPARSE:
         found = way(shape, (i, j, v), aim)
@@ -75,6 +71,19 @@ def least_norm(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Fl
         tried.append((missed, found))
     least = min(tried, key=lambda item: item[0])
     return least[1] if least[0] < FAR * tried[0][0] else tried[0][1]
+
+
+def _to_size_one(i: Any, v: Floats, rows: int) -> Floats:
+    """Divides entries v in rows i by the sizes [rows] of these: a row of small coefficients is no redundant one."""
+    # by a power of two before squares are formed, which could overflow
+    largest = np.zeros(rows)
+    np.maximum.at(largest, i, np.abs(v))
+    power = np.ldexp(1.0, np.frexp(np.where(largest > EMPTY, largest, 1.0))[1])
+    v /= power[i]
+    size = np.bincount(i, v * v, rows)
+    size = np.where(size > 0.0, np.sqrt(size), 1.0)
+    v /= size[i]
+    return size * power
 
 
 def in_order(

@@ -6,6 +6,7 @@ rows of size one.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -38,8 +39,14 @@ class _Columns:
     values: Floats
 
     def arrays(self) -> tuple[NDArray[Any], ...]:
-        """What the core is told of it, the order of elimination with it; the caller keeps them alive."""
-        return self.pattern.column, self.pattern.row, self.values, tall_order(self.pattern)
+        """What the core is told of it; the caller keeps them alive."""
+        return self.pattern.column, self.pattern.row, self.values
+
+    def whole(self, found: Floats, *, rest: float = 0.0) -> Floats:
+        """Of all unknowns, `rest` those of columns without entries."""
+        whole = np.full(self.used.size, rest)
+        whole[self.used] = found
+        return whole
 
 
 def _columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> _Columns | None:
@@ -56,30 +63,46 @@ def _columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> _Colum
             return None
         rows = unknowns
     number = np.cumsum(used, dtype=np.int32) - 1
+    if _in_order(i, j):
+        begin = np.append(np.int32(0), np.cumsum(np.bincount(j, minlength=shape[1])[used], dtype=np.int32))
+        return _Columns(used, Pattern(rows, unknowns, begin, np.ascontiguousarray(i, dtype=np.int32)), v)
     pattern, (slot,) = compress(rows, unknowns, [Places(i, number[j])])
-    values: Floats = np.bincount(slot, weights=v, minlength=pattern.entries).astype(np.float64)
+    values: Floats = np.bincount(slot, weights=v, minlength=pattern.entries).astype(np.float64, copy=False)
     return _Columns(used, pattern, values)
 
 
-def determined(shape: tuple[int, int], entries: Entries, aim: Floats) -> Floats | None:
-    """The u that rows determine, unknowns that stand in none of them zero; None where they leave others open.  Rows in
-    excess are not looked at.
+def _in_order(i: Any, j: Any) -> bool:
+    """Whether entries stand by columns, and by rows in each, as those of a pattern do: they need not be copied."""
+    return bool(((j[1:] > j[:-1]) | ((j[1:] == j[:-1]) & (i[1:] > i[:-1]))).all())
+
+
+def determined(
+    shape: tuple[int, int], entries: Entries, aim: Floats, met: Callable[[Floats], bool] = lambda _: True
+) -> Floats | None:
+    """The u that rows determine, unknowns that stand in none of them zero; None where they leave others open, or it is
+    not `met`: rows in excess are not looked at.  By factors where rows do not determine one unknown after the other.
     """
     columns = _columns(shape, entries, fewer=False)
-    if columns is None:
-        return None
-    arrays, found = columns.arrays(), np.zeros(columns.pattern.unknowns)
-    limits = PIVOT, FILLED * columns.pattern.entries
-    failed = lib.core.sd_determined(
-        shape[0], found.size, *(lib.pointer(item) for item in arrays), *limits, lib.pointer(aim), lib.pointer(found)
-    )
-    if failed == MEMORY:
-        raise MemoryError
-    if failed:
-        return None
-    whole = np.zeros(shape[1])
-    whole[columns.used] = found
-    return whole
+    for way in (_substituted, _factored) if columns is not None else ():
+        found = np.zeros(columns.pattern.unknowns)
+        failed = way(shape[0], columns, aim, found)
+        if failed == MEMORY:
+            raise MemoryError
+        whole = None if failed else columns.whole(found)
+        if whole is not None and met(whole):
+            return whole
+    return None
+
+
+def _substituted(rows: int, columns: _Columns, aim: Floats, found: Floats) -> int:
+    places = (lib.pointer(item) for item in columns.arrays())
+    return int(lib.core.sd_substituted(rows, found.size, *places, PIVOT, lib.pointer(aim), lib.pointer(found)))
+
+
+def _factored(rows: int, columns: _Columns, aim: Floats, found: Floats) -> int:
+    order, limits = tall_order(columns.pattern), (PIVOT, FILLED * columns.pattern.entries)
+    places = (lib.pointer(item) for item in (*columns.arrays(), order))
+    return int(lib.core.sd_determined(rows, found.size, *places, *limits, lib.pointer(aim), lib.pointer(found)))
 
 
 def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
@@ -89,7 +112,8 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
     columns = _columns(shape, entries, fewer=True)
     assert columns is not None
     # numbers of which no row's coefficients make zero by chance; half to one
-    arrays, found = columns.arrays(), 0.75 + 0.25 * np.cos(2.0 * np.pi * uniform(columns.pattern.unknowns))
+    found = 0.75 + 0.25 * np.cos(2.0 * np.pi * uniform(columns.pattern.unknowns))
+    arrays = *columns.arrays(), tall_order(columns.pattern)
     limits = PIVOT, FILLED * columns.pattern.entries
     failed = lib.core.sd_left_open(
         columns.pattern.rows, found.size, *(lib.pointer(item) for item in arrays), *limits, lib.pointer(found)
@@ -98,8 +122,7 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
         raise MemoryError
     if failed:
         return None
-    whole = np.where(columns.used, 0.0, 1.0)
-    whole[columns.used] = found
+    whole = columns.whole(found, rest=1.0)
     whole /= max(np.abs(whole).max(initial=0.0), 1e-300)
     return whole
 

@@ -24,8 +24,8 @@ class Equations:
     """system: as written; settled: its form "start".
 
     guessed: (rows of block initial that are guesses, the unknowns that they miss); unsettled [rows]: they need not
-    hold; rows, columns, structural [entries]: of the matrix; alike [unknowns]: number of the kind and unit of each;
-    member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them.
+    hold; rows, columns [entries]: of what some block writes in the matrix; alike [unknowns]: number of the kind and
+    unit of each; member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them.
     """
 
     def __init__(self, system: System, settled: System) -> None:
@@ -46,11 +46,11 @@ class Equations:
         pattern = settled.pattern
         columns = pattern.columns_of()
         moved = columns_of_rates(self.n, self.rates, columns)
-        self.rated = np.flatnonzero(moved >= 0).astype(np.int32)
-        self.rows = np.concatenate([pattern.row, pattern.row[self.rated]])
-        self.columns = np.concatenate([columns, moved[self.rated]])
         in_y, in_rate = settled.structural()
-        self.structural = np.concatenate([in_y, in_rate[self.rated]])
+        plain, rated = (np.flatnonzero(some).astype(np.int32) for some in (in_y, in_rate & (moved >= 0)))
+        self.plain, self.entry = plain.size, np.concatenate([plain, rated])
+        self.rows = pattern.row[self.entry]
+        self.columns = np.concatenate([columns[plain], moved[rated]])
 
     def _kinds(self, settled: System) -> None:
         kinds = alike(settled)
@@ -66,7 +66,7 @@ class Equations:
         for group, family, first in settled.form.groups:
             rows = settled.description.rows[family]
             contents[first : first + rows.size] = group == "initial" and rows.content
-        own = self.structural & contents[self.rows] & (self.columns < self.written)
+        own = contents[self.rows] & (self.columns < self.written)
         mask[self.columns[own]] = True
         mask[self.momentum] |= mask[self.flow]
         return mask
@@ -77,8 +77,8 @@ class Equations:
         balance = Balance(settled.rows, self.rows, self.columns, self.alike)
         found.system, found.balance, found.extended = c.addressof(settled.core), balance.core, settled.form.extended
         found.written, found.rates = self.n, self.rates.size
-        found.rated, found.kinematics = self.rated.size, form.k_q.size
-        arrays = self.rates, self.rated, form.k_q, form.k_f
+        found.plain, found.rated, found.kinematics = self.plain, self.entry.size - self.plain, form.k_q.size
+        arrays = self.rates, self.entry, form.k_q, form.k_f
         found.rate, found.entry, found.k_q, found.k_f = map(lib.pointer, arrays)
         found.kept = balance
         return found

@@ -13,6 +13,7 @@ import ctypes as c
 import functools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,12 @@ from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import START, Floats, Initial, Ints
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import inertia, own_inertia, own_unknown
+from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.gauss_newton import Problem, Work
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
+from sysdyn.runtime.numerics.products import add_product
 from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.values import dataclass
@@ -89,8 +92,8 @@ def remembered(
             found = ask(self, t, x)
             if x.size > LARGE and found.size > x.size:  # the room counts
                 return found
-            self.known[name] = found
-        return self.known[name].copy()
+            self.known[name] = read_only(found)
+        return self.known[name]
 
     return answer
 
@@ -110,6 +113,8 @@ class Starter:
         self.given = _given(settled)
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
+        if known.unknowns > LARGE:
+            settled.put_away(whole=False)
         self.n, self.rates, self.measured = known.n, known.rates, known.measured
         self._momentum, self._flow = known.momentum, known.flow
         self.every = ~known.unsettled  # rows that must hold
@@ -122,6 +127,7 @@ class Starter:
             self.rows = np.append(self.rows, np.repeat(self._places, known.unknowns))
             self.columns = np.append(self.columns, np.tile(np.arange(known.unknowns), self._places.size))
         self.guess = np.append(self.given.guess, np.zeros(self.rates.size))
+        self.given = replace(self.given, guess=self.guess[: self.n])
         self.free = np.append(~self.given.fixed, np.ones(self.rates.size, dtype=bool))
         self.written = np.append(self.given.written, np.zeros(self.rates.size, dtype=bool))
 
@@ -156,7 +162,7 @@ class Starter:
         held = np.zeros(self.equations.unknowns, dtype=bool)
         held[form.k_q] = ~self.given.written[form.k_q] & ~inertial[form.k_f]
         known = self.equations
-        held[known.columns[known.structural & ~self.groups("phi")[known.rows]]] = False
+        held[known.columns[~self.groups("phi")[known.rows]]] = False
         return held
 
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
@@ -215,9 +221,8 @@ class Starter:
         """One over the size of the terms of each row [rows], by the larger of magnitudes and values; of sums over that
         of what is summed, which may cancel.
         """
-        known = self.equations
-        terms = np.abs(self._slopes(t, x)) * np.maximum(scale, np.abs(x))[known.columns]
-        size = np.bincount(known.rows, weights=terms, minlength=self.settled.rows)
+        known, size = self.equations, np.zeros(self.settled.rows)
+        add_product(known.rows, known.columns, np.abs(self._slopes(t, x)), np.maximum(scale, np.abs(x)), size)
         if self.summed:
             size[self._places] = np.abs(self._sums) @ size[self._summed]
         return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)

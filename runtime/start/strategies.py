@@ -89,7 +89,7 @@ def first(tries: Tries, x: Floats) -> tuple[Solution, bool]:
 def _beyond(starter: Starter, t: float, x: Floats, free: Mask) -> bool:
     """Whether rows that read none of these unknowns are missed: loops of springs, constraints of the state."""
     known = starter.equations
-    read = np.bincount(known.rows, known.structural & free[known.columns], starter.settled.rows)
+    read = np.bincount(known.rows, free[known.columns], starter.settled.rows)
     missed = np.where((read == 0) & ~known.unsettled, np.abs(starter.residual(t, x)), 0.0)
     return bool(missed.any() and (missed * starter.row_scale(t, x, starter.scale(t, x)) > OWN).any())
 

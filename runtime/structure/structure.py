@@ -9,7 +9,6 @@ Freedom: rank of [Phi_q; Psi_f], taken from the reactions of the multipliers (vi
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -133,7 +132,7 @@ def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     linear = order.linear(pattern)
     try:
         for rate in RATES:
-            index = _growth(linear, lambda cj: (jy + cj * jyd) * scale, rate)
+            index = _growth(linear, (jy, jyd, scale), rate)
             if index is not None:
                 return index
     finally:
@@ -141,14 +140,20 @@ def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     return None
 
 
-def _growth(linear: Any, matrix: Callable[[float], Floats], rate: float) -> int | None:
-    """The index by the growth from cj = rate to ten times that; None where it does not tell.
+def _growth(linear: Any, matrix: tuple[Floats, Floats, Floats], rate: float) -> int | None:
+    """The index by the growth from cj = rate to ten times that; None where it does not tell.  matrix: dF/dy, dF/dyd,
+    what both are multiplied by [entries].
 
     The larger cj comes first: there sums of rows lose most, and the pivots that it finds serve the other one.
     """
     sizes, least = [], 1.0
+    jy, jyd, scale = matrix
+    values = lib.reader(linear.contents.scaled, jy.size)  # of a large one the room counts
     for cj in (10.0 * rate, rate):
-        size, pivot = _inverse(linear, matrix(cj))
+        np.multiply(jyd, cj, out=values)
+        values += jy
+        values *= scale
+        size, pivot = _inverse(linear, values)
         if not (np.isfinite(size) and size > 0.0):
             return None
         least = min(least, pivot)

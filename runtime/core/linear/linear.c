@@ -1,5 +1,6 @@
 /* Scaling, dense LU and the choice between dense and sparse: see linear.h. */
 #include "linear/linear.h"
+#include "linear/lanes.h"
 #include "linear/sparse.h"
 
 #include <math.h>
@@ -34,7 +35,8 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
     linear->column = column;
     linear->row = row;
     linear->row_scale = calloc(2 * m + 1, sizeof(double));
-    linear->work = calloc(2 * m + nnz + 1, sizeof(sd_number));
+    size_t left = order ? 0 : m; /* what is left of a right side, by sparse factors in room of theirs */
+    linear->work = calloc(m + left + nnz + SD_LANES, sizeof(sd_number));
     linear->pivot = calloc(order ? 1 : 2 * m + 1, sizeof(int32_t)); /* of dense ones */
     linear->place = !linear->pivot || order ? NULL : linear->pivot + m;
     linear->rank = n;
@@ -47,8 +49,8 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
         return NULL;
     }
     linear->column_scale = linear->row_scale + m;
-    linear->work2 = linear->work + m;
-    linear->scaled = linear->work + 2 * m;
+    linear->work2 = order ? NULL : linear->work + m;
+    linear->scaled = linear->work + m + left;
     return linear;
 }
 
@@ -366,7 +368,7 @@ void sd_linear_again(sd_linear *linear)
 static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
 {
     int32_t n = linear->n;
-    sd_number *rest = linear->work2;
+    sd_number *rest = linear->sparse ? linear->sparse->x : linear->work2;
     if (linear->sparse && linear->smallest >= REFINE && linear->rank == n) {
         sd_sparse_solve(linear->sparse, x, linear->work, linear->row_scale, linear->column_scale);
         return;
@@ -382,6 +384,8 @@ static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
         for (int32_t i = 0; i < n; i++)
             x[i] += isfinite(sd_size(rest[i])) ? rest[i] : 0.0;
     }
+    if (linear->sparse)
+        memset(rest, 0, (size_t)n * sizeof *rest);
     if (linear->rank < n)
         shorten(linear, x);
     for (int32_t i = 0; i < n; i++)

@@ -32,11 +32,11 @@ typedef struct sd_linear {
     int32_t n, entries;
     const int32_t *column, *row; /* pattern, compressed columns, of the caller */
     double *row_scale, *column_scale;
-    sd_number *scaled;           /* entries of the scaled matrix */
+    sd_number *scaled;           /* entries of the scaled matrix, in whole lanes; a matrix may be put there to be factorised */
     sd_number *dense;               /* LU of small matrices, [n][n] by columns; NULL for sparse ones */
     int32_t *pivot;
     sd_sparse *sparse;
-    sd_number *work, *work2;
+    sd_number *work, *work2;     /* [n]; work2: of dense ones, NULL beside sparse factors */
     double smallest;             /* smallest pivot relative to its column: 0 singular */
     int32_t bad_row, bad_column; /* where it was found */
     int64_t factorisations, pivotings;
@@ -60,7 +60,7 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
 /* the same by an order; NULL: dense */
 sd_linear *sd_linear_ordered(int32_t n, const int32_t *column, const int32_t *row, const sd_order *order);
 void sd_linear_free(sd_linear *linear);
-/* values [entries], scale [n] magnitudes of the unknowns or NULL.  0 done, 1 singular (bad_row, bad_column), 2 memory. */
+/* values [entries], linear->scaled or elsewhere; scale [n] magnitudes of the unknowns or NULL.  0 done, 1 singular (bad_row, bad_column), 2 memory. */
 int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *scale);
 /* x [n]: right side in, solution out */
 void sd_linear_solve(sd_linear *linear, sd_number *x);

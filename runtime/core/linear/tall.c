@@ -2,6 +2,7 @@
 
 #include "linear/sparse.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -47,6 +48,70 @@ int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const in
         refine(lu, column, row, value, b, x, rest);
     free(rest);
     sd_sparse_free(lu);
+    return failed;
+}
+
+void sd_add_product(int32_t entries, const int32_t *row, const int32_t *column, const double *value, const double *x, double *out)
+{
+    for (int32_t e = 0; e < entries; e++)
+        out[row[e]] += value[e] * x[column[e]];
+}
+
+/* pivot [columns] := the places of the entries by which rows determine one unknown after the other, of := the columns of these;
+ * 0 where some are left.  room [3 rows] */
+static int find_sequence(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
+                         double least, int32_t *pivot, int32_t *of, int32_t *room)
+{
+    int32_t *left = room, *last = left + rows, *stack = last + rows, waiting = 0, found = 0;
+    memset(room, 0, 2 * (size_t)rows * sizeof *room);
+    for (int32_t c = 0; c < columns; c++)
+        for (int32_t e = column[c]; e < column[c + 1]; e++) {
+            left[row[e]]++;
+            last[row[e]] ^= c; /* of the columns that are left: where it is one, its number */
+        }
+    for (int32_t r = 0; r < rows; r++)
+        if (left[r] == 1)
+            stack[waiting++] = r;
+    while (waiting) {
+        int32_t r = stack[--waiting], c = last[r], own = 0;
+        if (!left[r])
+            continue;
+        double largest = 0.0;
+        for (int32_t e = column[c]; e < column[c + 1]; e++) {
+            largest = fmax(largest, fabs(value[e]));
+            own = row[e] == r ? e : own;
+        }
+        if (!(fabs(value[own]) >= least * largest) || !(largest > 0.0))
+            continue;
+        pivot[found] = own;
+        of[found++] = c;
+        for (int32_t e = column[c]; e < column[c + 1]; e++) {
+            last[row[e]] ^= c;
+            if (--left[row[e]] == 1)
+                stack[waiting++] = row[e];
+        }
+    }
+    return found == columns;
+}
+
+int sd_substituted(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
+                   double least, const double *b, double *x)
+{
+    int32_t *pivot = malloc((2 * (size_t)columns + 3 * (size_t)rows + 1) * sizeof *pivot), *of = pivot + columns;
+    double *rest = malloc(((size_t)rows + 1) * sizeof *rest);
+    int failed = !pivot || !rest ? 2 : !find_sequence(rows, columns, column, row, value, least, pivot, of, of + columns);
+    memset(x, 0, (size_t)columns * sizeof *x);
+    for (int pass = 0; pass <= REFINEMENTS && !failed; pass++) {
+        miss(rows, columns, column, row, value, b, x, rest);
+        for (int32_t k = 0; k < columns; k++) {
+            double step = rest[row[pivot[k]]] / value[pivot[k]];
+            x[of[k]] += step;
+            for (int32_t e = column[of[k]]; e < column[of[k] + 1]; e++)
+                rest[row[e]] -= value[e] * step;
+        }
+    }
+    free(pivot);
+    free(rest);
     return failed;
 }
 

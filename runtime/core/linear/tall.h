@@ -15,6 +15,15 @@
 int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
                   const int32_t *order, double least, int64_t most, const double *b, double *x);
 
+/* The same where each row in turn has one unknown left: substitution needs no order and no factors, and makes the rows that
+ * it takes hold to round-off.  0 done, 1 some unknown does not follow so, 2 no memory */
+int sd_substituted(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
+                   double least, const double *b, double *x);
+
+/* out += A x of a matrix by its entries: row, column, value [entries] */
+void sd_add_product(int32_t entries, const int32_t *row, const int32_t *column, const double *value, const double *x,
+                    double *out);
+
 /* A direction that A leaves open: x [columns] with A x = 0, its entries in the columns that follow from the others as
  * they are on entry; 0 where every column has a pivot.  0 done, 2 no memory, 3 the factors fill too much */
 int sd_left_open(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,

@@ -40,19 +40,37 @@ int sd_start_residual(const sd_rows_of_start *s, double t, const double *x, doub
     return 0;
 }
 
+/* the same where slopes are no numbers: as sd_jacobian finds them */
+static int beside_roots(const sd_rows_of_start *s, double t, const double *y, const double *yd, double *values)
+{
+    double *jy = malloc((2 * (size_t)s->system->entries + 1) * sizeof *jy), *jyd = jy + s->system->entries;
+    if (!jy)
+        return -2;
+    sd_jacobian(s->system, t, y, yd, NULL, jy, jyd);
+    for (int32_t k = 0; k < s->plain + s->rated; k++)
+        values[k] = (k < s->plain ? jy : jyd)[s->entry[k]];
+    free(jy);
+    return 0;
+}
+
 int sd_start_jacobian(const sd_rows_of_start *s, double t, const double *x, double *values)
 {
-    int32_t entries = s->system->entries;
-    double *y = malloc((2 * (size_t)s->extended + (size_t)entries + 1) * sizeof *y);
+    int32_t entries = s->system->entries, whole = 1;
+    double *y = malloc((2 * (size_t)s->extended + (size_t)entries + 1) * sizeof *y), *yd = y + s->extended;
     if (!y)
         return -2;
-    double *jyd = y + 2 * (size_t)s->extended;
-    expand(s, x, y, y + s->extended);
-    sd_jacobian(s->system, t, y, y + s->extended, NULL, values, jyd);
-    for (int32_t k = 0; k < s->rated; k++)
-        values[entries + k] = jyd[s->entry[k]];
+    double *slope = yd + s->extended;
+    expand(s, x, y, yd);
+    /* one side after the other: of a large system the room counts */
+    for (int rate = 0; rate < 2 && whole; rate++) {
+        sd_slopes(s->system, t, y, yd, rate, slope);
+        whole = sd_finite(entries, slope);
+        for (int32_t k = rate ? s->plain : 0; k < s->plain + (rate ? s->rated : 0); k++)
+            values[k] = slope[s->entry[k]];
+    }
+    int failed = whole ? 0 : beside_roots(s, t, y, yd, values);
     free(y);
-    return 0;
+    return failed;
 }
 
 /* What one iteration needs; the arrays of one block of memory. */

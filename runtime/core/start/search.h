@@ -12,12 +12,12 @@
 /* The equations of a start.  Unknowns x [unknowns] = y as written and those of the start alone, the derivatives that occur. */
 typedef struct sd_rows_of_start {
     sd_system *system;                /* form "start" */
-    sd_balance balance;               /* of all entries: those of the system, of rates */
+    sd_balance balance;               /* of all entries: those of y, of rates */
     int32_t written, rates;
-    int32_t rated;                    /* entries of the system whose unknown has a derivative among the rates */
+    int32_t plain, rated;             /* entries of dF/dy that some block writes; of dF/dy' in the columns of the rates */
     int32_t kinematics;
     const int32_t *rate;              /* [rates] place in y */
-    const int32_t *entry;             /* [rated] place in the system's pattern */
+    const int32_t *entry;             /* [plain + rated] place in the system's pattern */
     const int32_t *k_q, *k_f;         /* [kinematics] places of displacements and of their flows */
     int32_t extended;                 /* length of y as blocks see it */
 } sd_rows_of_start;

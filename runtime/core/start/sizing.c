@@ -43,14 +43,14 @@ int sd_relaxed(const sd_system *system, const sd_order *order, int32_t rungs, co
     }
     if (still || sd_first_bad(entries, jy) >= 0 || sd_first_bad(entries, jyd) >= 0)
         return 0;
-    double *memory = calloc(2 * (size_t)rows + (size_t)n + (size_t)entries + 1, sizeof(double));
+    double *memory = calloc(2 * (size_t)rows + (size_t)n + 1, sizeof(double));
     sd_linear *linear = sd_linear_ordered(n, system->column, system->row, order);
     if (!memory || !linear) {
         free(memory);
         sd_linear_free(linear);
         return -1;
     }
-    double *push = memory, *step = push + rows, *moved = step + rows, *values = moved + n;
+    double *push = memory, *step = push + rows, *moved = step + rows, *values = linear->scaled;
     for (int32_t j = 0; j < n; j++)
         for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
             push[system->row[e]] += jyd[e] * yd[j];
@@ -301,25 +301,34 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
 {
     const sd_balance *b = s->balance;
     size_t n = (size_t)b->unknowns, rows = (size_t)b->rows, entries = (size_t)b->entries, kinds = (size_t)b->kinds;
+    double *first = calloc(n + rows + kinds + 1, sizeof *first), *like = calloc(n + 1, sizeof *like);
+    if (!first || !like) {
+        free(first);
+        free(like);
+        return -1;
+    }
+    double *moves = first, *excited = moves + n, *most = excited + rows;
+    double quick = sd_excitation(system, t0, t0 + span - t0, y, yd, s->part, s->parts, NOISE, excited);
+    *tau = time_scale(s, system, span, quick, y, yd, &(sd_motion){jy, jyd, rate, order}, like, moves, most);
+    free(like);
+    int failed = quick < 0.0 || *tau < 0.0;
+    if (rate && !failed)
+        failed |= sd_relaxed(system, order, s->rungs, s->rung, jy, jyd, rate, *tau, moves);
+    /* of a large system the room counts: what factors do not need follows them */
     size_t borne = system->scales > 0 ? 2 * n + rows + entries + SD_LANES : 0;
-    double *memory = calloc(7 * n + 3 * rows + 3 * entries + 2 * kinds + (size_t)system->kinematics + 3 + borne, sizeof(double));
+    double *memory = calloc(4 * n + (size_t)system->kinematics + rows + 2 * entries + kinds + 2 + borne, sizeof *memory);
     int32_t *carries = calloc(n + 1, sizeof *carries);
     if (!memory || !carries) {
+        free(first);
         free(memory);
         free(carries);
         return -1;
     }
-    double *moves = memory, *divisor = moves + n, *kept = divisor + n, *room = kept + n; /* room [3 n + kinds] */
-    double *most = room + 3 * n + kinds, *balanced = most + kinds, *excited = balanced + n, *row = excited + rows;
-    double *own_jy = row + 2 * rows, *own_jyd = own_jy + entries + 1, *size = own_jyd + entries + 1;
-    double *least = size + entries;
-    double quick = sd_excitation(system, t0, t0 + span - t0, y, yd, s->part, s->parts, NOISE, excited);
-    *tau = time_scale(s, system, span, quick, y, yd, &(sd_motion){jy, jyd, rate, order}, room, moves, most);
+    double *divisor = memory, *room = divisor + n; /* [3 n + kinds], of the compliance; behind that of these: */
+    double *kept = room, *balanced = kept + n, *least = balanced + n, *row = room + 3 * n + kinds + system->kinematics;
+    double *own_jy = row + rows, *own_jyd = own_jy + entries + 1, *size = own_jy;
     sd_jacobian(system, t0, y, yd, NULL, own_jy, own_jyd);
     carriers(s, own_jyd, carries);
-    int failed = quick < 0.0 || *tau < 0.0;
-    if (rate && !failed)
-        failed |= sd_relaxed(system, order, s->rungs, s->rung, jy, jyd, rate, *tau, moves);
     for (size_t k = 0; k < n; k++)
         moves[k] = !carries[k] ? 0.0 : rate ? moves[k] : *tau * fabs(yd[k]);
     compliance(s, own_jy, own_jyd, divisor, room);
@@ -329,7 +338,7 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
         size[e] = fabs(own_jy[e]) + fabs(own_jyd[e]) / *tau;
         size[e] = isfinite(size[e]) ? size[e] : 0.0;
     }
-    sd_bearing bearing = {system, t0, y, yd, least + system->kinematics};
+    sd_bearing bearing = {system, t0, y, yd, own_jyd + entries + 1};
     failed |= balanced_sizes(s, carries, size, excited, borne ? &bearing : NULL, found, kept, balanced, row);
     group_largest(b, found, most);
     for (size_t k = 0; k < n; k++)
@@ -341,6 +350,7 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
         found[k] = found[k] > TINY ? found[k] : UNKNOWN;
     if (rate)
         failed |= bounded(s, system, order, t0, quick, span, y, moves, carries, divisor, found, kept, balanced, most);
+    free(first);
     free(memory);
     free(carries);
     return failed ? -1 : 0;

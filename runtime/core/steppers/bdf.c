@@ -48,7 +48,8 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     if (!bdf)
         return NULL;
     size_t m = (size_t)sd_whole_lanes(system->unknowns), nnz = (size_t)sd_whole_lanes(system->entries);
-    bdf->memory = calloc((SD_MAX_ORDER + 2 + VECTORS) * m + 3 * nnz + 1, sizeof(double));
+    size_t steep = system->scales > 0; /* whose rows are judged by the matrix as it is */
+    bdf->memory = calloc((SD_MAX_ORDER + 2 + VECTORS) * m + (2 + steep) * nnz + 1, sizeof(double));
     bdf->powered = calloc(m + m / SD_LANES + 1, sizeof *bdf->powered);
     if (!bdf->memory || !bdf->powered) {
         sd_bdf_free(bdf);
@@ -64,7 +65,7 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
         *vectors[i] = next;
     bdf->jy = next;
     bdf->jyd = bdf->jy + nnz;
-    bdf->g = bdf->jyd + nnz;
+    bdf->g = steep ? bdf->jyd + nnz : linear->scaled;
     bdf->system = system;
     bdf->linear = linear;
     sd_linear_replayed(linear);

@@ -69,7 +69,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep,
            sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
     size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
-    radau->memory = calloc(all * m + 3 * nnz, sizeof(double));
+    radau->memory = calloc(all * m + (steep ? 3 : 2) * nnz, sizeof(double));
     radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
     radau->right = calloc(pairs * m + 1, sizeof(double complex));
     if (!radau->memory || !radau->right || !radau->gap) {
@@ -85,7 +85,7 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
             of_stages[i][s] = next;
     radau->jy = next;
     radau->jyd = radau->jy + nnz;
-    radau->g = radau->jyd + nnz;
+    radau->g = steep ? radau->jyd + nnz : linear->scaled; /* rows of steep laws are judged by the matrix as it is */
     for (size_t k = 0; k < pairs; k++) {
         radau->w[k] = radau->right + k * m;
         radau->complex_linear[k] = complex_linear[k];

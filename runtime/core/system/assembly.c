@@ -88,13 +88,13 @@ static void evaluate_slopes(const sd_system *system, double t, const double *y, 
     sd_slopes(system, t, y, yd, 1, jyd);
 }
 
-/* the first row with a slope that is no number; -1: none */
+/* the first row with a slope that is no number, or any where the pattern is put away; -1: none */
 static int32_t steep_beyond(const sd_system *system, const double *jy, const double *jyd)
 {
     if (sd_finite(system->entries, jy) && sd_finite(system->entries, jyd))
         return -1;
     int32_t e = sd_first_bad(system->entries, jy);
-    return system->row[e >= 0 ? e : sd_first_bad(system->entries, jyd)];
+    return system->row ? system->row[e >= 0 ? e : sd_first_bad(system->entries, jyd)] : 0;
 }
 
 int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *yd, const double *size, double *jy,

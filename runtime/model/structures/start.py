@@ -44,6 +44,7 @@ class RowsOfStart(c.Structure):
         ("balance", Balance),
         ("written", I),
         ("rates", I),
+        ("plain", I),
         ("rated", I),
         ("kinematics", I),
         ("rate", P),
