@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysdyn.dsl.elaborate import events
+from sysdyn.dsl.elaborate import switches
 from sysdyn.dsl.elaborate.authors import told
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
@@ -160,7 +160,7 @@ def _judged(
     _begin(elaborator, read_scene)
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
-        events.expanded(elaborator, known)
+        switches.expanded(elaborator, known)
     checks.values(elaborator, known, report)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)

@@ -133,6 +133,12 @@ class Loaded:
         self.parameters = {p.name: p for p in made if not p.name.startswith("#")}  # those are the compiler's own
         report.raise_if_failed()
 
+    @property
+    def written_out(self) -> bool:
+        """Whether events, inequalities or corners of arrays stand for each element: sizes are part of the text."""
+        network = self.first.prepared.network
+        return bool(network.events or network.switches or self.first.prepared.compiled.form.kinks)
+
     def _text(self, settings: tuple[tuple[str, str], ...]) -> Compiled:
         """The text under settings that its numbers cannot take."""
         if settings not in self._compiled:
@@ -162,7 +168,8 @@ class Loaded:
                 silent = Report()
                 with ex.fresh():
                     number = load.constant(self.target.document, value, parameter.unit.dimension, name, silent)
-            if parameter is None or number is None or isinstance(number, str):
+            sized = parameter is not None and parameter.whole and self.written_out
+            if parameter is None or number is None or isinstance(number, str) or sized:
                 texts.append((name, _text_of(value)))
             else:
                 key = (plain, *map(int, element[2].split(","))) if element else name
