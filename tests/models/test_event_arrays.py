@@ -81,9 +81,9 @@ def test_events_assign_elements(tmp_path, formulation, method):
     for instant in (*np.arange(0.0, 2.0, 1 / 3), *np.arange(0.0, 2.0, 0.4), 0.5, 1.5):
         away &= np.abs(trace.time - instant) > 1e-6
     for i in (1, 2, 3):
-        assert off(f"k[{i}]", lambda t: floor(i * t)) == 0.0
-        assert off(f"x[{i}]", lambda t: i * t % 1) < 1e-6
-        assert off(f"late[{i}]", lambda t: 0.1 * i + sum(j / i for j in range(1, floor(i * t) + 1))) < 1e-6
+        assert off(f"k[{i}]", lambda t, i=i: floor(i * t)) == 0.0
+        assert off(f"x[{i}]", lambda t, i=i: i * t % 1) < 1e-6
+        assert off(f"late[{i}]", lambda t, i=i: 0.1 * i + sum(j / i for j in range(1, floor(i * t) + 1))) < 1e-6
     assert off("y[1]", lambda t: abs(1 - t)) < 1e-6
     assert off("y[2]", lambda t: 1 - 2 * t if t < 0.5 else 3 * (t - 0.5)) < 1e-6
     assert off("up[1]", lambda t: (floor(t / 0.4) + 1) % 2) == 0.0
