@@ -144,3 +144,36 @@ def test_what_is_wrong_with_an_array_of_discretes_is_said(tmp_path):
     assert "E805" in codes(COUNTED.replace("[1 m/s, 2 m/s, 3 m/s]", "[1 m/s, 2 m/s]"))
     assert codes(COUNTED.replace("[1 m/s, 2 m/s, 3 m/s]", "[1 m/s, 2 m, 3 m/s]")) == ["E207"]
     assert codes(COUNTED.replace("k[i] := k[i] + 1;", "k[i] := k[i] + 1; k[i] := 0;")) == ["E704"]
+
+
+COUNTERS = """
+component counter {
+  param n = 2
+  param v: m/s
+  state x[1..n]: m = 0 m
+  discrete k[1..n] = 0
+  for j in 1..n {
+    dynamic x[j]' = v*j
+    when x[j] >= 1 m { x[j] := 0 m; k[j] := k[j] + 1 }
+  }
+  output total = sum(j in 1..n: k[j] + x[j]/(1 m))
+}
+model m {
+  param half = 1
+  param many = 2*half
+  for i in 1..3 { C[i]: counter(v = 0.37 m/s*i, n = many) }
+  D: counter(v = 0.7 m/s, n = 3)
+  let all = sum(i in 1..3: C[i].total)
+}
+scene s of m { time 0 s to 3 s; trace C[2].total as c, D.total as d, all every 0.1 s }
+"""
+
+
+@pytest.mark.parametrize("half", [1, 2])
+def test_arrays_of_components_with_arrays_of_events(tmp_path, half):
+    (tmp_path / "m.sd").write_text(COUNTERS)
+    trace = load(tmp_path / "m.sd").run(set={"half": half})
+    sums = {1: 3, 2: 10}[half]
+    assert np.max(np.abs(trace["c"] - 0.74 * sums * trace.time)) < 1e-5
+    assert np.max(np.abs(trace["d"] - 0.7 * 6 * trace.time)) < 1e-5
+    assert np.max(np.abs(trace["all"] - 0.37 * 6 * sums * trace.time)) < 1e-5

@@ -128,3 +128,37 @@ scene s of m { time 0 s to 2 s; trace one, two, rate every 0.1 s }
         assert codes(wrong.replace("{}", argument)) == ["E206"]
     assert codes(text.replace("v[n]: m", "v[0]: m")) == ["E807"]
     assert codes("table f(x[2]: m) -> N linear clamp [ (0, 1), (1, 2) ]\n" + text) == ["E206"]
+
+
+LADDERS = """
+component ladder {
+  param n = 2
+  param R: ohm
+  port a: electrical
+  node v[0..n]: electrical
+  for j in 1..n {
+    r[j]: dissipator(e = R*f) v[j - 1] -> v[j]
+    c[j]: potential(q = 1 F*e) v[j] -> ground
+    init c[j].e = 0 V
+  }
+  w: dissipator(e = R*f) a -> v[0]
+}
+model m {
+  node p: electrical
+  V: effort(e = 1 V) p -> ground
+  for i in 1..3 { L[i]: ladder(n = 3, R = 1 ohm*i) a = p }
+  K: ladder(R = 1 ohm) a = p
+}
+scene s of m { time 0 s to 4 s; trace L[1].c[3].e as a, L[3].c[1].e as b, K.c[2].e as c every 0.1 s }
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_components_in_an_array_have_arrays_of_their_own_size(tmp_path, formulation):
+    trace = run(tmp_path, LADDERS, formulation=formulation)
+    for name, n, ohms, k in (("a", 3, 1.0, 2), ("b", 3, 3.0, 0), ("c", 2, 1.0, 1)):
+        matrix = -2 * np.eye(n) + np.eye(n, k=1) + np.eye(n, k=-1)
+        matrix[0, 0], matrix[-1, -1] = -1.5, -1.0
+        values, vectors = np.linalg.eigh(matrix / ohms)
+        wanted = [(vectors @ ((1 - np.exp(values * t)) * (vectors.T @ np.ones(n))))[k] for t in trace.time]
+        assert np.max(np.abs(trace[name] - wanted)) < 1e-5
