@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysdyn.dsl.elaborate import events
+from sysdyn.dsl.elaborate import switches
 from sysdyn.dsl.elaborate.authors import told
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
@@ -19,7 +19,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.depth import deep
 from sysdyn.dsl.model.network import Network, Parameter, Scene
-from sysdyn.dsl.model.rewriting import nodes_read
+from sysdyn.dsl.model.rewriting import nodes_read, with_common_sizes
 from sysdyn.dsl.model.units import Dimension
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
@@ -160,12 +160,12 @@ def _judged(
     _begin(elaborator, read_scene)
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
-        events.expanded(elaborator, known)
+        switches.expanded(elaborator, known)
     checks.values(elaborator, known, report)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
         floating(elaborator, reader.observations, report)
-    found = _result(elaborator, reader, read_scene)
+    found = with_common_sizes(_result(elaborator, reader, read_scene))
     laws.run(found, known, report)
     return None if report.failed or _incomplete(report) else found
 

@@ -53,7 +53,9 @@ class _Planner:
         names = [r.named(k) for r in _rows(system) for k in range(r.size)]
         self.row = {name: k for k, name in enumerate(names)}
         self.unknown = {
-            (f.owner, f.kind): int(system.form.at[k]) for k, f in enumerate(description.families) if f.kind in "sf"
+            (f.owner, f.kind): (int(system.form.at[k]), f.shape)
+            for k, f in enumerate(description.families)
+            if f.kind in "sf"
         }
         self.relations: list[Relation] = []
 
@@ -100,13 +102,14 @@ class _Planner:
     def _assignment(self, action: Action) -> Assignment:
         row, target = self.row[action.value], action.target
         if target.op == "param":
-            return Assignment(target.data, "discrete", self.parameter(target), row)
+            return Assignment(_shown(target.data, target), "discrete", self.parameter(target), row)
         name, kind, _ = target.data
         if (name, kind) not in self.unknown:
             text = f"an event assigns the flow of {name}, which is no unknown of this formulation"
             raise ModelError([Diagnostic("E702", text, action.place)])
-        shown = f"{name}'" if kind == "f" else name
-        return Assignment(shown, "state" if kind == "s" else "flow", self.unknown[name, kind], row)
+        first, shape = self.unknown[name, kind]
+        shown = _shown(name, target) + "'" * (kind == "f")
+        return Assignment(shown, "state" if kind == "s" else "flow", first + _position(target, shape), row)
 
     def parameter(self, node: Node) -> int:
         """The place in p of a parameter, or of an element of one."""
@@ -115,10 +118,7 @@ class _Planner:
             return compiled.program.scalars.index(node.data)
         boxes = binding.parameters.boxes[node.data]
         where = places_of(compiled.network, compiled.form, compiled.program, binding)[1][node.data]
-        position = 0
-        for at, (first, last) in zip(node.args, boxes, strict=True):
-            position = position * (last - first + 1) + int(at.data) - first
-        return where + position
+        return where + _position(node, boxes)
 
     def _contact(self, number: int, s: Switch) -> Contact:
         def row(name: str | None) -> int:
@@ -134,6 +134,18 @@ class _Planner:
             row(s.upper), row(s.lower), sense, row(s.guard), restitution,
             tuple(self.row[name] for name in s.aim), tuple(self.parameter(n) for n in s.direction),
         )  # fmt: skip
+
+
+def _position(node: Node, shape: Sequence[tuple[int, int]]) -> int:
+    """Where an element stands in its family, row by row."""
+    position = 0
+    for at, (first, last) in zip(node.args, shape, strict=True):
+        position = position * (last - first + 1) + round(at.data) - first
+    return position
+
+
+def _shown(name: str, node: Node) -> str:
+    return f"{name}[{', '.join(str(round(a.data)) for a in node.args)}]" if node.args else name
 
 
 def _plain(form: DescriptorForm) -> frozenset[int]:

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -133,6 +134,22 @@ class Loaded:
         self.parameters = {p.name: p for p in made if not p.name.startswith("#")}  # those are the compiler's own
         report.raise_if_failed()
 
+    @cached_property
+    def sizes(self) -> frozenset[str]:
+        """Sizes that are part of the text, and what they follow from: where events, inequalities or corners stand for
+        each element, and those of components in arrays.
+        """
+        network = self.first.prepared.network
+        written = network.events or network.switches or self.first.prepared.compiled.form.kinks
+        found = {p.name for p in network.parameters if p.whole and (written or p.shape)}
+        waiting = list(found)
+        while waiting:
+            values = self.parameters[waiting.pop()].values
+            more = {n.data for n in ex.topological(values) if n.op == "param"} - found
+            found |= more
+            waiting += more
+        return frozenset(found)
+
     def _text(self, settings: tuple[tuple[str, str], ...]) -> Compiled:
         """The text under settings that its numbers cannot take."""
         if settings not in self._compiled:
@@ -162,7 +179,7 @@ class Loaded:
                 silent = Report()
                 with ex.fresh():
                     number = load.constant(self.target.document, value, parameter.unit.dimension, name, silent)
-            if parameter is None or number is None or isinstance(number, str):
+            if parameter is None or number is None or isinstance(number, str) or plain in self.sizes:
                 texts.append((name, _text_of(value)))
             else:
                 key = (plain, *map(int, element[2].split(","))) if element else name

@@ -90,12 +90,7 @@ class Declarations(Parameters):
                 message = "a bundle has no single initial value"
                 raise self.resolver.fail("E207", message, statement.init.span, help="init name.member.q = ...")
             for decl in statement.decls:
-                members: dict[str, NodeSymbol | PortSymbol] = {}
-                for member, domain_name in bundle.members:
-                    domain = self.scope.find(domain_name)
-                    assert isinstance(domain, DomainSymbol)
-                    members[member] = self._node(decl, f"{decl.name}.{member}", domain)
-                self.enter(BundleNode(decl.name, members, self.place(decl.span)))
+                self.enter(self._bundle(decl, decl.name, bundle))
             return
         domain = self.domain(statement.domain)
         for decl in statement.decls:
@@ -105,6 +100,17 @@ class Declarations(Parameters):
                 effort = domain.common == "effort"
                 unit = domain.effort if effort else domain.displacement
                 self._own_initial(decl, "ne" if effort else "nq", symbol.family, unit.dimension, statement.init)
+
+    def _bundle(self, decl: syntax.Decl, name: str, bundle: BundleSymbol) -> BundleNode:
+        """The nodes of a bundle, of those within it too; name: the path to it."""
+        members: dict[str, NodeSymbol | PortSymbol | BundleNode] = {}
+        for member, kind in bundle.members:
+            inner = f"{name}.{member}"
+            if isinstance(kind, BundleSymbol):
+                members[member] = self._bundle(decl, inner, kind)
+            else:
+                members[member] = self._node(decl, inner, kind)
+        return BundleNode(name, members, self.place(decl.span))
 
     def _node(self, decl: syntax.Decl, name: str, domain: DomainSymbol) -> NodeSymbol:
         family = self.current.family(name, self.shape(decl))

@@ -9,19 +9,15 @@ effort c*sense with a sense that events set, and psi: u = 0, which holds while t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from itertools import product
 
 from sysdyn.dsl.elaborate.parts import ElaborationContext
-from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Action, Constraint, Event, Loop, Observation, Parameter, Switch
+from sysdyn.dsl.model.network import Action, Constraint, Event, Loop, Observation, Parameter
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
-from sysdyn.dsl.model.values import Values
-from sysdyn.dsl.names.symbols import ParameterSymbol, Typed
+from sysdyn.dsl.names.symbols import ParameterSymbol, Typed, Vector
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
@@ -52,31 +48,65 @@ class Draft:
     direction: tuple[Node, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Assigned:
+    """`target := value` under loops."""
+
+    target: Node
+    value: Node
+    dimension: Dimension | None
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class EventDraft:
+    """An event of an array of statements: its expressions under loops, its comparisons as written (network.Event)."""
+
+    name: str
+    condition: Node | None
+    period: Node | None
+    actions: tuple[Assigned, ...]
+    loops: tuple[Loop, ...]
+    place: Place
+
+
 # -- discrete variables ------------------------------------------------------------------------------------
 
 
 def discrete(frame: ElaborationContext, s: syntax.Discrete) -> None:
     """`discrete g = 1`: a parameter that events assign."""
     decl, resolver = s.decl, frame.resolver
-    if decl.indices or resolver.loops:
-        raise resolver.fail("N608", f"an array of discrete variables ('{decl.name}') is not supported yet", decl.span)
-    value = resolver.scalar_or_truth(s.value)
+    own = resolver.loops[len(frame.current.loops) :]
+    if own and not decl.indices:
+        raise resolver.fail("E806", f"'{decl.name}' needs its loop variable: {decl.name}[i]", decl.span)
+    found = resolver.resolve(s.value)
+    items = found.items if isinstance(found, Vector) else (found,)
+    value = next((i for i in items if i.dimension is not None), items[0])
     unit = frame.unit(s.unit) if s.unit else si(value.dimension or NONE)
-    if value.dimension is not None and value.dimension != unit.dimension:
-        message = f"'{decl.name}' is declared {dim.show(unit.dimension)} but starts at {dim.show(value.dimension)}"
-        raise resolver.fail("E207", message, s.value.span)
-    for inner in ex.variables(value.node) - {ex.time()}:
-        raise resolver.fail(
-            "E807",
-            f"the initial value of '{decl.name}' depends on '{inner}'",
-            s.value.span,
-            help="parameters, constants and t only",
-        )
-    family, place = frame.current.family(decl.name), frame.place(decl.span)
+    for item in items:
+        if item.dimension is not None and item.dimension != unit.dimension:
+            have = dim.show(item.dimension)
+            message = f"'{decl.name}' is declared {dim.show(unit.dimension)} but starts at {have}"
+            raise resolver.fail("E207", message, s.value.span)
+        for inner in ex.variables(item.node) - {ex.time()}:
+            message = f"the initial value of '{decl.name}' depends on '{inner}'"
+            raise resolver.fail("E807", message, s.value.span, help="parameters, constants and t only")
+    shape, place = frame.shape(decl), frame.place(decl.span)
+    if isinstance(found, Vector) and (len(shape) != 1 or not frame.fits(shape, len(items))):
+        message = f"'{decl.name}' has {len(items)} values, which do not fit its shape"
+        raise resolver.fail("E805", message, s.value.span)
+    family = frame.current.family(decl.name, shape)
     frame.enter(ParameterSymbol(decl.name, family, unit.dimension, value.truth, place))
-    node = ex.conditional(value.node, ex.const(1.0), ex.const(0.0)) if value.truth else value.node
-    frame.parts.parameters[family.name] = Parameter(family.name, (), unit, (node,), (), place)
+    nodes = tuple(_number(i) for i in items)
+    around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
+    indices = (*around, *(loop.index for loop in own))
+    frame.parts.parameters[family.name] = Parameter(family.name, family.whole, unit, nodes, indices, place)
     frame.parts.discretes.add(family.name)
+
+
+def _number(value: Typed) -> Node:
+    """A condition as 1 or 0."""
+    return ex.conditional(value.node, ex.const(1.0), ex.const(0.0)) if value.truth else value.node
 
 
 # -- when, every -------------------------------------------------------------------------------------------
@@ -85,20 +115,17 @@ def discrete(frame: ElaborationContext, s: syntax.Discrete) -> None:
 def when(frame: ElaborationContext, s: syntax.When) -> None:
     """`when condition { target := value }`."""
     resolver = frame.resolver
-    _outside_loops(frame, s.span, "when")
     condition = resolver.condition(s.condition)
     moving = any(ex.variables(n) or _discretes(frame, n) for n in ex.topological([condition]) if n.op == "cmp")
     if not moving:
         raise resolver.fail("E701", "'when' condition has no relation that can cross", s.condition.span)
     place = frame.place(s.span)
     name = " ".join(resolver.source.text[s.condition.span.start : s.condition.span.end].split())
-    event = Event(f"when {name}", _watched(frame, condition, place), None, _actions(frame, s.actions), place)
-    frame.parts.events.append(event)
+    _enter(frame, EventDraft(f"when {name}", condition, None, _actions(frame, s.actions), resolver.loops, place))
 
 
 def every(frame: ElaborationContext, s: syntax.Every) -> None:
     """`every period { target := value }`."""
-    _outside_loops(frame, s.span, "every")
     message = "the period of 'every' is in {}, wants s"
     period = frame.resolver.wanted(s.period, dim.TIME, "E703", message)
     if ex.variables(period) or _discretes(frame, period) or (ex.is_const(period) and not period.data > 0.0):
@@ -107,12 +134,27 @@ def every(frame: ElaborationContext, s: syntax.Every) -> None:
         raise frame.resolver.fail("E703", message, s.period.span)
     place = frame.place(s.span)
     name = " ".join(frame.resolver.source.text[s.period.span.start : s.period.span.end].split())
-    frame.parts.events.append(Event(f"every {name}", None, period, _actions(frame, s.actions), place))
+    _enter(frame, EventDraft(f"every {name}", None, period, _actions(frame, s.actions), frame.resolver.loops, place))
 
 
-def _outside_loops(frame: ElaborationContext, span: syntax.Span, what: str) -> None:
-    if frame.resolver.loops:
-        raise frame.resolver.fail("N608", f"'{what}' in a 'for' is not supported yet", span)
+def _enter(frame: ElaborationContext, draft: EventDraft) -> None:
+    """An event; one of an array waits until the sizes are known."""
+    if draft.loops:
+        frame.parts.event_drafts.append(draft)
+    else:
+        frame.parts.events.append(event_of(frame, draft, {}))
+
+
+def event_of(frame: ElaborationContext, draft: EventDraft, change: dict[Node, Node]) -> Event:
+    """One element of an event, with its watched values; change: numbers for the loop variables."""
+
+    def of(node: Node) -> Node:
+        return ex.substitute(node, change) if change else node
+
+    condition = None if draft.condition is None else _watched(frame, of(draft.condition), draft.place)
+    period = None if draft.period is None else of(draft.period)
+    actions = [(of(a.target), watch(frame, of(a.value), a.dimension, a.place), a.place) for a in draft.actions]
+    return Event(draft.name, condition, period, tuple(Action(*a) for a in actions), draft.place)
 
 
 def _discretes(frame: ElaborationContext, root: Node) -> bool:
@@ -138,9 +180,9 @@ def watch(frame: ElaborationContext, node: Node, dimension: Dimension | None, pl
     return name
 
 
-def _actions(frame: ElaborationContext, actions: tuple[syntax.Action, ...]) -> tuple[Action, ...]:
+def _actions(frame: ElaborationContext, actions: tuple[syntax.Action, ...]) -> tuple[Assigned, ...]:
     """Assignments of an event, each to a state, a discrete or a flow, of its kind and dimension."""
-    found: list[Action] = []
+    found: list[Assigned] = []
     for action in actions:
         if isinstance(action, syntax.Broken):  # its syntax was complained of
             continue
@@ -152,11 +194,9 @@ def _actions(frame: ElaborationContext, actions: tuple[syntax.Action, ...]) -> t
             have = "a condition" if value.truth else dim.show(value.dimension)
             want = "a condition" if truth else dim.show(target.dimension)
             raise frame.resolver.fail("E208", f"{target.node} := ...: {want} expected, {have} found", action.value.span)
-        node = ex.conditional(value.node, ex.const(1.0), ex.const(0.0)) if value.truth else value.node
-        place = frame.place(action.span)
         if any(a.target is target.node for a in found):
             raise frame.resolver.fail("E704", f"the event assigns {target.node} twice", action.span)
-        found.append(Action(target.node, watch(frame, node, target.dimension, place), place))
+        found.append(Assigned(target.node, _number(value), target.dimension, frame.place(action.span)))
     return tuple(found)
 
 
@@ -168,12 +208,12 @@ def _target(frame: ElaborationContext, action: syntax.Action) -> tuple[Typed, bo
         node = node.args[0]
     if node.op == "param" and node.data in frame.parts.discretes:
         return Typed(node, value.dimension), value.truth
-    if node.op == "var" and not node.args:
+    if node.op == "var":
         name, kind, order = node.data
         if kind == "s" and order == 0:
             return value, False
         if (kind, order) in (("q", 1), ("f", 0), ("nf", 0), ("nq", 1)):
-            return Typed(ex.var(name, "f"), value.dimension), False
+            return Typed(ex.var(name, "f", *node.args), value.dimension), False
     text = " ".join(frame.resolver.source.text[action.target.span.start : action.target.span.end].split())
     message = f"event assigns {text} (only discrete variables, states and x' of a coordinate may jump)"
     help_ = f"discrete {text} = ... in place of its declaration" if node.op == "param" else f"{text}' := ..., its rate"
@@ -338,62 +378,3 @@ def _stick(
     frame.parts.drafts.append(
         Draft(name, at, loops, "friction", place, unit, value, multiplier, element, bound, sense)
     )
-
-
-# -- switches of arrays, one by one --------------------------------------------------------------------------
-
-
-def expanded(frame: ElaborationContext, known: Values) -> None:
-    """Switches and their observations, an array's element by element."""
-    for draft in frame.parts.drafts:
-        for change in _iterations(draft.loops, known):
-            frame.parts.switches.append(_switch(frame, draft, change, known))
-
-
-def _bounds(draft: Draft) -> tuple[Node | None, Node | None, Node | None]:
-    """The bound of a multiplier, and what it lacks to it on both sides."""
-    if draft.bound is None:
-        return None, None, None
-    return draft.bound, ex.sub(draft.bound, draft.multiplier), ex.add(draft.bound, draft.multiplier)
-
-
-def _iterations(loops: tuple[Loop, ...], known: Values) -> Iterator[dict[Node, Node]]:
-    """Numbers for the loop variables."""
-    ranges: list[range] = []
-    for loop in loops:
-        first, last = known.number(loop.first), known.number(loop.last)
-        if not math.isfinite(first + last):  # a bound that follows an outer loop
-            return
-        ranges.append(range(int(first), int(last) + 1))
-    number = 1
-    for r in ranges:
-        number *= len(r)
-    budget.charge(budget.NODE * max(number - 1, 0), "inequalities that are written out one by one")
-    for at in product(*ranges):
-        yield {ex.index(loop.index): ex.const(float(i)) for loop, i in zip(loops, at, strict=True)}
-
-
-def _switch(frame: ElaborationContext, draft: Draft, change: dict[Node, Node], known: Values) -> Switch:
-    """One element of a set-valued law with its watched values."""
-    def of(node: Node) -> Node:
-        return ex.substitute(node, change)
-
-    def seen(node: Node | None) -> str | None:
-        return None if node is None else watch(frame, of(node), NONE, draft.place)
-
-    bound, upper, lower = (seen(n) for n in _bounds(draft))
-    at = tuple(int(known.number(of(n))) for n in draft.at)
-    name = f"{draft.label}[{', '.join(map(str, at))}]" if at else draft.label
-    guard = None if draft.guard is None else ex.conditional(draft.guard, ex.const(1.0), ex.const(0.0))
-    value = watch(frame, of(draft.value), draft.unit.dimension, draft.place)
-    rate = watch(frame, of(draft.rate or time_derivative(draft.value)), NONE, draft.place)
-    multiplier = watch(frame, of(draft.multiplier), NONE, draft.place)
-    twice = time_derivative(time_derivative(of(draft.value))) if draft.kind == "phi" else None
-    acceleration = None if twice is None else watch(frame, twice, NONE, draft.place)
-    sense = None if draft.sense is None else of(draft.sense)
-    restitution = None if draft.restitution is None else of(draft.restitution)
-    return Switch(
-        name, draft.label, at, draft.kind, draft.place, value, rate, multiplier, draft.element,
-        acceleration, bound, upper, lower, sense, seen(guard), restitution,
-        tuple(watch(frame, of(n), NONE, draft.place) for n in draft.aim), tuple(of(n) for n in draft.direction),
-    )  # fmt: skip

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
+from itertools import count
 from pathlib import Path
 
+from sysdyn.dsl.elaborate.bundles import Bundles
 from sysdyn.dsl.elaborate.tables import read_table
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.network import Table
@@ -15,7 +18,6 @@ from sysdyn.dsl.model.units import NONE, Unit, multiply, si
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import (
-    BundleSymbol,
     ComponentSymbol,
     Definition,
     DomainSymbol,
@@ -78,6 +80,7 @@ class FileScope:
         for item in file.items:
             for symbol in self._symbols(item, scope, file.source):
                 self._enter(symbol, scope)
+        Bundles(file, scope, self.report).declare(self._enter)
 
     def _enter(self, symbol: Symbol, scope: Scope) -> None:
         before = scope.symbols.get(symbol.name)
@@ -112,9 +115,6 @@ class FileScope:
         match item:
             case syntax.Domain():
                 yield from self._domain(item, scope, source)
-            case syntax.Bundle():
-                members = tuple((w.name, m.domain.name) for m in item.members for w in m.names)
-                yield BundleSymbol(item.name.name, members, Place(source, item.name.span))
             case syntax.Component() | syntax.Model():
                 yield ComponentSymbol(item.name.name, item.body, scope, source, Place(source, item.name.span))
             case syntax.Const():
@@ -226,6 +226,11 @@ class FileScope:
 
     def _table(self, item: syntax.Table, scope: Scope, source: SourceText) -> Iterator[Symbol]:
         """A table with its data, checked when it is read."""
+        sized = next((p for p in item.params if p.size is not None), None)
+        if sized is not None:
+            message = f"argument '{sized.name}' of table {item.name.name} is one number, not an array"
+            self.report.error("E206", message, Place(source, sized.span), help=f"{sized.name}: {sized.unit.text}")
+            return
         heads = [(p.name, read_unit(p.unit, scope, source, self.report)) for p in item.params]
         result = read_unit(item.result, scope, source, self.report)
         units = [u for _, u in heads if u is not None]
@@ -233,7 +238,15 @@ class FileScope:
             return
         place = Place(source, item.name.span)
         arguments = tuple((name, unit.dimension) for (name, _), unit in zip(heads, units, strict=True))
-        yield TableSymbol(item.name.name, arguments, result.dimension, place)
+        key = self._key(item.name.name, source)
+        yield TableSymbol(item.name.name, key, arguments, result.dimension, place)
         table = read_table(item, units, result, source, self.report)
         if table is not None:
-            self.tables[table.name] = table
+            self.tables[key] = replace(table, name=key)
+
+    def _key(self, name: str, source: SourceText) -> str:
+        """What a table is called among those of all files: by its own name in the model's, else with its module's."""
+        if source is self.file.source:
+            return name
+        qualified = f"{Path(source.name).stem}.{name}"
+        return next(k for n in count(1) if (k := qualified if n == 1 else f"{qualified}#{n}") not in self.tables)

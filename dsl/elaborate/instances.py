@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 
+from sysdyn.dsl.elaborate import bundles
 from sysdyn.dsl.elaborate.declarations import DECLARED
 from sysdyn.dsl.elaborate.elements import Elements
 from sysdyn.dsl.elaborate.files import FileScope, exported
@@ -19,7 +20,6 @@ from sysdyn.dsl.elaborate.moulds import Moulds, charge
 from sysdyn.dsl.elaborate.parameters import Argument
 from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.unit_variables import solve_units
-from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import LevelChoice
@@ -35,7 +35,6 @@ from sysdyn.dsl.names.symbols import (
     End,
     Family,
     InstanceSymbol,
-    NodeSymbol,
     PortSymbol,
     Scope,
     Space,
@@ -337,20 +336,7 @@ class Instances(Elements):
         wanted = space.scope.find(word.name)
         place = self.place(value.span)
         if isinstance(wanted, BundleSymbol):
-            found = self.resolver.located(value)
-            if found is None or not isinstance(found.symbol, BundleNode):
-                raise self.resolver.fail(
-                    "E401", f"port '{name}' of '{s.decl.name}' is a bundle {wanted.name}", value.span
-                )
-            members: dict[str, NodeSymbol | PortSymbol] = {}
-            for member, inner in found.symbol.members.items():
-                if isinstance(inner, PortSymbol):
-                    end = inner.end
-                    end = End(end.node, tuple(ex.substitute(a, found.change) for a in end.at), end.domain)
-                else:
-                    end = self._node_end(inner, found.indices, found.change, value)
-                members[member] = PortSymbol(member, end, place)
-            space.scope.symbols[name] = BundleNode(name, members, place)
+            space.scope.symbols[name] = self._bundle_bound(s, name, wanted, value)
             return
         if not isinstance(wanted, DomainSymbol):
             message = f"'{word.name}' is not a domain"
@@ -360,6 +346,22 @@ class Instances(Elements):
         assert bound_to is not None
         self._same_domain(s, f"port '{name}'", wanted, bound_to, value)
         space.scope.symbols[name] = PortSymbol(name, bound_to, place)
+
+    def _bundle_bound(self, s: syntax.Instance, name: str, wanted: BundleSymbol, value: syntax.Expr) -> BundleNode:
+        """A port of several nodes, bound to a bundle of the same members or to ground."""
+        place = self.place(value.span)
+        if isinstance(value, syntax.Name) and value.name == "ground":
+            return bundles.grounded(name, wanted, place)
+        found = self.resolver.located(value)
+        if found is None or not isinstance(found.symbol, BundleNode) or not bundles.fits(wanted, found.symbol):
+            message = f"port '{name}' of '{s.decl.name}' is a bundle {wanted.name}, '{self._text(value)}' is none"
+            members = ", ".join(f"{m}: {kind.name}" for m, kind in wanted.members)
+            help_ = f"a node of {wanted.name} ({members}), or ground"
+            raise self.resolver.fail("E401", message, value.span, help=help_)
+        indices, change = found.indices, found.change
+        return bundles.bound(
+            name, found.symbol, change, lambda node: self._node_end(node, indices, change, value), place
+        )
 
     def _same_domain(self, s: syntax.Instance, what: str, wanted: DomainSymbol, end: End, value: syntax.Expr) -> None:
         if end.domain.name != wanted.name:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from sysdyn.dsl.elaborate import bundles
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import dimensions as dim
@@ -155,9 +156,8 @@ class _Walk:
                     inner = space.scope
                     yield from self.inside(inner, f"{shown}{name}{above}.", f"{read}{name}{here}.", len(space.around))
             elif isinstance(symbol, BundleNode):
-                for member, node in symbol.members.items():
-                    if isinstance(node, NodeSymbol):
-                        yield from self._members(node, f"{shown}{name}", f"{read}{name}", f".{member}")
+                for member, node in bundles.nodes(symbol):
+                    yield from self._members(node, f"{shown}{name}", f"{read}{name}", member)
             else:
                 yield from self._members(symbol, f"{shown}{name}", f"{read}{name}")
 

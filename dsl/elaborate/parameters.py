@@ -174,23 +174,6 @@ class Parameters(ElaborationContext):
                 message = f"parameter '{statement.decl.name}' depends on '{inner}': a parameter is a constant"
                 raise self.resolver.fail("E807", message, self._where(statement))
 
-    def fits(self, shape: Shape, count: int) -> bool:
-        """Whether a list of that length fills a shape."""
-        first, last = (self.given(node) for node in shape[0])
-        if not (ex.is_const(first) and ex.is_const(last)):
-            return False
-        return int(last.data) - int(first.data) + 1 == count
-
-    def given(self, node: Node) -> Node:
-        """A bound with the parameters that the instance gives."""
-        parameters = self.parts.parameters
-        while True:
-            known = {n: parameters[n.data] for n in ex.topological([node]) if n.op == "param" and n.data in parameters}
-            values = {n: p.values[0] for n, p in known.items() if not n.args and len(p.values) == 1}
-            if not values:
-                return node
-            node = ex.substitute(node, values)
-
     def _where(self, statement: syntax.Param) -> syntax.Span:
         return statement.value.span if statement.value is not None else statement.decl.span
 

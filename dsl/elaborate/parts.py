@@ -101,6 +101,7 @@ class NetworkBuilder:
     events: list[Event] = field(default_factory=list)
     switches: list[Switch] = field(default_factory=list)
     drafts: list[Any] = field(default_factory=list)  # of switches (elaborate/events.py)
+    event_drafts: list[Any] = field(default_factory=list)  # of events in a `for`
     watched: list[Observation] = field(default_factory=list)  # what events and switches read
     requirements: list[Requirement | CastRequirement] = field(default_factory=list)
     nodes: list[NodeFamily] = field(default_factory=list)
@@ -247,6 +248,23 @@ class ElaborationContext:
         lows = {n: loop.first for n, loop in used.items()}
         highs = {n: loop.last for n, loop in used.items()}
         return ex.substitute(node, lows), ex.substitute(node, highs)
+
+    def fits(self, shape: Shape, count: int) -> bool:
+        """Whether a list of that length fills a shape."""
+        first, last = (self.given(node) for node in shape[0])
+        if not (ex.is_const(first) and ex.is_const(last)):
+            return False
+        return int(last.data) - int(first.data) + 1 == count
+
+    def given(self, node: Node) -> Node:
+        """A bound with the parameters that the instance gives."""
+        parameters = self.parts.parameters
+        while True:
+            known = {n: parameters[n.data] for n in ex.topological([node]) if n.op == "param" and n.data in parameters}
+            values = {n: p.values[0] for n, p in known.items() if not n.args and len(p.values) == 1}
+            if not values:
+                return node
+            node = ex.substitute(node, values)
 
     def looped(self, index: syntax.Index) -> Node | None:
         """An index that varies with the loops around; None of `1..n` and `3`, which declare all elements at once."""

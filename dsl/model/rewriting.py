@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from sysdyn.dsl.model.expression import Node, topological
+from sysdyn.dsl.model.expression import Node, substitute, topological
 from sysdyn.dsl.model.network import Network
 
 EXPRESSIONS = {
@@ -45,6 +45,44 @@ def rewritten(network: Network, change: Callable[[Node], Node], sorts: Iterable[
 
     changed: dict[str, Any] = {s: tuple(new(x, EXPRESSIONS[s]) for x in getattr(network, s)) for s in sorts}
     return replace(network, **changed)
+
+
+def everywhere(said: Any, change: Callable[[Node], Node]) -> Any:
+    """A network, or a part of one, with every expression changed: indices, ranges and loops too."""
+    if isinstance(said, Node):
+        return change(said)
+    if isinstance(said, tuple):
+        parts = tuple(everywhere(part, change) for part in said)
+        return said if all(a is b for a, b in zip(parts, said, strict=True)) else parts
+    if type(said).__module__ != Network.__module__:
+        return said
+    fields = {name: getattr(said, name) for name in said.__dataclass_fields__}
+    new = {name: everywhere(value, change) for name, value in fields.items()}
+    return replace(said, **{name: value for name, value in new.items() if value is not fields[name]})
+
+
+def with_common_sizes(network: Network) -> Network:
+    """The sizes that a component in an array has of its own, as one number where they are the same in each element.
+
+    An index that is affine in its loop variable stays so: `v[L.n[i] - j]` is `v[n - j]`.
+    """
+    set_alone = {setting.name for setting in network.elements}
+    sizes = [p for p in network.parameters if p.whole and p.shape and len(p.values) == 1 and p.name not in set_alone]
+    common: dict[str, Node] = {}
+
+    def change(root: Node) -> Node:
+        found = {n: common[n.data] for n in topological([root]) if n.op == "param" and n.data in common}
+        return substitute(root, found) if found else root
+
+    for _ in sizes:  # one may be another one's argument
+        before = len(common)
+        for p in sizes:
+            value = change(p.values[0])
+            if p.name not in common and all(n.op != "index" for n in topological([value])):
+                common[p.name] = value
+        if len(common) == before:
+            break
+    return everywhere(network, change) if common else network
 
 
 def nodes_read(said: Any) -> frozenset[str]:

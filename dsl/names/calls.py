@@ -18,6 +18,9 @@ from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.tree import syntax
 from sysdyn.dsl.tree.walking import children
 
+Head = tuple[str, Dimension, int | None]
+"""An argument in the head of a function or table: its name and dimension, of an array how many elements it has."""
+
 
 class Calls(Context):
     """Functions, tables, reductions and arrays written as lists."""
@@ -55,6 +58,8 @@ class Calls(Context):
         """Whether the body takes elements of an array whose items were written out one by one."""
         for inner in walk(e.body):
             if isinstance(inner, syntax.Item) and isinstance(inner.base, syntax.Name):
+                if isinstance(self._bound.get(inner.base.name), Vector):
+                    return True
                 symbol = self.scope.find(inner.base.name)
                 if isinstance(symbol, Definition) and not symbol.at:
                     return True
@@ -169,19 +174,29 @@ class Calls(Context):
             return total
         return Typed(ex.sqrt(total.node), None if total.dimension is None else dim.halved(total.dimension))
 
-    def _arguments(self, name: str, heads: Sequence[tuple[str, Dimension]], e: syntax.Call) -> list[Node]:
+    def _arguments(self, name: str, heads: Sequence[Head], e: syntax.Call) -> list[Value]:
         if len(heads) != len(e.args):
             wants = f"{len(heads)} argument{'s' * (len(heads) != 1)}"
-            shape = f"{name}({', '.join(head for head, _ in heads)})"
+            shape = f"{name}({', '.join(head for head, _, _ in heads)})"
             raise self.fail("E206", f"{name} takes {wants}, {len(e.args)} given", e.span, help=shape)
-        nodes = []
-        for (head, dimension), arg in zip(heads, e.args, strict=True):
+        values: list[Value] = []
+        for (head, dimension, size), arg in zip(heads, e.args, strict=True):
             message = f"argument '{head}' of {name} is in {{}}, wants {dim.show(dimension)}"
-            nodes.append(self.wanted(arg.value, dimension, "E206", message))
-        return nodes
+            if size is None:
+                values.append(Typed(self.wanted(arg.value, dimension, "E206", message), dimension))
+                continue
+            value = self.resolve(arg.value)
+            if not isinstance(value, Vector) or len(value.items) != size:
+                found = f"{len(value.items)} of them" if isinstance(value, Vector) else "one number"
+                said = f"argument '{head}' of {name} is an array of {size}, found {found}"
+                raise self.fail("E206", said, arg.value.span)
+            items = (self.fitting(i, arg.value, dimension, "E206", message) for i in value.items)
+            values.append(Vector(tuple(Typed(node, dimension) for node in items)))
+        return values
 
     def _table(self, symbol: TableSymbol, e: syntax.Call) -> Value:
-        return Typed(ex.table(symbol.name, *self._arguments(symbol.name, symbol.arguments, e)), symbol.result)
+        heads = [(name, dimension, None) for name, dimension in symbol.arguments]
+        return Typed(ex.table(symbol.key, *_nodes(self._arguments(symbol.name, heads, e))), symbol.result)
 
     def _function(self, symbol: FunctionSymbol, e: syntax.Call) -> Value:
         """A function of the text: its body with the arguments in place; E105 where it calls itself."""
@@ -190,28 +205,38 @@ class Calls(Context):
         result = read_unit(definition.result, symbol.file_scope, symbol.source, self.report)
         if result is None or None in units:
             raise Failed
-        heads = [(p.name, u.dimension) for p, u in zip(definition.params, units, strict=True) if u]
-        nodes = self._arguments(name, heads, e)
+        sizes = [self._size(p, symbol) for p in definition.params]
+        heads = [(p.name, u.dimension, n) for p, u, n in zip(definition.params, units, sizes, strict=True) if u]
+        values = self._arguments(name, heads, e)
         if any(s.expression is definition.value for s in self._active):
             raise self.fail("E105", f"circular definition: {name} -> {name}", e.span)
-        key = definition, tuple(nodes)
+        key = definition, _nodes(values)
         if key not in self._applied:
             budget.charge(budget.EXPANSION, f"what function '{name}' is expanded to")
             self._applied[key] = None
-            self._applied[key] = self._body(symbol, heads, nodes, result.dimension)
+            self._applied[key] = self._body(symbol, values, result.dimension)
         node = self._applied[key]
         if node is None:
             raise Failed  # reported where it was first applied to these
         return Typed(node, result.dimension)
 
-    def _body(
-        self, symbol: FunctionSymbol, heads: Sequence[tuple[str, Dimension]], nodes: Sequence[Node], result: Dimension
-    ) -> Node:
+    def _size(self, parameter: syntax.Parameter, symbol: FunctionSymbol) -> int | None:
+        """How many elements an argument has; None of one number."""
+        if parameter.size is None:
+            return None
+        with self.space(Space("", symbol.file_scope, symbol.file_scope, symbol.source)):
+            node = self.whole_number(parameter.size, "the size of an argument")
+            if not ex.is_const(node) or node.data < 1:
+                message = f"the size of argument '{parameter.name}' of {symbol.name} is no number of elements"
+                raise self.fail("E807", message, parameter.size.span, help=f"{parameter.name}[3]: ...")
+        return int(node.data)
+
+    def _body(self, symbol: FunctionSymbol, values: Sequence[Value], result: Dimension) -> Node:
         """The value of a function of the file at its arguments, of dimension `result`."""
         definition, name = symbol.definition, symbol.name
         space = Space("", symbol.file_scope, symbol.file_scope, symbol.source)
         marker = Definition(name, "fn", definition.value, (), None, space, symbol.place, definition.name.span)
-        arguments = {n: Typed(node, d) for (n, d), node in zip(heads, nodes, strict=True)}
+        arguments = {p.name: value for p, value in zip(definition.params, values, strict=True)}
         self._active.append(marker)
         try:
             with self.space(space), self.bound(arguments):
@@ -228,6 +253,11 @@ def walk(root: syntax.Expr) -> Iterator[object]:
         node = stack.pop()
         yield node
         stack += children(node)
+
+
+def _nodes(values: Sequence[Value]) -> tuple[Node, ...]:
+    """The numbers in values, arrays written out."""
+    return tuple(i.node for v in values for i in (v.items if isinstance(v, Vector) else (v,)))
 
 
 def _times(a: Typed, b: Typed) -> Typed:

@@ -5,7 +5,7 @@ The resolver's rules are spread over `names`, `members`, `arithmetic` and `calls
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -81,7 +81,7 @@ class Inside:
 
     __slots__ = ("_before", "_bound", "_context", "_loops")
 
-    def __init__(self, context: Context, loops: tuple[Loop, ...], bound: dict[str, Typed]) -> None:
+    def __init__(self, context: Context, loops: tuple[Loop, ...], bound: dict[str, Value]) -> None:
         self._context, self._loops, self._bound = context, list(loops), bound
 
     def __enter__(self) -> None:
@@ -112,7 +112,7 @@ class Context:
         self._applied: dict[tuple[syntax.Function, tuple[Node, ...]], Node | None] = {}  # functions to arguments
         self._active: list[Definition] = []
         self._loops: list[Loop] = []
-        self._bound: dict[str, Typed] = {}  # loop variables, function arguments, an element's own variables
+        self._bound: dict[str, Value] = {}  # loop variables, function arguments, an element's own variables
         self._names: dict[str, int] = {}
         self.chosen: dict[tuple[int, tuple[Node, ...]], Space] = {}  # the statement of a label that an index means
         self.scope = Scope()
@@ -139,7 +139,7 @@ class Context:
         return Entered(self, space)
 
     @contextmanager
-    def bound(self, names: dict[str, Typed]) -> Iterator[None]:
+    def bound(self, names: Mapping[str, Value]) -> Iterator[None]:
         """Bring values into sight that hide the scope's names."""
         before = self._bound
         self._bound = {**before, **names}
@@ -153,11 +153,11 @@ class Context:
         """Whether nothing is in sight but the scope's names."""
         return not self._bound and not self._loops
 
-    def sight(self) -> dict[str, Typed]:
+    def sight(self) -> dict[str, Value]:
         """What is bound here: to be brought into sight again later."""
         return dict(self._bound)
 
-    def inside(self, loops: tuple[Loop, ...], sight: dict[str, Typed]) -> Inside:
+    def inside(self, loops: tuple[Loop, ...], sight: dict[str, Value]) -> Inside:
         """Go back to where a statement stands."""
         return Inside(self, loops, sight)
 
@@ -230,7 +230,7 @@ class Context:
 
     def bound_loops(self) -> list[str]:
         """Names of the loop variables in sight, as written."""
-        return [n for n, v in self._bound.items() if v.node.op == "index"]
+        return [n for n, v in self._bound.items() if isinstance(v, Typed) and v.node.op == "index"]
 
     def place(self, span: syntax.Span) -> Place:
         """A span of the present text."""

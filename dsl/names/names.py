@@ -77,7 +77,7 @@ class Names(Context):
         if known_ is not None:
             self._looks_like_division(e)
             return known_[1]
-        unit = read_unit(e.unit, self.scope, self.source, self.report)
+        unit = read_unit(e.unit, self.scope, self.source, self.report, self._bound)
         if unit is None:
             raise Failed
         if unit.offset:
@@ -169,7 +169,10 @@ class Names(Context):
                 return self.definition(symbol, self._implied(symbol, span) if symbol.implied else None)
             case Unsupported():
                 raise Failed  # its declaration has been reported as N608
-            case NodeSymbol() | PortSymbol() | BundleNode():
+            case BundleNode():
+                names = ", ".join(f"{symbol.name}.{m}" for m in symbol.members)
+                raise self.fail("E104", f"'{symbol.name}' is a bundle, not a value", span, help=f"its nodes: {names}")
+            case NodeSymbol() | PortSymbol():
                 domain = symbol.domain if isinstance(symbol, NodeSymbol) else None
                 common = domain.common if domain else "effort"
                 help_ = (
@@ -192,7 +195,7 @@ class Names(Context):
     def _implied(self, symbol: Definition, span: syntax.Span) -> tuple[Node, ...]:
         if not all(name in self._bound for name in symbol.at):
             raise self.fail("E101", f"'{symbol.name}' is known only inside its 'for {symbol.at[-1]}'", span)
-        return tuple(self._bound[name].node for name in symbol.at)
+        return tuple(v.node for name in symbol.at if isinstance(v := self._bound[name], Typed))
 
     def _expanded(self, symbol: ParameterSymbol | UnknownSymbol, span: syntax.Span) -> Vector:
         """A whole array as a value: only where its bounds are written as numbers."""

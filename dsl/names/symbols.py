@@ -15,6 +15,7 @@ from sysdyn.values import dataclass
 
 DomainSymbol = Domain
 
+
 @dataclass(frozen=True, slots=True)
 class Typed:
     """A resolved expression: a node and its dimension; None fits every dimension (the numbers 0 and inf)."""
@@ -34,10 +35,10 @@ class Vector:
 
 @dataclass(frozen=True, slots=True)
 class BundleSymbol:
-    """A bundle of nodes: the domain of each member."""
+    """A bundle of nodes: of each member its domain, or the bundle that it is itself."""
 
     name: str
-    members: tuple[tuple[str, str], ...]
+    members: tuple[tuple[str, DomainSymbol | BundleSymbol], ...]
     place: Place
 
 
@@ -54,9 +55,10 @@ class ComponentSymbol:
 
 @dataclass(frozen=True, slots=True)
 class TableSymbol:
-    """An interpolation table with the dimensions of its arguments and values."""
+    """An interpolation table with the dimensions of its arguments and values; key: its name among all files' tables."""
 
     name: str
+    key: str
     arguments: tuple[tuple[str, Dimension], ...]
     result: Dimension
     place: Place
@@ -154,7 +156,7 @@ class BundleNode:
     """Several nodes (or ports) handled as one."""
 
     name: str
-    members: dict[str, NodeSymbol | PortSymbol]
+    members: dict[str, NodeSymbol | PortSymbol | BundleNode]
     place: Place
 
 
@@ -245,7 +247,7 @@ class Definition:
     place: Place
     span: syntax.Span
     implied: bool = False
-    bound: tuple[tuple[str, Typed], ...] = ()  # loop variables in sight where it is read
+    bound: tuple[tuple[str, Typed | Vector], ...] = ()  # loop variables in sight where it is read
 
 
 @dataclass(frozen=True, slots=True)

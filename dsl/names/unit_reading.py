@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from fractions import Fraction
 
 from sysdyn.dsl.model.unit_habits import declaration, respelled
@@ -11,21 +12,25 @@ from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 
 
-def read_unit(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report) -> Unit | None:
-    """The value of a unit; None after reporting E201 or E209."""
+def read_unit(
+    unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, bound: Container[str] = ()
+) -> Unit | None:
+    """The value of a unit; None after reporting E201 or E209.  bound: names in sight beside those of the scope."""
     declaring = scope.declaring
     if declaring.read is None:
         declaring.read = {}
     key = unit.text, len(declaring.units)
     found = declaring.read.get(key)
     if found is None:
-        found = _read(unit, scope, source, report)
+        found = _read(unit, scope, source, report, bound)
         if found is not None and "$" not in unit.text:
             declaring.read[key] = found
     return found
 
 
-def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report) -> Unit | None:
+def _read(
+    unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, bound: Container[str]
+) -> Unit | None:
     dimension: Dimension = NONE
     scale = Fraction(1)
     for factor in unit.factors:
@@ -36,7 +41,8 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report) -
         declared = scope.unit(factor.name)
         found = (declared.dimension, declared.scale) if declared else known(factor.name)
         if found is None:
-            _unknown(unit, factor, scope, Place(source, factor.span), report)
+            in_sight = factor.name in bound or scope.find(factor.name) is not None
+            _unknown(unit, factor, in_sight, Place(source, factor.span), report)
             return None
         power = factor.exponent if factor.op == "." else -factor.exponent
         dimension = multiply(dimension, found[0], power)
@@ -50,7 +56,7 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report) -
     return Unit(dimension, scale, si_text(dimension) if solved else unit.text)
 
 
-def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, scope: Scope, place: Place, report: Report) -> None:
+def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place: Place, report: Report) -> None:
     """Report a factor of a unit that nobody declared, with what is near."""
     if factor.name.startswith("$"):
         report.error(
@@ -66,7 +72,7 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, scope: Scope, place: 
     help_: str | None
     edit = None
     before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
-    if scope.find(factor.name) is not None and before:
+    if in_sight and before:
         sign = "/" if factor.op == "/" else "*"
         verb = "divide" if factor.op == "/" else "multiply"
         help_ = f"to {verb} by the variable {factor.name} write '{before} {sign} {factor.name}'"

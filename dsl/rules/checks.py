@@ -179,6 +179,8 @@ def _set_valued(model: Elaborator, report: Report) -> None:
     said += [(w.effort, w.place, "work") for w in parts.works] + [(d.expression, d.place, "") for d in parts.dynamics]
     said += [(e.expression, e.place, e.function) for e in parts.energies]
     said += [(o.expression, o.place, "") for o in parts.watched]
+    said += [(a.value, a.place, "") for d in parts.event_drafts for a in d.actions]
+    said += [(d.condition, d.place, "") for d in parts.event_drafts if d.condition is not None]
     for node, place, kind in said:
         if _has_setsign(node):
             if kind in ("gamma", "D", "law"):

@@ -97,7 +97,7 @@ class Bundle:
     """`bundle planar { x, y: translation }`."""
 
     name: Word
-    members: tuple[BundleMember, ...]
+    members: tuple[BundleMember | Broken, ...]
     span: Span
     doc: str | None = None
 

@@ -17,6 +17,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.forms.corners.broken import broken
 from sysdyn.compiler.forms.corners.kinks import YES, Surface, surfaces, watched
+from sysdyn.compiler.forms.corners.written import written
 from sysdyn.compiler.forms.descriptor import (
     BESIDE,
     BLOCKS,
@@ -61,6 +62,7 @@ def frozen(form: DescriptorForm, network: Network) -> tuple[DescriptorForm, tupl
     """The form of a network with frozen branches, and the parameters that hold them."""
     tables, place = {t.name: t for t in network.tables}, network.place
     form = replace(form, blocks=tuple(_opened(b, tables) for b in form.blocks)) if tables else form
+    form = written(form, network)
     found = surfaces(form, frozenset(n.data for s in network.switches for n in s.direction))
     if not found:
         return form, ()

@@ -8,7 +8,7 @@ neither for a method and is left alone, and so is one whose branch ends there (s
 for none can be held across.  Which of the three it is, is asked of the expressions on the surface u = 0, at
 sampled values of everything else; of what stands beside other conditions (raw > hi and err > 0) on both sides of these.
 Received: a descriptor form; returned: its `Surface`s, in the order of the text.
-Loops keep what they have (a family is one row here): what stands in one is integrated through.
+What stands in a loop is integrated through; written.py writes loops out before.
 """
 
 from __future__ import annotations

@@ -1,0 +1,164 @@
+"""Models as a reader of the language's page would write them, against closed forms."""
+
+from math import cos, sin
+
+import numpy as np
+import pytest
+from sysdyn.api import check, simulate
+
+G = 9.80665
+
+
+def run(folder, text, **options):
+    file = folder / "m.sd"
+    file.write_text(text)
+    return simulate(file, output=folder / "m.h5", **{"accuracy": 1e-7, **options})
+
+
+def off(trace, name, closed):
+    """The greatest error of a quantity, in parts of its greatest value."""
+    wanted = np.array([closed(t) for t in trace.time])
+    return float(np.max(np.abs(np.array(trace[name]) - wanted)) / np.max(np.abs(wanted)))
+
+
+def codes(text):
+    return [d.code for d in check(text) if d.severity == "error"]
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_tables_of_one_name_in_two_files_are_two_tables(tmp_path, formulation):
+    (tmp_path / "parts.sd").write_text(
+        "table map(x: 1) -> N linear clamp [ (0, 0), (1, 10) ]\n"
+        "fn twice(x: 1) -> N = 2*map(x)\n"
+        "component push { port x: translation\n  F: effort(e = map(t/(1 s))) ground -> x\n}\n"
+    )
+    text = """
+from parts import push, twice
+table map(x: 1) -> N linear clamp [ (0, 100), (1, 200) ]
+model m {
+  node x: translation = 0 m
+  M: kinetic(p = 1 kg*f) x
+  A: push() x = x
+  B: effort(e = map(t/(1 s))) ground -> x
+  C: effort(e = twice(t/(1 s))) ground -> x
+}
+scene s of m { time 0 s to 1 s; trace M.p as p, A.F.e as a, B.e as b, C.e as c every 0.1 s }
+"""
+    trace = run(tmp_path, text, formulation=formulation)
+    assert off(trace, "p", lambda t: 100 * t + 65 * t**2) < 1e-7
+    assert off(trace, "a", lambda t: 10 * t) < 1e-12
+    assert off(trace, "b", lambda t: 100 + 100 * t) < 1e-12
+    assert off(trace, "c", lambda t: 20 * t) < 1e-12
+
+
+BUNDLES = """
+bundle point { x, y: translation }
+bundle pair { a, b: point }
+component bob {
+  param m: kg
+  port at: point
+  energy T* = 1/2*m*(at.x.f^2 + at.y.f^2)
+  work -m*g0 on at.y.q
+}
+component dumbbell {
+  port ends: pair
+  A: bob(m = 1 kg) at = ends.a
+  B: bob(m = 2 kg) at = ends.b
+}
+component tether {
+  port a, b: point
+  X: potential(e = 12 N/m*q) on a.x.q - b.x.q
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_bundles_hold_bundles_and_their_ports_take_ground(tmp_path, formulation):
+    text = BUNDLES + """
+model m {
+  param n = 2
+  node P[1..n]: pair
+  for i in 1..n {
+    D[i]: dumbbell() ends = P[i]
+    T[i]: tether() a = P[i].a, b = ground
+    init P[i].a.x.q = 0.5 m*i
+    init P[i].b.y.f = 3 m/s
+  }
+}
+scene s of m { time 0 s to 1 s; trace P[2].a.x.q as x, P[1].b.y.q as y, T[2].X.e as F every 0.1 s }
+"""
+    trace = run(tmp_path, text, formulation=formulation)
+    assert off(trace, "x", lambda t: cos(12**0.5 * t)) < 1e-6
+    assert off(trace, "y", lambda t: 3 * t - G * t**2 / 2) < 1e-6
+    assert off(trace, "F", lambda t: 12 * cos(12**0.5 * t)) < 1e-6
+
+
+def test_what_is_wrong_with_a_bundle_is_said():
+    model = "model m { node p: a; coord z: translation = 1 m; energy T* = 1/2*1 kg*z'^2 }\n"
+    assert codes(f"bundle a {{ x: b }}\nbundle b {{ z: a }}\n{model}") == ["E801"]
+    assert codes(f"bundle a {{ x: trans }}\n{model}") == ["E202"]
+    assert codes(f"bundle a {{ x, x: translation }}\n{model}") == ["E106"]
+    other = f"{BUNDLES}model m {{ node p: planar; B: bob(m = 1 kg) at = p }}\n"
+    assert codes(other) == ["E401"]
+    assert codes(f"{BUNDLES}model m {{ node p: point; let h = p; B: bob(m = 1 kg) at = p }}\n") == ["E104"]
+
+
+def test_a_function_of_an_array(tmp_path):
+    text = """
+const n = 3
+fn length(v[n]: m) -> m = sqrt(sum(i in 1..n: v[i]^2))
+fn turned(v[2]: m, by: 1) -> m = v[1]*cos(by) - v[2]*sin(by)
+fn outer(v[2]: m) -> m = turned(v, 0.5) + length([v[1], v[2], 0 m])
+model m {
+  param a[1..2]: m = [3 m, 4 m]
+  state z: m = 0 m
+  dynamic z' = 1 m/s
+  let one = length([z, 2*z, 3 m])
+  let two = outer(a) + outer([z, 0 m])
+  let rate = one'
+}
+scene s of m { time 0 s to 2 s; trace one, two, rate every 0.1 s }
+"""
+    trace = run(tmp_path, text)
+    assert off(trace, "one", lambda t: (5 * t**2 + 9) ** 0.5) < 1e-12
+    assert off(trace, "two", lambda t: 3 * cos(0.5) - 4 * sin(0.5) + 5 + t * (cos(0.5) + 1)) < 1e-12
+    assert off(trace, "rate", lambda t: 5 * t / (5 * t**2 + 9) ** 0.5) < 1e-12
+    wrong = text.replace("length([z, 2*z, 3 m])", "{}")
+    for argument in ("length([z, z])", "length(z)", "length([z, z, 1 s])"):
+        assert codes(wrong.replace("{}", argument)) == ["E206"]
+    assert codes(text.replace("v[n]: m", "v[0]: m")) == ["E807"]
+    assert codes("table f(x[2]: m) -> N linear clamp [ (0, 1), (1, 2) ]\n" + text) == ["E206"]
+
+
+LADDERS = """
+component ladder {
+  param n = 2
+  param R: ohm
+  port a: electrical
+  node v[0..n]: electrical
+  for j in 1..n {
+    r[j]: dissipator(e = R*f) v[j - 1] -> v[j]
+    c[j]: potential(q = 1 F*e) v[j] -> ground
+    init c[j].e = 0 V
+  }
+  w: dissipator(e = R*f) a -> v[0]
+}
+model m {
+  node p: electrical
+  V: effort(e = 1 V) p -> ground
+  for i in 1..3 { L[i]: ladder(n = 3, R = 1 ohm*i) a = p }
+  K: ladder(R = 1 ohm) a = p
+}
+scene s of m { time 0 s to 4 s; trace L[1].c[3].e as a, L[3].c[1].e as b, K.c[2].e as c every 0.1 s }
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_components_in_an_array_have_arrays_of_their_own_size(tmp_path, formulation):
+    trace = run(tmp_path, LADDERS, formulation=formulation)
+    for name, n, ohms, k in (("a", 3, 1.0, 2), ("b", 3, 3.0, 0), ("c", 2, 1.0, 1)):
+        matrix = -2 * np.eye(n) + np.eye(n, k=1) + np.eye(n, k=-1)
+        matrix[0, 0], matrix[-1, -1] = -1.5, -1.0
+        values, vectors = np.linalg.eigh(matrix / ohms)
+        wanted = [(vectors @ ((1 - np.exp(values * t)) * (vectors.T @ np.ones(n))))[k] for t in trace.time]
+        assert np.max(np.abs(trace[name] - wanted)) < 1e-5
