@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import ctypes as c
 import functools
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -123,15 +122,6 @@ class Starter:
         self.guess = np.append(self.given.guess, np.zeros(self.rates.size))
         self.free = np.append(~self.given.fixed, np.ones(self.rates.size, dtype=bool))
         self.written = np.append(self.given.written, np.zeros(self.rates.size, dtype=bool))
-
-    @contextmanager
-    def granted(self) -> Iterator[None]:
-        """Work of its own for what is done within, under the same limit of wall time."""
-        own, self.work = self.work, Work(until=self.work.until)
-        try:
-            yield
-        finally:
-            self.work = own
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""

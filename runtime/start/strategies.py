@@ -27,14 +27,14 @@ FOLLOWED, NEARLY = 12, 1e-4
 
 
 def rescaled(
-    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, *, least: bool = True, sized: Floats | None = None
+    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, *, least: bool = True
 ) -> tuple[Solution, bool]:
-    """Everything at once from x, and whether it holds; magnitudes are those of `sized` at first (None: x).
+    """Everything at once from x, and whether it holds.
 
     Magnitudes that proved wrong (currents of 1e-12 A at the guess, a diode at 2 V) are taken anew: the rows must hold
     in the magnitudes of the solution too.
     """
-    at, best = x if sized is None else sized, Solution(x, np.inf, np.zeros(0))
+    at, best = x, Solution(x, np.inf, np.zeros(0))
     for k in range(_RESCALINGS):
         if k and starter.work.done:
             break
@@ -96,30 +96,14 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         yield found, True
 
 
-def _completed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """From the end of a homotopy: rates, which follow from the rest by linear rows; where that is not all, everything
-    at once.
-    """
-    x, sized = x.copy(), starter.without_noise(x, starter.scale(t, x))  # what round-off left is no magnitude
-    x[starter.n :] = sized[starter.n :] = guess[starter.n :]
-    if (x == guess)[free & ~starter.following(t, x)].all():
-        rates = free & (np.arange(x.size) >= starter.n)
-        found, holds = rescaled(starter, t, x, x, rates, least=False, sized=sized)
-        if holds:
-            return found, holds
-        x = found.x
-    return rescaled(starter, t, x, guess, free, sized=sized)
-
-
 def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """Along what fades of the misses of all rows, as fast as Newton's method follows, the state held if that will do
     (Newton's homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.  With work of its own.
     """
     follows = free & starter.following(t, x)
     for may in (follows, free) if (follows != free).any() else (free,):
-        with starter.granted():
-            found = _completed(starter, t, _at_the_end(starter, t, x, may), guess, may)
-        yield found
+        starter.work = replace(starter.work, spent=0.0, largest=0.0)
+        yield rescaled(starter, t, _at_the_end(starter, t, x, may), guess, may)
 
 
 def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
@@ -132,7 +116,7 @@ def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
         found = solve(faded, x, FOLLOWED)
         follows = found.residual < NEARLY
         x, done, part = (found.x, done + part, 2.0 * part) if follows else (x, done, 0.25 * part)
-    return solve(problem_of(starter, t, x, x, rows=starter.every, free=free), x).x
+    return x
 
 
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
