@@ -111,9 +111,12 @@ def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
     miss, done, part = starter.residual(t, x), 0.0, 0.5
     while done < 1.0 and part > LEAST_PART and not starter.work.done:
         left = max(1.0 - done - part, 0.0) * miss
+
+        def faded(z: Floats, left: Floats = left) -> Floats:
+            return starter.residual(t, z) - left
+
         rows = problem_of(starter, t, x, x, rows=starter.every, free=free)
-        faded = replace(rows, residual=lambda z, left=left: starter.residual(t, z) - left, core=None)
-        found = solve(faded, x, FOLLOWED)
+        found = solve(replace(rows, residual=faded, core=None), x, FOLLOWED)
         follows = found.residual < NEARLY
         x, done, part = (found.x, done + part, 2.0 * part) if follows else (x, done, 0.25 * part)
     return x
