@@ -283,20 +283,6 @@ def stepped(problem: Problem, x: Floats) -> Floats:
     return found
 
 
-def corrected(problem: Problem, x: Floats) -> Floats | None:
-    """The point one step from x where the rows determine it; None where they do not, or the problem is no small one."""
-    linear, free = _Linear(problem, x), problem.free
-    if max(linear.shape) > SINGULAR_VALUES:
-        return None
-    r = (problem.residual(x) * linear.row_scale)[problem.use]
-    step = linear.determined(np.zeros(linear.shape[1]), r, beside=True)
-    found = x.copy()
-    if step is None or not np.isfinite(step).all():
-        return None
-    found[free] += step * linear.unit[free]
-    return found
-
-
 def least_residual(problem: Problem, x: Floats) -> Floats:
     """Where the rows cannot vanish: the x near which they are least (Levenberg-Marquardt, rows scaled once, dense)."""
     with np.errstate(all="ignore"):
