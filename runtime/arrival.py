@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.integrate.alternatives import alternatives
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, Request
@@ -17,7 +18,7 @@ from sysdyn.runtime.integrate.way import LONG, Way
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.simulate import alternatives, counted, formed
+from sysdyn.runtime.simulate import counted, formed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import Structure
 

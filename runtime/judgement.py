@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime.integrate.ledgers import Balance
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.integrate.options import Options, own_tolerances
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.values import dataclass
@@ -119,11 +119,6 @@ def cancelled(
         own = seen.get(name, 0.0)
         if terms * 4.0 * EPS < own < CANCELS * terms and terms * error > (asked or MOST) * own:
             yield Cancelled(name, terms * error, terms)
-
-
-def own_tolerances(options: Options) -> bool:
-    """Whether the solver's own tolerances are given: nothing estimates the error."""
-    return options.rtol is not None or options.atol is not None
 
 
 def allowed(options: Options) -> float:

@@ -13,16 +13,17 @@ from typing import Any
 import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.accuracy import Achieved, Lighter, control
-from sysdyn.runtime.integrate.options import Options, choose_index, choose_method
+from sysdyn.runtime.integrate.alternatives import alternatives
+from sysdyn.runtime.integrate.options import Options, choose_index, choose_method, own_tolerances
 from sysdyn.runtime.integrate.runs import Runs, Samples
 from sysdyn.runtime.integrate.second_opinion import confirmed
-from sysdyn.runtime.integrate.underlying import rateless, underlying_form
+from sysdyn.runtime.integrate.underlying import underlying_form
 from sysdyn.runtime.integrate.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
-from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge, own_tolerances
+from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
-from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
@@ -31,8 +32,6 @@ from sysdyn.values import dataclass
 
 NO_FURTHER = 1.0 + 1e-9
 """Of the instant at which a method stopped: another that stops there got no further."""
-NOT_STIFF = "not stiff"
-"""Why method auto stays with the explicit method."""
 REFINED, REFINE, HELPS = 4, 0.3, 0.5
 """Runs with shorter steps for the sake of the ledgers, how long they are beside those before, and what of the balance
 is left of one that a step spoils."""
@@ -40,22 +39,8 @@ LITTLE_HAPPENS = "little happens"
 """Why method auto goes on with the bdf behind a draft of radau."""
 LIGHT = 200
 """Steps of the bdf there, beyond which they are no cheaper than radau's."""
-SMALL = 100
-"""Unknowns up to which steep laws are the bdf's: where they turn, Newton's method holds the steps of any method, and a
-step of the bdf is the cheapest; of larger systems factors and rows are dear, and radau takes the fewest steps."""
-
 PATIENCE = {"bdf": (LONG, LONG_STEEP), "rosenbrock": (BRIEF, BRIEF_STEEP)}
 """Steps after which the next method is tried, of laws that are not steep and of those that are."""
-
-MEDIUM = 300
-"""Unknowns up to which eight solutions of a step cost less than iterations that converge, where no law is steep: nltl
-as co_hamiltonian (200) takes 0.4 to 0.7 of radau's CPU at 1e-2 to 1e-6, rc_ladder as co_lagrangian (102) 0.9 to 1.1.
-"""
-
-COARSE, COARSER = 1e-6, 1e-3
-"""Accuracies, of small systems and of medium ones (a beam of 160 takes 0.5 of radau's CPU at 1e-2, 1.4 at 1e-4), below
-which more stages, whose orders are higher, cost less than the method without Newton's iteration.
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -322,55 +307,6 @@ def simulate(
     runs = Runs(start, options, ways[0])
     with runs.keeping.claimed():
         return _runs(runs, ways[1:], written, facts, warnings)
-
-
-def _without_newton(way: Way, options: Options) -> tuple[Way, ...]:
-    """The method that solves a few linear systems a step and iterates for nothing, where it is the cheapest."""
-    wanted = [a for a in (options.accuracy, *(w for _, w in options.accuracy_on)) if a is not None]
-    most = SMALL if way.system.form.scales else MEDIUM
-    least = COARSE if way.system.unknowns <= SMALL else COARSER
-    serves = way.index <= 1 and way.system.unknowns <= most and min(wanted, default=1.0) >= least
-    return (replace(way, method="rosenbrock"),) if serves else ()
-
-
-def _differentiated(way: Way, written: System, options: Options) -> tuple[Way, ...]:
-    """Radau at index 1, where constraints that diodes make and leave hold by their derivatives: of 48 rectifiers at random
-    that neither method met at index 2 it met 12.
-    """
-    if way.index < 2 or way.system.unknowns > MEDIUM or options.events:
-        return ()
-    return (Way("radau", written.another("1"), 1, "1"),)
-
-
-def _because(reason: str, ways: tuple[Way, ...]) -> tuple[Way, ...]:
-    return replace(ways[0], reason=reason), *ways[1:]
-
-
-def alternatives(way: Way, written: System, start: ConsistentState, options: Options) -> tuple[Way, ...]:
-    """What method auto tries, in this order; `way` among it.
-
-    The explicit method on the underlying equation comes first where there is one and no law is steep: it is by far the
-    cheapest on a model that is not stiff, and gives up in a few steps on one that is.
-    """
-    other = replace(way, method="bdf" if way.method == "radau" else "radau")
-    if own_tolerances(options):
-        return way, other
-    if way.method == "dopri":
-        return replace(way, reason=NOT_STIFF), replace(way, method="radau"), replace(way, method="bdf")
-    if options.index != "auto":
-        return replace(way, reason=f"index {way.name} was asked for"), other
-    if options.events and not options.events.bends:
-        return replace(way, reason="events"), other
-    if way.system.form.scales:
-        iterating = (other, way) if way.system.unknowns <= SMALL else (way, other)
-        return _because("steep laws", _without_newton(way, options) + iterating + _differentiated(way, written, options))
-    system = written.another("0")
-    missing = rateless(system, start)
-    if missing:
-        if system.unknowns > LARGE:
-            system.forget()
-        return _because(f"no explicit equation for {missing[0]}", (*_without_newton(way, options), way, other))
-    return Way("dopri", system, 1, "0", NOT_STIFF), *_without_newton(way, options), way, other
 
 
 def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure, warnings: tuple[str, ...]) -> Outcome:

@@ -230,8 +230,9 @@ def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
 
 
 class _Estimate:
-    """The estimate of the last of two runs, and the power with which the errors fall.  alone: no pair before says how they
-    do.
+    """The estimate of the last of two runs, and the power with which the errors fall.
+
+    alone: no pair before says how they do.
     """
 
     def __init__(self, law: Law, target: Floats) -> None:

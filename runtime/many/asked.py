@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime.integrate.alternatives import alternatives
 from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.way import Way
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.simulate import alternatives, counted, form_name, formed
+from sysdyn.runtime.simulate import counted, form_name, formed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import Structure
 from sysdyn.values import dataclass
