@@ -5,7 +5,7 @@ import pytest
 from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.numerics import least_change
 from sysdyn.runtime.numerics.least_change import least_norm
-from sysdyn.runtime.numerics.ordering import neighbours, paired_order
+from sysdyn.runtime.numerics.ordering import neighbours, paired_order, symmetric_order, tall_order
 from sysdyn.runtime.numerics.tall import determined, free_unknowns, left_open
 
 N = 400
@@ -155,3 +155,18 @@ def test_what_is_free_does_not_depend_on_units():
     of_row, of_column = np.array([1e12, 1.0, 1e-12]), np.array([1.0, 1e9, 1e-9, 1.0])
     entries = rows, columns, values * of_row[rows] * of_column[columns]
     assert free_unknowns((4, 4), entries).tolist() == [True, True, True, False]
+
+
+@pytest.mark.parametrize("n", [150, 500])
+def test_what_stands_in_every_row_is_eliminated_last(n):
+    """Each of the others fills nothing; taken first it would fill everything."""
+    hub, here = n // 3, np.arange(n)
+    rows, columns = np.concatenate([here, here]), np.concatenate([here, np.full(n, hub)])
+    tall, _ = compress(n + 5, n, [Places(rows, columns)])
+    assert sorted(tall_order(tall).tolist()) == here.tolist()
+    assert hub in tall_order(tall)[-2:]
+    square, _ = compress(n, n, [Places(np.append(rows, columns), np.append(columns, rows))])
+    order = symmetric_order(square)
+    assert order.paired
+    assert hub in order.columns[-2:]
+    assert order.filled <= 4 * n
