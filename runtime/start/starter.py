@@ -12,6 +12,7 @@ from __future__ import annotations
 import ctypes as c
 import functools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -119,6 +120,10 @@ class Starter:
         self.guess = np.append(self.given.guess, np.zeros(self.rates.size))
         self.free = np.append(~self.given.fixed, np.ones(self.rates.size, dtype=bool))
         self.written = np.append(self.given.written, np.zeros(self.rates.size, dtype=bool))
+
+    def begin(self) -> None:
+        """A way begins, with work of its own under the same limit of wall time."""
+        self.work = replace(self.work, spent=0.0, largest=0.0)
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
