@@ -21,7 +21,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.gauss_newton import FOLDS, Problem, Work, solve
+from sysdyn.runtime.numerics.gauss_newton import Problem, Work, solve
 from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.numerics.rank import least_squares, null_space
 from sysdyn.runtime.start.start import ConsistentState
@@ -168,11 +168,8 @@ class Resting:
         guess = guess.copy()
         guess[self.still] = self.along @ (self.along.T @ guess[self.still])
         problem = self.problem(guess)
-        for folds in (0, FOLDS):
-            best = solve(problem, guess, folds=folds)
-            if best.residual < MET:
-                break
-        else:
+        best = solve(problem, guess)
+        if not best.residual < MET:
             return None
         y = self._turned(self._clean(best.x, problem))
         again = self.problem(y)  # in magnitudes of its own: what is near zero in the guess's may be large in these

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.model.description import Floats, Initial, Ints
+from sysdyn.runtime.model.description import Floats, stated
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import RANK
 from sysdyn.runtime.numerics.rank import count, decomposed
@@ -25,18 +25,6 @@ LARGEST = 400
 STATE = ("q", "f", "p", "s")
 
 
-def guesses(at: Ints, written: int, initial: tuple[Initial, ...]) -> tuple[Floats, Mask]:
-    """Initial values by unknown [written], 0 where there is none, and which are written; at: places of families."""
-    found, said = np.zeros(written), np.zeros(written, dtype=bool)
-    fixed = np.zeros(written, dtype=bool)
-    for item in sorted(initial, key=lambda item: item.fixed):
-        places = at[item.family] + item.positions
-        found[places] = np.where(fixed[places], found[places], item.values)
-        fixed[places] |= item.fixed
-        said[places] = True
-    return found, said
-
-
 def anchors(settler: Settler, system: System, t: float, point: tuple[Floats, Floats], magnitude: Floats) -> Mask | None:
     """Which unknowns [written] are anchors; None where the rows leave something open beside them.
 
@@ -45,7 +33,7 @@ def anchors(settler: Settler, system: System, t: float, point: tuple[Floats, Flo
     n = system.form.written
     if n + settler.rates.size > LARGEST:
         return None
-    guess, said = guesses(system.form.at, n, system.description.initial)
+    guess, _, said = stated(system.form.at, n, system.description.initial)
     state = np.isin(system.kinds[:n], STATE)
     stayed = np.abs(point[0] - guess) <= AGREES * np.maximum(magnitude[:n], np.abs(guess))
     anchored = said & stayed & state

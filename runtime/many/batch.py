@@ -21,11 +21,11 @@ from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, 
 from sysdyn.runtime.integrate.runs import APART, ROUGH, Runs
 from sysdyn.runtime.integrate.way import Way
 from sysdyn.runtime.judgement import allowed, judge
-from sysdyn.runtime.many.anchors import anchors, guesses
+from sysdyn.runtime.many.anchors import anchors
 from sysdyn.runtime.many.asked import DONE, END, ROWS, TRACES, WHY, Claim, NotApplicableError, Results, obstacle
 from sysdyn.runtime.many.mass_matrix import mass_matrix
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, stated
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.scales import sizing
 from sysdyn.runtime.model.system import System
@@ -109,7 +109,7 @@ class Batch:
 
         What a run's estimate then misses costs it a finer run, never its promise.
         """
-        guess = guesses(self.system.form.at, self.system.form.written, self.system.description.initial)[0]
+        guess = stated(self.system.form.at, self.system.form.written, self.system.description.initial)[0]
         found = self.run(self.system.description.p[None, :], guess[None, :])
         if found.state[0] != DONE:
             if self.core.keep == ROWS:
@@ -247,7 +247,7 @@ class Batch:
         self._alive += [settler, settled]
         many.y0, many.yd0 = self._kept(y.copy()), self._kept(yd.copy())
         many.anchored = self._kept(found.astype(np.int32))
-        guess, said = guesses(system.form.at, n, system.description.initial)
+        guess, _, said = stated(system.form.at, n, system.description.initial)
         many.guessed, many.guess = self._kept((said & ~found).astype(np.int32)), self._kept(guess)
         many.size = self._kept(made.sizes.magnitude[:n].copy())
         many.jy0, many.jyd0 = self._kept(np.append(jy, 0.0)), self._kept(np.append(jyd, 0.0))

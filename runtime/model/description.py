@@ -170,6 +170,20 @@ class Initial:
     label: RowLabel
 
 
+def stated(
+    at: Ints, size: int, initial: tuple[Initial, ...]
+) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    """What a text says of unknowns at the start [size]: the values, 0 where it says nothing; which are fixed, and which
+    are written.  Of an unknown that is said twice a fixed value counts; at: places of families.
+    """
+    values, fixed, written = np.zeros(size), np.zeros(size, dtype=bool), np.zeros(size, dtype=bool)
+    for item in sorted(initial, key=lambda item: item.fixed):
+        own = at[item.family] + item.positions
+        values[own], written[own] = item.values, True
+        fixed[own] |= item.fixed
+    return values, fixed, written
+
+
 @dataclass(frozen=True, slots=True)
 class Description:
     """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts: what follows from

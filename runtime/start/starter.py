@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
-from sysdyn.runtime.model.description import START, Floats, Initial, Ints
+from sysdyn.runtime.model.description import START, Floats, Initial, Ints, stated
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import inertia, own_inertia, own_unknown
 from sysdyn.runtime.model.patterns import read_only
@@ -58,13 +58,10 @@ class _Given:
 
 def _given(system: System) -> _Given:
     """The initial values of a text.  InconsistentStart where two fixed ones differ."""
-    n, stated = system.unknowns, sorted(system.description.initial, key=lambda item: item.fixed)
-    said = [(item, system.form.at[item.family] + item.positions) for item in stated]
-    found = _Given(np.zeros(n), np.zeros(n, dtype=bool), system.are("slack").copy(), said)
-    for item, own in said:
-        found.guess[own] = item.values
-        found.fixed[own] |= item.fixed
-        found.written[own] = True
+    at, initial = system.form.at, system.description.initial
+    guess, fixed, written = stated(at, system.unknowns, initial)
+    said = [(item, at[item.family] + item.positions) for item in sorted(initial, key=lambda item: item.fixed)]
+    found = _Given(guess, fixed, written | system.are("slack"), said)
     for item, own in ((item, own) for item, own in said if item.fixed):
         apart = np.abs(found.guess[own] - item.values)
         wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(found.guess[own]), np.abs(item.values)))
@@ -128,6 +125,10 @@ class Starter:
         self.given = replace(self.given, guess=self.guess[: self.n])
         self.free = np.append(~self.given.fixed, np.ones(self.rates.size, dtype=bool))
         self.written = np.append(self.given.written, np.zeros(self.rates.size, dtype=bool))
+
+    def begin(self) -> None:
+        """A way begins, with work of its own under the same limit of wall time."""
+        self.work = replace(self.work, spent=0.0, largest=0.0)
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""

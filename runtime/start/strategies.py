@@ -102,7 +102,7 @@ def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tr
     """
     follows = free & starter.following(t, x)
     for may in (follows, free) if (follows != free).any() else (free,):
-        starter.work = replace(starter.work, spent=0.0, largest=0.0)
+        starter.begin()
         yield rescaled(starter, t, _at_the_end(starter, t, x, may), guess, may)
 
 

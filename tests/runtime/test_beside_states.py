@@ -11,8 +11,8 @@ from sysdyn.runtime.linear.pencil import motions, parted
 from sysdyn.runtime.linear.stability import Energy, energy_at, verdict
 from sysdyn.runtime.linear.states import pivots, rank_of, unseen
 from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced
-from sysdyn.runtime.many.anchors import guesses
 from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.description import stated
 from sysdyn.runtime.model.held_rows import held_rows, switch_rows
 from sysdyn.runtime.model.switches import Switches
 from sysdyn.runtime.model.system import System
@@ -232,7 +232,7 @@ def test_a_fixed_value_goes_before_a_guess_of_the_same():
     said = [([0, 1], [1.0, 2.0], True), ([1, 2], [5.0, 6.0], False)]
     initial = tuple(SimpleNamespace(family=1, positions=np.array(p), values=np.array(v), fixed=f) for p, v, f in said)
     for order in (initial, initial[::-1]):
-        values, written = guesses(np.array([0, 2], dtype=np.int32), 6, order)
+        values, _, written = stated(np.array([0, 2], dtype=np.int32), 6, order)
         assert values.tolist() == [0.0, 0.0, 1.0, 2.0, 6.0, 0.0]
         assert written.tolist() == [False, False, True, True, True, False]
 

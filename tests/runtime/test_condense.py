@@ -1,9 +1,12 @@
 """Sums of sums against the matrices they are."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from sysdyn.runtime.condense.composition import composed
-from sysdyn.runtime.condense.sums import Straights, Sums, numbers_of
+from sysdyn.runtime.condense.elimination import Elimination
+from sysdyn.runtime.condense.sums import Straights, Sums, numbers_of, sums
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -66,3 +69,14 @@ def test_stretches_of_sums_are_renewed_with_their_numbers():
     made = Straights(numbers(3.0))
     made.renew(numbers(3.0))
     assert [(s.place, s.number, s.terms, bool(s.constant)) for s in made.array] == [(1, 1, 1, True), (3, 1, 2, False)]
+
+
+def test_numbers_of_a_sum_are_those_of_its_row_over_its_pivot():
+    """2 x + 4 y - 6 = 0 defines x = 3 - 2 y, and 5 z - x = 0 then z = x/5; w, which nothing reads, goes too."""
+    columns = np.array([0, 1, 0, 2])
+    system = SimpleNamespace(unknowns=4, pattern=SimpleNamespace(columns_of=lambda: columns))
+    longs = [np.array(item) for item in ([0, 2], [0, 1], [0, 3], [0, 1, 2], [1, 2], [3])]
+    found = sums(system, Elimination(*longs), np.array([2.0, 4.0, -1.0, 5.0]), np.array([-6.0, 0.0]))
+    assert found.constant.tolist() == [3.0, 0.0]
+    assert found.factor.tolist() == [-2.0, 0.2]
+    assert (found.source.tolist(), found.kept.tolist(), found.unread.tolist()) == ([1, 0], [1], [3])

@@ -5,7 +5,7 @@ import pytest
 from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.numerics import least_change, tall
 from sysdyn.runtime.numerics.least_change import least_norm
-from sysdyn.runtime.numerics.ordering import neighbours, paired_order
+from sysdyn.runtime.numerics.ordering import neighbours, paired_order, symmetric_order, tall_order
 from sysdyn.runtime.numerics.tall import determined, free_unknowns, left_open
 
 N = 400
@@ -201,3 +201,16 @@ def test_an_unknown_does_not_follow_by_an_entry_that_is_next_to_none():
     faint = np.where((j == 9) & (np.isin(i, i[(j == 9) & (v > 0.5)])), 1e-12, v)
     columns = tall._columns(shape, (i, j, faint), fewer=False)
     assert tall._substituted(shape[0], columns, np.ones(shape[0]), np.zeros(N)) == 1
+@pytest.mark.parametrize("n", [150, 500])
+def test_what_stands_in_every_row_is_eliminated_last(n):
+    """Each of the others fills nothing; taken first it would fill everything."""
+    hub, here = n // 3, np.arange(n)
+    rows, columns = np.concatenate([here, here]), np.concatenate([here, np.full(n, hub)])
+    tall, _ = compress(n + 5, n, [Places(rows, columns)])
+    assert sorted(tall_order(tall).tolist()) == here.tolist()
+    assert hub in tall_order(tall)[-2:]
+    square, _ = compress(n, n, [Places(np.append(rows, columns), np.append(columns, rows))])
+    order = symmetric_order(square)
+    assert order.paired
+    assert hub in order.columns[-2:]
+    assert order.filled <= 4 * n
