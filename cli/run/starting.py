@@ -28,8 +28,10 @@ from sysdyn.runtime.structure.structure import Structure, structure
 from sysdyn.values import dataclass
 
 SOUGHT = {
+    "rows_as_written": "down steep laws, from the equations without their derivatives",
     "homotopy": "along what fades of the misses at the guess",
     "perturbed_guess": "from a point beside the guess",
+    "largest_scales": "in the largest scales that the equations propose",
 }
 """What the summary says of a start by its strategy (runtime/start); nothing of the plain one."""
 

@@ -18,11 +18,12 @@ from sysdyn.runtime.numerics.gauss_newton import (
     OutOfTimeError,
     Solution,
     Work,
+    corrected,
     least_residual,
     solve,
     stepped,
 )
-from sysdyn.runtime.numerics.least_change import DENSE
+from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Places, Starter, problem_of
 from sysdyn.runtime.start.strategies import CLOSED, EXACT, OWN, STRATEGIES, first, rescaled
@@ -32,6 +33,8 @@ BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
 NOTHING = 1e-100
 """Of any unit: what an iteration down a steep law leaves of zero."""
+SHARPER = 60
+"""Corrections in which what follows from the state is found, or left as it was."""
 EXPLAINED = 0.1
 """Share of the work of a search that explaining what was not found may take."""
 
@@ -111,16 +114,33 @@ def _anew(
     return best, False
 
 
+def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
+    """The solution with what follows from its state by corrections that vanish, where rows determine them: what only
+    leakage ties moves by volts under rows that hold to round-off of the largest current.
+    """
+    if best.x.size > SINGULAR_VALUES:
+        return best
+    x, follows = best.x, free & starter.following(t, best.x)
+    for k in range(SHARPER):
+        problem = problem_of(starter, t, x, x, rows=starter.every, free=follows)
+        near = corrected(problem, x)
+        if near is None or starter.work.done:
+            break
+        if (np.abs(near - x) <= EXACT * np.maximum(problem.scale, np.abs(x))).all():
+            return solve(problem, x, 1) if k else best
+        x = near
+    return best
+
+
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
     """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
     x = _begun(starter, t, guess, free)
     best = Solution(x, np.inf, np.zeros(0))
     for name, strategy in STRATEGIES:
-        starter.begin()
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = _anew(starter, t, found, x, guess, free)
         if holds or sure:
-            return again, name
+            return _sharp(starter, t, again, free), name
         best = found if found.residual < best.residual else best
     return best, ""
 

@@ -11,14 +11,15 @@ from __future__ import annotations
 
 import ctypes as c
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.balance import Balance
+from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import START, Floats, Initial, Ints, stated
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import inertia, own_inertia, own_unknown
@@ -80,7 +81,7 @@ def remembered(
 
     @functools.wraps(ask)
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
-        here = t, x.tobytes()
+        here = t, self.generous, x.tobytes()
         if here != self.here:
             self.here = here
             self.known.clear()
@@ -102,8 +103,9 @@ class Starter:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.here, self.known = (0.0, b""), dict[str, NDArray[Any]]()
+        self.here, self.known = (0.0, False, b""), dict[str, NDArray[Any]]()
         self.work = Work()  # of one search for a start
+        self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
         self.given = _given(settled)
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
@@ -126,9 +128,14 @@ class Starter:
         self.free = np.append(~self.given.fixed, np.ones(self.rates.size, dtype=bool))
         self.written = np.append(self.given.written, np.zeros(self.rates.size, dtype=bool))
 
-    def begin(self) -> None:
-        """A way begins, with work of its own under the same limit of wall time."""
-        self.work = replace(self.work, spent=0.0, largest=0.0)
+    @contextmanager
+    def granted(self, share: float = 1.0) -> Iterator[None]:
+        """Work of its own for what is done within, under the same limit of wall time."""
+        own, self.work = self.work, Work(share, self.work.until)
+        try:
+            yield
+        finally:
+            self.work = own
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
@@ -326,7 +333,9 @@ class Starter:
 
     @remembered
     def scale(self, t: float, x: Floats) -> Floats:
-        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes."""
+        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes; the largest
+        (rates of fast and slow stores 1e12 apart) where generous.
+        """
         known, found, nominal = self.equations, np.zeros(x.size), self.settled.nominal
         x = np.ascontiguousarray(x, dtype=np.float64)
         values, free = self.jacobian(t, x), self.residual(t, x)
@@ -335,7 +344,7 @@ class Starter:
         sized = values - told
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
-        sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), 0, lib.pointer(found)
+        sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * self.generous, lib.pointer(found)
         if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *sizes):
             raise MemoryError
         if missed.size:  # what guesses of one unit miss is measured alike

@@ -11,15 +11,19 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.gauss_newton import Solution, solve
+from sysdyn.runtime.numerics.gauss_newton import FOLDS, Solution, solve
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter, problem_of
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS = 6
+HIDDEN = ("dynamics_rate", "momentum_rate", "phi_rate", "phi_acceleration", "psi_rate", "gamma_rate")
+"""Groups of rows that are derivatives of others."""
 EXACT = 1e-9
 OWN = 1e-6
 CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
+WALKED = 0.2
+"""Share of the work of a search that walking down steep laws may take."""
 LEAST_PART = 1e-6
 """Of misses: less is not faded out at once."""
 FOLLOWED, NEARLY = 12, 1e-4
@@ -27,14 +31,14 @@ FOLLOWED, NEARLY = 12, 1e-4
 
 
 def rescaled(
-    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, *, least: bool = True
+    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, *, least: bool = True, sized: Floats | None = None
 ) -> tuple[Solution, bool]:
-    """Everything at once from x, and whether it holds.
+    """Everything at once from x, and whether it holds; magnitudes are those of `sized` at first (None: x).
 
     Magnitudes that proved wrong (currents of 1e-12 A at the guess, a diode at 2 V) are taken anew: the rows must hold
     in the magnitudes of the solution too.
     """
-    at, best = x, Solution(x, np.inf, np.zeros(0))
+    at, best = x if sized is None else sized, Solution(x, np.inf, np.zeros(0))
     for k in range(_RESCALINGS):
         if k and starter.work.done:
             break
@@ -57,6 +61,14 @@ def own_residual(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> f
     scale = np.maximum(starter.scale(t, magnitudes), NOISE * starter.largest_alike(magnitudes))
     size = starter.row_scale(t, magnitudes, scale)[starter.every]
     return float(np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0))
+
+
+def _bent(starter: Starter, t: float, x: Floats) -> Mask:
+    """Rows that are not linear."""
+    here, there = (starter.jacobian(t, z) for z in (x, x + 1e-3 * starter.scale(t, x)))
+    bent = np.zeros(starter.settled.rows, dtype=bool)
+    bent[starter.rows[here != there]] = True
+    return bent
 
 
 Tries = Iterator[tuple[Solution, bool]]
@@ -96,30 +108,67 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         yield found, True
 
 
+def _as_written(starter: Starter, t: float, x: Floats) -> Mask:
+    """Rows as written and such derivatives as are linear: far from a solution the derivative of an exponential hides
+    what itself is after.
+    """
+    return starter.every & ~(starter.groups(*HIDDEN) & _bent(starter, t, x))
+
+
+def _completed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """From a point at which rows as written hold: rates, which follow from the rest by linear rows; where that is not
+    all, everything at once.
+    """
+    x, sized = x.copy(), starter.without_noise(x, starter.scale(t, x))  # what round-off left is no magnitude
+    x[starter.n :] = sized[starter.n :] = guess[starter.n :]
+    if (x == guess)[free & ~starter.following(t, x)].all():
+        rates = free & (np.arange(x.size) >= starter.n)
+        found, holds = rescaled(starter, t, x, x, rates, least=False, sized=sized)
+        if holds:
+            return found, holds
+        x = found.x
+    return rescaled(starter, t, x, guess, free, sized=sized)
+
+
+def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """Down steep laws on the rows as written, with a share of work of its own; then everything."""
+    rows = _as_written(starter, t, x)
+    with starter.granted(WALKED):
+        for _ in range(_RESCALINGS):
+            found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
+            if not np.isfinite(found.residual) or (found.x == x).all():
+                break
+            x = found.x
+    yield _completed(starter, t, x, guess, free)
+
+
 def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """Along what fades of the misses of all rows, as fast as Newton's method follows, the state held if that will do
-    (Newton's homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.  With work of its own.
+    """Along what fades of the misses of rows as written, as fast as Newton's method follows, the state held if that
+    will do; then everything (Newton's homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.  With work of
+    its own.
     """
     follows = free & starter.following(t, x)
     for may in (follows, free) if (follows != free).any() else (free,):
-        starter.begin()
-        yield rescaled(starter, t, _at_the_end(starter, t, x, may), guess, may)
+        with starter.granted():
+            found = _completed(starter, t, _at_the_end(starter, t, x, may), guess, may)
+        yield found
+
+
+def _faded(starter: Starter, t: float, miss: Floats) -> Callable[[Floats], Floats]:
+    """Rows that hold where those of the start are missed by so much."""
+    return lambda x: starter.residual(t, x) - miss
 
 
 def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
     """Where the homotopy leads; as far as it got where work is over."""
-    miss, done, part = starter.residual(t, x), 0.0, 0.5
+    every, miss, done, part = _as_written(starter, t, x), starter.residual(t, x), 0.0, 0.5
     while done < 1.0 and part > LEAST_PART and not starter.work.done:
-        left = max(1.0 - done - part, 0.0) * miss
-
-        def faded(z: Floats, left: Floats = left) -> Floats:
-            return starter.residual(t, z) - left
-
-        rows = problem_of(starter, t, x, x, rows=starter.every, free=free)
-        found = solve(replace(rows, residual=faded, core=None), x, FOLLOWED)
+        left = _faded(starter, t, max(1.0 - done - part, 0.0) * miss)
+        rows = problem_of(starter, t, x, x, rows=every, free=free)
+        found = solve(replace(rows, residual=left, core=None), x, FOLLOWED)
         follows = found.residual < NEARLY
         x, done, part = (found.x, done + part, 2.0 * part) if follows else (x, done, 0.25 * part)
-    return x
+    return solve(problem_of(starter, t, x, x, rows=every, free=free), x).x
 
 
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
@@ -134,10 +183,22 @@ def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask)
         yield rescaled(starter, t, shaken, guess, free)
 
 
+def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """Everything at once in the largest scales that rows propose, with work of its own; kept where it succeeds."""
+    starter.generous = True
+    with starter.granted():
+        found, holds = rescaled(starter, t, x, guess, free)
+    starter.generous = holds
+    if holds:
+        yield found, True
+
+
 STRATEGIES: tuple[tuple[str, Strategy], ...] = (
     ("newton", _newton),
+    ("rows_as_written", _walked),
     ("homotopy", _led),
     ("perturbed_guess", _perturbed),
+    ("largest_scales", _in_largest_scales),
 )
 """Globalisation: what is tried, in this order, until all rows hold."""
 
@@ -146,6 +207,6 @@ def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
     """A point behind a jump at which all rows hold that must, from x; None where none was found.  A step of 10 V across
     a diode makes steep laws lie far behind it.
     """
-    tries = (found for strategy in (_newton, _led) for found in strategy(starter, t, x, x, free))
+    tries = (found for strategy in (_newton, _walked, _led) for found in strategy(starter, t, x, x, free))
     found, holds = first(tries, x)
     return found.x if holds else None

@@ -38,10 +38,19 @@ STEEP = "exp(e_1/0.025 - 28) + e_1 - 10"
 """1e-12 (exp(e/25 mV)) and a volt an ohm from 10 V: a diode behind a step."""
 
 
-@pytest.mark.parametrize("name", ["newton", "homotopy"])
-@pytest.mark.parametrize("guess", [0.0, 1.0, 17.0])
-def test_each_way_leads_down_a_steep_law_and_up_to_it(name, guess):
-    """From 17 V its exponent is 652; from 0 V the first step would lead to 10 V and exp(372)."""
+@pytest.mark.parametrize("name", ["newton", "rows_as_written", "homotopy"])
+@pytest.mark.parametrize("guess", [0.0, 1.0])
+def test_each_way_leads_up_to_a_steep_law_and_down_it(name, guess):
+    """From 0 V the first step would lead to 10 V and exp(372)."""
+    rests(name, guess)
+
+
+def test_from_far_up_a_steep_law_one_way_leads_down():
+    """From 17 V its exponent is 652."""
+    rests("rows_as_written", 17.0)
+
+
+def rests(name, guess):
     starter, x, free = at_rest(driven(STEEP), e_1=guess)
     found, holds = first(dict(STRATEGIES)[name](starter, 0.0, x, x, free), x)
     root = brentq(lambda e: math.exp(e / 0.025 - 28.0) + e - 10.0, 0.0, 2.0, xtol=1e-14)

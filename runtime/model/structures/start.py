@@ -67,6 +67,7 @@ class Search(c.Structure):
         ("weight", P),
         ("t", D),
         ("most", I),
+        ("folds", I),
         ("share", D),
         ("spent", D),
         ("largest", D),
