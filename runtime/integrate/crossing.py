@@ -49,13 +49,13 @@ def go_on(
     """Restarts at t (s) from a point [unknowns as written], with the row of the instant `label`."""
     n = run.system.form.written
     if not run.start_rate.flags.writeable:  # the start's own
-        run.y, run.start_rate = np.zeros(run.system.unknowns), np.zeros(run.system.unknowns)
+        run.start_rate = np.zeros(run.system.unknowns)
         run.driver.run.start_rate = lib.pointer(run.start_rate)
-    run.y[:], run.start_rate[:] = 0.0, 0.0
-    run.y[:n], run.start_rate[:n] = point
-    run.yd = np.where(run.roles.differential, run.start_rate, 0.0)
-    run.sizes.begin_to_move(t, run.y, run.start_rate)
-    run.sizes.resolve(t, run.y, run.yd, run.roles.state)
+    y, run.start_rate[:] = np.zeros(run.system.unknowns), 0.0
+    y[:n], run.start_rate[:n] = point
+    yd = np.where(run.roles.differential, run.start_rate, 0.0)
+    run.sizes.begin_to_move(t, y, run.start_rate)
+    run.sizes.resolve(t, y, yd, run.roles.state)
     run.sizes.hand_down()
-    pointers = (lib.pointer(item) for item in (run.y, run.yd, *before))
+    pointers = (lib.pointer(item) for item in (y, yd, *before))
     lib.core.sd_run_restart(run.driver.core, t, label, *pointers)

@@ -44,14 +44,14 @@ def least_norm(
     shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats, *, spent: bool = False
 ) -> Floats:
     """The u of least norm with A u = aim; A [rows, unknowns] by its entries (row, column, value).  spent: nobody else
-    needs the values, which are overwritten: of a large matrix the room counts.
+    needs values and aim, which are overwritten: of a large matrix the room counts.
     """
     i, j, v = entries
     if not (np.isfinite(v).all() and np.isfinite(aim).all()):
         raise NotFiniteError
     v = v if spent else v.copy()
     back = _to_size_one(i, v, shape[0])
-    aim = aim / back
+    aim = np.divide(aim, back, out=aim if spent else None)
     small = MET * float(np.abs(aim * back).max(initial=0.0))
     tried: list[tuple[float, Floats]] = []
 

@@ -112,6 +112,7 @@ class Starter:
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
         if known.unknowns > LARGE:
             settled.put_away(whole=False)
+            settled.forget_once("structural")
         self.n, self.rates, self.measured = known.n, known.rates, known.measured
         self._momentum, self._flow = known.momentum, known.flow
         self.every = ~known.unsettled  # rows that must hold

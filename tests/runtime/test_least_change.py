@@ -136,3 +136,18 @@ def test_work_is_counted_by_size_and_ends_by_the_clock():
     with pytest.raises(OutOfTimeError):
         late.evaluation(1)
     Work(until=time.monotonic() + 1e3).evaluation(1)
+
+
+def test_values_and_aim_stay_the_callers_unless_they_are_spent():
+    """A wide matrix of rows of unlike sizes, and one of more rows than unknowns that factors take."""
+    for shape, scale in (((3, 5), 1e6), ((260, 200), 1e-3)):
+        random = np.random.default_rng(5)
+        matrix = random.standard_normal(shape) * np.where(np.arange(shape[0]) % 2, scale, 1.0)[:, None]
+        i, j, v = entries(matrix)
+        aim = matrix @ random.standard_normal(shape[1])
+        kept = v.copy(), aim.copy()
+        found = least_norm(shape, (i, j, v), aim)
+        assert (v == kept[0]).all()
+        assert (aim == kept[1]).all()
+        assert (least_norm(shape, (i, j, v), aim, spent=True) == found).all()
+        assert matrix @ found == pytest.approx(kept[1], rel=1e-9, abs=1e-9 * np.abs(kept[1]).max())
