@@ -407,6 +407,7 @@ class Instances(Elements):
         for name, statement in head.inputs.items():
             with self.entering(space):
                 dimension = self.unit(statement.unit).dimension
+                shape = tuple((self.given(a), self.given(b)) for a, b in self.shape(statement.decl))
             place = self.place(s.span)
             if name in inputs:
                 value, here, bound = inputs[name], self.current, tuple(sight.items())
@@ -414,5 +415,5 @@ class Instances(Elements):
                 assert statement.value is not None
                 value, here, bound = statement.value, space, ()
             space.scope.symbols[name] = Definition(
-                name, "input", value, (), dimension, here, place, value.span, bound=bound
+                name, "input", value, (), dimension, here, place, value.span, bound=bound, shape=shape
             )

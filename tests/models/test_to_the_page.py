@@ -162,3 +162,27 @@ def test_components_in_an_array_have_arrays_of_their_own_size(tmp_path, formulat
         values, vectors = np.linalg.eigh(matrix / ohms)
         wanted = [(vectors @ ((1 - np.exp(values * t)) * (vectors.T @ np.ones(n))))[k] for t in trace.time]
         assert np.max(np.abs(trace[name] - wanted)) < 1e-5
+
+
+def test_inputs_of_components_are_arrays_of_their_shape(tmp_path):
+    text = """
+component mixer {
+  param n = 2
+  input u[0..n - 1]: V
+  output y = u[0] - 2*u[1]
+}
+model m {
+  state x[1..2]: V = 1 V
+  for i in 1..2 { dynamic x[i]' = -x[i]/(1 s*i) }
+  A: mixer() u = x
+  B: mixer(u = [x[2], 3 V])
+}
+scene s of m { time 0 s to 2 s; trace A.y as a, B.y as b every 0.1 s }
+"""
+    trace = run(tmp_path, text)
+    assert np.max(np.abs(trace["a"] - (np.exp(-trace.time) - 2 * np.exp(-trace.time / 2)))) < 1e-6
+    assert np.max(np.abs(trace["b"] - (np.exp(-trace.time / 2) - 6))) < 1e-6
+    for wrong, code in (("x[1]", "E805"), ("[x[1], 3 V, x[2]]", "E805"), ("[x[1], 3 m]", "E207")):
+        assert codes(text.replace("u = x\n", f"u = {wrong}\n")) == [code]
+    one = text.replace("input u[0..n - 1]: V", "input u: V").replace("u[0] - 2*u[1]", "u")
+    assert set(codes(one)) == {"E805"}
