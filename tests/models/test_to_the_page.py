@@ -186,3 +186,55 @@ scene s of m { time 0 s to 2 s; trace A.y as a, B.y as b every 0.1 s }
         assert codes(text.replace("u = x\n", f"u = {wrong}\n")) == [code]
     one = text.replace("input u[0..n - 1]: V", "input u: V").replace("u[0] - 2*u[1]", "u")
     assert set(codes(one)) == {"E805"}
+
+
+STARS = """
+component star {
+  param n = 3
+  param R[1..n]: ohm
+  port c: electrical
+  port p[1..n]: electrical
+  for i in 1..n { r[i]: dissipator(e = R[i]*f) p[i] -> c }
+  let mean = sum(i in 1..n: p[i].e)/n
+}
+component half {
+  port q[1..3]: electrical
+  port c: electrical
+  S: star(R = [2 ohm, 4 ohm, 8 ohm]) c = c, p = q
+}
+component loads {
+  node a[1..3], c: electrical
+  for k in 1..2 { D[k]: half() c = c, q = a }
+  for i in 1..3 {
+    C[i]: potential(q = 1 F*e) a[i] -> ground
+    init C[i].e = 1 V*i
+  }
+  G: dissipator(e = 5 ohm*f) c -> ground
+}
+model m { for j in 1..2 { L[j]: loads() } }
+scene s of m { time 0 s to 1 s; trace L[1].a[1].e as x, L[2].D[2].S.mean as mean every 0.1 s }
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_ports_that_are_arrays(tmp_path, formulation):
+    trace = run(tmp_path, STARS, formulation=formulation)
+    g = np.array([1, 0.5, 0.25])
+    values, vectors = np.linalg.eigh(np.outer(g, g) / (g.sum() + 0.2) - np.diag(g))
+    wanted = np.array([vectors @ (np.exp(values * t) * (vectors.T @ [1.0, 2.0, 3.0])) for t in trace.time])
+    assert np.max(np.abs(trace["x"] - wanted[:, 0])) < 1e-6
+    assert np.max(np.abs(trace["mean"] - wanted.mean(axis=1))) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("c = c, q = a", "c = c, q = c"),
+        ("node a[1..3]", "node a[0..3]"),
+        ("p[i] -> c }", "p -> c }"),
+        ("p[i] -> c }", "p[i] -> c[i] }"),
+        ("p[i].e)/n", "c[i].e)/n"),
+    ],
+)
+def test_what_is_wrong_with_an_array_of_ports_is_said(right, wrong):
+    assert "E805" in codes(STARS.replace(right, wrong))
