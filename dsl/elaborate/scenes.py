@@ -118,15 +118,20 @@ class SceneReader:
         near = nearest(shown, (*self.model.parts.parameters, *self.model.parts.inputs))
         message = f"'{shown}' is not a parameter or input of model '{self.model.model.name.name}'"
         help_ = f"nearest: '{near}'" if near else "init sets initial values" if symbol is not None else None
+        if name in self.model.parts.inputs:
+            help_ = f"the whole: set {name} = [a, b, ...]"
         raise self.resolver.fail("E910", message, s.target.span, help=help_)
 
     def _set_input(self, name: str, unit: Unit, place: Place, s: syntax.Set) -> None:
         value = self._bare(s.value, unit.dimension)
         self.model.parts.parameters.pop(name, None)
         space = self.model.space
+        shape = getattr(space.scope.symbols[name], "shape", ())
         if self.resolver.source is not space.source:  # the command line has a text of its own
             space = Space("", space.scope, space.file_scope, self.resolver.source)
-        self.model.define_input(Definition(name, "input", value, (), unit.dimension, space, place, s.span))
+        self.model.define_input(
+            Definition(name, "input", value, (), unit.dimension, space, place, s.span, shape=shape)
+        )
 
     def _bare(self, value: syntax.Expr, dimension: Dimension) -> syntax.Expr:
         """On the command line a bare number is in SI units."""
@@ -177,9 +182,12 @@ class SceneReader:
             raise self.resolver.fail("E207", message, s.value.span, help=help_)
         for inner in ex.topological([value.node]):
             if inner.op in ("var", "time"):
-                message = f"parameter '{symbol.name}' is set to something that depends on '{inner}'"
+                varies = symbol.name in self.model.parts.inputs
+                what = f"an element of input '{symbol.name}'" if varies else f"parameter '{symbol.name}'"
+                message = f"{what} is set to something that depends on '{inner}'"
+                help_ = f"the whole: set {symbol.name} = [a, b, ...]" if varies else None
                 raise self.resolver.fail(
-                    "E807", message, s.value.span, help="a parameter is a constant; an input may vary"
+                    "E807", message, s.value.span, help=help_ or "a parameter is a constant; an input may vary"
                 )
 
     # -- span and numbers ----------------------------------------------------------------------------------

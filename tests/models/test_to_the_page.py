@@ -238,3 +238,50 @@ def test_ports_that_are_arrays(tmp_path, formulation):
 )
 def test_what_is_wrong_with_an_array_of_ports_is_said(right, wrong):
     assert "E805" in codes(STARS.replace(right, wrong))
+
+
+FED = """
+model m {
+  param n = 3
+  param tau[1..n]: s = [1 s, 2 s, 0.5 s]
+  input u[1..n]: V = [1 V, 2 V, 3 V]
+  input w[1..n]: V = 1 V
+  input k[1..2]: V = [1 V*t/(1 s), 2 V]
+  input f[0..1]: V
+  state z[1..n]: V = 0 V
+  for i in 1..n { dynamic z[i]' = (u[i]*w[i]/(1 V) - z[i])/tau[i] }
+  let total = sum(i in 1..n: u[i]*i)
+  let signals = k[1] + k[2] + 10*f[0] + f[1]
+}
+scene s of m {
+  time 0 s to 1 s
+  set u[2] = 4 V
+  set f = [1 V*t/(1 s), 2 V]
+  trace z[2] as z, total, signals every 0.1 s
+}
+"""
+
+
+@pytest.mark.parametrize("weight", [1, 10])
+def test_inputs_of_a_model_are_arrays(tmp_path, weight):
+    trace = run(tmp_path, FED, set={"w[2]": weight})
+    assert off(trace, "z", lambda t: 4 * weight * (1 - np.exp(-t / 2))) < 1e-6
+    assert off(trace, "total", lambda t: 18.0) < 1e-12
+    assert off(trace, "signals", lambda t: 11 * t + 4) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "code"),
+    [
+        ("  set f = [1 V*t/(1 s), 2 V]\n", "", "E904"),
+        ("set u[2] = 4 V", "set u = [1 V, 2 V]", "E805"),
+        ("set u[2] = 4 V", "set u[2] = 4 V*t/(1 s)", "E807"),
+        ("set u[2] = 4 V", "set u[4] = 4 V", "E805"),
+        ("set u[2] = 4 V", "set u = 4 A", "E207"),
+        ("set u[2] = 4 V", "set k[2] = 4 V", "E910"),
+        ("[1 V*t/(1 s), 2 V]\n  input", "1 V*t/(1 s)\n  input", "E805"),
+    ],
+)
+def test_what_is_wrong_with_an_array_of_inputs_is_said(right, wrong, code):
+    assert right in FED
+    assert code in codes(FED.replace(right, wrong))
