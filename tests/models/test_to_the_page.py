@@ -285,3 +285,49 @@ def test_inputs_of_a_model_are_arrays(tmp_path, weight):
 def test_what_is_wrong_with_an_array_of_inputs_is_said(right, wrong, code):
     assert right in FED
     assert code in codes(FED.replace(right, wrong))
+
+
+SET = """
+model m {
+  param n = 4
+  param a[1..4]: kg = 1 kg
+  param b[1..2, 1..2]: kg = 1 kg
+  param c[1..n]: kg = 1 kg
+  coord x[1..2]: translation = 1 m
+  energy T* = sum(i in 1..2: 1/2*1 kg*x[i]'^2)
+  let sa = a[1] + 10*a[2] + 100*a[3] + 1000*a[4]
+  let sb = b[1, 1] + 10*b[1, 2] + 100*b[2, 1] + 1000*b[2, 2]
+  let sc = c[1] + 10*c[2] + 100*c[3] + 1000*c[4]
+}
+scene s of m { time 0 s to 1 s; set STATEMENT; trace sa, sb, sc, x[1..2]; accuracy 1e-5 on x[1..2] }
+"""
+
+
+@pytest.mark.parametrize(
+    ("statement", "sums"),
+    [
+        ("a[1..2] = 5 kg", (1155, 1111, 1111)),
+        ("a[2..3] = [5 kg, 6 kg]", (1651, 1111, 1111)),
+        ("a[1..4] = 3 kg", (3333, 1111, 1111)),
+        ("b[1, 1..2] = 5 kg", (1111, 1155, 1111)),
+        ("b[1..2, 1] = [5 kg, 6 kg]", (1111, 1615, 1111)),
+        ("b[1..2, 1..2] = 4 kg", (1111, 4444, 1111)),
+        ("c[2..n] = 7 kg", (1111, 1111, 7771)),
+        ("c[n] = 7 kg; set c = 2 kg", (1111, 1111, 7222)),
+    ],
+)
+def test_a_range_of_a_parameter_is_set_and_no_more(tmp_path, statement, sums):
+    trace = run(tmp_path, SET.replace("STATEMENT", statement), accuracy=None)
+    assert [trace[name][0] for name in ("sa", "sb", "sc")] == list(sums)
+
+
+def test_the_command_line_wins_over_elements_that_the_scene_sets(tmp_path):
+    text = SET.replace("STATEMENT", "a[1] = 7 kg")
+    assert run(tmp_path, text, accuracy=None, set={"a": "5"})["sa"][0] == 5555
+    assert run(tmp_path, text, accuracy=None, set={"a[1..2]": "5"})["sa"][0] == 1155
+    assert run(tmp_path, text, accuracy=None, set={"a[4]": "5"})["sa"][0] == 5117
+
+
+@pytest.mark.parametrize("statement", ["a[3..5] = 1 kg", "a[1..2] = [1 kg, 2 kg, 3 kg]", "b[1..2] = 1 kg"])
+def test_a_range_that_does_not_fit_is_said(statement):
+    assert codes(SET.replace("STATEMENT", statement)) == ["E805"]
