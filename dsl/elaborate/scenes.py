@@ -101,6 +101,12 @@ class SceneReader:
         """`set ref = value` of a parameter or an element of one; paths lead into instances."""
         if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
             return
+        path = s.target.base if isinstance(s.target, syntax.Item) else s.target
+        if ranges_of(path):  # a range of components
+            for target, _ in self._each_of(path):
+                whole = replace(s.target, base=target) if isinstance(s.target, syntax.Item) else target
+                self.set_parameter(replace(s, target=whole))
+            return
         found = self.resolver.located(s.target)
         symbol = None if found is None else found.symbol
         if isinstance(symbol, Unsupported):
@@ -153,6 +159,10 @@ class SceneReader:
         at: list[tuple[Node, ...]] = [(n,) for n in around]
         if around or not self._all(parameter, found.indices):
             at += [self._chosen(symbol, i) for i in found.indices]
+        if around and not found.indices:  # of a component in an array: each element
+            bounds = ([self.model.given(ex.substitute(b, found.change)) for b in pair] for pair in symbol.shape)
+            at += [tuple(ex.const(float(k)) for k in range(round(a.data), round(b.data) + 1)) for a, b in bounds
+                   if ex.is_const(a) and ex.is_const(b)]  # fmt: skip
         nodes = tuple(i.node for i in items)
         if symbol.truth:
             nodes = (ex.conditional(nodes[0], ex.const(1.0), ex.const(0.0)),)

@@ -331,3 +331,38 @@ def test_the_command_line_wins_over_elements_that_the_scene_sets(tmp_path):
 @pytest.mark.parametrize("statement", ["a[3..5] = 1 kg", "a[1..2] = [1 kg, 2 kg, 3 kg]", "b[1..2] = 1 kg"])
 def test_a_range_that_does_not_fit_is_said(statement):
     assert codes(SET.replace("STATEMENT", statement)) == ["E805"]
+
+
+CELLS = """
+component cell {
+  param R = 1 ohm
+  param k[1..2] = 1
+  port a: electrical
+  r: dissipator(e = R*(k[1] + 10*k[2])/11*f) a -> ground
+}
+model m {
+  node v[1..3]: electrical
+  for i in 1..3 {
+    X[i]: cell() a = v[i]
+    C[i]: potential(q = 1 F*e) v[i] -> ground
+    init C[i].e = 1 V
+  }
+}
+scene s of m { time 0 s to 1 s; set STATEMENT; trace X[1..3].r.f as i }
+"""
+
+
+@pytest.mark.parametrize(
+    ("statement", "ohms"),
+    [
+        ("X[1..2].R = 7 ohm", (7, 7, 1)),
+        ("X[3].R = 7 ohm", (1, 1, 7)),
+        ("X[2..3].k = [11, 22]", (1, 21, 21)),
+        ("X[1].k = 5", (5, 1, 1)),
+        ("X[1..2].k[1] = 12", (2, 2, 1)),
+        ("X[1..2].k[1..2] = 4", (4, 4, 1)),
+    ],
+)
+def test_parameters_of_a_range_of_components_are_set(tmp_path, statement, ohms):
+    trace = run(tmp_path, CELLS.replace("STATEMENT", statement))
+    assert [trace[f"i[{k}]"][0] for k in (1, 2, 3)] == pytest.approx([1 / r for r in ohms], rel=1e-12)
