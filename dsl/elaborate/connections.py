@@ -154,6 +154,8 @@ class Connections(Statements):
             raise self.resolver.fail("E407", f"'{self._text(e)}' is no node", e.span)
         match symbol:
             case PortSymbol():
+                if found.indices:
+                    raise self.resolver.index_count(symbol.name, 0, len(found.indices), e.span)
                 end = symbol.end
                 return End(end.node, tuple(ex.substitute(a, found.change) for a in end.at), end.domain)
             case NodeSymbol():

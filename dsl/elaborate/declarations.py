@@ -25,6 +25,7 @@ from sysdyn.dsl.names.symbols import (
     ParameterSymbol,
     PortSymbol,
     UnknownSymbol,
+    Vector,
     nearest,
 )
 from sysdyn.dsl.text.diagnostics import Related, Report
@@ -206,23 +207,22 @@ class Declarations(Parameters):
         decl = statement.decl
         unit = self.unit(statement.unit)
         place = self.place(decl.span)
-        if decl.indices:
-            raise self.resolver.fail("N608", f"an array of inputs ('{decl.name}') is not supported yet", decl.span)
+        shape = self.shape(decl)
         self.parts.inputs[decl.name] = (unit, place)
         self.resolver.inputs.add(decl.name)
         if statement.value is None:
-            self.enter(ParameterSymbol(decl.name, self.current.family(decl.name), unit.dimension, False, place))
-            self.parts.parameters[decl.name] = Parameter(decl.name, (), unit, (), (), place)
+            self.enter(ParameterSymbol(decl.name, self.current.family(decl.name, shape), unit.dimension, False, place))
+            self.parts.parameters[decl.name] = Parameter(decl.name, shape, unit, (), (), place)
         else:
             definition = Definition(
-                decl.name, "input", statement.value, (), unit.dimension, self.current, place, decl.span
+                decl.name, "input", statement.value, (), unit.dimension, self.current, place, decl.span, shape=shape
             )
             self.enter(definition)
             self.define_input(definition)
 
     def define_input(self, definition: Definition) -> None:
         """Give an input its value; one that holds a constant is a run-time value: setting it compiles nothing."""
-        name = definition.name
+        name, shape = definition.name, definition.shape
         self.scope.symbols[name] = definition
         if not self._is_constant(definition.expression):
             return
@@ -230,12 +230,21 @@ class Declarations(Parameters):
         try:
             with self.resolver.space(definition.space):
                 message = f"input '{name}' is declared {dim.show(unit.dimension)} but set to {{}}"
-                value = self.resolver.wanted(definition.expression, unit.dimension, "E207", message)
+                found = self.resolver.resolve(definition.expression) if shape else None
+                if isinstance(found, Vector):
+                    items = found.items
+                    if len(shape) != 1 or not self.fits(shape, len(items)):
+                        message = f"input '{name}' has {len(items)} values, which do not fit its shape"
+                        raise self.resolver.fail("E805", message, definition.expression.span)
+                else:
+                    items = (self.resolver.scalar(definition.expression),)
+                written = definition.expression
+                values = tuple(self.resolver.fitting(i, written, unit.dimension, "E207", message) for i in items)
         except Failed:
             return
-        family = self.current.family(name)
+        family = self.current.family(name, shape)
         self.scope.symbols[name] = ParameterSymbol(name, family, unit.dimension, False, definition.place)
-        self.parts.parameters[name] = Parameter(name, (), unit, (value,), (), definition.place)
+        self.parts.parameters[name] = Parameter(name, shape, unit, values, (), definition.place)
 
     def _is_constant(self, expression: syntax.Expr) -> bool:
         """Whether an expression is made of numbers, parameters and constants only."""

@@ -20,6 +20,7 @@ from sysdyn.dsl.elaborate.moulds import Moulds, charge
 from sysdyn.dsl.elaborate.parameters import Argument
 from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.unit_variables import solve_units
+from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import LevelChoice
@@ -35,6 +36,7 @@ from sysdyn.dsl.names.symbols import (
     End,
     Family,
     InstanceSymbol,
+    NodeSymbol,
     PortSymbol,
     Scope,
     Space,
@@ -45,6 +47,10 @@ from sysdyn.dsl.text.diagnostics import Place, Related, Report
 from sysdyn.dsl.tree import syntax
 
 BUILTINS = (*ONE_PORTS, *TWO_PORTS)
+
+
+def _decl(statement: syntax.Port, name: str) -> syntax.Decl:
+    return next(d for d in statement.decls if d.name == name)
 
 
 def _range_text(bounds: tuple[Node, Node]) -> str:
@@ -185,6 +191,7 @@ class Instances(Elements):
                 assert isinstance(statement, syntax.Broken)
                 self.scope.broken |= statement.names
             self.declare_parameters(body, arguments)
+            self._port_shapes(s, head)
             self._required(s, component, head, arguments)
         if head.inputs:
             self._bind_inputs(s, space, head, inputs)
@@ -342,10 +349,40 @@ class Instances(Elements):
             message = f"'{word.name}' is not a domain"
             self.report.error("E202", message, Place(space.source, word.span))
             raise Failed
+        if _decl(head.ports[name], name).indices:
+            space.scope.symbols[name] = self._array_bound(s, name, wanted, value)
+            return
         bound_to = self.end(value, wanted)
         assert bound_to is not None
         self._same_domain(s, f"port '{name}'", wanted, bound_to, value)
         space.scope.symbols[name] = PortSymbol(name, bound_to, place)
+
+    def _array_bound(self, s: syntax.Instance, name: str, wanted: DomainSymbol, value: syntax.Expr) -> NodeSymbol:
+        """A port that is an array: the array of nodes that it is bound to, under the port's name."""
+        found = self.resolver.located(value)
+        symbol = None if found is None else found.symbol
+        if found is None or not isinstance(symbol, NodeSymbol) or found.indices or not symbol.family.shape:
+            message = f"port '{name}' of '{s.decl.name}' is an array, '{self._text(value)}' is no array of nodes"
+            raise self.resolver.fail("E805", message, value.span, help=f"node a[1..3]: {wanted.name}, and {name} = a")
+        own, place = symbol.family, self.place(value.span)
+        prefix = tuple(ex.substitute(a, found.change) for a in own.prefix)
+        node = NodeSymbol(name, Family(own.name, prefix, own.around, own.shape), symbol.domain, place)
+        self._same_domain(s, f"port '{name}'", wanted, End(node, (), symbol.domain), value)
+        return node
+
+    def _port_shapes(self, s: syntax.Instance, head: Interface) -> None:
+        """E805: ports that are arrays have the bounds of the nodes that they are bound to."""
+        for name, statement in head.ports.items():
+            decl, symbol = _decl(statement, name), self.scope.symbols.get(name)
+            if not decl.indices or not isinstance(symbol, NodeSymbol):
+                continue
+            bounds = [tuple(map(self.given, b)) for b in self.shape(decl)]
+            others = [tuple(map(self.given, b)) for b in symbol.family.shape]
+            if bounds != others:
+                shown = [", ".join(f"{to_text(a)}..{to_text(b)}" for a, b in pairs) for pairs in (bounds, others)]
+                message = f"port '{name}' of '{s.decl.name}' runs over {shown[0]}, its nodes over {shown[1]}"
+                where = symbol.place
+                self.report.error("E805", message, where, help=f"nodes over {shown[0]}")
 
     def _bundle_bound(self, s: syntax.Instance, name: str, wanted: BundleSymbol, value: syntax.Expr) -> BundleNode:
         """A port of several nodes, bound to a bundle of the same members or to ground."""
@@ -407,6 +444,7 @@ class Instances(Elements):
         for name, statement in head.inputs.items():
             with self.entering(space):
                 dimension = self.unit(statement.unit).dimension
+                shape = tuple((self.given(a), self.given(b)) for a, b in self.shape(statement.decl))
             place = self.place(s.span)
             if name in inputs:
                 value, here, bound = inputs[name], self.current, tuple(sight.items())
@@ -414,5 +452,5 @@ class Instances(Elements):
                 assert statement.value is not None
                 value, here, bound = statement.value, space, ()
             space.scope.symbols[name] = Definition(
-                name, "input", value, (), dimension, here, place, value.span, bound=bound
+                name, "input", value, (), dimension, here, place, value.span, bound=bound, shape=shape
             )

@@ -261,7 +261,10 @@ class ElaborationContext:
         parameters = self.parts.parameters
         while True:
             known = {n: parameters[n.data] for n in ex.topological([node]) if n.op == "param" and n.data in parameters}
-            values = {n: p.values[0] for n, p in known.items() if not n.args and len(p.values) == 1}
+            single = {n: p.values[0] for n, p in known.items() if len(p.values) == 1}
+            values = {  # of arrays: what is alike in all elements
+                n: v for n, v in single.items() if not n.args or all(m.op != "index" for m in ex.topological([v]))
+            }
             if not values:
                 return node
             node = ex.substitute(node, values)

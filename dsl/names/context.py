@@ -267,15 +267,20 @@ class Context:
         """A scalar value or a condition."""
         value = self.resolve(expression)
         if isinstance(value, Vector):
-            raise self.fail("E203", "an array stands where one number is wanted", expression.span)
+            raise self._no_array(expression)
         return value
 
     def one_number(self, value: Value, expression: syntax.Expr) -> Typed:
         """A value found before, where one number is wanted; expression: where it was found."""
         if isinstance(value, Vector):
-            raise self.fail("E203", "an array stands where one number is wanted", expression.span)
+            raise self._no_array(expression)
         self.is_number(value, expression)
         return value
+
+    def _no_array(self, expression: syntax.Expr) -> Failed:
+        message = "an array stands where one number is wanted"
+        help_ = "an element of it: x[1]; sum(i in 1..n: x[i]), norm(x) and dot(x, y) make one number of all"
+        return self.fail("E203", message, expression.span, help=help_)
 
     def wanted(self, expression: syntax.Expr, dimension: Dimension, code: str, message: str) -> Node:
         """A scalar of one dimension; otherwise code with message (its {} is what was found)."""

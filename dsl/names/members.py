@@ -122,6 +122,8 @@ class Members(Quantities):
                 )
                 return self._changed(self.node_quantity(End(symbol, at, symbol.domain), e), base.change)
             case PortSymbol():
+                if base.indices:
+                    raise self.index_count(symbol.name, 0, len(base.indices), e.span)
                 if symbol.end.domain.common == "flow" and e.name == "e":  # not that of the whole node
                     raise self.no_member(shown, e, ("q", "f", "p"))
                 return self._changed(self.node_quantity(symbol.end, e), base.change)

@@ -256,7 +256,7 @@ class Names(Context):
         try:
             with self.space(symbol.space), self.bound({**dict(symbol.bound), **placeholders}):
                 value = self.resolve(symbol.expression)
-                self._declared(symbol, value)
+                value = self._declared(symbol, value)
                 if self.virtual and symbol.kind in ("output", "input"):
                     value = _signal(value)
         except SeveralError as several:
@@ -275,15 +275,28 @@ class Names(Context):
         self._values[key] = value
         return value
 
-    def _declared(self, symbol: Definition, value: Value) -> None:
-        if symbol.dimension is None or not isinstance(value, Typed) or value.dimension in (None, symbol.dimension):
-            return
-        message = (
-            f"{symbol.kind} '{symbol.name}' is declared {dim.show(symbol.dimension)} "
-            f"but set to {dim.show(value.dimension)}"
-        )
-        help_ = self.missing(value.dimension, symbol.dimension, symbol.expression)
-        raise self.fail("E207", message, symbol.expression.span, help=help_)
+    def _declared(self, symbol: Definition, value: Value) -> Value:
+        """A value as its declaration wants it: of its dimension (E207), an input's of its shape (E805)."""
+        items = value.items if isinstance(value, Vector) else (value,)
+        wrong = next((i.dimension for i in items if i.dimension not in (None, symbol.dimension)), None)
+        if symbol.dimension is not None and wrong is not None:
+            declared = dim.show(symbol.dimension)
+            message = f"{symbol.kind} '{symbol.name}' is declared {declared} but set to {dim.show(wrong)}"
+            help_ = self.missing(wrong, symbol.dimension, symbol.expression)
+            raise self.fail("E207", message, symbol.expression.span, help=help_)
+        if symbol.kind != "input" or (not symbol.shape and isinstance(value, Typed)):
+            return value
+        message = f"input '{symbol.name}' is one number, not an array"
+        if symbol.shape:
+            (first, last), *others = symbol.shape
+            size = last.data - first.data + 1 if ex.is_const(first) and ex.is_const(last) and not others else None
+            if isinstance(value, Vector) and size == len(items):
+                return Vector(value.items, int(first.data))
+            known = "of numbers" if size is None else f"of {size:g}"
+            found = f"{len(items)} of them" if isinstance(value, Vector) else "one number"
+            message = f"input '{symbol.name}' is an array {known}, found {found}"
+        help_ = "[a, b, ...]" if symbol.shape else "an element: x[1]"
+        raise self.fail("E805", message, symbol.expression.span, help=help_)
 
     # -- elements of arrays --------------------------------------------------------------------------------
 

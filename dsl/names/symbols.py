@@ -248,6 +248,7 @@ class Definition:
     span: syntax.Span
     implied: bool = False
     bound: tuple[tuple[str, Typed | Vector], ...] = ()  # loop variables in sight where it is read
+    shape: Shape = ()  # of an input that is an array
 
 
 @dataclass(frozen=True, slots=True)

@@ -120,7 +120,7 @@ def test_a_dynamic_variable_takes_the_unit_of_its_initial_value():
         ("coord x: translatoin", "E202", "'translatoin' is not a domain", "translatoin"),
         ("coord x: translation = 2 kg", "E207", "'x' is in m but starts at kg", "2 kg"),
         ("let y[1..3] = 2", "E806", "the elements of 'y' are given by one formula", "y[1..3]"),
-        ("input u[1..2]: V", "N608", "an array of inputs ('u') is not supported yet", "u[1..2]"),
+        ("input u[1..2]: V = [1 V]", "E805", "input 'u' has 1 values, which do not fit its shape", "[1 V]"),
         ("coord x: translation = 1 m; init x = 2 m", "E106", "'x' gets its initial value twice", "init x = 2 m"),
     ],
 )
