@@ -5,7 +5,8 @@ the time scale of the start (never the span alone: a long run would call everyth
 among unknowns of the same kind and unit.  That time is the shortest in which anything gets as far as it is, or as its
 like are where it is zero, unless it goes a thousand times as far (a particle near the speed of light beside a ball).
 Unknowns that are zero with all of that take the magnitude that balances the rows they stand in: the other terms
-of the row, and how far the row itself moves with t over the span (sources that start at zero).  Such a row knows
+of the row, and how far the row itself moves with t over the span (sources that start at zero).  What a steep law
+proposes is shortened to what it bears: its slope is that of one point (core/start/magnitudes.c).  Such a row knows
 nothing of what relieves it (the whole of a source on a diode would drive 1e8 A), and balances little where what drives
 it is round-off (a diode that blocks): those that carry the state lie within what the sources make of them by the time
 in which they move, or a thousandth of that of their like, and what by the whole span (core/start/response.h).
