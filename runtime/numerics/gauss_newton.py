@@ -32,8 +32,9 @@ EVALUATION = 1e6
 EACH = 40.0
 """Operations that an entry of the matrix takes in an evaluation."""
 _ITERATIONS = 60
-FOLDS = 709
-"""Iterations that an exponential, falling by e in each, takes from the largest number."""
+_FOLDS = 709
+"""Iterations that an exponential, falling by e in each, takes from the largest number: as long as rows shrink as fast
+as their terms do none is counted."""
 _HALVINGS = 12
 _LOST = 3
 """Directions one after the other along which no step makes the rows smaller: the next ones do not either."""
@@ -186,23 +187,20 @@ class _Linear:
         return stays + least_norm(self.shape, (i, j, v), aim, spent=True)
 
 
-def solve(problem: Problem, x: Floats, most: int = _ITERATIONS, folds: int = 0) -> Solution:
-    """From x towards the solution nearest to problem.guess; the best point met in so many iterations.
-
-    folds: iterations that are not counted while rows shrink as fast as their terms do.
-    """
+def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
+    """From x towards the solution nearest to problem.guess; the best point met in so many iterations."""
     if problem.core is not None and not problem.levels:
         small = max(int(problem.use.sum()), int(problem.free.sum())) <= SMALL
-        found = _in_core(problem, problem.core, x, (most, folds), measure=not small)
+        found = _in_core(problem, problem.core, x, most, measure=not small)
         if small or found.residual <= _ROUND_OFF:  # a large one that holds is not linearised
             return found
         del found
     with np.errstate(all="ignore"):  # what overflows is seen as not finite
-        return _solve(problem, x, most, folds)
+        return _solve(problem, x, most)
 
 
 def _in_core(
-    problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, limits: tuple[int, int], *, measure: bool
+    problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, most: int, *, measure: bool
 ) -> Solution:
     """The same of a small problem (core/start/search.h); measure: x as it is, of any."""
     found, scaled = x.copy(), np.zeros(problem.number)
@@ -211,7 +209,7 @@ def _in_core(
     numbers = lib.pointer(problem.guess), lib.pointer(problem.scale), lib.pointer(problem.weight)
     spent = work.share, work.spent, work.largest
     answers = lib.pointer(found), lib.pointer(scaled)
-    search = lib.Search(c.addressof(core[0]), *masks, *numbers, core[1], *limits, *spent, *answers)
+    search = lib.Search(c.addressof(core[0]), *masks, *numbers, core[1], most, *spent, *answers)
     if (lib.core.sd_search_measure if measure else lib.core.sd_search_solve)(c.byref(search)):
         raise MemoryError
     if problem.check is not None:
@@ -220,11 +218,11 @@ def _in_core(
     return Solution(found, search.residual, scaled)
 
 
-def _solve(problem: Problem, x: Floats, most: int, folds: int) -> Solution:
+def _solve(problem: Problem, x: Floats, most: int) -> Solution:
     x = x.copy()
     best = Solution(x, np.inf, np.full(problem.number, np.inf))
     stale, taken, lost = 0, 0, 0
-    for _ in range(most + folds):
+    for _ in range(most + _FOLDS):
         if taken == most or lost == _LOST:
             break
         taken += 1

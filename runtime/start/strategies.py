@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.gauss_newton import FOLDS, Solution, solve
+from sysdyn.runtime.numerics.gauss_newton import Solution, solve
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter, problem_of
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
@@ -135,7 +135,7 @@ def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     rows = _as_written(starter, t, x)
     with starter.granted(WALKED):
         for _ in range(_RESCALINGS):
-            found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x, folds=FOLDS)
+            found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
             if not np.isfinite(found.residual) or (found.x == x).all():
                 break
             x = found.x

@@ -15,6 +15,7 @@
 #define EACH 40.0
 #define HALVINGS 12
 #define LOST 3
+#define FOLDS 709
 #define ROUND_OFF 2e-15
 #define BESIDE 1e-8
 
@@ -213,7 +214,7 @@ static void iterate(sd_search *s, room *w, double *x)
 {
     size_t all = (size_t)s->start->balance.unknowns, rows = (size_t)s->start->balance.rows;
     int stale = 0, taken = 0, lost = 0;
-    for (int k = 0; k < s->most + s->folds && taken != s->most && lost != LOST; k++) {
+    for (int k = 0; k < s->most + FOLDS && taken != s->most && lost != LOST; k++) {
         taken++;
         linearise(s, x, w);
         count(s, w);

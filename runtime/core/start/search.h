@@ -32,7 +32,7 @@ typedef struct sd_search {
     const int32_t *use, *free;                      /* [rows], [unknowns] */
     const double *guess, *scale, *weight;           /* [unknowns] */
     double t;
-    int32_t most, folds;                            /* iterations; those not counted while rows shrink as their terms do */
+    int32_t most;                                   /* iterations, but for those in which rows shrink as their terms do */
     double share, spent, largest;                   /* of the work (least_change.Work) */
     double *x, *scaled;                             /* [unknowns], [rows]: the best point, from x, and its scaled rows */
     double residual;                                /* the largest of them */

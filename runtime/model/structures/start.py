@@ -67,7 +67,6 @@ class Search(c.Structure):
         ("weight", P),
         ("t", D),
         ("most", I),
-        ("folds", I),
         ("share", D),
         ("spent", D),
         ("largest", D),
