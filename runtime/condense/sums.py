@@ -77,7 +77,7 @@ class Straights:
         broken = np.zeros(number, dtype=bool)
         owner = np.repeat(np.arange(number, dtype=np.int32), count)
         broken[owner[~steps]] = True
-        begin = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
+        begin: NDArray[np.integer] = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
         unlike = np.zeros(number, dtype=bool)
         unlike[owner[inner][found.factor[inner] != found.factor[above[inner]]]] = True
         begin = self._cut(begin, unlike)
@@ -105,7 +105,7 @@ class Straights:
         self._long = [tuple(map(int, line)) for line in zip(long, entries, sizes, strict=True)]
 
     @staticmethod
-    def _cut(begin: Ints, unlike: Mask) -> Ints:
+    def _cut(begin: NDArray[np.integer], unlike: Mask) -> NDArray[np.integer]:
         """Where stretches begin, once long ones are cut where factors change, if these are few: an end of a line."""
         unlike[begin] = False
         changes = np.add.reduceat(unlike, begin, dtype=np.int64) if begin.size else begin

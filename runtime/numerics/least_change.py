@@ -80,7 +80,7 @@ def _to_size_one(i: Any, v: Floats, rows: int) -> Floats:
     np.maximum.at(largest, i, np.abs(v))
     power = np.ldexp(1.0, np.frexp(np.where(largest > EMPTY, largest, 1.0))[1])
     v /= power[i]
-    size = np.bincount(i, v * v, rows)
+    size = np.bincount(i, v * v, rows).astype(np.float64, copy=False)
     size = np.where(size > 0.0, np.sqrt(size), 1.0)
     v /= size[i]
     return size * power

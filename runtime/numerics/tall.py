@@ -65,9 +65,10 @@ def _columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> _Colum
     number = np.cumsum(used, dtype=np.int32) - 1
     if _in_order(i, j):
         begin = np.append(np.int32(0), np.cumsum(np.bincount(j, minlength=shape[1])[used], dtype=np.int32))
-        return _Columns(used, Pattern(rows, unknowns, begin, np.ascontiguousarray(i, dtype=np.int32)), v)
+        row, values = np.ascontiguousarray(i, dtype=np.int32), np.ascontiguousarray(v, dtype=np.float64)
+        return _Columns(used, Pattern(rows, unknowns, begin, row), values)
     pattern, (slot,) = compress(rows, unknowns, [Places(i, number[j])])
-    values: Floats = np.bincount(slot, weights=v, minlength=pattern.entries).astype(np.float64, copy=False)
+    values = np.bincount(slot, weights=v, minlength=pattern.entries).astype(np.float64, copy=False)
     return _Columns(used, pattern, values)
 
 
@@ -83,7 +84,9 @@ def determined(
     not `met`: rows in excess are not looked at.  By factors where rows do not determine one unknown after the other.
     """
     columns = _columns(shape, entries, fewer=False)
-    for way in (_substituted, _factored) if columns is not None else ():
+    if columns is None:
+        return None
+    for way in (_substituted, _factored):
         found = np.zeros(columns.pattern.unknowns)
         failed = way(shape[0], columns, aim, found)
         if failed == MEMORY:
