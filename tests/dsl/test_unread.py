@@ -93,7 +93,8 @@ def test_a_lost_item_that_a_model_does_without(tmp_path, capsys):
 
 @pytest.mark.parametrize("slip", ["0.5zork", "0.5output", "10k"])
 def test_a_law_whose_number_cannot_be_read_is_told_of_that_alone(slip):
-    text = f"model m {{ state x: m = 1 m; dynamic x' = 1 m/s*({slip} + 1) }}\nscene s of m {{ time 0 s to 1 s; trace x }}"
+    model = f"model m {{ state x: m = 1 m; dynamic x' = 1 m/s*({slip} + 1) }}"
+    text = f"{model}\nscene s of m {{ time 0 s to 1 s; trace x }}"
     assert [d.code for d in api.check(text)] == ["E114"]
 
 
