@@ -319,6 +319,12 @@ class Scope:
             scope = scope.outer
         return scope
 
+    def miss(self) -> None:
+        """A part of the text could not be read, which has been said."""
+        scope: Scope | None = self
+        while scope is not None:
+            scope.missed, scope = True, scope.outer
+
     def is_broken(self, name: str) -> bool:
         """Whether the name stands in a statement that could not be read."""
         scope: Scope | None = self

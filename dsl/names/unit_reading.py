@@ -41,6 +41,9 @@ def _read(
         declared = scope.unit(factor.name)
         found = (declared.dimension, declared.scale) if declared else known(factor.name)
         if found is None:
+            if source.text[unit.span.start - 1 : unit.span.start].isalnum():
+                scope.miss()  # grown to its number, as in 10k: that has been said (E114)
+                return None
             in_sight = factor.name in bound or scope.find(factor.name) is not None
             _unknown(unit, factor, in_sight, Place(source, factor.span), report)
             return None
@@ -66,8 +69,6 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
             help="write the unit itself",
         )
         return
-    if place.source.text[unit.span.start - 1 : unit.span.start].isalnum():
-        return  # grown to its number, as in 10k: that has been said (E114)
     message = f"'{factor.name}' is not a unit, in '{unit.text}'"
     help_: str | None
     edit = None

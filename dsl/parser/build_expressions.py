@@ -81,6 +81,7 @@ def reduction(v: Values, span: Span, notes: Notes) -> s.Reduction | s.Call:
             operation.span,
             "sum, prod, min or max(i in 1..n: ...)",
         )
+        operation = s.Word("sum", operation.span)  # as one of them it is read on
     notes.declared(index)
     return s.Reduction(operation.name, index, bounds.lower, bounds.upper, body, span)
 

@@ -119,7 +119,7 @@ def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...]
         return (), -1
     null = np.abs(columns).max(axis=1)
     names = tuple(system.name(int(k)) for k in np.flatnonzero(null > 1e-6 * null.max()))
-    return names, int(np.argmax(np.abs(rows[-1])))
+    return names, int(np.argmax(np.abs(rows[-1]))) if rows.size else -1
 
 
 def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:

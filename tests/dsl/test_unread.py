@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from sysdyn import api
 from sysdyn.cli.main import run
 
 WHOLE = """const big = 2
@@ -88,3 +89,15 @@ def test_a_lost_item_that_a_model_does_without(tmp_path, capsys):
     assert code == 1
     assert found == ["E113"]
     assert "turn of drum: ok" in err
+
+
+@pytest.mark.parametrize("slip", ["0.5zork", "0.5output", "10k"])
+def test_a_law_whose_number_cannot_be_read_is_told_of_that_alone(slip):
+    model = f"model m {{ state x: m = 1 m; dynamic x' = 1 m/s*({slip} + 1) }}"
+    text = f"{model}\nscene s of m {{ time 0 s to 1 s; trace x }}"
+    assert [d.code for d in api.check(text)] == ["E114"]
+
+
+def test_a_reduction_that_there_is_not_is_told_of_that_alone():
+    text = "model m { coord x[1..2]: translation; energy T* = pi(i in 1..2: 1/2*1 kg*x[i]'^2) }"
+    assert [d.code for d in api.check(text) if d.severity == "error"] == ["E113"]
