@@ -132,7 +132,8 @@ def test_quiet_silences_no_refusal(duffing, tmp_path, capsys):
     assert "E921" in capsys.readouterr().err
     assert run(["simulate", str(duffing), "-o", out, "--quiet", "--rtol", "0.2", "--method", "bdf", "--json"]) == 3
     assert json.loads(capsys.readouterr().out)["exit"] == 3
-    duffing.write_text(duffing.read_text().replace("  init x'", "  discrete g[1..2] = 0\n  init x'"))
+    ahead = "  implicit e: N ~ 1 N\n  work e on x\n  gamma push: e >= 1 N\n  init x'"
+    duffing.write_text(duffing.read_text().replace("  init x'", ahead))
     assert run(["simulate", str(duffing), "-o", out, "--quiet"]) == 1
     assert "E608" in capsys.readouterr().err
 
