@@ -12,7 +12,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Action, Event, Switch
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.events.plan import Assignment, Condition, Contact, Happened, Kink, Plan, Relation, Sampled, When
-from sysdyn.runtime.model.description import RowFamily
+from sysdyn.runtime.model.description import RowFamily, position_of
 from sysdyn.runtime.model.system import System
 
 ZENO = 8
@@ -109,7 +109,8 @@ class _Planner:
             raise ModelError([Diagnostic("E702", text, action.place)])
         first, shape = self.unknown[name, kind]
         shown = _shown(name, target) + "'" * (kind == "f")
-        return Assignment(shown, "state" if kind == "s" else "flow", first + _position(target, shape), row)
+        place = first + position_of(shape, (n.data for n in target.args))
+        return Assignment(shown, "state" if kind == "s" else "flow", place, row)
 
     def parameter(self, node: Node) -> int:
         """The place in p of a parameter, or of an element of one."""
@@ -118,7 +119,7 @@ class _Planner:
             return compiled.program.scalars.index(node.data)
         boxes = binding.parameters.boxes[node.data]
         where = places_of(compiled.network, compiled.form, compiled.program, binding)[1][node.data]
-        return where + _position(node, boxes)
+        return where + position_of(boxes, (n.data for n in node.args))
 
     def _contact(self, number: int, s: Switch) -> Contact:
         def row(name: str | None) -> int:
@@ -134,14 +135,6 @@ class _Planner:
             row(s.upper), row(s.lower), sense, row(s.guard), restitution,
             tuple(self.row[name] for name in s.aim), tuple(self.parameter(n) for n in s.direction),
         )  # fmt: skip
-
-
-def _position(node: Node, shape: Sequence[tuple[int, int]]) -> int:
-    """Where an element stands in its family, row by row."""
-    position = 0
-    for at, (first, last) in zip(node.args, shape, strict=True):
-        position = position * (last - first + 1) + round(at.data) - first
-    return position
 
 
 def _shown(name: str, node: Node) -> str:

@@ -231,14 +231,11 @@ class Declarations(Parameters):
             with self.resolver.space(definition.space):
                 message = f"input '{name}' is declared {dim.show(unit.dimension)} but set to {{}}"
                 found = self.resolver.resolve(definition.expression) if shape else None
-                if isinstance(found, Vector):
-                    items = found.items
-                    if len(shape) != 1 or not self.fits(shape, len(items)):
-                        message = f"input '{name}' has {len(items)} values, which do not fit its shape"
-                        raise self.resolver.fail("E805", message, definition.expression.span)
-                else:
-                    items = (self.resolver.scalar(definition.expression),)
                 written = definition.expression
+                items = found.items if isinstance(found, Vector) else (self.resolver.scalar(written),)
+                if not self.fills(found, shape):
+                    what = f"input '{name}' has {len(items)} values, which do not fit its shape"
+                    raise self.resolver.fail("E805", what, written.span)
                 values = tuple(self.resolver.fitting(i, written, unit.dimension, "E207", message) for i in items)
         except Failed:
             return

@@ -92,7 +92,7 @@ def discrete(frame: ElaborationContext, s: syntax.Discrete) -> None:
             message = f"the initial value of '{decl.name}' depends on '{inner}'"
             raise resolver.fail("E807", message, s.value.span, help="parameters, constants and t only")
     shape, place = frame.shape(decl), frame.place(decl.span)
-    if isinstance(found, Vector) and (len(shape) != 1 or not frame.fits(shape, len(items))):
+    if not frame.fills(found, shape):
         message = f"'{decl.name}' has {len(items)} values, which do not fit its shape"
         raise resolver.fail("E805", message, s.value.span)
     family = frame.current.family(decl.name, shape)

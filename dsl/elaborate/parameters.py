@@ -125,7 +125,7 @@ class Parameters(ElaborationContext):
         items = value.items if isinstance(value, Vector) else (value,)
         for item in items:
             self._is_run_constant(item.node, statement)
-        if isinstance(value, Vector) and (len(shape) != 1 or not self.fits(shape, len(items))):
+        if not self.fills(value, shape):
             message = f"'{statement.decl.name}' has {len(items)} values, which do not fit its shape"
             raise self.resolver.fail("E805", message, self._where(statement))
         what = "default" if written is statement.value else "argument"

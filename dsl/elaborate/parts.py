@@ -37,7 +37,7 @@ from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.resolve import Resolver
-from sysdyn.dsl.names.symbols import ConstraintSymbol, Scope, Space, Symbol
+from sysdyn.dsl.names.symbols import ConstraintSymbol, Scope, Space, Symbol, Vector
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
 from sysdyn.dsl.tree import syntax
@@ -249,12 +249,16 @@ class ElaborationContext:
         highs = {n: loop.last for n, loop in used.items()}
         return ex.substitute(node, lows), ex.substitute(node, highs)
 
-    def fits(self, shape: Shape, count: int) -> bool:
-        """Whether a list of that length fills a shape."""
+    def fills(self, value: object, shape: Shape) -> bool:
+        """Whether a value fills a shape: a list that of as many in a row, another any."""
+        if not isinstance(value, Vector):
+            return True
+        if len(shape) != 1:
+            return False
         first, last = (self.given(node) for node in shape[0])
         if not (ex.is_const(first) and ex.is_const(last)):
             return False
-        return int(last.data) - int(first.data) + 1 == count
+        return int(last.data) - int(first.data) + 1 == len(value.items)
 
     def given(self, node: Node) -> Node:
         """A bound with the parameters that the instance gives."""

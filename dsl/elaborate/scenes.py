@@ -177,9 +177,7 @@ class SceneReader:
             given = nodes if isinstance(value, Vector) else nodes * len(elements)
             self.elements += [ElementSetting(parameter.name, a, n, place) for a, n in zip(elements, given, strict=True)]
             return
-        if isinstance(value, Vector) and (
-            len(parameter.shape) != 1 or not self.model.fits(parameter.shape, len(items))
-        ):
+        if not self.model.fills(value, parameter.shape):
             message = f"'{symbol.name}' is given {len(items)} values, which do not fit its shape"
             raise self.resolver.fail("E805", message, s.value.span)
         if self.resolver.source is not self.model.source:  # the command line wins over the scene's elements

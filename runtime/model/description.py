@@ -7,7 +7,7 @@ hands on a `Description`: unknown families, row families, blocks with their kern
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
 from weakref import WeakValueDictionary
@@ -65,6 +65,14 @@ def element(name: str, shape: Shape, position: int) -> str:
         position, rest = divmod(position, last - first + 1)
         index.append(str(first + rest))
     return f"{name}[{', '.join(reversed(index))}]"
+
+
+def position_of(shape: Shape, at: Iterable[float]) -> int:
+    """The row-major position of the element with these indices, which `element` names."""
+    position = 0
+    for index, (first, last) in zip(at, shape, strict=True):
+        position = position * (last - first + 1) + round(index) - first
+    return position
 
 
 Elements = Sequence[tuple[str, str, int]]
@@ -367,7 +375,4 @@ def _again(before: Description, binding: Mapping[str, Any]) -> Description:
 def _switched(item: Mapping[str, Any], families: Sequence[Mapping[str, Any]], shapes: list[Shape]) -> tuple[int, int]:
     """Family and position of the multiplier of a constraint that holds at times."""
     family = next(k for k, f in enumerate(families) if f["kind"] in ("kappa", "mu") and f["owner"] == item["owner"])
-    position = 0
-    for value, (first, last) in zip(item["at"], shapes[family], strict=True):
-        position = position * (last - first + 1) + (int(value) - first)
-    return family, position
+    return family, position_of(shapes[family], item["at"])

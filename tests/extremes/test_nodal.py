@@ -16,35 +16,46 @@ LONG = bool(os.environ.get("SYSDYN_LONG"))
 SEEDS = range(60) if LONG else (3, 4, 20, 48)
 
 
+class Compared:
+    """A circuit over two periods, and what the other equations make of it; None where they stop."""
+
+    def __init__(self, seed):
+        self.circuit = rectifier(seed)
+        self.end = 2.0 / self.circuit.frequency
+        self.instants = np.linspace(0.0, self.end, 101)
+        nodal = Nodal(self.circuit)
+        found = nodal.run(self.instants, 1e-7, 1 / 300)
+        self.traced = None if found is None else nodal.traced(found)
+
+    def run(self, folder, **options):
+        return ran(folder, self.circuit.text(ACCURACY, self.end), **options)
+
+    def off(self, run):
+        """Of each quantity, of its largest value; behind the first row."""
+        for name, exact in self.traced.items():
+            yield name, np.abs(run.at(name, self.instants) - exact)[1:].max() / np.abs(exact).max()
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_is_met_is_right(tmp_path, seed):
     """Behind the first row, where currents of coils that no text fixes may be what they like."""
-    circuit = rectifier(seed)
-    end = 2.0 / circuit.frequency
-    instants = np.linspace(0.0, end, 101)
-    nodal = Nodal(circuit)
-    found = nodal.run(instants, 1e-7, 1 / 300)
-    assert LONG or found is not None
-    if found is None:
+    made = Compared(seed)
+    assert LONG or made.traced is not None
+    if made.traced is None:
         pytest.skip("the other equations stop")
     for formulation in FORMS:
-        run = ran(tmp_path, circuit.text(ACCURACY, end), formulation=formulation, max_wall="20")
+        run = made.run(tmp_path, formulation=formulation, max_wall="20")
         if run.refused or not run.met:
             assert LONG, f"{formulation}: {run.refused}"  # those of the slice are done in every formulation
             continue
-        for name, exact in nodal.traced(found).items():
-            off = np.abs(run.at(name, instants) - exact)[1:].max() / np.abs(exact).max()
+        for name, off in made.off(run):
             assert off < 3 * ACCURACY, (formulation, name)
 
 
 def test_constraints_by_their_derivatives(tmp_path):
     """What the last method of auto makes of the node that blocked diodes leave: it was met, and carried no current."""
-    circuit = rectifier(20)
-    end = 2.0 / circuit.frequency
-    instants = np.linspace(0.0, end, 101)
-    nodal = Nodal(circuit)
-    found = nodal.run(instants, 1e-7, 1 / 300)
-    run = ran(tmp_path, circuit.text(ACCURACY, end), formulation="lagrangian", method="radau", index="1")
+    made = Compared(20)
+    run = made.run(tmp_path, formulation="lagrangian", method="radau", index="1")
     assert run.met
-    for name, exact in nodal.traced(found).items():
-        assert np.abs(run.at(name, instants) - exact)[1:].max() < 3 * ACCURACY * np.abs(exact).max()
+    for name, off in made.off(run):
+        assert off < 3 * ACCURACY, name

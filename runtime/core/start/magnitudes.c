@@ -10,7 +10,6 @@
 #define BORNE 1e3       /* times what balances a steep row, or what it is at the point: what a proposal may make of it */
 #define TENTH 0.1       /* of a proposal that a steep law does not bear: the next one */
 #define SHORTER 320     /* of them: from the largest double to one */
-#define SPREAD 0.6180339887498949
 
 /* small [entries] := 1 where a coefficient is small beside the largest of its row and kind, 2 where it is none; line [rows]: room.  Entries of
  * a kind lie beside each other, for unknowns do. */
@@ -80,7 +79,7 @@ static void slopes_beside(const sd_balance *m, const sd_bearing *bearing, int wa
 {
     double apart = 0.0;
     for (int32_t k = 0; k < m->unknowns; k++) {
-        apart = fmod(apart + SPREAD, 1.0);
+        apart = sd_next_part(apart);
         int proposed = found[k] == 0.0 && isfinite(best[k]);
         moved[k] = bearing->y[k] + (proposed ? way * (1.0 + apart) * best[k] : 0.0);
     }

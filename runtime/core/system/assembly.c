@@ -16,7 +16,6 @@
 /* how far beside a root at zero its slope is taken: of an unknown's magnitude, and at least; the golden ratio's part */
 #define ROOT_BESIDE 1e-8
 #define ROOT_LEAST 1e-12
-#define ROOT_SPREAD 0.6180339887498949
 
 static inline void add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r)
 {
@@ -105,9 +104,9 @@ int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *
     int32_t bad = steep_beyond(system, jy, jyd);
     double *beside = bad < 0 ? NULL : malloc(((size_t)system->unknowns + SD_LANES) * sizeof *beside);
     for (int way = 1; way >= -1 && bad >= 0 && beside; way -= 2) {
-        double apart = 0.0; /* all by different parts, so that no difference of two stays at zero */
+        double apart = 0.0;
         for (int32_t j = 0; j < system->unknowns; j++) {
-            apart = fmod(apart + ROOT_SPREAD, 1.0);
+            apart = sd_next_part(apart);
             beside[j] = y[j] + way * (1.0 + apart) * (ROOT_BESIDE * fmax(fabs(y[j]), size ? size[j] : 0.0) + ROOT_LEAST);
         }
         evaluate_slopes(system, t, beside, yd, jy, jyd);

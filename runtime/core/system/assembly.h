@@ -24,6 +24,8 @@
 #include "linear/lanes.h"
 #include "system/contract.h"
 
+#include <math.h>
+
 typedef struct sd_call {
     sd_rows *rows;
     sd_entries *dy;
@@ -61,6 +63,13 @@ struct sd_system {
     const sd_left *left; /* the unknowns and rows are those that are left of another system; NULL: all are */
     int32_t together;    /* 1: its blocks may be called by several threads at once */
 };
+
+/* the part of one behind that of the unknown before, so that unknowns which are moved by 1 + part move apart from each other:
+ * steps of the golden ratio */
+static inline double sd_next_part(double part)
+{
+    return fmod(part + 0.6180339887498949, 1.0);
+}
 
 /* r := F(t, y, yd) */
 void sd_residual(sd_system *system, double t, const double *y, const double *yd, double *r);
