@@ -20,7 +20,7 @@ from pathlib import Path
 from sysdyn.compiler.program import cache as cache_
 
 # -O1: code as fast as -O2 on the benchmarks (Andrews 0.32 us a residual either way), compiled in 2/3 of the time
-FLAGS = ("-O1", "-std=c11", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno")
+FLAGS = ("-O1", "-std=c11", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno", "-fno-plt")
 
 
 FEW = 4096

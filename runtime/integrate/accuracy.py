@@ -46,7 +46,7 @@ DIFFER, FAR_OFF, DEEP, MORE, DEEPEST = 0.3, 10.0, 3.0, 1.7, 1e-6
 relaxation oscillation is lost), their tolerances less than these decades apart: the next one is then as small as
 takes MORE times the steps, by what the last drop cost, at least this part.  Where that has nothing in common with the
 run before either, a hundredth of it follows (with 2 times and without that van der Pol costs 1.03 of it)."""
-SLOWEST = 0.75
+SLOWEST = 0.6
 """The least power with which errors are taken to fall when the next tolerance is chosen."""
 STRETCH = 1.5
 """Of the longest step of a run over that of a finer one: where it, and not the tolerance, holds both, their steps still
@@ -188,7 +188,7 @@ def _shrink(law: Law, power: float, step: float) -> float:
     """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step larger; beyond
     law.far nothing more is credited.
     """
-    ratio = max(10.0 ** (-power * step), law.far**power)
+    ratio = max(10.0 ** (-power * step), law.far**law.credit)
     return float(law.safety * ratio / (1.0 - ratio))
 
 
