@@ -259,6 +259,30 @@ def test_a_replay_bears_scales_of_forty_decades(n):
     assert solver.linear.contents.replayed
 
 
+@pytest.mark.parametrize("n", [3, 40, 90])
+def test_columns_that_a_steep_law_leaves_open_are_seen_by_a_replay(n):
+    """A diode's slope ties two nodes to the ground while it conducts; where it underflows their common potential is
+    left, and determined again when it conducts once more.
+    """
+    rng = np.random.default_rng(n)
+    full = np.diag(rng.uniform(2.0, 3.0, n)) + np.diag(np.append([0.0], rng.uniform(-1.0, 1.0, n - 2)), 1)
+
+    def blocked(slope):
+        full[:2, :2] = [[2.0, -2.0], [-2.0, 2.0 + slope]]
+        return csc_array(full)
+
+    solver = replayed(blocked(1.0))
+    linear, idle = solver.linear.contents, (np.arange(n) == 1).astype(np.int32)
+    linear.null_pivot, linear.idle = 1e-290, lib.pointer(idle)
+    wanted = rng.normal(size=n)
+    wanted[1] = -wanted[0]  # the shortest
+    for slope, replays in ((1.0, 1), (1e3, 1), (1e-300, 0), (1.0, 1), (1e-6, 1), (0.0, 0), (1e8, 1), (3.0, 1)):
+        matrix = blocked(slope)
+        assert solver.factor(matrix.data, np.ones(n)) == 0
+        assert (linear.replayed, linear.rank) == (replays, n if replays else n - 1)
+        assert np.allclose(solver.solve(matrix @ wanted), wanted, rtol=1e-8, atol=0.0)
+
+
 def test_machine_code_and_interpreter_agree_to_the_bit():
     matrix = random_matrix(40, 3, 0.1)
     one, other = replayed(matrix), replayed(matrix, machine=False)

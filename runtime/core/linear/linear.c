@@ -185,10 +185,11 @@ void sd_linear_left(const sd_linear *linear, char *left)
             left[linear->dense ? linear->place[k] : linear->sparse->order[k]] = 1;
 }
 
-/* by the list of operations, if there is one and it serves; columns that steep laws may leave open want exchanges */
+/* by the list of operations, if there is one and it serves: a column that nothing determines has no pivot there, which shows.
+ * Where weak pivots are to be left, rows are exchanged */
 static int replay(sd_linear *linear, const sd_number *values, const double *scale)
 {
-    if (!linear->elimination || linear->idle || !sd_elimination_factor(linear->elimination, values, scale))
+    if (!linear->elimination || linear->null_pivot > SD_LEAST_PIVOT || !sd_elimination_factor(linear->elimination, values, scale))
         return 0;
     linear->smallest = 1.0;
     linear->rank = linear->n;
@@ -330,7 +331,7 @@ static SD_APART int pivot(sd_linear *linear, const sd_number *values, const doub
     int failed = linear->dense ? dense_factor(linear) : sparse_factor(linear);
     if (!failed && linear->rank < linear->n)
         failed = null_vectors(linear);
-    if (linear->elimination && !linear->idle && !failed)
+    if (linear->elimination && linear->rank == linear->n && !failed)
         sd_elimination_learn(linear->elimination, linear->scaled);
     return failed;
 }
