@@ -11,7 +11,7 @@ LONG = 1000
 """Steps of the bdf after which method auto tries radau."""
 LONG_STEEP = 1_000_000
 """The same of steep laws: where they turn Newton's method holds the steps of any method, and the bdf's are cheap."""
-BRIEF, BRIEF_STEEP = 1000, 20_000
+BRIEF, BRIEF_STEEP = 1000, 200_000
 """Steps of rosenbrock after which method auto tries another: where laws are so steep that the equations are nearly of
 index 2, its error test holds the steps; those of steep laws that turn often."""
 HELD = 100

@@ -64,7 +64,7 @@ def singles(bench: Bench, finest: float, seconds: float) -> list[Measured]:
         for rtol in TOLERANCES:
             if rtol < 0.9e-3 * finest:
                 break
-            run = bench.run(2, accuracy=None, rtol=rtol, method=method, max_steps=20_000, max_wall=seconds)
+            run = bench.run(2, accuracy=None, rtol=rtol, method=method, max_wall=seconds)
             if run is not None:
                 found.append(run)
             elif found and found[-1].method == method:
