@@ -20,13 +20,11 @@ def real_power(base: float, exponent: float) -> float:
     return value if isinstance(value, float) else math.nan
 
 
-_POLES = {"ln": (0.0,), "log10": (0.0,), "atanh": (-1.0, 1.0)}
-"""Where a function is infinite and Python's raises: -inf at the first, inf at the second."""
-
-
 def _of_math(name: str, own: str | None = None) -> Callable[..., float]:
-    """A function of Python as C has it, infinite beyond all numbers with the sign of its limit; NaN where there is none."""
-    function, odd, poles = getattr(math, own or name), name in ("sinh", "floor", "ceil"), _POLES.get(name, ())
+    """A function of Python's: beyond all numbers infinite with the sign of its limit; NaN where it is none, and at a
+    pole, for a constant ln(0) is refused.
+    """
+    function, odd = getattr(math, own or name), name in ("sinh", "floor", "ceil")
 
     def call(*values: float) -> float:
         try:
@@ -34,7 +32,7 @@ def _of_math(name: str, own: str | None = None) -> Callable[..., float]:
         except OverflowError:
             return math.copysign(math.inf, values[0]) if odd else math.inf
         except ValueError:
-            return (-math.inf, math.inf)[poles.index(values[0])] if values[0] in poles else math.nan
+            return math.nan
 
     return call
 
