@@ -27,7 +27,6 @@ from sysdyn.compiler.model.terms import (
 )
 from sysdyn.compiler.network.primal.bounds import Affine, Interval, Picked, Sizes, number
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.text.diagnostics import ModelError
 
@@ -87,6 +86,7 @@ SQUARES = [
     lambda: x.power(total(I, q), x.const(2.0)),
     lambda: total(I, lambda i: x.mul(q(i), x.reduction("sum", K, i, x.param("n"), q(x.index(K))))),
     lambda: x.call("sin", total(I, q)),
+    lambda: x.linear(1.0, [(-2.0, total(I, lambda i: x.linear(4.0, [(3.0, q(i)), (0.5, i)])))]),
 ]
 
 
