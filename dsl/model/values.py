@@ -6,7 +6,7 @@ Parameters of any array size; elements are computed one at a time and only where
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
@@ -68,6 +68,17 @@ class Values:
         if len(parameter.values) > 1:
             k = at[-1] - int(self.number(parameter.shape[-1][0]))
         return self.number(parameter.values[k], bound) if 0 <= k < len(parameter.values) else math.nan
+
+    def iterations(self, loops: Sequence[Loop], at: Mapping[Node, float] | None = None) -> Iterator[dict[Node, float]]:
+        """The values of the loop variables, the last loop's the fastest; bounds may follow outer loops."""
+        at = dict(at or {})
+        if not loops:
+            yield at
+            return
+        first, last = self.number(loops[0].first, at), self.number(loops[0].last, at)
+        if math.isfinite(first + last):
+            for i in range(round(first), round(last) + 1):
+                yield from self.iterations(loops[1:], {**at, ex.index(loops[0].index): float(i)})
 
     def bounds(self, node: Node, loops: Sequence[Loop]) -> tuple[float, float]:
         """Least and greatest value of an affine index over its loops (an empty loop gives inf, -inf)."""
