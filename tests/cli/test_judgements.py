@@ -107,6 +107,8 @@ def test_what_misses_by_less_than_the_runs_own_error_says_which_accuracy_would_d
     assert told.help == "this is less than the estimated error of the run (0.01): --accuracy 2e-05 would decide it"
     (told,) = expecting(said, RAMP, estimate=1e-5)[1]
     assert "estimated error" not in told.help
+    (told,) = expecting("expect finally: x == 3.5 within 0.49", RAMP, estimate=1e-2)[1]  # 0.01 beyond what is granted
+    assert told.help.endswith("--accuracy 3e-04 would decide it")
 
 
 # --- runs that disagree -----------------------------------------------------------------------------------------------
