@@ -84,10 +84,10 @@ def test_a_parameter_stays_a_name_where_it_has_the_unit():
 def test_diodes_side_by_side_carry_more_through_less_resistance(said, area):
     node, diode, series = element(f"d1 a 0 dm{said}").lines
     assert node == "node d1_in: electrical"
-    assert given(diode, "Is") == pytest.approx(2e-14 * area, rel=1e-14)
-    assert given(diode, "vT") == pytest.approx(1.5 * THERMAL, rel=1e-14)
+    assert given(diode, "Is") == pytest.approx(2e-14 * area, rel=1e-14, abs=0.0)
+    assert given(diode, "vT") == pytest.approx(1.5 * THERMAL, rel=1e-14, abs=0.0)
     assert diode.endswith("d1_in -> ground")
-    assert given(series, "R") == pytest.approx(4.0 / area, rel=1e-14)
+    assert given(series, "R") == pytest.approx(4.0 / area, rel=1e-14, abs=0.0)
     assert series.endswith("a -> d1_in")
 
 
@@ -100,9 +100,9 @@ def test_transistors_of_ebers_and_moll_are_those_of_the_transport_form(said, are
         (line,) = element(f"q1 {nodes} qn{said}").lines
         forward, backward = given(line, "aF"), given(line, "aR")
         assert (forward, backward) == (pytest.approx(50.0 / 51.0), 0.75)
-        assert forward * given(line, "Ies") == pytest.approx(1e-15 * area, rel=1e-13)
-        assert backward * given(line, "Ics") == pytest.approx(1e-15 * area, rel=1e-13)
-        assert given(line, "vT") == pytest.approx(1.25 * THERMAL, rel=1e-14)
+        assert forward * given(line, "Ies") == pytest.approx(1e-15 * area, rel=1e-13, abs=0.0)
+        assert backward * given(line, "Ics") == pytest.approx(1e-15 * area, rel=1e-13, abs=0.0)
+        assert given(line, "vT") == pytest.approx(1.25 * THERMAL, rel=1e-14, abs=0.0)
         assert line.startswith("q1: npn(")
         assert line.endswith("c = c, b = b, e = e")
     assert element("q1 c b e qp").local == ("pnp",)
@@ -120,12 +120,12 @@ def test_a_transistor_with_a_junction_short_is_a_diode(text, line, current):
     (found,) = element(text).lines
     assert found.startswith("q1: diode(")
     assert found.endswith(line)
-    assert given(found, "Is") == pytest.approx(current, rel=1e-14)
+    assert given(found, "Is") == pytest.approx(current, rel=1e-14, abs=0.0)
 
 
 def test_field_effect_transistors():
     (line,) = element("m1 d g s 0 mn w=20u l=2u m=3").lines
-    assert given(line, "beta") == pytest.approx(3e-5 * 10.0 * 3.0, rel=1e-14)
+    assert given(line, "beta") == pytest.approx(3e-5 * 10.0 * 3.0, rel=1e-14, abs=0.0)
     assert (given(line, "vto"), given(line, "lambda")) == (0.75, 0.02)
     assert given(element("m1 d g s 0 mn").lines[0], "beta") == 3e-5  # as wide as long
     with pytest.raises(Unreadable, match="level 2"):
@@ -199,6 +199,9 @@ def test_parameters_that_are_values_alone_stay_parameters_of_a_component():
     assert "param rx = 1 kohm" in text
     assert "x1: part(rx = 3 kohm) a = s, b = ground" in text
     assert "r2: resistor(R = 20 ohm)" in text
+    both, _ = written("t\n.subckt part a b rx=1k\nR1 a c {rx}\nR2 c b {rx*2}\n.ends\nX1 s 0 part\nV1 s 0 1\n")
+    assert "param rx" not in both
+    assert "r1: resistor(R = 1 kohm)" in both
     _, said = written("t\n.subckt part a b k=2\nR2 a b {k*10}\n.ends\nX1 s 0 part k=3\nV1 s 0 1\n")
     assert [c for c, _ in said] == ["E941"]
     assert "is no value of an element by itself" in said[0][1]

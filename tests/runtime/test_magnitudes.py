@@ -71,7 +71,7 @@ def rod(**more):
 def test_round_off_of_a_constraint_is_that_of_its_largest_term():
     """Slopes are 6 and -8, the terms 18 and 32: of x nothing is known below 32 eps/6, of y below 32 eps/8."""
     system, y, jy = rod()
-    assert unresolved(system, y, jy) == pytest.approx(values(system, q_x=32 / 6 * EPS, q_y=4 * EPS), rel=1e-14)
+    assert unresolved(system, y, jy) == pytest.approx(values(system, q_x=32 / 6 * EPS, q_y=4 * EPS), rel=1e-14, abs=0.0)
 
 
 def test_what_stands_in_no_constraint_is_known():
@@ -86,7 +86,7 @@ def test_noise_of_flows_is_that_of_displacements_over_a_step_and_multipliers_bal
     flows = 10.0 * EPS * np.array([32 / 6, 4.0])
     kappa = max(0.5 * flows[0] / 6.0, 2.0 * flows[1] / 8.0)
     expected = values(system, q_x=32 / 6 * EPS, q_y=4 * EPS, f_x=flows[0], f_y=flows[1], kappa_rod=kappa)
-    assert noise(system, y, jy, 0.1) == pytest.approx(expected, rel=1e-14)
+    assert noise(system, y, jy, 0.1) == pytest.approx(expected, rel=1e-14, abs=0.0)
 
 
 # --- after a run ------------------------------------------------------------------------------------------------------
@@ -116,13 +116,13 @@ def test_a_thousandth_of_its_like_is_the_least_and_a_millionth_of_what_it_went_b
     found = after({"q_x": 2.0, "q_y": 1e-9, "f_x": 0.5, "f_y": 0.0}, WENT_BY)
     assert (found["q_y"], found["f_y"]) == pytest.approx((2e-3, 5e-4), rel=1e-14)
     still = after({"q_x": 1e-12}, {**WENT_BY, "f_x": 0.0, "f_y": 0.0})
-    assert (still["q_x"], still["q_y"]) == pytest.approx((5e-6, 5e-6), rel=1e-14)
+    assert (still["q_x"], still["q_y"]) == pytest.approx((5e-6, 5e-6), rel=1e-14, abs=0.0)
 
 
 def test_flows_that_are_round_off_count_by_their_displacements_over_the_span():
     """q of 2 m in 10 s: a tenth of 0.2 m/s, and of that a thousandth."""
     found = after({"q_x": 2.0, "q_y": 1.0, "f_x": 1e-9, "f_y": 1e-10}, WENT_BY)
-    assert (found["f_x"], found["f_y"]) == pytest.approx((2e-5, 1e-5), rel=1e-12)
+    assert (found["f_x"], found["f_y"]) == pytest.approx((2e-5, 1e-5), rel=1e-12, abs=0.0)
 
 
 def test_what_the_text_names_is_kept():
@@ -153,7 +153,7 @@ def test_an_absolute_tolerance_asks_nothing_below_the_round_off_of_a_magnitude()
     atol = told(Request(1.0, np.zeros(0), atol=1e-8))[2].atol
     assert atol.tolist() == [1e-8] * 4 + [1e6 * ROUND_OFF]
     assert told(Request(1.0, np.zeros(0), atol=0.0))[2].atol == pytest.approx(
-        ROUND_OFF * np.array([5.0, 5.0, 1.0, 1.0, 1e6])
+        ROUND_OFF * np.array([5.0, 5.0, 1.0, 1.0, 1e6]), rel=1e-14, abs=0.0
     )
     assert told(Request(1.0, np.zeros(0)))[2].atol is None
 
