@@ -1,5 +1,6 @@
 """Changes of an author's text, to the letter: what is left out, joined, renamed, and what goes with it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -74,6 +75,10 @@ def test_parameters_that_nothing_reads_any_more_go():
     left = edits.without(target, TEXT, one)
     after, _ = opened(left)
     assert lines(left)(edits.unread(after, left, TEXT)) == ["  param R0 = 1 kohm # of the first"]
+    twice = TEXT.replace("R = 2 ohm", "R = 2*R0")  # that another element reads stays too
+    target, one = candidate(twice, "R1")
+    left = edits.without(target, twice, one)
+    assert edits.unread(opened(left)[0], left, twice) == left
     unread = TEXT.replace("R = R0)", "R = 5 ohm)")  # that nobody read before either stays
     assert edits.unread(opened(unread)[0], unread, unread) == unread
 
@@ -147,6 +152,19 @@ def test_candidates_are_statements_the_least_active_first_and_no_sources():
     assert list(made(found)) == ["C1", "R1", "R2"]
     assert made(found)["R2"] == (3.0, 0.3, "R2: effort(e = 0 V) b -> c")
     assert made(found)["C1"][2] == "C1: effort(e = 0 V) b -> ground"
+
+
+def test_an_element_may_be_called_as_an_energy_is():
+    """V is the author's source, and Valve might be a component; a statement is found by its place."""
+    held = made([activity("V", 0.5, "held")])  # as if it were a store
+    assert held["V"][2] == "V: effort(e = 0 V) a -> ground"
+    target, _ = opened(TEXT)
+    place = target.model.body[2].span
+    stated = replace(
+        activity("", 1.0), label="D (line 6)", place=target.document.file.source.place(place.start, place.end)
+    )
+    (only,) = edits.candidates(target, opened(TEXT)[1], [stated])
+    assert (only.name, only.span) == ("", (place.start, place.end))
 
 
 def test_parts_of_a_component_count_together():

@@ -199,6 +199,7 @@ def test_powers_of_contents_and_works():
     assert {k: (p.role, p.power) for k, p in by.items()} == {
         "T*": ("held", False), "D": ("out", True), "work": ("in", True), "V": ("held", False),
     }  # fmt: skip
+    assert {p.branch for p in parts} == {""}
     at = {"x": 0.5, "x_": -2.0}
     assert worth(by["D"], **at) == pytest.approx(2.0 * 8.0)
     assert worth(by["work"], **at) == pytest.approx(-(3.0 * 2.0 * 0.5 * -2.0))
@@ -218,7 +219,7 @@ def test_branches_are_measured_and_shares_counted_by_their_roles():
     network, parts = powers(
         "node a: electrical\nV: effort(e = 2 V) a -> ground\nR: dissipator(e = 3 ohm*f) a -> ground"
     )
-    assert [(p.label, p.role, p.power) for p in parts] == [("V", "in", True), ("R", "out", True)]
+    assert [(p.label, p.branch, p.role, p.power) for p in parts] == [("V", "V", "in", True), ("R", "R", "out", True)]
     assert len(network.states) == len(network.dynamics) == 2
     values = {"power of V": [1.0, -3.0], "power of R": [0.5, 4.5]}
     kept = {name: Quantity(name, np.array(v), "J", None, None) for name, v in values.items()}
