@@ -248,14 +248,15 @@ def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
 def values(model: Elaborator, known: Values, report: Report) -> None:
     """E322, E324, E805, E807 with the values bound."""
     for r in model.parts.requirements:
-        if r.is_met(known):
-            continue
-        node, loops, place = r.condition, r.loops, r.place
-        bound = {ex.index(loop.index): known.number(loop.first) for loop in loops}
-        if all(not math.isnan(known.number(n, bound)) for n in _parameters(node)) and not known.truth(node, bound):
-            text = format_expression(r.written)
-            shown = ", ".join(_valued(n, known.number(n, bound), model) for n in _parameters(node))
-            report.error("E322", f"require {text} fails: {shown}", place, help=f"values for which {text}")
+        for at in r.failures(known):
+            met = {n: known.number(n, at) for n in _parameters(r.condition)}
+            if not any(map(math.isnan, met.values())):
+                text = format_expression(r.written)
+                said = {ex.substitute(n, {i: ex.const(v) for i, v in at.items()}): value for n, value in met.items()}
+                shown = ", ".join(_valued(n, value, model) for n, value in said.items())
+                shown = shown or ", ".join(f"{i} = {v:g}" for i, v in at.items())
+                report.error("E322", f"require {text} fails: {shown}", r.place, help=f"values for which {text}")
+                break
     for node, place in _expressions(model):
         if not _undefined(node, place, report):
             _divisions(model, node, place, known, report)

@@ -146,9 +146,9 @@ def test_a_branch_that_stands_in_nothing():
 # -- with the numbers -------------------------------------------------------------------------------------------------
 
 
-def judged(body, *, required=True):
+def judged(body, before="", *, required=True):
     """What the checks before and after the values are known say."""
-    model, source = elaborated(body)
+    model, source = elaborated(body, before)
     report = Report()
     checks.run(model, report, required=required)
     checks.values(model, Values(model.parts.parameters, []), report)
@@ -197,6 +197,39 @@ def test_what_is_required_is_told_with_its_values():
     body = SPRING.format("k") + "\nparam k = 3 kN/m\nparam limit = 2 N/mm\nrequire k < limit"
     assert judged(body) == [("E322", "require k < limit fails: k = 3 kN/m, limit = 2 N/mm", "require k < limit")]
     assert judged(body.replace("3 kN", "1 kN")) == []
+
+
+LEAKS = """node a: electrical
+C: potential(q = 1 F*e) a
+param r[1..3] = [{}]
+{}
+for i in 1..3 {{ R[i]: dissipator(e = r[i]*f) a }}"""
+
+
+@pytest.mark.parametrize(
+    ("resistances", "said", "found"),
+    [
+        ("1 ohm, 2 ohm, 3 ohm", "for i in 1..3 { require r[i] > 0 ohm }", None),
+        ("1 ohm, 2 ohm, -3 ohm", "for i in 1..3 { require r[i] > 0 ohm }", "require r[i] > 0 ohm fails: r[3] = -3 ohm"),
+        ("1 ohm, 2 ohm, 1 ohm", "for i in 2..3 { require r[i] >= r[i - 1] }",
+         "require r[i] >= r[i - 1] fails: r[3] = 1 ohm, r[2] = 2 ohm"),
+        ("1 ohm, 2 ohm, 3 ohm", "for i in 1..3 { for j in i..3 { require i <= j } }", None),
+        ("1 ohm, 2 ohm, 3 ohm", "for i in 1..3 { for j in i..3 { require i < j } }",
+         "require i < j fails: i = 1, j = 1"),
+        ("-1 ohm, -2 ohm, -3 ohm", "for i in 1..0 { require r[i] > 0 ohm }", None),
+    ],
+)  # fmt: skip
+def test_what_is_required_in_a_loop_is_required_of_every_element(resistances, said, found):
+    assert [(c, m) for c, m, _ in judged(LEAKS.format(resistances, said))] == ([("E322", found)] if found else [])
+
+
+def test_what_a_component_requires_holds_for_every_element_of_an_array_of_it():
+    part = "component leak { param R: ohm; require R > 0 ohm; branch: electrical; law e = R*f }\n"
+    body = "node a: electrical\nC: potential(q = 1 F*e) a\nfor i in 1..3 {{ X[i]: leak(R = (1 ohm)*({})) a -> ground }}"
+    assert [(c, m) for c, m, _ in judged(body.format("i - 1/2"), part)] == []
+    assert [(c, m) for c, m, _ in judged(body.format("2.5 - i"), part)] == [
+        ("E322", "require R > 0 ohm fails: X.R[3] = -0.5 ohm")
+    ]
 
 
 def test_an_index_outside_its_family():
