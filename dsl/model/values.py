@@ -83,18 +83,18 @@ class Values:
                 yield from self.iterations(loops[1:], {**at, ex.index(loops[0].index): float(i)})
 
     def cases(self, node: Node, loops: Sequence[Loop]) -> Iterator[dict[Node, float]]:
-        """The values of the loop variables for which a node may have values of its own: the first ones alone where it
-        does not follow them.
+        """The values of the loop variables for which a function of its unknowns may be one of its own: the first ones
+        alone where it does not follow them.
         """
         found = self.iterations(loops)
-        return found if self._follows(node) else islice(found, 1)
+        return found if loops and self._follows(node) else islice(found, 1)
 
     def _follows(self, node: Node) -> bool:
-        """Whether loop variables enter the value of a node: not by the index of what is the same in each element."""
+        """Whether loop variables enter a function: not by the index of what is the same in each element."""
         stack, seen = [node], {node}
         while stack:
             top = stack.pop()
-            below = top.args
+            below = () if top.op == "var" else top.args
             if top.op == "index":
                 return True
             if top.op == "param" and top.args:

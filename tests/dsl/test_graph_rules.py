@@ -111,6 +111,22 @@ def test_a_modulus_from_zero_on_is_no_fault(law):
     assert said(f"param k = 2\nnode x: translation\nX: {law} x") == []
 
 
+@pytest.mark.parametrize(
+    ("law", "values", "code", "shown"),
+    [
+        ("dissipator(e = k[i]*f*(1 N.s/m))", "1, 2, 3", None, ""),
+        ("dissipator(e = k[i]*f*(1 N.s/m))", "1, -2, 3", "E325", "(k[2] = -2)"),
+        ("kinetic(p = k[i]*f*(1 kg))", "1, 2, -3", "E321", "(k[3] = -3)"),
+        ("potential(e = (2 - i)*q*(1 N/m))", "1, 1, 1", "E325", "(-1)"),
+    ],
+)
+def test_a_modulus_below_zero_of_one_element_of_an_array(law, values, code, shown):
+    body = f"param k[1..3] = [{values}]\nnode x: translation\nfor i in 1..3 {{ X[i]: {law} x }}"
+    found = said(body)
+    assert [c for c, _, _ in found] == ([code] if code else [])
+    assert all(shown in message for _, message, _ in found)
+
+
 COUPLED = """component machine {{
   branch coil: electrical
   branch shaft: rotation
