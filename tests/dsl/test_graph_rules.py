@@ -5,7 +5,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.rewriting import nodes_read
 from sysdyn.dsl.model.values import Values
-from sysdyn.dsl.rules import checks, graph_checks
+from sysdyn.dsl.rules import bound_values, checks, graph_checks
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 
 
@@ -167,7 +167,7 @@ def judged(body, before="", *, required=True):
     model, source = elaborated(body, before)
     report = Report()
     checks.run(model, report, required=required)
-    checks.values(model, Values(model.parts.parameters, []), report)
+    bound_values.run(model, Values(model.parts.parameters, []), report)
     return told(report, source)
 
 
