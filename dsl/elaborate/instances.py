@@ -322,6 +322,10 @@ class Instances(Elements):
         bound: set[str],
     ) -> None:
         name = connection.name.name
+        if name in inputs or (name in bound and name in head.ports):
+            what = "input" if name in inputs else "port"
+            message = f"{what} '{name}' of '{s.decl.name}' is bound twice"
+            raise self.resolver.fail("E402", message, connection.span, help="one of the two")
         if name in head.inputs:
             inputs[name] = connection.value
         elif name in head.ports:
