@@ -47,6 +47,7 @@ class SceneReader:
         self.given = Settings(elaborator)
         self._raw: dict[Node, str] = {}  # traced expression before its unit -> name
         self._found: dict[str, object] = {}
+        self._targets: set[tuple[str, str]] = set()
 
     def levels(self, scene: syntax.Scene) -> None:
         """The `level` statements and those that set inputs: before the model's instances are elaborated."""
@@ -62,6 +63,8 @@ class SceneReader:
 
     def set_parameter(self, s: syntax.Set) -> None:
         """A `set` of a parameter or elements of one."""
+        if self.resolver.source is self.model.source:  # of the command line the last one counts
+            self._one("set", s.target)
         self.given.parameter(s)
 
     @property
@@ -94,6 +97,13 @@ class SceneReader:
             do(statement)
         except Failed:
             return
+
+    def _one(self, word: str, target: syntax.Expr) -> None:
+        """What a scene gives to one target once."""
+        said = word, "".join(self.resolver.source.text[target.span.start : target.span.end].split())
+        if said in self._targets:
+            raise self.resolver.fail("E106", f"the scene gives '{said[1]}' twice", target.span, help="one of the two")
+        self._targets.add(said)
 
     def _once(self, key: str, value: object, span: syntax.Span, word: str | None = None) -> None:
         """What the scene may say once; word: the author's, where it is not the key."""
@@ -285,6 +295,7 @@ class SceneReader:
 
     def level(self, s: syntax.SceneLevel) -> None:
         """`level ref = name`: before the model's instances are elaborated."""
+        self._one("level", s.target)
         text = " ".join(self.resolver.source.text[s.target.span.start : s.target.span.end].split())
         self.model.levels[text.replace(" ", "")] = (s.level.name, self.resolver.place(s.span))
 

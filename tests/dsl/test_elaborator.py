@@ -171,3 +171,8 @@ def test_of_two_connections_of_one_port_or_input_none_is_taken(connection, said)
     elaborator.names()
     elaborator.elements()
     assert [(d.code, d.message) for d in report] == ([("E402", said)] if said else [])
+
+
+@pytest.mark.parametrize(("arguments", "said"), [("k = 1 N/m", []), ("k = 1 N/m, k = 2 N/m", ["E106"])])
+def test_an_argument_that_is_given_twice_is_refused(arguments, said):
+    assert whole(OSCILLATOR.replace("spring()", f"spring({arguments})"))[1] == said
