@@ -5,7 +5,9 @@ Received: an elaborator whose parameters are known, their `Values`.  Each findin
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 from collections.abc import Iterable, Sequence
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
@@ -13,7 +15,7 @@ from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Constraint, Coordinate, Loop, NodeFamily, Shape, State, Unknown
+from sysdyn.dsl.model.network import Branch, Constraint, Coordinate, Dynamic, Loop, NodeFamily, Shape, State, Unknown
 from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.rules.checks import expressions_of, nodes_of
@@ -36,6 +38,8 @@ def run(model: Elaborator, known: Values, report: Report) -> None:
         if not _undefined(node, place, report):
             _divisions(model, node, place, known, report)
     _sizes(model, known, report)
+    _dynamics(model, known, report)
+    _branches(model, known, report)
     _elements(model, known, report)
     _indices(model, known, report)
 
@@ -102,6 +106,68 @@ def _sizes(model: Elaborator, known: Values, report: Report) -> None:
             message = f"'{name}' is a size or an index, so it must be a whole number: {value:g}"
             help_ = f"{math.floor(value):g} or {math.ceil(value):g}" if abs(value) < 2**31 else "a smaller number"
             report.error("E805", message, parameter.place, help=help_, subject="sizes")
+
+
+def _dynamics(model: Elaborator, known: Values, report: Report) -> None:
+    """E507: every element of a state has exactly one dynamic; that some state has none at all is told before."""
+    given: dict[str, list[Dynamic]] = {}
+    for dynamic in model.parts.dynamics:
+        given.setdefault(dynamic.state.data[0], []).append(dynamic)
+    for state in model.parts.states:
+        said = given.get(state.name, [])
+        if not state.shape or not said or (len(said) == 1 and _whole(said[0], state)):
+            continue
+        counts = _counted([(dynamic.state.args, dynamic.loops) for dynamic in said], known)
+        twice = next((element for element, number in counts.items() if number > 1), None)
+        box = [range(round(known.number(a)), round(known.number(b)) + 1) for a, b in state.shape if _known(a, b, known)]
+        every = itertools.product(*box) if len(box) == len(state.shape) else ()
+        wrong = next((element for element in every if element not in counts), None) if twice is None else twice
+        if wrong is not None:
+            name = _indexed(state.name, wrong)
+            what = "has no dynamic" if twice is None else f"has {counts[wrong]} dynamics"
+            report.error("E507", f"state {name} {what}", said[-1].place, help="each element once")
+
+
+def _branches(model: Elaborator, known: Values, report: Report) -> None:
+    """E106: an element of an array that several statements make."""
+    pieces: dict[str, list[Branch]] = {}
+    for branch in model.parts.branches:
+        if branch.at:
+            pieces.setdefault(re.sub(r"\[[^]]*\]", "", branch.name), []).append(branch)  # `X[2].R` is a piece of X.R
+    told: set[str] = set()
+    for name, made in pieces.items():
+        label = name.partition(".")[0].partition("#")[0]
+        if len(made) < 2 or label in told:
+            continue
+        counts = _counted([(branch.at, branch.loops) for branch in made], known)
+        for element in (element for element, number in counts.items() if number > 1):
+            told.add(label)
+            report.error("E106", f"'{_indexed(label, element)}' is declared twice", made[-1].place)
+            break
+
+
+def _counted(places: Iterable[tuple[Sequence[Node], Sequence[Loop]]], known: Values) -> dict[tuple[float, ...], int]:
+    """How often each element is meant by indices under loops."""
+    counts: dict[tuple[float, ...], int] = {}
+    for indices, loops in places:
+        for at in known.iterations(loops):
+            element = tuple(known.number(n, at) for n in indices)
+            counts[element] = counts.get(element, 0) + 1
+    return counts
+
+
+def _indexed(name: str, element: Sequence[float]) -> str:
+    return f"{name}[{', '.join(f'{k:g}' for k in element)}]"
+
+
+def _whole(dynamic: Dynamic, state: State) -> bool:
+    """Whether a dynamic is plainly that of every element once: its loops are the bounds of the state."""
+    own = tuple(ex.index(loop.index) for loop in dynamic.loops)
+    return dynamic.state.args == own and tuple((loop.first, loop.last) for loop in dynamic.loops) == state.shape
+
+
+def _known(first: Node, last: Node, known: Values) -> bool:
+    return math.isfinite(known.number(first) + known.number(last))
 
 
 def _elements(model: Elaborator, known: Values, report: Report) -> None:

@@ -248,6 +248,58 @@ def test_what_a_component_requires_holds_for_every_element_of_an_array_of_it():
     ]
 
 
+STATES = "state y[1..2, 1..2]: 1 = 0\n"
+LOWER = "for i in 1..2 { for j in 1..i { dynamic y[i, j]' = 1/(1 s) } }\n"
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("for i in 1..2 { for j in 1..2 { dynamic y[i, j]' = 1/(1 s) } }", None),
+        (LOWER + "dynamic y[1, 2]' = 2/(1 s)", None),
+        (LOWER, "state y[1, 2] has no dynamic"),
+        (LOWER + "dynamic y[1, 2]' = 2/(1 s)\ndynamic y[2, 1]' = 2/(1 s)", "state y[2, 1] has 2 dynamics"),
+        ("for i in 1..2 { for j in 1..2 { dynamic y[j, i]' = 1/(1 s) } }", None),
+        ("for i in 1..2 { dynamic y[i, i]' = 1/(1 s) }", "state y[1, 2] has no dynamic"),
+    ],
+)
+def test_every_element_of_a_state_has_one_dynamic(body, said):
+    """Rows of two would be added up: of 1 and 2 a rate of 1.5 was made."""
+    assert [(c, m) for c, m, _ in judged(STATES + body)] == ([("E507", said)] if said else [])
+
+
+RC = "node a: electrical\nC: potential(q = 1 F*e) a\n"
+PAIR = "component pair { port a: electrical; R: dissipator(e = 1 ohm*f) a; S: dissipator(e = 1 ohm*f) a }\n"
+
+
+@pytest.mark.parametrize(
+    ("body", "twice"),
+    [
+        ("for i in 1..2 { R[i]: dissipator(e = 1 ohm*f) a }\nR[3]: dissipator(e = 1 ohm*f) a", None),
+        ("for i in 1..2 { R[i]: dissipator(e = 1 ohm*f) a }\nR[2]: dissipator(e = 3 ohm*f) a", "R[2]"),
+        ("R[1]: dissipator(e = 1 ohm*f) a\nR[1]: dissipator(e = 1 ohm*f) a", "R[1]"),
+        ("X[1]: pair() a\nX[2]: pair() a", None),
+        ("X[1]: pair() a\nX[2]: pair() a\nX[1]: pair() a", "X[1]"),
+    ],
+)
+def test_an_element_of_an_array_is_made_once(body, twice):
+    """Two resistors under one name both carried a current, of which the trace had one."""
+    assert [(c, m) for c, m, _ in judged(RC + body, PAIR)] == (
+        [("E106", f"'{twice}' is declared twice")] if twice else []
+    )
+
+
+def test_a_constraint_is_declared_once():
+    """Two rows under one name were added up: of x' = 1 m/s and x' = 2 m/s came 1.5 m/s."""
+    report = Report()
+    text = (
+        "model m {\ncoord x: translation = 0 m\nenergy T* = 1/2*(1 kg)*x'^2\npsi a: x' = 1 m/s\npsi a: x' = 2 m/s\n}\n"
+    )
+    document = load.document(SourceText("m.sd", text), report)
+    assert load.network(document, document.models["m"], None, report) is None
+    assert [(d.code, d.message) for d in report] == [("E106", "'a' is declared twice")]
+
+
 def test_an_index_outside_its_family():
     body = "param n = {}\nnode x[1..n]: translation\nfor i in 1..3 {{ M[i]: kinetic(p = 1 kg*f) x[i] }}"
     assert judged(body.format(3)) == []
