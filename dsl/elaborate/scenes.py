@@ -144,6 +144,8 @@ class SceneReader:
             )
         before = self._found.get("limits", ())
         assert isinstance(before, tuple)
+        if s.name.name in dict(before):
+            raise self.resolver.fail("E106", f"the scene says 'limit {s.name.name}' twice", s.span)
         self._found["limits"] = (*before, (s.name.name, self._constant(s.value, NONE, "a limit")))
 
     def _formulation(self, s: syntax.Formulation) -> None:
@@ -166,6 +168,8 @@ class SceneReader:
                 raise self.resolver.fail(
                     "E405", message, arg.span, help=", ".join(f"{n} = .." for n in _SOLVER_OPTIONS)
                 )
+            if arg.name in dict(options):
+                raise self.resolver.fail("E106", f"'{arg.name}' of the solver is given twice", arg.span)
             if arg.name in ("keep_implicit", "keep_flow"):
                 node = self._yes(arg.value, arg.name)
             else:
