@@ -26,7 +26,7 @@ from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import Space, nearest
 from sysdyn.dsl.parser.parse import parse
-from sysdyn.dsl.rules import checks, graph_checks, laws
+from sysdyn.dsl.rules import bound_values, checks, graph_checks, laws
 from sysdyn.dsl.rules.floating import floating
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
@@ -161,7 +161,7 @@ def _judged(
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
         switches.expanded(elaborator, known)
-    checks.values(elaborator, known, report)
+    bound_values.run(elaborator, known, report)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
         floating(elaborator, reader.observations, report)

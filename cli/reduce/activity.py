@@ -92,7 +92,7 @@ def _sorted(trace: Trace, parts: Sequence[Part], ran: Ran) -> Activities:
     energies = {part.name: share.energy for part, share in zip(parts, shares(trace, parts), strict=True)}
     items = [
         Activity(
-            part.label, part.name.removeprefix("power of ") if part.power else "", part.role, value,
+            part.label, part.branch, part.role, value,
             value / total if total > 0.0 else 0.0, energies[part.name], part.domain, part.place,
         )
         for part, value in found

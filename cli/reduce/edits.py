@@ -62,7 +62,7 @@ def candidates(target: Target, network: Network, found: Sequence[Activity]) -> t
 
 def _statement(target: Target, activity: Activity) -> syntax.Statement | None:
     """The statement of the model that makes an element, or that is one; None inside components and loops."""
-    if activity.name and not activity.label.startswith(("T*", "V", "T ", "D ", "G ", "work")):
+    if activity.name:
         first = re.split(r"[.\[#]", activity.name, maxsplit=1)[0]
         for s in target.model.body:
             if isinstance(s, syntax.Instance) and s.decl.name == first:

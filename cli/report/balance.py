@@ -48,6 +48,12 @@ class Part:
     place: Place
     domain: str
 
+    @property
+    def branch(self) -> str:
+        """Name of the branch; "" of a statement (the number behind its kind stands apart)."""
+        name = self.name.removeprefix("power of ")
+        return "" if " " in name else name
+
 
 @dataclass(frozen=True, slots=True)
 class Share:

@@ -96,12 +96,40 @@ def _number(scope: Scope, text: str, unit: str) -> str:
     return quantity(value(text, scope.known), unit)
 
 
+def _more(words: tuple[str, ...], scope: Scope, *, areas: bool) -> tuple[float, dict[str, str], tuple[str, ...]]:
+    """How many of a device stand side by side (M; areas: a number alone, AREA), its IC, and what else its card says."""
+    plain_ = [w for w in words if w not in ("(", ")", ",", "off")]
+    times, given, left = 1.0, dict[str, str](), []
+    while plain_:
+        if plain_[1:2] == ["="] and len(plain_) > 2:
+            name, _, text = plain_[:3]
+            given[name] = text
+            plain_ = plain_[3:]
+            if name in ("area", "m"):
+                times *= value(text, scope.known)
+            elif name == "ic":  # of a transistor two
+                plain_ = plain_[1:] if plain_ and plain_[1:2] != ["="] else plain_
+            else:
+                left.append(name)
+        elif areas and (number(plain_[0]) is not None or plain_[0][0] in "{'"):
+            times *= value(plain_[0], scope.known)
+            plain_ = plain_[1:]
+        else:
+            left.append(plain_[0])
+            plain_ = plain_[1:]
+    if not times > 0.0:
+        raise Unreadable(f"{times:g} of a device are none")
+    return times, given, tuple(left)
+
+
 def _passive(kind: str, letter: str, unit: str, state: str, state_unit: str) -> Callable[[Card, Scope], Element]:
     def element(card: Card, scope: Scope) -> Element:
         words = _wanted(card, 4)
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
-        given = dict(pairs(words[4:])) if "=" in words[4:] else {}
+        times, given, left = _more(words[4:], scope, areas=False)
         amount = _number(scope, words[3], unit)
+        if times != 1.0:
+            amount = f"{plain(times)}*({amount})" if kind == "capacitor" else f"({amount})/{plain(times)}"
         line = f"{name}: {kind}({letter} = {amount}) {a} -> {b}"
         initial: tuple[str, ...] = ()
         if state and scope.uic:
@@ -109,7 +137,7 @@ def _passive(kind: str, letter: str, unit: str, state: str, state_unit: str) -> 
         elif state:
             still = "f" if state == "e" else "e"
             initial = (f"init {name}.{still} = 0 {'A' if still == 'f' else 'V'}",)
-        return Element((line,), (kind,), (), initial)
+        return Element((line,), (kind,), (), initial, left)
 
     return element
 
@@ -161,10 +189,10 @@ def _diode(card: Card, scope: Scope) -> Element:
     words = _wanted(card, 4)
     name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
     model = _model(card, scope, words[3], ("d",))
-    area = value(words[4], scope.known) if len(words) > 4 and number(words[4]) is not None else 1.0
+    area, _, more = _more(words[4:], scope, areas=True)
     current, voltage = model.values.get("is", 1e-14) * area, model.values.get("n", 1.0) * THERMAL
     given = f"Is = {quantity(current, 'A')}, vT = {quantity(voltage, 'V')}"
-    left = _beyond(model, ("is", "n", "rs"), ("level", "eg", "xti", "tnom"))
+    left = (*_beyond(model, ("is", "n", "rs"), ("level", "eg", "xti", "tnom")), *more)
     ohms = model.values.get("rs", 0.0) / area
     if ohms > 0.0:
         inner = f"{name}_in"
@@ -183,7 +211,8 @@ def _bipolar(card: Card, scope: Scope) -> Element:
     at = next((k for k in (4, 5) if k < len(words) and words[k] in scope.models), 4)
     model = _model(card, scope, words[at], ("npn", "pnp"))
     v = model.values
-    saturation, forward, backward = v.get("is", 1e-16), v.get("bf", 100.0), v.get("br", 1.0)
+    area, _, more = _more(words[at + 1 :], scope, areas=True)
+    saturation, forward, backward = v.get("is", 1e-16) * area, v.get("bf", 100.0), v.get("br", 1.0)
     ahead, behind = forward / (1.0 + forward), backward / (1.0 + backward)
     given = (
         f"Ies = {quantity(saturation / ahead, 'A')}, Ics = {quantity(saturation / behind, 'A')}, aF = {plain(ahead)}, "
@@ -193,7 +222,7 @@ def _bipolar(card: Card, scope: Scope) -> Element:
     name = scope.name[card.head]
     line = f"{name}: {model.kind}({given}) c = {c}, b = {b}, e = {e}"
     same = ("nr",) if v.get("nr") == v.get("nf", 1.0) else ()
-    left = _beyond(model, ("is", "bf", "br", "nf"), ("level", "eg", "xti", "xtb", "tnom", *same))
+    left = (*_beyond(model, ("is", "bf", "br", "nf"), ("level", "eg", "xti", "xtb", "tnom", *same)), *more)
     if b in (c, e) and c != e:  # one junction is short: the other is a diode
         current, other = (saturation / ahead, e) if b == c else (saturation / behind, c)
         ends = f"{b} -> {other}" if model.kind == "npn" else f"{other} -> {b}"

@@ -109,7 +109,7 @@ class Writer:
             self.report.error("E941", str(error), place)
             return Element(())
         if found.left_out:
-            text = f"'{card.head}': {', '.join(found.left_out)} of its model is left out"
+            text = f"'{card.head}': {', '.join(found.left_out)} of its card or model is left out"
             self.report.warning("W941", text, place, help="the run differs from SPICE's by what they do")
         self.written.uses |= set(found.uses)
         self.written.local += found.local

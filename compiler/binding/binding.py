@@ -134,6 +134,8 @@ def _owners(form: DescriptorForm, parameters: Parameters) -> dict[str, Extents]:
 def _hull(name: str, places: tuple[tuple[tuple[Node, ...], Nest, Place], ...], parameters: Parameters) -> Extents:
     """The box around all rows of a label; a hole or a second row of one index is E805."""
     if not places[0][0]:
+        if len(places) > 1:
+            raise ModelError([Diagnostic("E805", f"constraint {name} is given twice", places[-1][2])])
         return ()
     found = [np.stack([np.rint(a) for a in over(nest, at, parameters.lookup)]) for at, nest, _ in places]
     everything = np.concatenate(found, axis=1).astype(np.int64)

@@ -229,6 +229,9 @@ class Instances(Elements):
                 help_ = f"{names[0]} = {text}" if len(names) == 1 else f"name it: {', '.join(head.parameters)}"
                 message = f"'{text}' is a positional argument: those of '{component.name}' are named"
                 raise self.resolver.fail("E404", message, arg.span, help=help_)
+            if arg.name in found or arg.name in inputs:
+                message = f"'{arg.name}' of '{s.decl.name}' is given twice"
+                raise self.resolver.fail("E106", message, arg.span, help="one of the two")
             if arg.name in head.inputs:
                 inputs[arg.name] = arg.value
                 continue
@@ -322,6 +325,10 @@ class Instances(Elements):
         bound: set[str],
     ) -> None:
         name = connection.name.name
+        if name in inputs or (name in bound and name in head.ports):
+            what = "input" if name in inputs else "port"
+            message = f"{what} '{name}' of '{s.decl.name}' is bound twice"
+            raise self.resolver.fail("E402", message, connection.span, help="one of the two")
         if name in head.inputs:
             inputs[name] = connection.value
         elif name in head.ports:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import field
 from functools import partial
@@ -55,9 +55,9 @@ class Requirement:
     place: Place
     written: syntax.Expr
 
-    def is_met(self, known: Values) -> bool:
-        """Whether the condition holds where its loops begin."""
-        return known.truth(self.condition, {ex.index(loop.index): known.number(loop.first) for loop in self.loops})
+    def failures(self, known: Values) -> Iterator[Mapping[Node, float]]:
+        """The values of its loop variables for which the condition does not hold."""
+        return (at for at in known.cases(self.condition, self.loops) if not known.truth(self.condition, at))
 
 
 @dataclass(slots=True)
@@ -75,9 +75,9 @@ class CastRequirement:
         """In the names of the instance."""
         return self.cast.under(self.path)
 
-    def is_met(self, known: Values) -> bool:
-        """Whether the condition holds."""
-        return self.cast.truth(self.path, known)
+    def failures(self, known: Values) -> Iterator[Mapping[Node, float]]:
+        """One, without loop variables, if the condition does not hold."""
+        return iter(() if self.cast.truth(self.path, known) else ({},))
 
 
 @dataclass(slots=True)

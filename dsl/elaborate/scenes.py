@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
 from sysdyn.dsl.elaborate import events
 from sysdyn.dsl.elaborate.elaborate import Elaborator
-from sysdyn.dsl.elaborate.slices import element_of, ranges_of
+from sysdyn.dsl.elaborate.settings import Settings
+from sysdyn.dsl.elaborate.slices import each_of
 from sysdyn.dsl.format.format import format_expression
-from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import ElementSetting, Observation, Parameter, Scene
+from sysdyn.dsl.model.network import ElementSetting, Observation, Scene
 from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.habits import blamed
-from sysdyn.dsl.names.paths import Located
-from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Space, Typed, Unsupported, Vector, nearest
+from sysdyn.dsl.names.symbols import Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Place, SourceText
 from sysdyn.dsl.tree import syntax
@@ -46,9 +44,10 @@ class SceneReader:
         self.resolver = elaborator.resolver
         self.report = elaborator.report
         self.observations: list[Observation] = []
-        self.elements: list[ElementSetting] = []
+        self.given = Settings(elaborator)
         self._raw: dict[Node, str] = {}  # traced expression before its unit -> name
         self._found: dict[str, object] = {}
+        self._targets: set[tuple[str, str]] = set()
 
     def levels(self, scene: syntax.Scene) -> None:
         """The `level` statements and those that set inputs: before the model's instances are elaborated."""
@@ -60,8 +59,18 @@ class SceneReader:
 
     def set_input(self, s: syntax.Set) -> None:
         """A `set` of an input of the model; others wait."""
-        if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
-            self._set_input(s.target.name, *self.model.parts.inputs[s.target.name], s)
+        self.given.input(s)
+
+    def set_parameter(self, s: syntax.Set) -> None:
+        """A `set` of a parameter or elements of one."""
+        if self.resolver.source is self.model.source:  # of the command line the last one counts
+            self._one("set", s.target)
+        self.given.parameter(s)
+
+    @property
+    def elements(self) -> list[ElementSetting]:
+        """Elements of parameters that were set."""
+        return self.given.elements
 
     def read(self, scene: syntax.Scene, place: Place) -> Scene:
         """Everything else of the scene."""
@@ -89,133 +98,18 @@ class SceneReader:
         except Failed:
             return
 
+    def _one(self, word: str, target: syntax.Expr) -> None:
+        """What a scene gives to one target once."""
+        said = word, "".join(self.resolver.source.text[target.span.start : target.span.end].split())
+        if said in self._targets:
+            raise self.resolver.fail("E106", f"the scene gives '{said[1]}' twice", target.span, help="one of the two")
+        self._targets.add(said)
+
     def _once(self, key: str, value: object, span: syntax.Span, word: str | None = None) -> None:
         """What the scene may say once; word: the author's, where it is not the key."""
         if key in self._found:
             raise self.resolver.fail("E106", f"the scene says '{word or key}' twice", span)
         self._found[key] = value
-
-    # -- set -----------------------------------------------------------------------------------------------
-
-    def set_parameter(self, s: syntax.Set) -> None:
-        """`set ref = value` of a parameter or an element of one; paths lead into instances."""
-        if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
-            return
-        path = s.target.base if isinstance(s.target, syntax.Item) else s.target
-        if ranges_of(path):  # a range of components
-            for target, _ in self._each_of(path):
-                whole = replace(s.target, base=target) if isinstance(s.target, syntax.Item) else target
-                self.set_parameter(replace(s, target=whole))
-            return
-        found = self.resolver.located(s.target)
-        symbol = None if found is None else found.symbol
-        if isinstance(symbol, Unsupported):
-            raise Failed
-        if found is not None and isinstance(symbol, ParameterSymbol):
-            self._set_parameter(symbol, found, s)
-            return
-        root = s.target
-        while isinstance(root, (syntax.Item, syntax.Member)):
-            root = root.base
-        shown = " ".join(self.resolver.source.text[s.target.span.start : s.target.span.end].split())
-        name = root.name if isinstance(root, syntax.Name) else shown
-        if self.model.space.scope.is_broken(name):
-            raise Failed
-        near = nearest(shown, (*self.model.parts.parameters, *self.model.parts.inputs))
-        message = f"'{shown}' is not a parameter or input of model '{self.model.model.name.name}'"
-        help_ = f"nearest: '{near}'" if near else "init sets initial values" if symbol is not None else None
-        if name in self.model.parts.inputs:
-            help_ = f"the whole: set {name} = [a, b, ...]"
-        raise self.resolver.fail("E910", message, s.target.span, help=help_)
-
-    def _set_input(self, name: str, unit: Unit, place: Place, s: syntax.Set) -> None:
-        value = self._bare(s.value, unit.dimension)
-        self.model.parts.parameters.pop(name, None)
-        space = self.model.space
-        shape = getattr(space.scope.symbols[name], "shape", ())
-        if self.resolver.source is not space.source:  # the command line has a text of its own
-            space = Space("", space.scope, space.file_scope, self.resolver.source)
-        self.model.define_input(
-            Definition(name, "input", value, (), unit.dimension, space, place, s.span, shape=shape)
-        )
-
-    def _bare(self, value: syntax.Expr, dimension: Dimension) -> syntax.Expr:
-        """On the command line a bare number is in SI units."""
-        inner = value.operand if isinstance(value, syntax.Negative) else value
-        if self.resolver.source is self.model.source or not isinstance(inner, syntax.Number) or not dimension:
-            return value
-        number = syntax.Quantity(inner.value, inner.text, _si_unit(dimension, inner.span), inner.span)
-        self.model.files.scope.units.update({f"SI {dim.show(dimension)}": si(dimension)})
-        return syntax.Negative(number, value.span) if isinstance(value, syntax.Negative) else number
-
-    def _set_parameter(self, symbol: ParameterSymbol, found: Located, s: syntax.Set) -> None:
-        """A parameter, or elements of one, with its new value."""
-        parameter = self.model.parts.parameters[symbol.family.name]
-        value = self.resolver.resolve(self._bare(s.value, symbol.dimension or NONE))
-        items = value.items if isinstance(value, Vector) else (value,)
-        for item in items:
-            self._check_setting(symbol, item, s)
-        around = tuple(ex.substitute(n, found.change) for n in symbol.family.prefix)
-        at: list[tuple[Node, ...]] = [(n,) for n in around]
-        if around or not self._all(parameter, found.indices):
-            at += [self._chosen(symbol, i) for i in found.indices]
-        if around and not found.indices:  # of a component in an array: each element
-            bounds = ([self.model.given(ex.substitute(b, found.change)) for b in pair] for pair in symbol.shape)
-            at += [tuple(ex.const(float(k)) for k in range(round(a.data), round(b.data) + 1)) for a, b in bounds
-                   if ex.is_const(a) and ex.is_const(b)]  # fmt: skip
-        nodes = tuple(i.node for i in items)
-        if symbol.truth:
-            nodes = (ex.conditional(nodes[0], ex.const(1.0), ex.const(0.0)),)
-        place = self.resolver.place(s.span)
-        if at:
-            elements = list(itertools.product(*at))
-            if len(at) != len(parameter.shape):
-                raise self.resolver.index_count(symbol.name, len(symbol.shape), len(found.indices), s.target.span)
-            if isinstance(value, Vector) and (sum(len(a) > 1 for a in at) > 1 or len(elements) != len(items)):
-                message = f"{len(elements)} elements of '{symbol.name}' are given {len(items)} values"
-                raise self.resolver.fail("E805", message, s.value.span)
-            given = nodes if isinstance(value, Vector) else nodes * len(elements)
-            self.elements += [ElementSetting(parameter.name, a, n, place) for a, n in zip(elements, given, strict=True)]
-            return
-        if not self.model.fills(value, parameter.shape):
-            message = f"'{symbol.name}' is given {len(items)} values, which do not fit its shape"
-            raise self.resolver.fail("E805", message, s.value.span)
-        if self.resolver.source is not self.model.source:  # the command line wins over the scene's elements
-            self.elements = [e for e in self.elements if e.name != parameter.name]
-        self.model.parts.parameters[parameter.name] = replace(parameter, values=nodes, indices=(), place=place)
-
-    def _all(self, parameter: Parameter, indices: tuple[syntax.Index, ...]) -> bool:
-        """Whether ranges take all elements."""
-        ranges = [i for i in indices if isinstance(i, syntax.Range)]
-        said = [(self.resolver.whole_number(i.lower, "a bound"), self.resolver.whole_number(i.upper, "a bound"))
-                for i in ranges]  # fmt: skip
-        return len(ranges) == len(indices) and [*said] == [*parameter.shape]
-
-    def _chosen(self, symbol: ParameterSymbol, index: syntax.Index) -> tuple[Node, ...]:
-        """The numbers of an index, all those of a range."""
-        if not isinstance(index, syntax.Range):
-            return (self.resolver.whole_number(index, "an index"),)
-        return tuple(ex.const(float(k)) for k in range(self._bound(index.lower), self._bound(index.upper) + 1))
-
-    def _check_setting(self, symbol: ParameterSymbol, value: Typed, s: syntax.Set) -> None:
-        """E207: a setting is of the kind and the dimension of its parameter."""
-        if value.truth != symbol.truth:
-            raise self.resolver.fail(
-                "E207", f"'{symbol.name}' is {'a condition' if symbol.truth else 'a number'}", s.value.span
-            )
-        if value.dimension is not None and value.dimension != symbol.dimension:
-            message = f"'{symbol.name}' is in {dim.show(symbol.dimension)} but set to {dim.show(value.dimension)}"
-            help_ = self.resolver.missing(value.dimension, symbol.dimension, s.value)
-            raise self.resolver.fail("E207", message, s.value.span, help=help_)
-        for inner in ex.topological([value.node]):
-            if inner.op in ("var", "time"):
-                varies = symbol.name in self.model.parts.inputs
-                what = f"an element of input '{symbol.name}'" if varies else f"parameter '{symbol.name}'"
-                message = f"{what} is set to something that depends on '{inner}'"
-                help_ = f"the whole: set {symbol.name} = [a, b, ...]" if varies else None
-                raise self.resolver.fail(
-                    "E807", message, s.value.span, help=help_ or "a parameter is a constant; an input may vary"
-                )
 
     # -- span and numbers ----------------------------------------------------------------------------------
 
@@ -250,6 +144,8 @@ class SceneReader:
             )
         before = self._found.get("limits", ())
         assert isinstance(before, tuple)
+        if s.name.name in dict(before):
+            raise self.resolver.fail("E106", f"the scene says 'limit {s.name.name}' twice", s.span)
         self._found["limits"] = (*before, (s.name.name, self._constant(s.value, NONE, "a limit")))
 
     def _formulation(self, s: syntax.Formulation) -> None:
@@ -272,6 +168,8 @@ class SceneReader:
                 raise self.resolver.fail(
                     "E405", message, arg.span, help=", ".join(f"{n} = .." for n in _SOLVER_OPTIONS)
                 )
+            if arg.name in dict(options):
+                raise self.resolver.fail("E106", f"'{arg.name}' of the solver is given twice", arg.span)
             if arg.name in ("keep_implicit", "keep_flow"):
                 node = self._yes(arg.value, arg.name)
             else:
@@ -316,26 +214,10 @@ class SceneReader:
 
     def _items(self, item: syntax.TraceItem) -> None:
         """A traced expression; of `x[1..n].e` each element."""
-        for expr, at in self._each_of(item.expr):
+        for expr, at in each_of(self.model, item.expr):
             name = f"{item.alias.name}[{', '.join(map(str, at))}]" if item.alias and at else ""
             alias = replace(item.alias, name=name) if item.alias and at else item.alias
             self._item(replace(item, expr=expr, alias=alias) if at else item)
-
-    def _each_of(self, written: syntax.Expr) -> Iterator[tuple[syntax.Expr, tuple[int, ...]]]:
-        """Each element of `x[1..n].e` with its indices; any other expression itself, with none."""
-        ranges = ranges_of(written)
-        numbers = [range(self._bound(r.lower), self._bound(r.upper) + 1) for r in ranges]
-        if ranges:
-            budget.charge(budget.NODE * math.prod(map(len, numbers)), f"each element of '{self._text(written)}'")
-        for at in itertools.product(*numbers):
-            yield (element_of(written, dict(zip(ranges, at, strict=True))) if at else written), at
-
-    def _bound(self, bound: syntax.Expr) -> int:
-        """A bound of a slice, with the sizes that the scene and the command give."""
-        node = self.model.given(self.resolver.whole_number(bound, "a bound"))
-        if not ex.is_const(node):
-            raise self.resolver.fail("E807", "the bound of a slice depends on something without a value", bound.span)
-        return int(node.data)
 
     def _item(self, item: syntax.TraceItem) -> None:
         """One traced expression under its name; E905 where it does not exist or is an array."""
@@ -384,7 +266,7 @@ class SceneReader:
             text = f"accuracy {value.data:g}: from {FINEST_ACCURACY:g} to less than 1, what doubles can tell"
             raise self.resolver.fail("E906", text, s.value.span, help="accuracy 1e-6")
         names = []
-        for target in (element for written in s.on for element, _ in self._each_of(written)):
+        for target in (element for written in s.on for element, _ in each_of(self.model, written)):
             try:
                 with self.resolver.leniently():
                     node = self.resolver.scalar(target).node
@@ -417,16 +299,12 @@ class SceneReader:
 
     def level(self, s: syntax.SceneLevel) -> None:
         """`level ref = name`: before the model's instances are elaborated."""
+        self._one("level", s.target)
         text = " ".join(self.resolver.source.text[s.target.span.start : s.target.span.end].split())
         self.model.levels[text.replace(" ", "")] = (s.level.name, self.resolver.place(s.span))
 
     def _when(self, s: syntax.When) -> None:
         events.when(self.model, s)
-
-
-def _si_unit(dimension: Dimension, span: syntax.Span) -> syntax.Unit:
-    name = f"SI {dim.show(dimension)}"
-    return syntax.Unit((syntax.UnitFactor(name, 1, ".", span),), name, span)
 
 
 _STATEMENTS: dict[type, Callable[..., None]] = {

@@ -14,7 +14,9 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Constraint, Dynamic, Energy, Expectation, Golden, Initial, Work
 from sysdyn.dsl.model.quasi import NotLinearError, virtual
 from sysdyn.dsl.model.units import NONE, Dimension, multiply, si
+from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.symbols import BranchSymbol, InstanceSymbol, Typed, UnknownSymbol
+from sysdyn.dsl.text.diagnostics import Related
 from sysdyn.dsl.tree import syntax
 
 
@@ -37,6 +39,11 @@ class Statements(Declarations):
         if loops - used:
             message = f"'{s.decl.name}' stands in a 'for': its label needs the loop variable"
             raise self.resolver.fail("E106", message, s.decl.span, help=f"{s.decl.name}[i]")
+        before = self.resolver.constraints.get(family.name, [])
+        if before and not at:  # of elements that are given twice the binding knows
+            related = (Related("first declared here", before[0].place),)
+            self.report.error("E106", f"'{s.decl.name}' is declared twice", self.place(s.decl.span), related=related)
+            raise Failed
         node = ex.sub(left.node, right.node)
         constraint = Constraint(s.kind, family.name, at, node, self.resolver.loops, si(dimension), place)
         constraint = events.guarded(self, s, constraint)

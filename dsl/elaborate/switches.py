@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from itertools import product
 
 from sysdyn.dsl.elaborate.events import Draft, event_of, watch
 from sysdyn.dsl.elaborate.parts import ElaborationContext
@@ -36,18 +34,11 @@ def _bounds(draft: Draft) -> tuple[Node | None, Node | None, Node | None]:
 
 def _iterations(loops: tuple[Loop, ...], known: Values) -> Iterator[dict[Node, Node]]:
     """Numbers for the loop variables."""
-    ranges: list[range] = []
-    for loop in loops:
-        first, last = known.number(loop.first), known.number(loop.last)
-        if not math.isfinite(first + last):  # a bound that follows an outer loop
-            return
-        ranges.append(range(int(first), int(last) + 1))
-    number = 1
-    for r in ranges:
-        number *= len(r)
-    budget.charge(budget.NODE * max(number - 1, 0), "events and inequalities that are written out one by one")
-    for at in product(*ranges):
-        yield {ex.index(loop.index): ex.const(float(i)) for loop, i in zip(loops, at, strict=True)}
+    for k, _ in enumerate(known.iterations(loops)):
+        if k:
+            budget.charge(budget.NODE, "events and inequalities that are written out one by one")
+    for at in known.iterations(loops):
+        yield {name: ex.const(i) for name, i in at.items()}
 
 
 def _switch(frame: ElaborationContext, draft: Draft, change: dict[Node, Node], known: Values) -> Switch:

@@ -16,34 +16,39 @@ def real_power(base: float, exponent: float) -> float:
     try:
         value = base**exponent
     except (OverflowError, ZeroDivisionError):
-        return math.inf
+        return math.copysign(math.inf, base) if exponent % 2.0 == 1.0 else math.inf
     return value if isinstance(value, float) else math.nan
 
 
-def _safe(function: Callable[..., float]) -> Callable[..., float]:
+def _of_math(name: str, own: str | None = None) -> Callable[..., float]:
+    """A function of Python's: beyond all numbers infinite with the sign of its limit; NaN where it is none, and at a
+    pole, for a constant ln(0) is refused.
+    """
+    function, odd = getattr(math, own or name), name in ("sinh", "floor", "ceil")
+
     def call(*values: float) -> float:
         try:
             return float(function(*values))
         except OverflowError:
-            return math.inf
-        except (ValueError, ZeroDivisionError):
+            return math.copysign(math.inf, values[0]) if odd else math.inf
+        except ValueError:
             return math.nan
 
     return call
 
 
 def _sign(x: float) -> float:
-    return math.copysign(1.0, x) if x else 0.0
+    return x if math.isnan(x) else math.copysign(1.0, x) if x else 0.0
 
 
 def _mod(a: float, b: float) -> float:
-    return a - b * math.floor(a / b)
+    return a - b * FUNCTIONS["floor"](a / b) if b else math.nan
 
 
 # every function of the language with scalar arguments, by its name: the meaning all emitters must meet
 FUNCTIONS: Mapping[str, Callable[..., float]] = {
     **{
-        n: _safe(getattr(math, n))
+        n: _of_math(n)
         for n in (
             [
                 "sin",
@@ -68,12 +73,12 @@ FUNCTIONS: Mapping[str, Callable[..., float]] = {
             ]
         )
     },
-    "ln": _safe(math.log),
+    "ln": _of_math("ln", "log"),
     "abs": abs,
     "sign": _sign,
     "setsign": _sign,
     "min": min,
     "max": max,
-    "mod": _safe(_mod),
+    "mod": _mod,
     "step": lambda x: 1.0 if x >= 0.0 else 0.0,
 }

@@ -6,7 +6,8 @@ Parameters of any array size; elements are computed one at a time and only where
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
@@ -20,6 +21,7 @@ class Values:
     def __init__(self, parameters: Mapping[str, Parameter], elements: Sequence[ElementSetting] = ()) -> None:
         self._parameters = parameters
         self._known: dict[tuple[str, tuple[int, ...]], float] = {}
+        self._set = {setting.name for setting in elements}
         for name in parameters:  # in the order of dependence: no deep recursion
             if not parameters[name].shape:
                 self._element(name, ())
@@ -68,6 +70,40 @@ class Values:
         if len(parameter.values) > 1:
             k = at[-1] - int(self.number(parameter.shape[-1][0]))
         return self.number(parameter.values[k], bound) if 0 <= k < len(parameter.values) else math.nan
+
+    def iterations(self, loops: Sequence[Loop], at: Mapping[Node, float] | None = None) -> Iterator[dict[Node, float]]:
+        """The values of the loop variables, the last loop's the fastest; bounds may follow outer loops."""
+        at = dict(at or {})
+        if not loops:
+            yield at
+            return
+        first, last = self.number(loops[0].first, at), self.number(loops[0].last, at)
+        if math.isfinite(first + last):
+            for i in range(round(first), round(last) + 1):
+                yield from self.iterations(loops[1:], {**at, ex.index(loops[0].index): float(i)})
+
+    def cases(self, node: Node, loops: Sequence[Loop]) -> Iterator[dict[Node, float]]:
+        """The values of the loop variables for which a function of its unknowns may be one of its own: the first ones
+        alone where it does not follow them.
+        """
+        found = self.iterations(loops)
+        return found if loops and self._follows(node) else islice(found, 1)
+
+    def _follows(self, node: Node) -> bool:
+        """Whether loop variables enter a function: not by the index of what is the same in each element."""
+        stack, seen = [node], {node}
+        while stack:
+            top = stack.pop()
+            below = () if top.op == "var" else top.args
+            if top.op == "index":
+                return True
+            if top.op == "param" and top.args:
+                parameter = self._parameters.get(top.data)
+                if parameter is not None and len(parameter.values) == 1 and top.data not in self._set:
+                    below = parameter.values
+            stack += [n for n in below if n not in seen]
+            seen.update(below)
+        return False
 
     def bounds(self, node: Node, loops: Sequence[Loop]) -> tuple[float, float]:
         """Least and greatest value of an affine index over its loops (an empty loop gives inf, -inf)."""

@@ -1,4 +1,4 @@
-"""Rules on the resolved network: Paynter's diagram, constraints, values in their range, closed states.
+"""Rules on the resolved network: Paynter's diagram, constraints, closed states, results, smooth laws.
 
 Each rule is one function that looks at resolved statements and reports; none raises.
 """
@@ -9,25 +9,11 @@ import math
 from collections.abc import Iterable, Sequence
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
-from sysdyn.dsl.format.format import format_expression
-from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, signals_held
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import (
-    Branch,
-    Constraint,
-    Coordinate,
-    Loop,
-    NodeFamily,
-    Observation,
-    Shape,
-    State,
-    Unknown,
-)
-from sysdyn.dsl.model.units import quantity
-from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.model.network import Observation
 from sysdyn.dsl.rules.letters import letter, samples, unknowns_of
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
 
@@ -38,7 +24,7 @@ def families(model: Elaborator, report: Report) -> None:
     if not co or len(co) == len(model.parts.coordinates):
         return
     primal = {c.name for c in model.parts.coordinates if not c.complementary}
-    for node, place in _expressions(model):
+    for node, place in expressions_of(model):
         names = [n.data[0] for n in unknowns_of(node, "q f p")]
         both = [next((n for n in names if n in group), None) for group in (primal, co)]
         if all(both):
@@ -201,7 +187,7 @@ def set_valued_results(model: Elaborator, observations: Iterable[Observation], r
 
 
 def _has_setsign(root: Node) -> bool:
-    return any(n.op == "call" and n.data == "setsign" for n in _nodes(root))
+    return any(n.op == "call" and n.data == "setsign" for n in nodes_of(root))
 
 
 def _no_set(place: Place, report: Report) -> None:
@@ -245,147 +231,12 @@ def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
             report.error("E406", f"parameter '{name}' has no value", parameter.place, help=help_, subject=subject)
 
 
-def values(model: Elaborator, known: Values, report: Report) -> None:
-    """E322, E324, E805, E807 with the values bound."""
-    for r in model.parts.requirements:
-        if r.is_met(known):
-            continue
-        node, loops, place = r.condition, r.loops, r.place
-        bound = {ex.index(loop.index): known.number(loop.first) for loop in loops}
-        if all(not math.isnan(known.number(n, bound)) for n in _parameters(node)) and not known.truth(node, bound):
-            text = format_expression(r.written)
-            shown = ", ".join(_valued(n, known.number(n, bound), model) for n in _parameters(node))
-            report.error("E322", f"require {text} fails: {shown}", place, help=f"values for which {text}")
-    for node, place in _expressions(model):
-        if not _undefined(node, place, report):
-            _divisions(model, node, place, known, report)
-    _sizes(model, known, report)
-    _elements(model, known, report)
-    _indices(model, known, report)
-
-
-def _parameters(node: Node) -> list[Node]:
-    return [n for n in dict.fromkeys(_nodes(node)) if n.op == "param"]
-
-
-def _nodes(root: Node) -> Sequence[Node]:
+def nodes_of(root: Node) -> Sequence[Node]:
     """All nodes of an expression; most are no deeper than one operation."""
     return ex.topological([root]) if any(a.args for a in root.args) else (*root.args, root)
 
 
-def _valued(node: Node, value: float, model: Elaborator) -> str:
-    """`R = -3 ohm`: a parameter with its value in its own unit."""
-    unit = model.parts.parameters[node.data].unit if node.data in model.parts.parameters else None
-    return f"{node} = {value:g}" if unit is None else f"{node} = {quantity(value, unit)}"
-
-
-def _undefined(root: Node, place: Place, report: Report) -> bool:
-    """E324 where a constant of an expression is no number, or infinite as a term of a sum."""
-    for node in _always(root) if root.args else (root,):
-        constants = (node.data,) if node.op == "const" else (node.data[0], *node.data[1]) if node.op == "sum" else ()
-        if any(math.isnan(c) for c in constants):
-            message, help_ = "a constant here is no number", "a root, a logarithm or a quotient where it is defined"
-        elif node.op == "sum" and any(math.isinf(c) for c in constants):
-            message, help_ = "a constant here is too large for a number", "a smaller one"
-        else:
-            continue
-        report.error("E324", message, place, help=help_)
-        return True
-    return False
-
-
-def _divisions(model: Elaborator, node: Node, place: Place, known: Values, report: Report) -> None:
-    for inner in _always(node) if any(a.args for a in node.args) else (node,):
-        if inner.op != "mul" or not any(e < 0 for e in inner.data):
-            continue
-        for exponent, factor in zip(inner.data, inner.args, strict=True):
-            if exponent < 0 and _is_constant(factor) and known.number(factor) == 0.0:
-                names = _parameters(factor)
-                shown = ", ".join(_valued(n, known.number(n), model) for n in names) or f"{factor} = 0"
-                report.error("E324", f"division by zero with the values bound: {inner}, {shown}", place)
-                return
-
-
-def _always(root: Node) -> Iterable[Node]:
-    """What is evaluated whatever conditions say."""
-    found, left = dict[Node, None](), [root]
-    while left:
-        node = left.pop()
-        if node not in found:
-            found[node] = None
-            left += node.args[:1] if node.op == "cond" else node.args
-    return found
-
-
-def _is_constant(node: Node) -> bool:
-    return all(n.op not in ("var", "time", "index", "table") for n in ex.topological([node]))
-
-
-def _sizes(model: Elaborator, known: Values, report: Report) -> None:
-    for name in sorted(model.resolver.whole):
-        parameter = model.parts.parameters.get(name)
-        if parameter is None or parameter.shape or not parameter.values:
-            continue
-        value = known.number(ex.param(name))
-        if value != math.floor(value) or abs(value) > 2**31 - 2:
-            message = f"'{name}' is a size or an index, so it must be a whole number: {value:g}"
-            help_ = f"{math.floor(value):g} or {math.ceil(value):g}" if abs(value) < 2**31 else "a smaller number"
-            report.error("E805", message, parameter.place, help=help_, subject="sizes")
-
-
-def _elements(model: Elaborator, known: Values, report: Report) -> None:
-    """E119: arrays and loops of more elements than there is memory for."""
-    parts = model.parts
-    unknowns: list[Coordinate | Unknown | State | NodeFamily] = [*parts.coordinates, *parts.unknowns]
-    unknowns += [*parts.states, *parts.nodes]
-    counted = [(p.name, _volume(p.shape, known), p.place, budget.NUMBER) for p in parts.parameters.values()]
-    counted += [(u.name, _volume(u.shape, known), u.place, budget.UNKNOWN) for u in unknowns]
-    rows: list[Branch | Constraint] = [*parts.branches, *parts.constraints]
-    counted += [(r.name, _count(r.loops, known), r.place, budget.UNKNOWN) for r in rows]
-    left = float(budget.granted())
-    for name, count, place, price in counted:
-        left -= count * price
-        if left < 0.0:
-            message = f"the {count:.10g} elements of '{name}' need {budget.shown(count * price)}"
-            granted = budget.shown(budget.granted())
-            report.error("E119", f"{message}; one model may take {granted} in all", place, help="fewer elements")
-            return
-
-
-def _volume(shape: Shape, known: Values) -> float:
-    """Number of elements of a box; 0 where that is not known."""
-    if not shape:
-        return 1.0
-    lengths = [known.number(last) - known.number(first) + 1.0 for first, last in shape]
-    return math.prod(lengths) if all(n > 0.0 for n in lengths) else 0.0
-
-
-def _count(loops: Sequence[Loop], known: Values) -> float:
-    """Number of elements of the box around nested loops; 0 where that is not known."""
-    if not loops:
-        return 1.0
-    spans = [(known.bounds(ex.index(loop.index), loops[: k + 1])) for k, loop in enumerate(loops)]
-    lengths = [high - low + 1.0 for low, high in spans]
-    return math.prod(lengths) if all(n > 0.0 for n in lengths) else 0.0
-
-
-def _indices(model: Elaborator, known: Values, report: Report) -> None:
-    for use in model.resolver.uses:
-        low, high = known.bounds(use.value, use.loops)
-        first, last = (known.number(b) for b in use.shape)
-        if any(math.isnan(v) for v in (low, high, first, last)) or low > high:
-            continue
-        wrong = low if low < first else high if high > last else None
-        if wrong is not None:
-            span = use.place.span
-            written = " ".join(use.place.source.text[span.start : span.end].split())
-            message = f"index {wrong:g} of '{use.name}' is outside {first:g}..{last:g}: {use.name}[{written}]"
-            report.error("E805", message, use.place, help=f"{use.name} runs over {first:g}..{last:g}")
-        elif low != math.floor(low):
-            report.error("E805", f"index {low:g} of '{use.name}' is not a whole number", use.place, subject="sizes")
-
-
-def _expressions(model: Elaborator) -> Iterable[tuple[Node, Place]]:
+def expressions_of(model: Elaborator) -> Iterable[tuple[Node, Place]]:
     """Every expression that the model's equations are made of."""
     for b in model.parts.branches:
         if b.law is not None:
@@ -408,7 +259,7 @@ def _expressions(model: Elaborator) -> Iterable[tuple[Node, Place]]:
 
 
 def run(model: Elaborator, report: Report, *, required: bool) -> None:
-    """All rules; those with values only where every value is there."""
+    """All rules that need no values."""
     for rule in (families, constraints, states, accelerations, results, smoothness):
         rule(model, report)
     parameters(model, report, required=required)

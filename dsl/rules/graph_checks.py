@@ -200,11 +200,12 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
         return
     if slope.op != "param" and any(n.op in ("var", "time", "table") for n in ex.topological([slope])):
         return
-    bound = {ex.index(loop.index): known.number(loop.first) for loop in branch.loops}
-    value = known.number(slope, bound)
+    found = ((at, known.number(slope, at)) for at in known.cases(slope, branch.loops))
+    at, value = next((case for case in found if case[1] < 0.0), ({}, 0.0))
     if not value < 0.0:
         return
     name = branch.name.rpartition("#")[0] or branch.name
+    slope = ex.substitute(slope, {i: ex.const(k) for i, k in at.items()})
     shown = f"{value:g}" if slope.op == "const" else f"{slope} = {value:g}"
     if branch.kind == "kinetic":
         message = f"'{name}': the inertia is negative ({shown}): the motion is not determined forward in time"

@@ -60,17 +60,19 @@ def _judge(branch: Branch, law: Node, known: Values, laws: _Laws, report: Report
     own = [n for n in nodes if n.op == "var"]
     if len(own) != 1 or own[0].data[0] != branch.name or any(n.op in ("time", "table") for n in nodes):
         return
-    bound: dict[Node, float] = {ex.index(loop.index): known.number(loop.first) for loop in branch.loops}
-    values = [known.number(n, bound) for n in nodes if n.op == "param"]
-    like = _like(nodes, own[0], laws)
-    found = _delivers(like, dict(zip(like.params, values, strict=True)) | bound)
-    if found is not None:
+    params, like = [n for n in nodes if n.op == "param"], _like(nodes, own[0], laws)
+    for at in known.cases(law, branch.loops):
+        values = (known.number(n, at) for n in params)
+        found = _delivers(like, dict(zip(like.params, values, strict=True)) | at)
+        if found is None:
+            continue
         x, value = found
         domain, letter = branch.domain, own[0].data[1][1]
         unit = domain.flow if letter == "f" else domain.effort
         name = branch.name.partition("#")[0]
         message = f"dissipator '{name}': e*f = {x * value:.3g} W < 0 at {letter} = {x:g} {unit.text}"
         report.error("E313", f"{message} (active element)", branch.place, help="an effort or flow source with that law")
+        return
 
 
 def _like(nodes: Sequence[Node], own: Node, laws: _Laws) -> _Law:

@@ -21,6 +21,9 @@ Wide = NDArray[Any]
 """An array of mpf or mpc."""
 Values = NDArray[np.complex128]
 DIGITS = 120
+COUNTED = 1000.0
+"""Integers up to which are what is counted (signs of branches, turns, teeth) and known without round-off; beyond, 1e9
+N/m is a number as any other."""
 NOTHING = 1e-80
 """A pivot, in DIGITS: what is below is zero."""
 UNCERTAIN = 1e-2
@@ -58,10 +61,10 @@ def digits() -> Any:
 
 
 def shaken(matrix: Floats, seed: int = 3) -> Floats:
-    """Each magnitude changed by a round-off of its own, integers kept."""
+    """Each magnitude changed by a round-off of its own, small integers kept."""
     size, place = np.unique(np.abs(matrix), return_inverse=True)
     moved = size * (1.0 + 1e-15 * np.random.default_rng(seed).uniform(-1.0, 1.0, size.size))
-    moved = np.where(size == np.round(size), size, moved)
+    moved = np.where((size == np.round(size)) & (size <= COUNTED), size, moved)
     return np.copysign(moved[place].reshape(matrix.shape), matrix)
 
 

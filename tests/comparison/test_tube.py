@@ -10,8 +10,10 @@ from sysdyn.runtime.comparison.curve import (
     cells_at,
     largest,
     largest_magnitude,
+    turning_points,
     value_at,
     whole_cells,
+    with_extrema,
 )
 from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned
 from sysdyn.runtime.comparison.tube import band
@@ -85,6 +87,47 @@ def test_extrema_in_closed_form():
     size, at = largest_magnitude(b)
     assert np.allclose(size, np.abs(grid).max(axis=0), atol=1e-5)
     assert np.allclose(np.abs(value_at(b, at)), size, rtol=1e-12)
+
+
+def cubic(*coefficients):
+    """Coefficients [4, 1] of a + b x + c x^2 + d x^3 on 0..1."""
+    a, b, c, d = coefficients
+    return np.array([[a], [a + b / 3.0], [a + 2.0 * b / 3.0 + c / 3.0], [a + b + c + d]])
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "found"),
+    [
+        ((0.0, 1.0, -1.0, 0.0), [0.5]),  # a parabola
+        ((1.0, -1.0, 0.0, 4.0 / 3.0), [0.5]),  # 4 x^2 = 1
+        ((2.0, 2.0, -5.5, 11.0 / 3.0), [(1.0 - np.sqrt(3.0 / 11.0)) / 2.0, (1.0 + np.sqrt(3.0 / 11.0)) / 2.0]),
+        ((0.0, 3.0, 0.0, 0.0), []),  # a line
+        ((7.0, 0.0, 0.0, 0.0), []),
+        ((0.0, 0.0, 1.0, 0.0), []),  # at the end, not inside
+        ((0.0, 1.0, 1.0, 1.0), []),
+    ],
+)
+def test_where_a_cubic_turns(coefficients, found):
+    x = turning_points(cubic(*coefficients))
+    assert np.sort(x[np.isfinite(x)]) == pytest.approx(found, rel=1e-13)
+
+
+def test_a_curve_with_its_extrema_is_the_same_curve_and_monotone_in_every_cell():
+    """t^3 - 3 t from -2 to 2 in one cell turns at -1 and 1; behind it a jump, and a line that turns nowhere."""
+    curve = Curve(
+        np.array([-2.0, 2.0, 2.0, 5.0]), np.array([-2.0, 2.0, 9.0, 3.0]), np.array([9.0, 9.0, np.nan, np.nan])
+    )
+    found = with_extrema(curve)
+    assert found.time == pytest.approx([-2.0, -1.0, 1.0, 2.0, 2.0, 5.0], abs=1e-14)
+    assert found.values == pytest.approx([-2.0, 2.0, -2.0, 2.0, 9.0, 3.0], abs=1e-14)
+    assert found.rates[:4] == pytest.approx([9.0, 0.0, 0.0, 9.0])
+    assert np.isnan(found.rates[4:]).all()
+    cells = whole_cells(found, np.array([0, 1, 2]))
+    for x in (0.25, 0.5, 0.8):
+        t = found.time[:3] + x * np.diff(found.time)[:3]
+        assert value_at(cells, np.full(3, x)) == pytest.approx(t**3 - 3.0 * t, abs=1e-13)
+    bare = with_extrema(Curve(curve.time, curve.values))
+    assert bare.time.tolist() == curve.time.tolist()
 
 
 def test_parts_of_a_cell_are_the_same_cubic():

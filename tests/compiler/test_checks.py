@@ -158,3 +158,17 @@ def test_n608_a_sum_inside_a_nonlinear_energy(literal, codes):
         energies=(Energy("V", root, (), PLACE),),
     )
     assert [c for c, _ in findings(net)] == codes
+
+
+def test_e805_a_constraint_that_is_given_twice():
+    """Its rows would be added up to one."""
+    q = x.var("x", "q")
+    twice = [Constraint("phi", "tie", (), x.sub(q, x.const(value)), (), ONE, PLACE) for value in (1.0, 2.0)]
+    network = blank(
+        coordinates=(coordinate("x"),),
+        energies=(Energy("T*", x.power(x.var("x", "f"), x.const(2)), (), PLACE),),
+        constraints=tuple(twice),
+    )
+    with pytest.raises(ModelError) as caught:
+        compile_network(network, "lagrangian", "numpy").bind()
+    assert [(d.code, d.message) for d in caught.value.diagnostics] == [("E805", "constraint tie is given twice")]

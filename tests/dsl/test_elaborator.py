@@ -154,3 +154,25 @@ def test_ends_say_what_a_connection_joins():
     backwards, _ = whole("model m { node a, b: electrical; R: dissipator(e = 1 ohm*f) b -> a }")
     assert backwards.parts.branches[0].plus.node == "b"
     assert whole("model m { node a: electrical; R: dissipator(e = 1 ohm*f) a -> nowhere }")[1] == ["E101"]
+
+
+@pytest.mark.parametrize(
+    ("connection", "said"),
+    [
+        ("a = p, b = q, u = 0 V", None),
+        ("a = p, a = q, b = ground, u = 0 V", "port 'a' of 'L' is bound twice"),
+        ("a = p, b = q, u = 0 V, a = p", "port 'a' of 'L' is bound twice"),  # to the same too
+        ("a = p, b = q, u = 1 V, u = 2 V", "input 'u' of 'L' is bound twice"),
+    ],
+)
+def test_of_two_connections_of_one_port_or_input_none_is_taken(connection, said):
+    link = "component link { port a, b: electrical; input u: V; R: dissipator(e = 2 ohm*f + u) a -> b }"
+    elaborator, report = begun(f"{link}\nmodel m {{ node p, q: electrical; L: link() {connection} }}")
+    elaborator.names()
+    elaborator.elements()
+    assert [(d.code, d.message) for d in report] == ([("E402", said)] if said else [])
+
+
+@pytest.mark.parametrize(("arguments", "said"), [("k = 1 N/m", []), ("k = 1 N/m, k = 2 N/m", ["E106"])])
+def test_an_argument_that_is_given_twice_is_refused(arguments, said):
+    assert whole(OSCILLATOR.replace("spring()", f"spring({arguments})"))[1] == said

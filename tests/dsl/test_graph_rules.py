@@ -5,7 +5,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.rewriting import nodes_read
 from sysdyn.dsl.model.values import Values
-from sysdyn.dsl.rules import checks, graph_checks
+from sysdyn.dsl.rules import bound_values, checks, graph_checks
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 
 
@@ -111,6 +111,22 @@ def test_a_modulus_from_zero_on_is_no_fault(law):
     assert said(f"param k = 2\nnode x: translation\nX: {law} x") == []
 
 
+@pytest.mark.parametrize(
+    ("law", "values", "code", "shown"),
+    [
+        ("dissipator(e = k[i]*f*(1 N.s/m))", "1, 2, 3", None, ""),
+        ("dissipator(e = k[i]*f*(1 N.s/m))", "1, -2, 3", "E325", "(k[2] = -2)"),
+        ("kinetic(p = k[i]*f*(1 kg))", "1, 2, -3", "E321", "(k[3] = -3)"),
+        ("potential(e = (2 - i)*q*(1 N/m))", "1, 1, 1", "E325", "(-1)"),
+    ],
+)
+def test_a_modulus_below_zero_of_one_element_of_an_array(law, values, code, shown):
+    body = f"param k[1..3] = [{values}]\nnode x: translation\nfor i in 1..3 {{ X[i]: {law} x }}"
+    found = said(body)
+    assert [c for c, _, _ in found] == ([code] if code else [])
+    assert all(shown in message for _, message, _ in found)
+
+
 COUPLED = """component machine {{
   branch coil: electrical
   branch shaft: rotation
@@ -146,12 +162,12 @@ def test_a_branch_that_stands_in_nothing():
 # -- with the numbers -------------------------------------------------------------------------------------------------
 
 
-def judged(body, *, required=True):
+def judged(body, before="", *, required=True):
     """What the checks before and after the values are known say."""
-    model, source = elaborated(body)
+    model, source = elaborated(body, before)
     report = Report()
     checks.run(model, report, required=required)
-    checks.values(model, Values(model.parts.parameters, []), report)
+    bound_values.run(model, Values(model.parts.parameters, []), report)
     return told(report, source)
 
 
@@ -197,6 +213,91 @@ def test_what_is_required_is_told_with_its_values():
     body = SPRING.format("k") + "\nparam k = 3 kN/m\nparam limit = 2 N/mm\nrequire k < limit"
     assert judged(body) == [("E322", "require k < limit fails: k = 3 kN/m, limit = 2 N/mm", "require k < limit")]
     assert judged(body.replace("3 kN", "1 kN")) == []
+
+
+LEAKS = """node a: electrical
+C: potential(q = 1 F*e) a
+param r[1..3] = [{}]
+{}
+for i in 1..3 {{ R[i]: dissipator(e = r[i]*f) a }}"""
+
+
+@pytest.mark.parametrize(
+    ("resistances", "said", "found"),
+    [
+        ("1 ohm, 2 ohm, 3 ohm", "for i in 1..3 { require r[i] > 0 ohm }", None),
+        ("1 ohm, 2 ohm, -3 ohm", "for i in 1..3 { require r[i] > 0 ohm }", "require r[i] > 0 ohm fails: r[3] = -3 ohm"),
+        ("1 ohm, 2 ohm, 1 ohm", "for i in 2..3 { require r[i] >= r[i - 1] }",
+         "require r[i] >= r[i - 1] fails: r[3] = 1 ohm, r[2] = 2 ohm"),
+        ("1 ohm, 2 ohm, 3 ohm", "for i in 1..3 { for j in i..3 { require i <= j } }", None),
+        ("1 ohm, 2 ohm, 3 ohm", "for i in 1..3 { for j in i..3 { require i < j } }",
+         "require i < j fails: i = 1, j = 1"),
+        ("-1 ohm, -2 ohm, -3 ohm", "for i in 1..0 { require r[i] > 0 ohm }", None),
+    ],
+)  # fmt: skip
+def test_what_is_required_in_a_loop_is_required_of_every_element(resistances, said, found):
+    assert [(c, m) for c, m, _ in judged(LEAKS.format(resistances, said))] == ([("E322", found)] if found else [])
+
+
+def test_what_a_component_requires_holds_for_every_element_of_an_array_of_it():
+    part = "component leak { param R: ohm; require R > 0 ohm; branch: electrical; law e = R*f }\n"
+    body = "node a: electrical\nC: potential(q = 1 F*e) a\nfor i in 1..3 {{ X[i]: leak(R = (1 ohm)*({})) a -> ground }}"
+    assert [(c, m) for c, m, _ in judged(body.format("i - 1/2"), part)] == []
+    assert [(c, m) for c, m, _ in judged(body.format("2.5 - i"), part)] == [
+        ("E322", "require R > 0 ohm fails: X.R[3] = -0.5 ohm")
+    ]
+
+
+STATES = "state y[1..2, 1..2]: 1 = 0\n"
+LOWER = "for i in 1..2 { for j in 1..i { dynamic y[i, j]' = 1/(1 s) } }\n"
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("for i in 1..2 { for j in 1..2 { dynamic y[i, j]' = 1/(1 s) } }", None),
+        (LOWER + "dynamic y[1, 2]' = 2/(1 s)", None),
+        (LOWER, "state y[1, 2] has no dynamic"),
+        (LOWER + "dynamic y[1, 2]' = 2/(1 s)\ndynamic y[2, 1]' = 2/(1 s)", "state y[2, 1] has 2 dynamics"),
+        ("for i in 1..2 { for j in 1..2 { dynamic y[j, i]' = 1/(1 s) } }", None),
+        ("for i in 1..2 { dynamic y[i, i]' = 1/(1 s) }", "state y[1, 2] has no dynamic"),
+    ],
+)
+def test_every_element_of_a_state_has_one_dynamic(body, said):
+    """Rows of two would be added up: of 1 and 2 a rate of 1.5 was made."""
+    assert [(c, m) for c, m, _ in judged(STATES + body)] == ([("E507", said)] if said else [])
+
+
+RC = "node a: electrical\nC: potential(q = 1 F*e) a\n"
+PAIR = "component pair { port a: electrical; R: dissipator(e = 1 ohm*f) a; S: dissipator(e = 1 ohm*f) a }\n"
+
+
+@pytest.mark.parametrize(
+    ("body", "twice"),
+    [
+        ("for i in 1..2 { R[i]: dissipator(e = 1 ohm*f) a }\nR[3]: dissipator(e = 1 ohm*f) a", None),
+        ("for i in 1..2 { R[i]: dissipator(e = 1 ohm*f) a }\nR[2]: dissipator(e = 3 ohm*f) a", "R[2]"),
+        ("R[1]: dissipator(e = 1 ohm*f) a\nR[1]: dissipator(e = 1 ohm*f) a", "R[1]"),
+        ("X[1]: pair() a\nX[2]: pair() a", None),
+        ("X[1]: pair() a\nX[2]: pair() a\nX[1]: pair() a", "X[1]"),
+    ],
+)
+def test_an_element_of_an_array_is_made_once(body, twice):
+    """Two resistors under one name both carried a current, of which the trace had one."""
+    assert [(c, m) for c, m, _ in judged(RC + body, PAIR)] == (
+        [("E106", f"'{twice}' is declared twice")] if twice else []
+    )
+
+
+def test_a_constraint_is_declared_once():
+    """Two rows under one name were added up: of x' = 1 m/s and x' = 2 m/s came 1.5 m/s."""
+    report = Report()
+    text = (
+        "model m {\ncoord x: translation = 0 m\nenergy T* = 1/2*(1 kg)*x'^2\npsi a: x' = 1 m/s\npsi a: x' = 2 m/s\n}\n"
+    )
+    document = load.document(SourceText("m.sd", text), report)
+    assert load.network(document, document.models["m"], None, report) is None
+    assert [(d.code, d.message) for d in report] == [("E106", "'a' is declared twice")]
 
 
 def test_an_index_outside_its_family():

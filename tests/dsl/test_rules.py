@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Energy, Parameter
+from sysdyn.dsl.model.network import Energy, Loop, Parameter
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.rules.counted_twice import counted_twice
 from sysdyn.dsl.rules.dependent_stores import dependent_stores
@@ -197,6 +197,22 @@ def test_laws_that_differ_in_names_are_judged_by_their_own_values(parts):
     (found,) = said(passivity, replace(parts, branches=tuple(branches)), Values(parameters, ()))
     assert found[0] == "E313"
     assert found[1].startswith("dissipator 'R2': e*f = -")
+
+
+@pytest.mark.parametrize(
+    ("values", "active"), [((1.0, 2.0, 3.0), False), ((1.0, 2.0, -3.0), True), ((2.0,), False), ((-2.0,), True)]
+)
+def test_each_element_of_an_array_is_judged_by_its_own_values(parts, values, active):
+    """e = f^3 + b[i] f, i in 1..3; b of one value for all, or a list."""
+    resistor = next(b for b in parts.branches if b.name == "R")
+    i, three = ex.index("i"), ex.const(3.0)
+    f = ex.var("R", "bf", i)
+    law = ex.add(ex.mul(f, f, f), ex.mul(ex.param("b", i), f))
+    array = replace(resistor, at=(i,), loops=(Loop("i", ex.const(1.0), three),), law=law)
+    box = ((ex.const(1.0), three),)
+    b = Parameter("b", box, resistor.domain.flow, tuple(map(ex.const, values)), (), parts.place)
+    found = said(passivity, replace(parts, branches=(array,)), Values({"b": b}, ()))
+    assert [code for code, *_ in found] == (["E313"] if active else [])
 
 
 def test_a_law_that_rises_beside_a_pole_or_a_jump_gives_power_behind_it(parts):

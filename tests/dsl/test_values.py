@@ -53,6 +53,30 @@ def test_the_extremes_of_an_index_over_a_triangle_of_loops():
     assert values.bounds(i, [Loop("i", n, x.const(1))]) == (math.inf, -math.inf)
 
 
+def test_cases_are_all_iterations_where_a_value_follows_them_and_else_the_first():
+    """n = 3; a[i] = 5, b[i] = a[i] + n, c[i] = i, d a list, e[i] = 5 but for e[2] = 1."""
+    n, i = x.param("n"), x.index("i")
+    box = ((x.const(1), n),)
+    made = [
+        parameter("n", 3.0),
+        parameter("a", 5.0, shape=box),
+        parameter("b", x.add(x.param("a", i), n), shape=box, indices=("i",)),
+        parameter("c", i, shape=box, indices=("i",)),
+        parameter("d", 1.0, 2.0, 3.0, shape=box),
+        parameter("e", 5.0, shape=box),
+    ]
+    values = Values({p.name: p for p in made}, [ElementSetting("e", (x.const(2),), x.const(1), PLACE)])
+    loops = [Loop("i", x.const(1), n)]
+
+    def many(node):
+        return len(list(values.cases(node, loops)))
+
+    assert [many(x.param(p, i)) for p in "abcde"] == [1, 1, 3, 3, 3]
+    assert (many(n), many(x.add(n, x.power(i, x.const(2))))) == (1, 3)
+    assert many(x.param("f", i)) == 3  # of which nothing is known
+    assert list(values.cases(n, [Loop("i", n, x.const(1))])) == []
+
+
 def test_a_rolling_speed_multiplies_the_displacements_it_moves():
     """Along w = cos(th) x' + sin(th) y' + t th the virtual displacement is cos(th) dx + sin(th) dy."""
     th = x.var("th", "q")

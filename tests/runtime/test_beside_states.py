@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.events.locate import crossing
-from sysdyn.runtime.linear.pencil import motions, parted
+from sysdyn.runtime.linear.pencil import motions, parted, surely_parted, widely_parted
 from sysdyn.runtime.linear.stability import Energy, energy_at, verdict
 from sysdyn.runtime.linear.states import pivots, rank_of, unseen
 from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced
@@ -107,6 +107,34 @@ def test_a_capacitor_across_a_source_follows_its_rate():
     assert spaces[0].shape == (2, 0)
     assert found.d1.item() == pytest.approx(C, rel=1e-14)
     assert abs(found.d.item()) < 1e-14
+
+
+def two_stores(stiff, leak):
+    """x' = k (y - x), y' = x - y - d y, u into y; the currents are unknowns of their own, so that no sum of entries
+    hides d.
+    """
+    e = np.diag([1.0, 1.0, 0.0, 0.0])
+    a = np.array([[0.0, 0.0, -stiff, 0.0], [0.0, 0.0, 1.0, -1.0], [1.0, -1.0, -1.0, 0.0], [0.0, leak, 0.0, -1.0]])
+    b, c = np.array([[0.0], [1.0], [0.0], [0.0]]), np.array([[1.0, 0.0, 0.0, 0.0]])
+    return e, a, b, c, np.zeros((1, 4)), np.zeros((1, 1))
+
+
+@pytest.mark.parametrize(("stiff", "leak", "wide"), [(2.0, 0.5, False), (1e9, 1e-9, True), (1e12, 1e-12, True)])
+def test_a_slow_motion_beside_a_fast_one_keeps_its_digits(stiff, leak, wide):
+    """s^2 + (k + 1 + d) s + k d = 0: of -(k + 1) and about -d."""
+    matrices, chosen, names = two_stores(stiff, leak), np.array([0, 1]), ("x", "y")
+    found = surely_parted(matrices, chosen, motions(*matrices[:2]), names)
+    half = (stiff + 1.0 + leak) / 2.0
+    fast = half + np.sqrt(half**2 - stiff * leak)
+    values = np.linalg.eigvals(found.a) if found.decomposed is None else found.decomposed.values
+    assert np.sort(values.real) == pytest.approx([-fast, -stiff * leak / fast], rel=1e-11, abs=0.0)
+    assert ((found.decomposed is not None), found.names) == (wide, names)
+    assert found.b[:, 0] == pytest.approx([0.0, 1.0], abs=1e-12)
+    if wide:
+        alone = widely_parted(matrices, (np.array([1]), np.array([0])), 2)
+        assert alone.places.tolist() == [1, 0]  # the first group first
+        assert np.sort(alone.decomposed.values.real) == pytest.approx(np.sort(values.real), rel=1e-12, abs=0.0)
+        assert widely_parted(matrices, (np.array([1]),), 2) is None  # fewer than there are states
 
 
 def test_equations_that_leave_something_open_have_no_motions():

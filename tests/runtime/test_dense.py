@@ -54,8 +54,8 @@ def test_a_node_that_leakage_alone_holds(leak):
         [0, -3 * leak, 0, 0, 1],
     ]
     x = graded(rows, [leak, 0, 0, 0, 0])
-    assert x[:2] == pytest.approx([0.25, 0.25], rel=max(1e-14, leak))
-    assert x[2:] == pytest.approx([0.75 * leak, 0.25 * leak, 0.75 * leak], rel=max(1e-14, leak))
+    assert x[:2] == pytest.approx([0.25, 0.25], rel=max(1e-14, leak), abs=0.0)
+    assert x[2:] == pytest.approx([0.75 * leak, 0.25 * leak, 0.75 * leak], rel=max(1e-14, leak), abs=0.0)
 
 
 def test_graded_elimination_beside_fractions():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import small_models as models
+from sysdyn.runtime.events.conditions import with_momenta
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.carrier import load
@@ -189,3 +190,19 @@ def test_across_a_jump_of_a_speed_the_impulse_is_told():
     assert read(system, y, "q_x", "f_x", "mu_source") == pytest.approx([1.0, 3.0, -6.0], rel=1e-9)
     assert read(system, yd, "f_x") == pytest.approx([3.0], rel=1e-9)
     assert read(system, impulse, "mu_source") == pytest.approx([-6.0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kinetic", "momenta"), [("f_x**2 + f_x*f_y/2 + 3*f_y**2", (4.5, 7.0)), ("f_x**4 + f_y**2/2", (32.0, 1.0))]
+)
+def test_momenta_follow_from_flows_that_were_assigned(kinetic, momenta):
+    """dT*/df at f = (2, 1), whatever they were before; displacements and flows stay."""
+    settled = settled_of("x y", kinetic, "q_x**2", form="hamiltonian")
+    y = values(settled, q_x=5.0, f_x=2.0, f_y=1.0, p_x=-1.0, p_y=100.0)
+    found = with_momenta(settled, 0.0, y, np.zeros_like(y))
+    assert read(settled, found, "p_x", "p_y") == pytest.approx(momenta, rel=1e-14)
+    assert read(settled, found, "q_x", "f_x", "f_y") == [5.0, 2.0, 1.0]
+    assert read(settled, y, "p_x", "p_y") == [-1.0, 100.0]  # the caller's own stay
+    plain = settled_of("x y", kinetic, "q_x**2")  # without momenta there is nothing to do
+    y = values(plain, f_x=2.0)
+    assert with_momenta(plain, 0.0, y, y) is y

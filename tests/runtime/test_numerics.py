@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.numerics.equilibrate import equilibrated, factors, sparse_factors
 from sysdyn.runtime.numerics.points import distinct, normal, uniform
+from sysdyn.runtime.numerics.products import add_product
 from sysdyn.runtime.numerics.rank import TOLERANCE, NotFiniteError, count, decomposed, least_squares, null_space, rank
 
 
@@ -133,3 +134,18 @@ def test_normal_numbers_have_the_moments_of_the_normal_distribution():
     moments = [np.mean(found**k) for k in range(1, 5)]
     assert moments == pytest.approx([0.0, 1.0, 0.0, 3.0], abs=0.05)
     assert np.linalg.cond(found[:, :6]) < 10.0
+
+
+def test_a_matrix_by_its_entries_times_a_vector_is_added_to_what_is_there():
+    """[1 2; 0 3; 0 0] by entries, one of them in two parts, times (10, 100)."""
+    rows, columns, values = [1, 0, 0, 0], [1, 0, 1, 1], np.array([3.0, 1.0, 1.5, 0.5])
+    out = np.array([1.0, 1.0, 1.0])
+    assert add_product(rows, columns, values, np.array([10.0, 100.0]), out) is out
+    assert out.tolist() == [211.0, 301.0, 1.0]
+    none = np.zeros(0)
+    assert add_product([], [], none, none, np.array([2.0])).tolist() == [2.0]
+    # whatever kind of numbers and strides they come in
+    found = add_product(
+        np.array([0, 1], dtype=np.int32)[::-1], np.array([0, 0]), np.array([1, 2]), np.arange(6.0)[3::2], np.zeros(2)
+    )
+    assert found.tolist() == [6.0, 3.0]

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from sysdyn.runtime.linear import precise, responses, witness
-from sysdyn.runtime.linear.modes import Transfer, modes, stored, transfer
+from sysdyn.runtime.linear.modes import Transfer, modes, stored, transfer, wide_transfer
 from sysdyn.runtime.linear.tangent import Reduced
 
 NONE = np.zeros(0, complex)
@@ -150,7 +150,7 @@ def test_wide_elimination_solves_what_doubles_lose():
 
 def test_wide_eigenvalues_keep_a_slow_one_beside_a_fast_one():
     found = precise.decompose(precise.wide(np.array([[-1e20, 1e20], [0.0, -1e-12]])))
-    assert sorted(found.values.real) == pytest.approx([-1e20, -1e-12], rel=1e-15)
+    assert sorted(found.values.real) == pytest.approx([-1e20, -1e-12], rel=1e-15, abs=0.0)
 
 
 def test_a_quotient_loses_what_cancels():
@@ -185,3 +185,78 @@ def test_independent_rows_are_those_of_the_first_group():
         found = precise.independent(columns, groups).tolist()
     assert found[1:] == [2]
     assert found[0] in (0, 1)
+
+
+@pytest.mark.parametrize(("groups", "free"), [(([0], [1], [2]), {2}), (([2], [1], [0]), {0}), (([0, 1],), {0, 1})])
+def test_columns_that_a_null_space_leaves_free_are_the_last_groups_first(groups, free):
+    """x + y = 0, 2 y + z = 0: one of three is free, of those in no group (z in the last case) none if it can be."""
+    matrix = np.array([[1.0, 1.0, 0.0], [0.0, 2.0, 1.0]])
+    with precise.digits():
+        (found,), rows = precise.free(matrix, matrix, np.ones(3), tuple(np.array(g) for g in groups))
+    assert found in free
+    assert rows.tolist() == [0, 1]
+
+
+def test_what_the_change_of_round_off_moves_in_its_first_digits_is_no_pivot():
+    """Two rows that differ by 1e-15 in one entry are one row; that they differ by 1e-9 counts."""
+    for difference, free in ((1e-15, 1), (1e-9, 0)):
+        matrix = np.array([[0.3, 0.7], [0.3, 0.7 + difference]])
+        with precise.digits():
+            found, _ = precise.free(matrix, precise.shaken(matrix), np.ones(2), (np.array([0, 1]),))
+        assert found.size == free
+
+
+def test_round_off_shakes_like_numbers_alike_and_nothing_that_is_counted():
+    matrix = np.array([[0.3, -0.3], [2.0, 1e9]])
+    found = precise.shaken(matrix)
+    assert found[0, 0] == -found[0, 1] != 0.3
+    assert found[1, 0] == 2.0
+    assert found[1, 1] != 1e9
+    assert found == pytest.approx(matrix, rel=2e-15)
+
+
+def test_an_eigenvalue_that_round_off_moves_and_that_is_none_is_refused():
+    """Of -1 and -1e-9 in 1/s; what is round-off of the largest, or stands near it, is not asked."""
+    said = pytest.raises(ValueError, match="1e-09")
+
+    def refuse(value):
+        return ValueError(f"{abs(value):g}")
+
+    values = np.array([-1.0, -1e-9], complex)
+    with said:
+        precise.refuse_lost(values, values * [1.0, 1.01], refuse)
+    precise.refuse_lost(values, values * [1.0, 1.0 + 1e-8], refuse)  # steady enough
+    precise.refuse_lost(np.array([-1.0, -1e-11], complex), np.array([-1.0, -3e-11], complex), refuse)
+    precise.refuse_lost(np.array([-1.0, -1e-3], complex), np.array([-1.0, -2e-3], complex), refuse)
+
+
+def widely(a, b, c, d=0.0):
+    return *(precise.wide(np.array(part)) for part in (a, b, c)), mpmath.mpf(d)
+
+
+def test_a_transfer_function_in_many_digits_keeps_a_slow_pole_and_loses_what_cancels():
+    """(s + 2)/((s + 1)(s + 2)(s + 1e-18)) in three states."""
+    slow = 1e-18
+    a = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-2.0 * slow, -(2.0 + 3.0 * slow), -(3.0 + slow)]]
+    with precise.digits():
+        m = mpmath.mpf
+        exact = precise.wide(np.array(a))
+        exact[2] = [-2 * m(slow), -(2 + 3 * m(slow)), -(3 + m(slow))]
+        one = exact, *widely(a, [0.0, 0.0, 1.0], [2.0, 1.0, 0.0])[1:]
+        found = wide_transfer(one, one, (3, 4), (0.5, 0.0))
+    assert (found.output, found.input, found.improper) == (3, 4, (0.5, 0.0))
+    assert found.zeros.size == 0
+    assert found.poles == pytest.approx([-1.0, -slow], rel=1e-14, abs=0.0)
+    assert found.gain == 1.0
+    assert found.static == pytest.approx(1.0 / slow, rel=1e-14)
+
+
+def test_zeros_that_move_with_round_off_are_at_zero_or_at_infinity():
+    """c = (tiny, 1): (s + tiny)/(s + 1)(s + 3); c = (1, tiny): (1 + tiny s)/..., of which round-off makes the zero."""
+    a, b = [[0.0, 1.0], [-3.0, -4.0]], [0.0, 1.0]
+    with precise.digits():
+        small = wide_transfer(widely(a, b, [1e-17, 1.0]), widely(a, b, [-2e-17, 1.0]), (0, 0), (0.0, 0.0))
+        far = wide_transfer(widely(a, b, [1.0, 1e-17]), widely(a, b, [1.0, -2e-17]), (0, 0), (0.0, 0.0))
+    assert (small.zeros.tolist(), small.static) == ([0.0], 0.0)
+    assert far.zeros.size == 0
+    assert (far.gain, far.static) == pytest.approx((1.0, 1.0 / 3.0), rel=1e-14)

@@ -36,7 +36,7 @@ MAGNITUDE = np.array([2.0, 5.0, 0.1, 0.2])
 def test_what_is_round_off_of_the_largest_of_its_unit_is_relative_to_that():
     """x met 1e-14 m beside a place of 5 m, a nothing beside a radian's 1e-8, v its own 3 m/s."""
     sizes = quantities().sizes(np.array([1e-14, 0.0, 3.0]), MAGNITUDE)
-    assert sizes == pytest.approx([5e-12, 1e-20, 3.0], rel=1e-12)
+    assert sizes == pytest.approx([5e-12, 1e-20, 3.0], rel=1e-12, abs=0.0)
 
 
 def test_meters_are_relative_to_what_went_round():

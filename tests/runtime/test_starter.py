@@ -7,7 +7,7 @@ from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
-from sysdyn.runtime.start.settled import inertial_rows, rates_of
+from sysdyn.runtime.start.settled import columns_of_rates, flows_open, inertial_rows, rates_of
 from sysdyn.runtime.start.starter import Starter, problem_of
 from sysdyn.runtime.structure.redundancy import Reactions, combination, dependent
 
@@ -168,3 +168,20 @@ def test_the_combination_that_vanishes():
     weights = combination(reactions(ROWS), np.array([2]))
     assert weights / weights[0] == pytest.approx([1.0, -1.0, -1.0, 0.0, 0.0])
     assert combination(reactions(ROWS), np.array([3])).tolist() == [0.0, 0.0, 0.0, 1.0, 0.0]
+
+
+def test_rates_stand_behind_the_unknowns():
+    rates, columns = np.array([1, 3], dtype=np.int32), np.array([3, 0, 1, 3, 2])
+    assert columns_of_rates(4, rates, columns).tolist() == [5, -1, 4, 5, -1]
+    assert columns_of_rates(2, np.zeros(0, dtype=np.int32), np.array([0, 1])).tolist() == [-1, -1]
+
+
+@pytest.mark.parametrize(("content", "left"), [("0", True), ("f_b**2/2", False), ("(f_b + f_c)**2/2", False)])
+def test_flows_of_a_loop_of_stores_are_open(content, left):
+    """Two capacitors in parallel carry like currents; how large these are the rate of their balance says and no row
+    that is settled, unless there is a resistor.
+    """
+    manifest, binding, module = models.small("b c", 0, "(q_b**2 + q_c**2)/2", content, phi={"loop": "q_b - q_c"})
+    settled = System(manifest, binding, load(module), "settled")
+    y = np.zeros(settled.unknowns)
+    assert flows_open(settled, 0.0, y, y, settled.are("q")[: settled.form.written]) == left

@@ -7,14 +7,13 @@ and are integrated through.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
 from sysdyn.compiler.forms.corners.kinks import JUDGED, MOST, SMOOTH, sided, smoothness, watched
 from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Kernel, Summand
-from sysdyn.dsl.model.expression import Node, const, index, neg, substitute, topological
+from sysdyn.dsl.model.expression import Node, const, neg, substitute, topological
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.model.values import Values
 
@@ -48,19 +47,8 @@ def _own(node: Node) -> bool:
 
 
 def _iterations(kernel: Kernel, known: Values) -> Iterator[Iteration]:
-    """The elements of a nest; bounds may follow outer loops."""
-
-    def below(depth: int, at: dict[Node, float]) -> Iterator[dict[Node, float]]:
-        if depth == len(kernel.nest):
-            yield at
-            return
-        loop = kernel.nest[depth]
-        first, last = known.number(loop.first, at), known.number(loop.last, at)
-        if math.isfinite(first + last):
-            for i in range(round(first), round(last) + 1):
-                yield from below(depth + 1, {**at, index(loop.index): float(i)})
-
-    for at in below(0, {}):
+    """The elements of a nest."""
+    for at in known.iterations(kernel.nest):
         yield {n: const(i) for n, i in at.items()}
 
 

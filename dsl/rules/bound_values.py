@@ -1,0 +1,222 @@
+"""Rules on the numbers that a text binds: what is required, divisions, sizes, indices, room for arrays.
+
+Received: an elaborator whose parameters are known, their `Values`.  Each finding goes to the report; none raises.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Iterable, Sequence
+
+from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.format.format import format_expression
+from sysdyn.dsl.model import budget
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Branch, Constraint, Coordinate, Dynamic, Loop, NodeFamily, Shape, State, Unknown
+from sysdyn.dsl.model.units import quantity
+from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.rules.checks import expressions_of, nodes_of
+from sysdyn.dsl.text.diagnostics import Place, Report
+
+
+def run(model: Elaborator, known: Values, report: Report) -> None:
+    """E119, E322, E324, E805 with the values bound."""
+    for r in model.parts.requirements:
+        for at in r.failures(known):
+            met = {n: known.number(n, at) for n in _parameters(r.condition)}
+            if not any(map(math.isnan, met.values())):
+                text = format_expression(r.written)
+                said = {ex.substitute(n, {i: ex.const(v) for i, v in at.items()}): value for n, value in met.items()}
+                shown = ", ".join(_valued(n, value, model) for n, value in said.items())
+                shown = shown or ", ".join(f"{i} = {v:g}" for i, v in at.items())
+                report.error("E322", f"require {text} fails: {shown}", r.place, help=f"values for which {text}")
+                break
+    for node, place in expressions_of(model):
+        if not _undefined(node, place, report):
+            _divisions(model, node, place, known, report)
+    _sizes(model, known, report)
+    _dynamics(model, known, report)
+    _branches(model, known, report)
+    _elements(model, known, report)
+    _indices(model, known, report)
+
+
+def _parameters(node: Node) -> list[Node]:
+    return [n for n in dict.fromkeys(nodes_of(node)) if n.op == "param"]
+
+
+def _valued(node: Node, value: float, model: Elaborator) -> str:
+    """`R = -3 ohm`: a parameter with its value in its own unit."""
+    unit = model.parts.parameters[node.data].unit if node.data in model.parts.parameters else None
+    return f"{node} = {value:g}" if unit is None else f"{node} = {quantity(value, unit)}"
+
+
+def _undefined(root: Node, place: Place, report: Report) -> bool:
+    """E324 where a constant of an expression is no number, or infinite as a term of a sum."""
+    for node in _always(root) if root.args else (root,):
+        constants = (node.data,) if node.op == "const" else (node.data[0], *node.data[1]) if node.op == "sum" else ()
+        if any(math.isnan(c) for c in constants):
+            message, help_ = "a constant here is no number", "a root, a logarithm or a quotient where it is defined"
+        elif node.op == "sum" and any(math.isinf(c) for c in constants):
+            message, help_ = "a constant here is too large for a number", "a smaller one"
+        else:
+            continue
+        report.error("E324", message, place, help=help_)
+        return True
+    return False
+
+
+def _divisions(model: Elaborator, node: Node, place: Place, known: Values, report: Report) -> None:
+    for inner in _always(node) if any(a.args for a in node.args) else (node,):
+        if inner.op != "mul" or not any(e < 0 for e in inner.data):
+            continue
+        for exponent, factor in zip(inner.data, inner.args, strict=True):
+            if exponent < 0 and _is_constant(factor) and known.number(factor) == 0.0:
+                names = _parameters(factor)
+                shown = ", ".join(_valued(n, known.number(n), model) for n in names) or f"{factor} = 0"
+                report.error("E324", f"division by zero with the values bound: {inner}, {shown}", place)
+                return
+
+
+def _always(root: Node) -> Iterable[Node]:
+    """What is evaluated whatever conditions say."""
+    found, left = dict[Node, None](), [root]
+    while left:
+        node = left.pop()
+        if node not in found:
+            found[node] = None
+            left += node.args[:1] if node.op == "cond" else node.args
+    return found
+
+
+def _is_constant(node: Node) -> bool:
+    return all(n.op not in ("var", "time", "index", "table") for n in ex.topological([node]))
+
+
+def _sizes(model: Elaborator, known: Values, report: Report) -> None:
+    for name in sorted(model.resolver.whole):
+        parameter = model.parts.parameters.get(name)
+        if parameter is None or parameter.shape or not parameter.values:
+            continue
+        value = known.number(ex.param(name))
+        if value != math.floor(value) or abs(value) > 2**31 - 2:
+            message = f"'{name}' is a size or an index, so it must be a whole number: {value:g}"
+            help_ = f"{math.floor(value):g} or {math.ceil(value):g}" if abs(value) < 2**31 else "a smaller number"
+            report.error("E805", message, parameter.place, help=help_, subject="sizes")
+
+
+def _dynamics(model: Elaborator, known: Values, report: Report) -> None:
+    """E507: every element of a state has exactly one dynamic; that some state has none at all is told before."""
+    given: dict[str, list[Dynamic]] = {}
+    for dynamic in model.parts.dynamics:
+        given.setdefault(dynamic.state.data[0], []).append(dynamic)
+    for state in model.parts.states:
+        said = given.get(state.name, [])
+        if not state.shape or not said or (len(said) == 1 and _whole(said[0], state)):
+            continue
+        counts = _counted([(dynamic.state.args, dynamic.loops) for dynamic in said], known)
+        twice = next((element for element, number in counts.items() if number > 1), None)
+        box = [range(round(known.number(a)), round(known.number(b)) + 1) for a, b in state.shape if _known(a, b, known)]
+        every = itertools.product(*box) if len(box) == len(state.shape) else ()
+        wrong = next((element for element in every if element not in counts), None) if twice is None else twice
+        if wrong is not None:
+            name = _indexed(state.name, wrong)
+            what = "has no dynamic" if twice is None else f"has {counts[wrong]} dynamics"
+            report.error("E507", f"state {name} {what}", said[-1].place, help="each element once")
+
+
+def _branches(model: Elaborator, known: Values, report: Report) -> None:
+    """E106: an element of an array that several statements make."""
+    pieces: dict[str, list[Branch]] = {}
+    for branch in model.parts.branches:
+        if branch.at:
+            pieces.setdefault(re.sub(r"\[[^]]*\]", "", branch.name), []).append(branch)  # `X[2].R` is a piece of X.R
+    told: set[str] = set()
+    for name, made in pieces.items():
+        label = name.partition(".")[0].partition("#")[0]
+        if len(made) < 2 or label in told:
+            continue
+        counts = _counted([(branch.at, branch.loops) for branch in made], known)
+        for element in (element for element, number in counts.items() if number > 1):
+            told.add(label)
+            report.error("E106", f"'{_indexed(label, element)}' is declared twice", made[-1].place)
+            break
+
+
+def _counted(places: Iterable[tuple[Sequence[Node], Sequence[Loop]]], known: Values) -> dict[tuple[float, ...], int]:
+    """How often each element is meant by indices under loops."""
+    counts: dict[tuple[float, ...], int] = {}
+    for indices, loops in places:
+        for at in known.iterations(loops):
+            element = tuple(known.number(n, at) for n in indices)
+            counts[element] = counts.get(element, 0) + 1
+    return counts
+
+
+def _indexed(name: str, element: Sequence[float]) -> str:
+    return f"{name}[{', '.join(f'{k:g}' for k in element)}]"
+
+
+def _whole(dynamic: Dynamic, state: State) -> bool:
+    """Whether a dynamic is plainly that of every element once: its loops are the bounds of the state."""
+    own = tuple(ex.index(loop.index) for loop in dynamic.loops)
+    return dynamic.state.args == own and tuple((loop.first, loop.last) for loop in dynamic.loops) == state.shape
+
+
+def _known(first: Node, last: Node, known: Values) -> bool:
+    return math.isfinite(known.number(first) + known.number(last))
+
+
+def _elements(model: Elaborator, known: Values, report: Report) -> None:
+    """E119: arrays and loops of more elements than there is memory for."""
+    parts = model.parts
+    unknowns: list[Coordinate | Unknown | State | NodeFamily] = [*parts.coordinates, *parts.unknowns]
+    unknowns += [*parts.states, *parts.nodes]
+    counted = [(p.name, _volume(p.shape, known), p.place, budget.NUMBER) for p in parts.parameters.values()]
+    counted += [(u.name, _volume(u.shape, known), u.place, budget.UNKNOWN) for u in unknowns]
+    rows: list[Branch | Constraint] = [*parts.branches, *parts.constraints]
+    counted += [(r.name, _count(r.loops, known), r.place, budget.UNKNOWN) for r in rows]
+    left = float(budget.granted())
+    for name, count, place, price in counted:
+        left -= count * price
+        if left < 0.0:
+            message = f"the {count:.10g} elements of '{name}' need {budget.shown(count * price)}"
+            granted = budget.shown(budget.granted())
+            report.error("E119", f"{message}; one model may take {granted} in all", place, help="fewer elements")
+            return
+
+
+def _volume(shape: Shape, known: Values) -> float:
+    """Number of elements of a box; 0 where that is not known."""
+    if not shape:
+        return 1.0
+    lengths = [known.number(last) - known.number(first) + 1.0 for first, last in shape]
+    return math.prod(lengths) if all(n > 0.0 for n in lengths) else 0.0
+
+
+def _count(loops: Sequence[Loop], known: Values) -> float:
+    """Number of elements of the box around nested loops; 0 where that is not known."""
+    if not loops:
+        return 1.0
+    spans = [(known.bounds(ex.index(loop.index), loops[: k + 1])) for k, loop in enumerate(loops)]
+    lengths = [high - low + 1.0 for low, high in spans]
+    return math.prod(lengths) if all(n > 0.0 for n in lengths) else 0.0
+
+
+def _indices(model: Elaborator, known: Values, report: Report) -> None:
+    for use in model.resolver.uses:
+        low, high = known.bounds(use.value, use.loops)
+        first, last = (known.number(b) for b in use.shape)
+        if any(math.isnan(v) for v in (low, high, first, last)) or low > high:
+            continue
+        wrong = low if low < first else high if high > last else None
+        if wrong is not None:
+            span = use.place.span
+            written = " ".join(use.place.source.text[span.start : span.end].split())
+            message = f"index {wrong:g} of '{use.name}' is outside {first:g}..{last:g}: {use.name}[{written}]"
+            report.error("E805", message, use.place, help=f"{use.name} runs over {first:g}..{last:g}")
+        elif low != math.floor(low):
+            report.error("E805", f"index {low:g} of '{use.name}' is not a whole number", use.place, subject="sizes")
