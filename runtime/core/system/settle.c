@@ -386,12 +386,12 @@ static void finish(sd_settle *settle, double t, double *y, double *yd, int done,
         measure(settle, t, y, yd);
 }
 
-/* Whether the rows hold at (y, yd), or its own do.  A polynomial may be anywhere between steps: where the iteration left
- * magnitudes far beyond the point that it found, in those of the motion and of that point. */
-static int holds(sd_settle *settle, double t, const double *y, const double *yd, double best)
+/* Whether the rows hold at (y, yd) as far as `limit`, or its own do.  Of steep laws a polynomial may be anywhere between
+ * steps: where the iteration left magnitudes far beyond its point, in those of the motion and of this point. */
+static int holds(sd_settle *settle, double t, const double *y, const double *yd, double best, double limit)
 {
     int grown = 0;
-    for (int32_t j = 0; j < settle->unknowns + settle->rates; j++) {
+    for (int32_t j = 0; j < settle->unknowns + settle->rates && settle->system->scales > 0; j++) {
         double size = fmax(settle->usual[j], fabs(j < settle->unknowns ? y[j] : yd[settle->rate[j - settle->unknowns]]));
         if (settle->scale[j] > BEYOND * size && size > 0.0) {
             settle->scale[j] = size;
@@ -402,7 +402,7 @@ static int holds(sd_settle *settle, double t, const double *y, const double *yd,
         slopes(settle, t, y, yd, 0);
         best = measure(settle, t, y, yd);
     }
-    return best <= CLOSE || (measure(settle, t, y, yd), settle->own <= CLOSE);
+    return best <= limit || (measure(settle, t, y, yd), settle->own <= limit);
 }
 
 /* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */
@@ -414,7 +414,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     take(settle, y, yd, settle->x0);
     memcpy(settle->usual, settle->scale, (size_t)(settle->unknowns + settle->rates) * sizeof(double));
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && settle->refused < REFUSALS) {
-        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best)) {
+        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, fmax(CLOSE, settle->enough))) {
             take(settle, y, yd, settle->met);
             finish(settle, t, y, yd, 1, 1);
             return 0;
@@ -436,17 +436,19 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     int done = 0;
     if (best <= CLOSE) {
         put(settle, settle->x, y, yd);
-        done = holds(settle, t, y, yd, best);
+        done = holds(settle, t, y, yd, best, CLOSE);
     }
     if (!done && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
-        memcpy(settle->scale, settle->usual, (size_t)(settle->unknowns + settle->rates) * sizeof(double));
-        settle->ready = NONE;
+        if (settle->system->scales > 0) {
+            memcpy(settle->scale, settle->usual, (size_t)(settle->unknowns + settle->rates) * sizeof(double));
+            settle->ready = NONE;
+        }
         put_near(settle, y, yd);
         iterate(settle, t, y, yd, PATIENT, &best);
     }
     /* the best point met, or the given one; a rate may have no bound */
     put(settle, settle->x, y, yd);
-    done = done || holds(settle, t, y, yd, best);
+    done = done || holds(settle, t, y, yd, best, CLOSE);
     if (done)
         take(settle, y, yd, settle->met);
     else
