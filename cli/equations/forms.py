@@ -48,10 +48,22 @@ class Content:
     counted: tuple[str, ...] = ()
 
 
-def content_of(
-    target: Target, prepared: Prepared, form: str, request: Request, report: Report
-) -> Content | None:
+OF_COORDINATES = ("matrices", "underlying", "port_hamiltonian", "efforts")
+"""Forms that a model of dynamic variables alone does not have."""
+
+
+def content_of(target: Target, prepared: Prepared, form: str, request: Request, report: Report) -> Content | None:
     """The content of a --form; None where the report says why there is none.  Raises NoSuchEquations."""
+    if form in OF_COORDINATES and not any(f.kind == "f" for f in prepared.compiled.form.families):
+        raise NoSuchEquations("the model has no coordinates: see --form descriptor")
+    found = _content(target, prepared, form, request, report)
+    if found is not None and not (found.functions or found.equations or found.matrices):
+        linear = "nothing moves freely: the model has no states"
+        raise NoSuchEquations(linear if form == "linear" else "nothing is unknown in the model")
+    return found
+
+
+def _content(target: Target, prepared: Prepared, form: str, request: Request, report: Report) -> Content | None:
     compiled = prepared.compiled
     algebra = algebra_of(compiled.form, [p.name for p in compiled.network.parameters if not p.shape])
     match form:

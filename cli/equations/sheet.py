@@ -65,7 +65,8 @@ class Sheet:
     def to_text(self) -> str:
         """For a terminal."""
         parts = [_block(self.functions)] if self.functions else []
-        parts.append(_block(self.equations) + (f"\n... {self.more} more" if self.more else ""))
+        if self.equations:
+            parts.append(_block(self.equations) + (f"\n... {self.more} more" if self.more else ""))
         if self.legend:
             said = (f"{s} of {owner}, line {line}" if owner else s for s, owner, line in self.legend)
             parts.append("\n".join(said))

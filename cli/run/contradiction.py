@@ -43,6 +43,10 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             report.error("E519", f"gamma '{names}' has no solution at the start: {left}", where, related=related)
         case "implicit":
             report.error("E505", f"the gammas do not determine {', '.join(error.names)} at the start", where)
+        case "nonfinite" if not names:
+            message = "the equations are no numbers at the start: products or quotients beyond 1e308?"
+            sizes = "look at the sizes of parameters and initial values"
+            report.error("E519", message, prepared.network.place, help=sizes)
         case "nonfinite":
             message = f"{names} is not a number at the initial values: a root or logarithm out of its range?"
             report.error("E519", message, where)

@@ -106,7 +106,8 @@ def shortest(algebra: Algebra, coefficient: Any) -> Any:
     algebra.spent += size
     if size > LARGEST or algebra.spent > GRANTED:
         return coefficient
-    forms = [coefficient]
+    whole, held = _closed(sympy, coefficient)
+    forms = [whole]
     waves = coefficient.has(sympy.sin, sympy.cos)
     ways: list[Callable[[Any], Any]] = [sympy.factor]
     if waves and _over_sums(sympy, coefficient):
@@ -118,12 +119,20 @@ def shortest(algebra: Algebra, coefficient: Any) -> Any:
         ways.append(sympy.expand)
     for way in ways:
         try:
-            forms.append(way(coefficient))
+            forms.append(way(whole))
         except (sympy.PolynomialError, NotImplementedError):
             continue
     if waves:
         forms += [turned_factors(sympy, form) for form in forms[1:] if form.is_Mul]
+    forms = [form.xreplace(held) for form in forms] if held else forms
     return min(forms, key=lambda c: (sympy.count_ops(c, visual=False), str(c)))
+
+
+def _closed(sympy: Any, whole: Any) -> tuple[Any, dict[Any, Any]]:
+    """Exponentials and broken powers as symbols, and what these are: in polynomials exp(99 t) is of degree 99."""
+    broken = (p for p in whole.atoms(sympy.Pow) if not (2 * p.exp).is_Integer)
+    held = {p: sympy.Dummy() for p in (*whole.atoms(sympy.exp), *broken)}
+    return (whole.xreplace(held), {symbol: p for p, symbol in held.items()}) if held else (whole, {})
 
 
 def turned_factors(sympy: Any, form: Any) -> Any:

@@ -93,7 +93,7 @@ class Notes:
             digits = text.lower().partition("e")[0]
             if value != 0.0:
                 self.error("E114", f"the number {_short(text)} is too large: the largest is 1.797e308", span, "inf")
-                return 0.0
+                return 1.0  # neither zero nor infinite: nothing follows from it
             if digits.strip("0."):
                 self.error("E114", f"the number {_short(text)} is too small: the smallest is 5e-324", span, "0")
         return value

@@ -28,7 +28,7 @@ from sysdyn.runtime.integrate.settlers import Settlers, steep_balances
 from sysdyn.runtime.integrate.sizes import Sizes
 from sysdyn.runtime.integrate.told import Told
 from sysdyn.runtime.integrate.underlying import Underlying
-from sysdyn.runtime.integrate.unknown_roles import Roles, roles
+from sysdyn.runtime.integrate.unknown_roles import Roles, general_rates, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import confirmed
@@ -191,6 +191,7 @@ class Integration:
     def _kept_roles(self, whole: System, kept: Ints) -> Roles:
         """Roles of what is kept; constraints between displacements are left by their rates: no index above 2."""
         _, jyd = whole.jacobian(self.start.t, self.y, self.yd)
+        jyd = general_rates(whole, self.start.t, self.y, self.yd, jyd)
         return roles(whole, self.start.t, jyd, min(self.request.index, 2)).kept(kept)
 
     def last(self) -> tuple[Floats, Floats, Floats]:

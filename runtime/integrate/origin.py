@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from sysdyn.runtime.integrate.factors import Factors
 from sysdyn.runtime.integrate.underlying import Accelerations, underlying_form
-from sysdyn.runtime.integrate.unknown_roles import Roles, roles, without_rate
+from sysdyn.runtime.integrate.unknown_roles import Roles, general_rates, roles, without_rate
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import magnitudes, unresolved
 from sysdyn.runtime.model.system import System
@@ -28,8 +28,9 @@ class Origin:
         self.system, self.start, self.t = system, start, start.t
         self.y, self.rate = start.for_form(system)
         self._matrix: tuple[Floats, Floats] | None = None
-        self.yd = np.where(system.differential(self.jyd), self.rate, 0.0)
-        self.roles: Roles = roles(system, start.t, self.jyd, index)
+        rates = general_rates(system, start.t, self.y, self.rate, self.jyd)
+        self.yd = np.where(system.differential(rates), self.rate, 0.0)
+        self.roles: Roles = roles(system, start.t, rates, index)
         self.least = np.where(system.are("q", "f"), UNRESOLVED * unresolved(system, self.y, self.jy), 0.0)
         self._sized: tuple[float, tuple[Floats, float]] | None = None
         self._explicit: tuple[System, Roles] | None = None

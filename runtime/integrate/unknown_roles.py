@@ -16,12 +16,17 @@ from dataclasses import fields, replace
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.points import uniform
 from sysdyn.runtime.structure.rates import unique
 from sysdyn.values import dataclass
 
 BALANCED = 1e-12
 """Sum of a row of dF/dyd over that of its magnitudes that is round-off."""
+
+BESIDE = 1e-3
+"""Relative move of displacements: an inertia that vanishes at the start by chance does not vanish beside it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +60,22 @@ class Roles:
         return Roles(*(np.ascontiguousarray(array[places]) for array in arrays))
 
 
+def general_rates(system: System, t: float, y: Floats, yd: Floats, jyd: Floats) -> Floats:
+    """dF/dyd [entries] for `roles`: of the start, or of a point beside it where inertias vanish at the start alone."""
+    flows, displaced = system.are("f"), system.are("q")
+    if not displaced.any() or not (system.structural()[1] & (jyd == 0.0) & flows[system.pattern.columns_of()]).any():
+        return jyd
+    part = 0.5 + 0.5 * uniform(y.size, 0, 0)
+    beside = np.where(displaced, y + BESIDE * group_maximum(system, np.abs(y)) * part, y)
+    with np.errstate(all="ignore"):
+        _, found = system.jacobian(t, beside, yd)
+    return found if np.isfinite(found).all() else jyd
+
+
 def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     """Roles in one form at index `index` of that form (as written: the model's; 2: 2; 1: 1).
 
-    t, jyd: of the start, where dF/dyd shows the flows with inertia.
+    t, jyd: of the start; dF/dyd shows the flows with inertia (`general_rates`).
     """
     flows, implicit = system.are("f"), system.are("e")
     differential = system.differential(jyd)

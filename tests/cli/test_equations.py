@@ -404,6 +404,33 @@ def test_forms_that_do_not_exist(options, why, tmp_path, capsys):
     assert why in error["message"]
 
 
+ALONE = """model decay { state x: kg = 1 kg; dynamic x' = -x/(3 s) }"""
+DIVIDER = """
+model divider {
+  node a, b: electrical
+  V: effort(e = 5 V) a -> ground
+  R: dissipator(e = 100 ohm*f) a -> b
+  S: dissipator(e = 200 ohm*f) b -> ground
+}
+"""
+
+
+@pytest.mark.parametrize("form", ["matrices", "underlying", "port_hamiltonian", "efforts"])
+@pytest.mark.parametrize("alphabet", ["--text", "--latex", "--html"])
+def test_dynamic_variables_alone_have_no_coordinates(form, alphabet, tmp_path, capsys):
+    code, found = run_json(capsys, "equations", write(tmp_path, ALONE), "--form", form, alphabet)
+    assert code == 1
+    (error,) = found["diagnostics"]
+    assert (error["code"], "no coordinates" in error["message"]) == ("E607", True)
+
+
+@pytest.mark.parametrize(("text", "form"), [(DIVIDER, "linear"), ("model none { param a = 1 kg }", "descriptor")])
+def test_equations_that_there_are_none_of(text, form, tmp_path, capsys):
+    code, found = run_json(capsys, "equations", write(tmp_path, text), "--form", form)
+    assert code == 1
+    assert [d["code"] for d in found["diagnostics"]] == ["E607"]
+
+
 def test_a_circuit_has_no_underlying_equation(capsys):
     code, found = run_json(capsys, "equations", str(SEED / "lead_filter.sd"), "--form", "underlying")
     assert code == 1

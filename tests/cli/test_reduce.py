@@ -131,6 +131,30 @@ def test_the_largest_come_first_and_shares_add_up(tmp_path, capsys):
     assert sides[0] == pytest.approx(sides[1], rel=1e-4)
 
 
+CORNER = """\
+model corner {
+  coord x, y: translation = 1 m
+  energy T* = 1/2*(1 kg)*(x'^2 + y'^2)
+  phi left: x >= 0 m restitution 0.5
+  phi floor: y >= 0 m restitution 0.5
+  init x' = -2 m/s
+  init y' = -2 m/s
+}
+scene run of corner {
+  time 0 s to 2 s
+  trace x, y every 50 ms
+}
+"""
+
+
+def test_impacts_take_what_they_take(tmp_path, capsys):
+    """Of 4 J two impacts at once leave a quarter; what events watch is no quantity of the scene."""
+    code, found = run_json(capsys, "reduce", write(tmp_path, CORNER))
+    assert code == 0
+    (kinetic,) = found["result"]["activity"]
+    assert kinetic["activity"] == pytest.approx(3.0, rel=1e-9)
+
+
 def test_the_variation_of_a_cubic_is_that_of_its_extremes():
     # y = s (s - 1/4) (s - 1) on [0, 1] and its mirror image: two cells, extremes inside both
     def y(s):

@@ -290,3 +290,10 @@ def test_a_hostile_trace_in_a_browser(tmp_path, chromium):
     assert len(chromium.requests) == 1
     assert chromium.evaluate("document.title") != "taken"
     assert chromium.evaluate("document.querySelectorAll('img').length") == 0
+
+
+def test_elements_of_a_model_with_events_have_their_energies(tmp_path, monkeypatch):
+    """What events watch is no quantity of the scene: the run in which the powers are observed is made without them."""
+    monkeypatch.chdir(tmp_path)
+    report(ROOT / "models" / "gallery" / "bouncing_ball.sd", "--scene", "first")
+    assert '<rect class="held"' in Path("page.html").read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.joining import joined, shorter
+from sysdyn.compiler.equations.joining import joined, shorter, shortest
 from sysdyn.compiler.equations.order import Order
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
@@ -99,3 +99,15 @@ def test_the_terms_are_worth_what_was_joined(seed, arrow):
             continue
         parts = [value(t, numbers) for t in terms]
         assert sum(parts) == pytest.approx(exact, rel=1e-8, abs=1e-9 * sum(map(abs, parts))), to_text(root)
+
+
+@pytest.mark.parametrize("power", [False, True])
+def test_a_fast_exponential_is_no_polynomial_of_its_degree(power):
+    """exp(-t/(0.1 ms)) and a power to nine digits: as polynomials of degree 9999 and 141421356 they end never."""
+    m, _, _, a, *_ = leaves()
+    fast = x.power(x.add(a, x.const(1.0)), x.const(1.41421356)) if power else x.call("exp", x.mul(x.const(-9999.0), a))
+    root = x.sub(x.mul(m, fast), m)
+    terms = algebra()
+    short = terms.node(shortest(terms, terms.object(root)))
+    numbers = {m: 2.0, a: 1e-5}
+    assert value(short, numbers) == pytest.approx(value(root, numbers), rel=1e-12)

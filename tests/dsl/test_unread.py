@@ -101,3 +101,16 @@ def test_a_law_whose_number_cannot_be_read_is_told_of_that_alone(slip):
 def test_a_reduction_that_there_is_not_is_told_of_that_alone():
     text = "model m { coord x[1..2]: translation; energy T* = pi(i in 1..2: 1/2*1 kg*x[i]'^2) }"
     assert [d.code for d in api.check(text) if d.severity == "error"] == ["E113"]
+
+
+OSCILLATOR = "model p { param m = SIZE kg; coord x: translation = 1 m; energy T* = 1/2*m*x'^2; energy V = 2 N/m*x^2 }"
+
+
+def test_a_number_beyond_the_largest_is_told_of_alone():
+    assert [d.code for d in api.check(OSCILLATOR.replace("SIZE", "1e400"))] == ["E114"]
+
+
+def test_equations_beyond_the_largest_number_are_named():
+    (found,) = (d for d in api.check(OSCILLATOR.replace("SIZE", "1e-310")) if d.severity == "error")
+    assert found.code == "E519"
+    assert found.message.startswith("the equations are no numbers at the start")

@@ -5,6 +5,7 @@ test could see.  The accuracy asked holds all the same, and the ledgers, which a
 import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
+from scipy.special import lambertw
 
 TEXT = """
 model still {{
@@ -52,3 +53,30 @@ def test_energy_is_asked_of_the_ledger_alone(tmp_path):
     work = (126 * s + sum(c * np.sin(k * s) / k for c, k in sines)) / 512
     assert abs(trace["audit.dissipated"].values[-1] - 4.5 / 2 * work) < 1e-5
     assert np.abs(trace["audit.energy"].values).max() < 1e-6 * 4.5
+
+
+DIODE = """
+model clipper {
+  param Is = 1 pA
+  param vT = 25.85 mV
+  node a, b: electrical
+  V: effort(e = 5 V*sin(2*pi*50 Hz*t)) a -> ground
+  R: dissipator(e = 100 ohm*f) a -> b
+  D: dissipator(f = Is*(exp(e/vT) - 1)) b -> ground
+}
+scene run of clipper { time 0 s to 60 ms; trace R.f, D.e every 0.1 ms }
+"""
+
+
+@pytest.mark.parametrize("method", ["dopri", "radau", "bdf", "rosenbrock", "energy"])
+@pytest.mark.parametrize("formulation", FOUR)
+def test_a_diode_that_follows_its_source_between_long_steps(tmp_path, formulation, method):
+    """i R + vT ln(1 + i/Is) = V; of it there is a closed form in Lambert's W.  No step of dopri has an error here, and
+    its polynomial may be anywhere between: rows of 6e23 A were said to hold, in magnitudes that such points had left.
+    """
+    trace = trace_of(tmp_path, DIODE, scene="run", formulation=formulation, method=method)
+    volts = 5.0 * np.sin(100.0 * np.pi * trace.time)
+    inner = 1e-12 * 100.0 / 25.85e-3 * np.exp((volts + 1e-10) / 25.85e-3)
+    amperes = 25.85e-3 / 100.0 * lambertw(inner).real - 1e-12
+    assert np.abs(trace["R.f"].values - amperes).max() < 1e-9 * np.abs(amperes).max()
+    assert np.abs(trace["D.e"].values - (volts - 100.0 * amperes)).max() < 1e-8

@@ -113,3 +113,29 @@ def test_a_force_that_jumps_takes_massless_springs_to_the_stop_and_not_beyond(tm
     behind = trace.time > 0.42
     for name, before, after in (("x", -0.02, 0.015), ("y", -0.04, 0.03), ("s", 0.0, 2.0 - 0.75)):
         assert np.abs(trace[name].values - np.where(behind, after, before)).max() < 1e-12
+
+
+TURNED = """
+model turned {
+  param I = 2 kg.m^2
+  coord c: rotation = 1
+  coord s: rotation ~ 0
+  let w = c*s' - s*c'
+  energy T* = 1/2*I*w^2
+  phi unit_: c^2 + s^2 = 1
+  init w = 1 rad/s
+}
+scene run of turned { time 0 s to 8 s; trace c, s every 50 ms }
+"""
+
+
+@pytest.mark.parametrize(("method", "accuracy"), [("radau", 1e-6), ("bdf", 1e-3)])
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+def test_an_inertia_that_turns(tmp_path, formulation, method, accuracy):
+    """Coordinates without inertia along themselves: at the start this is c alone, elsewhere both.  c = cos(t),
+    s = sin(t); with roles as the start alone shows them radau stops and bdf takes 40 000 steps.
+    """
+    asked = {"formulation": formulation, "method": method, "index": "2", "accuracy": accuracy}
+    trace = trace_of(tmp_path, TURNED, scene="run", max_steps=3000, **asked)
+    assert np.abs(trace["c"].values - np.cos(trace.time)).max() < accuracy
+    assert np.abs(trace["s"].values - np.sin(trace.time)).max() < accuracy

@@ -25,7 +25,19 @@ from sysdyn.compiler.network.primal.reading import FUNCTIONS
 from sysdyn.compiler.network.primal.slopes import Slopes
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.dimensions import ENERGY as ENERGY_DIMENSION
-from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, sub, substitute, var, variables
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    const,
+    div,
+    index,
+    mul,
+    neg,
+    sub,
+    substitute,
+    var,
+    variables,
+)
 from sysdyn.dsl.model.network import (
     Constraint,
     Coupling,
@@ -95,7 +107,9 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     found.momenta.update(momenta)
     keep = network.scene is not None and network.scene.keeps("keep_implicit")
     for coupling, label in _ratios(network, elements, sizes):
-        _couple(coupling, label, elements, sizes, found, keep=keep)
+        # of a moving modulus the reflection has the reciprocal, which has no value where the modulus is zero
+        moving = reflected and bool(variables(coupling.ratio))
+        _couple(coupling, label, elements, sizes, found, keep=keep, moving=moving)
     return found
 
 
@@ -224,11 +238,18 @@ def _stem(name: str) -> str:
 
 
 def _couple(
-    coupling: Coupling, part: Part, elements: Sequence[Element], sizes: Sizes, found: Laws, *, keep: bool
+    coupling: Coupling,
+    part: Part,
+    elements: Sequence[Element],
+    sizes: Sizes,
+    found: Laws,
+    *,
+    keep: bool,
+    moving: bool,
 ) -> None:
     """Transformer f1 = n f2 or e1 = n e2; gyrator e1 = r f2.  The companion law makes e1 f1 + e2 f2 zero.
 
-    keep: the efforts of a gyrator are unknowns.
+    keep: the efforts of a gyrator are unknowns; moving: they are, and their gammas have the reciprocal of its ratio.
     """
     label = part.name
     c = coupling
@@ -236,8 +257,8 @@ def _couple(
     domain = next(e.branch.domain for e in elements if e.name == c.first)
     if c.kind == "gyrator":
         efforts = mul(c.ratio, second), neg(mul(c.ratio, first))
-        if keep:
-            efforts = _kept(c, part, efforts, elements, found)
+        if keep or moving:
+            efforts = _kept(c, part, efforts, elements, found, moving=moving)
         for effort, name in zip(efforts, (c.first, c.second), strict=True):
             place = replace(c.place, element=_stem(c.first))
             found.works.append(Work(neg(effort), var(name, "bq", *c.at), c.loops, place))
@@ -261,16 +282,25 @@ def _couple(
 
 
 def _kept(
-    coupling: Coupling, part: Part, efforts: tuple[Node, Node], elements: Sequence[Element], found: Laws
+    coupling: Coupling,
+    part: Part,
+    efforts: tuple[Node, Node],
+    elements: Sequence[Element],
+    found: Laws,
+    *,
+    moving: bool,
 ) -> tuple[Node, Node]:
-    """Both efforts of a gyrator as unknowns, each closed by its gamma."""
+    """Both efforts of a gyrator as unknowns, each closed by its gamma; moving: this is one of flows."""
     c, made = coupling, []
-    for port, (effort, name) in enumerate(zip(efforts, (c.first, c.second), strict=True), start=1):
-        unit = next(e.branch.domain for e in elements if e.name == name).effort
+    domains = [next(e.branch.domain for e in elements if e.name == name) for name in (c.first, c.second)]
+    for port, (effort, domain, other) in enumerate(zip(efforts, domains, reversed(domains), strict=True), start=1):
+        unit = domain.effort
         unknown = f"{part.name.removesuffix('.ratio').replace('#1', '')}.e{port}"
         found.unknowns.setdefault(unknown, Unknown(unknown, shape_of(part.box), unit, c.place))
         own_effort = var(unknown, "e", *c.at)
         equation = sub(own_effort, effort)
+        if moving:
+            equation, unit = sub(div(own_effort, c.ratio), div(effort, c.ratio)), other.flow
         found.constraints.append(Constraint("gamma", f"{unknown}.law", c.at, equation, c.loops, unit, c.place))
         made.append(own_effort)
     return made[0], made[1]

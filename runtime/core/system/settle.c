@@ -20,6 +20,7 @@
 #define STILL 1e-12     /* move of the state, in magnitudes, that is none */
 #define REFUSALS 3      /* of the basis in a row, behind which it is not tried any more */
 #define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
+#define BEYOND 1e3      /* times the point that was found, from which a magnitude was that of an iterate */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
 
 enum { NONE, MATRIX, BASIS };
@@ -32,7 +33,7 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
     size_t nnz = (size_t)system->entries + 1, m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1;
     size_t kept = system->left ? (size_t)system->unknowns + 8 : 0;
     size_t most = linear && (size_t)linear->entries > 2 * m ? (size_t)linear->entries : 2 * m;
-    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 6 * n + 2 * kept, sizeof(double));
+    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 7 * n + 2 * kept, sizeof(double));
     if (!settle->memory) {
         free(settle);
         return NULL;
@@ -52,7 +53,8 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
     settle->scale = settle->x0 + n;
     settle->step = settle->scale + n; /* unknowns, rates and rows */
     settle->met = settle->step + n + m;
-    settle->matrix = settle->met + n;
+    settle->usual = settle->met + n;
+    settle->matrix = settle->usual + n;
     settle->room = settle->matrix + most + 1;
     return settle;
 }
@@ -384,6 +386,25 @@ static void finish(sd_settle *settle, double t, double *y, double *yd, int done,
         measure(settle, t, y, yd);
 }
 
+/* Whether the rows hold at (y, yd) as far as `limit`, or its own do.  Of steep laws a polynomial may be anywhere between
+ * steps: where the iteration left magnitudes far beyond its point, in those of the motion and of this point. */
+static int holds(sd_settle *settle, double t, const double *y, const double *yd, double best, double limit)
+{
+    int grown = 0;
+    for (int32_t j = 0; j < settle->unknowns + settle->rates && settle->system->scales > 0; j++) {
+        double size = fmax(settle->usual[j], fabs(j < settle->unknowns ? y[j] : yd[settle->rate[j - settle->unknowns]]));
+        if (settle->scale[j] > BEYOND * size && size > 0.0) {
+            settle->scale[j] = size;
+            grown = 1;
+        }
+    }
+    if (grown) {
+        slopes(settle, t, y, yd, 0);
+        best = measure(settle, t, y, yd);
+    }
+    return best <= limit || (measure(settle, t, y, yd), settle->own <= limit);
+}
+
 /* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */
 static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 {
@@ -391,8 +412,9 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     settle->calls++;
     settle->contracted = 0.0;
     take(settle, y, yd, settle->x0);
+    memcpy(settle->usual, settle->scale, (size_t)(settle->unknowns + settle->rates) * sizeof(double));
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && settle->refused < REFUSALS) {
-        if (follow(settle, t, y, yd, &best)) {
+        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, fmax(CLOSE, settle->enough))) {
             take(settle, y, yd, settle->met);
             finish(settle, t, y, yd, 1, 1);
             return 0;
@@ -411,13 +433,22 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
         settle->ready = 0;
     }
     settle->ready = plain ? settle->ready : NONE;
-    if (best > CLOSE && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
+    int done = 0;
+    if (best <= CLOSE) {
+        put(settle, settle->x, y, yd);
+        done = holds(settle, t, y, yd, best, CLOSE);
+    }
+    if (!done && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
+        if (settle->system->scales > 0) {
+            memcpy(settle->scale, settle->usual, (size_t)(settle->unknowns + settle->rates) * sizeof(double));
+            settle->ready = NONE;
+        }
         put_near(settle, y, yd);
         iterate(settle, t, y, yd, PATIENT, &best);
     }
     /* the best point met, or the given one; a rate may have no bound */
     put(settle, settle->x, y, yd);
-    int done = best <= CLOSE || (measure(settle, t, y, yd), settle->own <= CLOSE);
+    done = done || holds(settle, t, y, yd, best, CLOSE);
     if (done)
         take(settle, y, yd, settle->met);
     else

@@ -133,7 +133,7 @@ class Settle(c.Structure):
         ("k_q", P),
         ("k_f", P),
         ("kinematics", I),
-        *[(name, P) for name in ["jy", "jyd", "matrix", "row_scale", "r", "x", "x0", "step", "met", "memory"]],
+        *[(name, P) for name in ["jy", "jyd", "matrix", "row_scale", "r", "x", "x0", "step", "memory", "met", "usual"]],
         *[(name, P) for name in ["basis", "basis_column", "basis_row", "basis_y", "basis_yd"]],
         *[(name, P) for name in ["lift", "basis_value"]],
         ("hold", D),
