@@ -66,9 +66,9 @@ TAME = 1e-6
 """Tolerance of the next run at most where the first two ran away alike (Robertson's falls through zero), and of a
 draft where Newton's failures say so before."""
 LENGTHY, DEAR = 1000, 1e-8
-"""Steps of a run in which so much happens that every method's loose runs have nothing in common, and a finer one costs less
-than another method's draft (the ring modulator at 1e-2, 1e-3, 1e-6: 0.10, 0.16, 0.6 s for 0.27, 0.63, 1.1); tolerance
-below which methods of more stages or steps cost less."""
+"""Steps of a run in which so much happens that every method's loose runs have nothing in common, and a finer one costs
+less than another method's draft (the ring modulator at 1e-2, 1e-3, 1e-6: 0.10, 0.16, 0.6 s for 0.27, 0.63, 1.1);
+tolerance below which methods of more stages or steps cost less."""
 TINY = 1e-30
 """An estimate beside what was asked below which it counts as none."""
 QUIET, AGREE = 5, 2.0
