@@ -161,7 +161,7 @@ class SceneReader:
         """The method and its options."""
         self._choice(s.name, SOLVERS, "solver")
         self._once("solver", s.name.name, s.span)
-        options = []
+        options: list[tuple[str, Node]] = []
         for arg in s.args or ():
             if arg.name is None or arg.name not in _SOLVER_OPTIONS:
                 message = f"the solver has no option '{arg.name or format_expression(arg.value)}'"

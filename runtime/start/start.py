@@ -26,7 +26,7 @@ from sysdyn.runtime.numerics.gauss_newton import (
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Places, Starter, problem_of
-from sysdyn.runtime.start.strategies import CLOSED, EXACT, OWN, STRATEGIES, first, rescaled
+from sysdyn.runtime.start.strategies import CLOSED, EXACT, OWN, applicable, first, rescaled
 from sysdyn.values import dataclass
 
 BACK = 1e-10
@@ -136,7 +136,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
     """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
     x = _begun(starter, t, guess, free)
     best = Solution(x, np.inf, np.zeros(0))
-    for name, strategy in STRATEGIES:
+    for name, strategy in applicable(starter, t, x):
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = _anew(starter, t, found, x, guess, free)
         if holds or sure:

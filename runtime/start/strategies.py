@@ -203,10 +203,17 @@ STRATEGIES: tuple[tuple[str, Strategy], ...] = (
 """Globalisation: what is tried, in this order, until all rows hold."""
 
 
+def applicable(starter: Starter, t: float, x: Floats) -> Iterator[tuple[str, Strategy]]:
+    """Of these, what may help from x: rows that are all linear hold at once or nowhere, but for magnitudes."""
+    yield STRATEGIES[0]
+    bent = bool(starter.settled.form.scales) or bool(_bent(starter, t, x).any())  # slopes of steep laws underflow
+    yield from (named for named in STRATEGIES[1:] if bent or named[1] is _in_largest_scales)
+
+
 def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
     """A point behind a jump at which all rows hold that must, from x; None where none was found.  A step of 10 V across
     a diode makes steep laws lie far behind it.
     """
-    tries = (found for strategy in (_newton, _walked, _led) for found in strategy(starter, t, x, x, free))
-    found, holds = first(tries, x)
+    ways = (way for _, way in applicable(starter, t, x) if way in (_newton, _walked, _led))
+    found, holds = first((found for way in ways for found in way(starter, t, x, x, free)), x)
     return found.x if holds else None

@@ -10,7 +10,7 @@ from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.start.starter import Starter
-from sysdyn.runtime.start.strategies import STRATEGIES, behind, first, own_residual
+from sysdyn.runtime.start.strategies import STRATEGIES, applicable, behind, first, own_residual
 from sysdyn.runtime.structure.redundancy import nearby, reactions, vanished
 
 
@@ -68,6 +68,13 @@ def test_behind_a_jump_the_root_is_found_and_none_where_there_is_none():
     assert math.exp(found[2] / 0.025 - 28.0) + found[2] == pytest.approx(10.0, rel=1e-10)
     starter, x, free = at_rest(driven("exp(e_1) + 1"))
     assert behind(starter, 0.0, x, free) is None
+
+
+@pytest.mark.parametrize(("law", "bent"), [("2*e_1 - 4", False), ("e_1**2 - 4", True), (STEEP, True)])
+def test_linear_rows_are_not_sought_along_detours(law, bent):
+    starter, x, _ = at_rest(driven(law))
+    found = [name for name, _ in applicable(starter, 0.0, x)]
+    assert found == ([name for name, _ in STRATEGIES] if bent else ["newton", "largest_scales"])
 
 
 def test_the_way_that_was_taken_stays_with_the_state():
