@@ -30,7 +30,7 @@ from sysdyn.runtime.structure.structure import Structure, index_of, structure
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
-NO_FURTHER = 1.0 + 1e-9
+NO_FURTHER = 1.0 + 1e-6
 """Of the instant at which a method stopped: another that stops there got no further."""
 REFINED, REFINE, HELPS = 4, 0.3, 0.5
 """Runs with shorter steps for the sake of the ledgers, how long they are beside those before, and what of the balance

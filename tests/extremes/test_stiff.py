@@ -97,15 +97,19 @@ def test_a_draft_in_which_newton_fails_is_given_up(tmp_path, published):
     assert run.trace.statistics["newton_failures"] < 100
 
 
-def test_a_long_smooth_motion_is_radau_with_all_its_stages(tmp_path, published):
+@pytest.mark.parametrize(
+    ("accuracy", "method", "most"),
+    [(1e-3, "rosenbrock", 100_000), (1e-6, "rosenbrock", 350_000), (1e-7, "radau", 500_000)],
+)
+def test_a_long_smooth_motion_of_steep_laws(tmp_path, published, accuracy, method, most):
     """The ring modulator's diodes are steep, its motion is smooth: the bdf at its highest order would take a million
-    steps, radau of three stages took 380 000 behind 2.2 million of other runs.
+    steps.  Rosenbrock goes on although its first runs have nothing in common; beyond it is radau's with all its stages.
     """
     wanted = published.ring() if callable(published.ring) else published.ring
-    run = ran(tmp_path, ROOT / "models/benchmark/ring.sd", scene="reference", accuracy=1e-6)
+    run = ran(tmp_path, ROOT / "models/benchmark/ring.sd", scene="reference", accuracy=accuracy)
     assert run.met
-    assert run.trace.attributes["method"] == "radau"
-    assert run.trace.statistics["steps"] < 1_000_000
+    assert run.trace.attributes["method"] == method
+    assert run.trace.statistics["steps"] < most
     for number, value in wanted.ref.items():
         values = np.asarray(run.trace[f"y{number}"])
-        assert abs(values[-1] - value) < 1e-6 * np.abs(values).max(), number
+        assert abs(values[-1] - value) < accuracy * np.abs(values).max(), number
