@@ -132,6 +132,9 @@ class SceneReader:
             message = f"the time ends before it starts: {self._text(s.start)} to {self._text(s.stop)}"
             help_ = f"time {self._text(s.stop)} to {self._text(s.start)}"
             raise self.resolver.fail("E912", message, s.span, help=help_)
+        if start.op == end.op == "const" and end.data == start.data:
+            message = f"the time ends where it starts: {self._text(s.start)} to {self._text(s.stop)}"
+            raise self.resolver.fail("E912", message, s.span, help=f"time {self._text(s.start)} to 10 s")
         self._found["end"] = end
 
     def _text(self, e: syntax.Expr) -> str:

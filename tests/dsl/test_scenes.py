@@ -85,6 +85,7 @@ def test_settings_replace_values_elements_and_inputs():
     ("body", "code", "message", "help_", "at"),
     [
         ("time 2 s to 1 s", "E912", "the time ends before it starts: 2 s to 1 s", "time 1 s to 2 s", "time 2 s to 1 s"),
+        ("time 2 s to 2 s", "E912", "the time ends where it starts: 2 s to 2 s", "time 2 s to 10 s", "time 2 s to 2 s"),
         ("time 0 s to inf", "E912", "'inf' is no instant: a run begins and ends", "time 0 s to 10 s",
          "time 0 s to inf"),
         ("time 0 m to 1 s", "E208", "the start '0 m' is in m, wants s", "write '0 s'", "0 m"),
