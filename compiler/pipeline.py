@@ -179,7 +179,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         energies.verify_energies(model)
         as_written = network.scene is not None and network.scene.keeps("keep_flow")
         model, notes = integrate(model) if integrating and not as_written else (model, ())
-        if traced and not any(o.stored for o in network.observations):
+        if traced and not network.traced:
             model, cut = with_coordinates_observed(model, network)
             notes = (*notes, *cut)
         found = check_energies(model, network)

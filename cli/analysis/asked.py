@@ -62,7 +62,7 @@ def compiled(
         document, target.model, target.scene, inner, request.settings, levels=request.levels, outputs=outputs
     )
     if network is not None and also is not None and (asked := also(network)):
-        names = [o.name for o in network.observations if o.stored]
+        names = network.traced
         unasked = frozenset(asked).difference(names)
         more = (*names, *(name for name in asked if name not in names))
         second = load.network(

@@ -106,7 +106,7 @@ class Model:
         self._loaded = loaded
         prepared = loaded.first.prepared
         self.parameters = shown(prepared.binding.values)
-        self.traced = tuple(o.name for o in prepared.network.observations if o.stored)
+        self.traced = prepared.network.traced
         self.formulation = prepared.formulation
 
     def __repr__(self) -> str:

@@ -70,7 +70,7 @@ def activities(
             report.error("E608", "the powers of the elements cannot be written: there is none, or they are too many",
                          prepared.network.place)  # fmt: skip
             return None
-        own = tuple(o.name for o in prepared.network.observations if o.stored)
+        own = prepared.network.traced
         cells = np.linspace(options.t_start, options.t_end, CELLS + 1)[1:-1]
         options = replace(
             options, output=folder / "activity.h5", every=None, at=tuple(cells), watch=None, sampled_at=()

@@ -247,7 +247,7 @@ class _Reduction:
                 accuracy_on=on,
                 max_wall=None if self.limit is None else max(self.limit - began, 1e-3),
             )
-            self.judged = tuple(n for n, _ in on) or tuple(o.name for o in prepared.network.observations if o.stored)
+            self.judged = tuple(n for n, _ in on) or prepared.network.traced
             try:
                 return integrate(target, prepared, options, report)
             except UsageError as error:

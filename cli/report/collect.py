@@ -132,7 +132,7 @@ def _energies(
     # what is observed may have no underlying equation
     method = {"dopri": options.method, "energy": "auto"}.get(ran.outcome.method, ran.outcome.method)
     fixed = replace(options, output=str(folder / "energies.h5"), method=method, progress=None)
-    own = tuple(o.name for o in prepared.network.observations if o.stored)
+    own = prepared.network.traced
     if options.accuracy is not None and own:  # of the scene's quantities alone
         fixed = replace(fixed, accuracy=None, accuracy_on=tuple((name, options.accuracy) for name in own))
     with _timed("energies of the elements (a run of their own)", stages):

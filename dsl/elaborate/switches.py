@@ -12,7 +12,7 @@ from sysdyn.dsl.model.calculus import time_derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Loop, Switch
 from sysdyn.dsl.model.units import NONE
-from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.model.values import Values, as_constants
 
 
 def expanded(frame: ElaborationContext, known: Values) -> None:
@@ -38,7 +38,7 @@ def _iterations(loops: tuple[Loop, ...], known: Values) -> Iterator[dict[Node, N
         if k:
             budget.charge(budget.NODE, "events and inequalities that are written out one by one")
     for at in known.iterations(loops):
-        yield {name: ex.const(i) for name, i in at.items()}
+        yield as_constants(at)
 
 
 def _switch(frame: ElaborationContext, draft: Draft, change: dict[Node, Node], known: Values) -> Switch:

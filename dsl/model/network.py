@@ -432,3 +432,8 @@ class Network:
     authors: Mapping[str, tuple[tuple[str, Place], ...]] = field(default_factory=dict)  # elements of gathered families
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)
     positions: tuple[State, ...] = ()  # of points, at the start alone
+
+    @property
+    def traced(self) -> tuple[str, ...]:
+        """Names of the observations that a trace stores; the others are what conditions of events read."""
+        return tuple(o.name for o in self.observations if o.stored)

@@ -15,6 +15,11 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import ElementSetting, Loop, Parameter
 
 
+def as_constants(at: Mapping[Node, float]) -> dict[Node, Node]:
+    """Numbers as nodes, to be put in the place of what has them."""
+    return {node: ex.const(value) for node, value in at.items()}
+
+
 class Values:
     """Values of a model's parameters; NaN where a parameter has none."""
 

@@ -17,7 +17,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Coordinate, Dynamic, Loop, NodeFamily, Shape, State, Unknown
 from sysdyn.dsl.model.units import quantity
-from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.model.values import Values, as_constants
 from sysdyn.dsl.rules.checks import expressions_of, nodes_of
 from sysdyn.dsl.text.diagnostics import Place, Report
 
@@ -29,7 +29,7 @@ def run(model: Elaborator, known: Values, report: Report) -> None:
             met = {n: known.number(n, at) for n in _parameters(r.condition)}
             if not any(map(math.isnan, met.values())):
                 text = format_expression(r.written)
-                said = {ex.substitute(n, {i: ex.const(v) for i, v in at.items()}): value for n, value in met.items()}
+                said = {ex.substitute(n, as_constants(at)): value for n, value in met.items()}
                 shown = ", ".join(_valued(n, value, model) for n, value in said.items())
                 shown = shown or ", ".join(f"{i} = {v:g}" for i, v in at.items())
                 report.error("E322", f"require {text} fails: {shown}", r.place, help=f"values for which {text}")

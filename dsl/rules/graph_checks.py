@@ -13,7 +13,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, NodeFamily, Terminal
 from sysdyn.dsl.model.rewriting import expressions
-from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.model.values import Values, as_constants
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
 
@@ -205,7 +205,7 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
     if not value < 0.0:
         return
     name = branch.name.rpartition("#")[0] or branch.name
-    slope = ex.substitute(slope, {i: ex.const(k) for i, k in at.items()})
+    slope = ex.substitute(slope, as_constants(at))
     shown = f"{value:g}" if slope.op == "const" else f"{slope} = {value:g}"
     if branch.kind == "kinetic":
         message = f"'{name}': the inertia is negative ({shown}): the motion is not determined forward in time"

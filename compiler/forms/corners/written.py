@@ -13,9 +13,9 @@ from itertools import product
 
 from sysdyn.compiler.forms.corners.kinks import JUDGED, MOST, SMOOTH, sided, smoothness, watched
 from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Kernel, Summand
-from sysdyn.dsl.model.expression import Node, const, neg, substitute, topological
+from sysdyn.dsl.model.expression import Node, neg, substitute, topological
 from sysdyn.dsl.model.network import Network
-from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.model.values import Values, as_constants
 
 Iteration = dict[Node, Node]
 """A number for each loop variable."""
@@ -49,7 +49,7 @@ def _own(node: Node) -> bool:
 def _iterations(kernel: Kernel, known: Values) -> Iterator[Iteration]:
     """The elements of a nest."""
     for at in known.iterations(kernel.nest):
-        yield {n: const(i) for n, i in at.items()}
+        yield as_constants(at)
 
 
 def _corners(kernel: Kernel, known: Values) -> set[Node]:

@@ -13,7 +13,7 @@
  * transistor that is off) leaves a row whose only term is its residual */
 #define NOTHING (DBL_EPSILON * DBL_EPSILON)
 
-/* how far beside a root at zero its slope is taken: of an unknown's magnitude, and at least; the golden ratio's part */
+/* how far beside a root at zero its slope is taken: of an unknown's magnitude, and at least */
 #define ROOT_BESIDE 1e-8
 #define ROOT_LEAST 1e-12
 

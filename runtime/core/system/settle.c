@@ -390,8 +390,9 @@ static void finish(sd_settle *settle, double t, double *y, double *yd, int done,
  * steps: where the iteration left magnitudes far beyond its point, in those of the motion and of this point. */
 static int holds(sd_settle *settle, double t, const double *y, const double *yd, double best, double limit)
 {
+    const int32_t number = settle->system->scales > 0 ? settle->unknowns + settle->rates : 0;
     int grown = 0;
-    for (int32_t j = 0; j < settle->unknowns + settle->rates && settle->system->scales > 0; j++) {
+    for (int32_t j = 0; j < number; j++) {
         double size = fmax(settle->usual[j], fabs(j < settle->unknowns ? y[j] : yd[settle->rate[j - settle->unknowns]]));
         if (settle->scale[j] > BEYOND * size && size > 0.0) {
             settle->scale[j] = size;
@@ -412,7 +413,8 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     settle->calls++;
     settle->contracted = 0.0;
     take(settle, y, yd, settle->x0);
-    memcpy(settle->usual, settle->scale, (size_t)(settle->unknowns + settle->rates) * sizeof(double));
+    const size_t steep = settle->system->scales > 0 ? (size_t)(settle->unknowns + settle->rates) * sizeof(double) : 0;
+    memcpy(settle->usual, settle->scale, steep);
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && settle->refused < REFUSALS) {
         if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, fmax(CLOSE, settle->enough))) {
             take(settle, y, yd, settle->met);
@@ -439,8 +441,8 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
         done = holds(settle, t, y, yd, best, CLOSE);
     }
     if (!done && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
-        if (settle->system->scales > 0) {
-            memcpy(settle->scale, settle->usual, (size_t)(settle->unknowns + settle->rates) * sizeof(double));
+        if (steep) {
+            memcpy(settle->scale, settle->usual, steep);
             settle->ready = NONE;
         }
         put_near(settle, y, yd);

@@ -35,7 +35,7 @@ typedef struct sd_settle {
     const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
     int32_t kinematics;
     double *jy, *jyd, *matrix, *row_scale, *r, *x, *x0, *step, *memory;
-    double *met, *usual;             /* [unknowns + rates] the last point that settled; magnitudes before the last call */
+    double *met, *usual;             /* [unknowns + rates] last point that settled; of steep laws: magnitudes before */
     sd_sparse *basis;                /* of G^T, its rows over the weights: what follows pivots first; or NULL */
     const int32_t *basis_column, *basis_row;      /* its pattern: [rows + 1], unknowns and rates of each row */
     const int32_t *basis_y, *basis_yd;            /* [entries] places of dF/dy, dF/dyd in it, -1: none */
