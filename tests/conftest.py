@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import gc
 import os
 import sys
 from collections import Counter
@@ -25,7 +26,10 @@ def _here(monkeypatch):
 
 @pytest.fixture
 def effort():
-    """Calls a function and counts the lines of Python that it runs: what a clock would say on a machine of its own."""
+    """Calls a function and counts the lines of Python that it runs: what a clock would say on a machine of its own.
+
+    What earlier tests left for the collector of garbage (directories, models) is not taken away meanwhile.
+    """
 
     def counted(function):
         lines = 0
@@ -36,11 +40,14 @@ def effort():
             return seen
 
         before = sys.gettrace()
+        gc.collect()
+        gc.disable()
         sys.settrace(seen)
         try:
             return function(), lines
         finally:
             sys.settrace(before)
+            gc.enable()
 
     return counted
 
