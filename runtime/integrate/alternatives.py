@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 from sysdyn.runtime.integrate.options import Options, own_tolerances
 from sysdyn.runtime.integrate.underlying import rateless
 from sysdyn.runtime.integrate.way import Way
+from sysdyn.runtime.model.scales import magnitudes
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.start import ConsistentState
 
@@ -19,6 +21,13 @@ MEDIUM = 300
 """Unknowns up to which eight solutions of a step cost less than iterations that converge, where no law is steep: nltl
 as co_hamiltonian (200) takes 0.4 to 0.7 of radau's CPU at 1e-2 to 1e-6, rc_ladder as co_lagrangian (102) 0.9 to 1.1.
 """
+
+FEW = 30
+"""Unknowns up to which the bdf of steep laws at index 2 costs less than eight solutions at index 1 (nonlinear_fluid, 7
+unknowns: 0.8 to 0.9 of its CPU); a tube of 71 takes 0.15 to 0.4 of the bdf's, which stability holds at its steps."""
+GROWS = 10.0
+"""Relative change of a law over that of an unknown, at its magnitude, from which on it turns within a part of that: a
+step ends where it does, and the cheapest are the bdf's (diodes 30 and more; friction of turbulent flow 2)."""
 
 COARSE, COARSER = 1e-6, 1e-3
 """Accuracies, of small systems and of medium ones (a beam of 160 takes 0.5 of radau's CPU at 1e-2, 1.4 at 1e-4), below
@@ -42,7 +51,7 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     if options.events and not options.events.bends:
         return replace(way, reason="events"), other
     if way.system.form.scales:
-        return _because("steep laws", _of_steep_laws(way, other, written, options))
+        return _because("steep laws", _of_steep_laws(way, other, written, start, options))
     system = written.another("0")
     missing = rateless(system, start)
     if missing:
@@ -61,9 +70,26 @@ def _without_newton(way: Way, options: Options) -> tuple[Way, ...]:
     return (replace(way, method="rosenbrock"),) if serves else ()
 
 
-def _of_steep_laws(way: Way, other: Way, written: System, options: Options) -> tuple[Way, ...]:
+def _of_steep_laws(
+    way: Way, other: Way, written: System, start: ConsistentState, options: Options
+) -> tuple[Way, ...]:
     iterating = (other, way) if way.system.unknowns <= SMALL else (way, other)
-    return _without_newton(way, options) + iterating + _differentiated(way, written, options)
+    ways = _without_newton(way, options) + iterating + _differentiated(way, written, options)
+    if way.index != 2 or not FEW < way.system.unknowns <= SMALL or _turns(written, start, options):
+        return ways
+    reduced = Way("rosenbrock", written.another("1"), 1, "1", reduced=True)
+    return _without_newton(reduced, options) + ways
+
+
+def _turns(system: System, start: ConsistentState, options: Options) -> bool:
+    """Whether a steep law changes by GROWS times as much as an unknown does, in parts, where these are as large as they
+    get.
+    """
+    t, y = options.t_start, magnitudes(system, options.t_start, options.t_end, start.y, start.yd)[0]
+    slopes = np.abs(system.jacobian(t, y, np.zeros_like(y))[0]) * y[system.pattern.columns_of()]
+    sizes = system.steep_sizes(t, y)[system.pattern.row]
+    with np.errstate(all="ignore"):
+        return not bool((slopes[sizes != 0.0] <= GROWS * sizes[sizes != 0.0]).all())
 
 
 def _differentiated(way: Way, written: System, options: Options) -> tuple[Way, ...]:

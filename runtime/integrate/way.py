@@ -26,7 +26,8 @@ system of which radau's factors are cheap enough for it to take over."""
 @dataclass(frozen=True, slots=True)
 class Way:
     """A method on a form of the model; index: of the form as the error test takes it, name: as the trace names it;
-    reason: why method auto takes it; smooth: the motion is long and smooth, however steep its laws.
+    reason: why method auto takes it; smooth: the motion is long and smooth, however steep its laws; reduced: equations
+    of index 2 taken at index 1.
     """
 
     method: str
@@ -35,8 +36,10 @@ class Way:
     name: str
     reason: str = ""
     smooth: bool = False
+    reduced: bool = False
 
     @property
     def law(self) -> accuracy.Law:
         """How its errors follow its tolerance."""
-        return accuracy.law_of(self.method, steep=bool(self.system.form.scales), smooth=self.smooth)
+        steep = bool(self.system.form.scales)
+        return accuracy.law_of(self.method, steep=steep, smooth=self.smooth, reduced=self.reduced)

@@ -338,14 +338,18 @@ class System(Facts):
 
     def steep_rows(self, t: float) -> Mask:
         """Rows that hold a steep law [rows]: those for which a scale is compiled."""
+        return self.steep_sizes(t, np.ones(self.form.written)) != 0.0
+
+    def steep_sizes(self, t: float, y: Floats) -> Floats:
+        """Sums of the magnitudes of the terms of rows that hold a steep law [rows], of rates as large as y; 0: others."""
         found = np.zeros(max(self.rows, 1))
-        ones = self._buffer(np.ones(self.form.written))
+        at = self._buffer(y)
         for k in range(len(self.form.scales)):
             call = self._scales[k]
             function = lib.ROWS(call.rows)
-            function(c.addressof(call.frame), t, *(lib.pointer(item) for item in (ones, ones, found)))
+            function(c.addressof(call.frame), t, *(lib.pointer(item) for item in (at, at, found)))
         self.failure.check()
-        return np.asarray(found[: self.rows] != 0.0)
+        return found[: self.rows]
 
     def _evaluate(self, block: str, t: float, y: Floats, yd: Floats) -> Floats:
         call = self.observer(block)

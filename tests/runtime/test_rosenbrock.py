@@ -113,6 +113,17 @@ def test_a_stiff_diode_as_the_others_have_it():
             assert np.abs(columns[name] - exact[name]).max() < 20 * rtol * np.abs(exact[name]).max(), name
 
 
+@pytest.mark.parametrize(("rtol", "steps"), [(1e-4, 40), (1e-7, 55), (1e-10, 110)])
+def test_what_follows_from_a_state_may_jump_with_its_law(rtol, steps):
+    """s' = -e, e = s above 0.5 and 2 s below: no step is so short that e changes little within it."""
+    law = {"law": "e_g - (1.5 - 0.5*tanh(1e20*(s_s - 0.5)))*s_s"}
+    start = {"s_s": (1, True), "q_x": (0, True), "f_x": (0, True)}
+    made = models.small("x", "f_x**2/2", "q_x**2/2", states={"s": "-e_g"}, implicit=("g",), gamma=law, initial=start)
+    _, columns, finished = rosenbrock(made, 2.0, rtol=rtol)
+    assert abs(columns["s_s"][-1] - 2.0 * np.exp(-4.0)) < rtol
+    assert finished.statistics.steps < steps
+
+
 def test_constraints_hold_to_round_off_at_index_one():
     rows, columns, _ = rosenbrock(models.pendulum(), 4.0, INSTANTS, "1", rtol=1e-6)
     assert rows[:, 7].max() < 1e-14

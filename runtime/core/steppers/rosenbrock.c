@@ -17,6 +17,10 @@
 #define TELLS 1e-8         /* of the longest step: over that, or the step, at least, for differences over less are round-off */
 #define RESOLVED 64.0      /* of what t resolves: at least that */
 #define INSIDE 0.75        /* of the step: where values within are looked at; those of what is slaved are furthest off there */
+#define SAME 0.01          /* part of an error by which that of a step half as long may differ where a law jumps */
+#define FALLS 0.5          /* of an error: that of a shorter step where none does */
+#define FAR_LONGER 1e3     /* a step over another whose error is to say the same of a jump */
+#define LEAST 1e-10        /* error of a step, for the next one's size */
 #define FAILS 12           /* matrices and stages of a step that may fail */
 
 static int step(void *rosenbrock)
@@ -147,15 +151,19 @@ static void set_weights(sd_rosenbrock *rosenbrock)
     }
 }
 
-/* root mean square over the tested unknowns in the error weights; h: of those that count with it */
-static double norm(const sd_rosenbrock *rosenbrock, const double *x, double h)
+/* root mean square over the tested unknowns in the error weights; h: of those that count with it.  Grows `state` to that of
+ * what carries the state. */
+static double norm(const sd_rosenbrock *rosenbrock, const double *x, double h, double *state)
 {
-    double all = 0.0;
+    double all = 0.0, own = 0.0;
     for (int32_t i = 0; i < rosenbrock->n; i++) {
         double part = x[i] * rosenbrock->weight[i] * (rosenbrock->test[i] > 0 ? h : 1.0);
         all += part * part;
+        own += rosenbrock->test[i] >= 0 ? part * part : 0.0;
     }
-    return rosenbrock->tested ? sqrt(all / rosenbrock->tested) : 0.0;
+    double number = rosenbrock->tested ? rosenbrock->tested : 1.0;
+    *state = fmax(*state, sqrt(own / number));
+    return rosenbrock->tested ? sqrt(all / number) : 0.0;
 }
 
 void sd_rosenbrock_start(sd_rosenbrock *rosenbrock, double t, const double *y, const double *yd, double h)
@@ -172,7 +180,7 @@ void sd_rosenbrock_start(sd_rosenbrock *rosenbrock, double t, const double *y, c
     set_weights(rosenbrock);
     double span = rosenbrock->t_end - t, part = pow(rosenbrock->rtol, POWER);
     if (!(h > 0.0)) { /* local error (h y'/y)^5 within tolerance */
-        double change = rosenbrock->rtol * norm(rosenbrock, yd, 1.0);
+        double state = 0.0, change = rosenbrock->rtol * norm(rosenbrock, yd, 1.0, &state);
         h = OPENS * span * fmin(1.0, 10.0 * part); /* runs that are compared begin apart */
         if (isfinite(change) && change > 0.0)
             h = fmin(h, 0.1 * part / change);
@@ -180,7 +188,7 @@ void sd_rosenbrock_start(sd_rosenbrock *rosenbrock, double t, const double *y, c
     }
     rosenbrock->h = fmin(rosenbrock->fixed_h > 0.0 ? rosenbrock->fixed_h : h, rosenbrock->h_max);
     rosenbrock->h_used = 0.0;
-    rosenbrock->error_accepted = 0.0;
+    rosenbrock->error_accepted = rosenbrock->h_refused = 0.0;
     rosenbrock->rejected = 0;
 }
 
@@ -328,6 +336,8 @@ static void accept(sd_rosenbrock *rosenbrock, double error)
         rosenbrock->phi[i] = rosenbrock->y[i] + rosenbrock->u[STAGES - 1][i];
         rosenbrock->yd[i] = rosenbrock->rate[i] + rosenbrock->v[STAGES - 1][i];
     }
+    if (!rosenbrock->rejected)
+        rosenbrock->h_refused = 0.0;
     rosenbrock->t = fabs(rosenbrock->t_end - t) <= 1e-12 * h ? rosenbrock->t_end : t;
     rosenbrock->h_used = h;
     rosenbrock->steps++;
@@ -349,8 +359,8 @@ static void project(sd_rosenbrock *rosenbrock)
 }
 
 /* what values within the step are off, where what is pulled back at once hides it from the error of the end: a Newton
- * correction at INSIDE of the step; in the weights, in `error` */
-static int look_within(sd_rosenbrock *rosenbrock, double *error)
+ * correction at INSIDE of the step; in the weights, in `error`, of the state in `state` */
+static int look_within(sd_rosenbrock *rosenbrock, double *error, double *state)
 {
     double *end = rosenbrock->end, *r = rosenbrock->inner;
     for (int32_t i = 0; i < rosenbrock->n; i++)
@@ -361,34 +371,48 @@ static int look_within(sd_rosenbrock *rosenbrock, double *error)
     if (cause != SD_FINE)
         return cause;
     sd_linear_solve(rosenbrock->linear, r);
-    *error = fmax(*error, norm(rosenbrock, r, rosenbrock->h));
+    *error = fmax(*error, norm(rosenbrock, r, rosenbrock->h, state));
     return SD_FINE;
 }
 
-/* factors and stages of a step, and its error in `error`; SD_ERROR_TEST where it is too large */
-static int attempt(sd_rosenbrock *rosenbrock, double *error)
+/* factors and stages of a step, its error in `error`, of the state alone in `state`; SD_ERROR_TEST where it is too large */
+static int attempt(sd_rosenbrock *rosenbrock, double *error, double *state)
 {
     int cause = factorise(rosenbrock);
     if (cause == SD_FINE)
         cause = take_stages(rosenbrock);
     if (cause != SD_FINE)
         return cause;
-    *error = norm(rosenbrock, rosenbrock->u[STAGES - 1], rosenbrock->h);
+    *state = 0.0;
+    *error = norm(rosenbrock, rosenbrock->u[STAGES - 1], rosenbrock->h, state);
     memcpy(rosenbrock->ee, rosenbrock->u[STAGES - 1], (size_t)rosenbrock->n * sizeof(double));
     if (*error < 1.0 || rosenbrock->fixed_h > 0.0)
-        cause = look_within(rosenbrock, error);
+        cause = look_within(rosenbrock, error, state);
     if (rosenbrock->fixed_h > 0.0)
         return isfinite(*error) ? SD_FINE : SD_NONFINITE;
     if (cause != SD_FINE)
         return cause;
-    *error = isfinite(*error) ? fmax(*error, 1e-10) : INFINITY;
+    *error = isfinite(*error) ? fmax(*error, LEAST) : INFINITY;
     return *error < 1.0 ? SD_FINE : SD_ERROR_TEST;
+}
+
+/* whether shorter steps do not make a refused one's error less: what follows from the state jumps where a law does.  It is that of
+ * one twice as long before it, or not much less than that of one FAR_LONGER; steps that end short of the jump lie between */
+static int stays(sd_rosenbrock *rosenbrock, double error)
+{
+    double longer = rosenbrock->h_refused, before = rosenbrock->error_refused;
+    if (!(longer > 0.0) || error < FALLS * before) {
+        rosenbrock->h_refused = rosenbrock->h;
+        rosenbrock->error_refused = error;
+        return 0;
+    }
+    return rosenbrock->h <= longer * (fabs(error - before) <= SAME * before ? 0.5 : 1.0 / FAR_LONGER);
 }
 
 int sd_rosenbrock_step(sd_rosenbrock *rosenbrock)
 {
     int failures = 0, known = 0;
-    double error = 0.0;
+    double error = 0.0, state = 0.0;
     set_weights(rosenbrock);
     rosenbrock->cause = SD_FINE;
     for (;;) {
@@ -401,7 +425,11 @@ int sd_rosenbrock_step(sd_rosenbrock *rosenbrock)
         int cause = known ? SD_FINE : linearise(rosenbrock);
         known = cause == SD_FINE;
         if (cause == SD_FINE)
-            cause = attempt(rosenbrock, &error);
+            cause = attempt(rosenbrock, &error, &state);
+        if (cause == SD_ERROR_TEST && stays(rosenbrock, error) && state < 1.0) {
+            cause = SD_FINE;
+            error = fmax(state, LEAST);
+        }
         if (cause == SD_FINE)
             break;
         rosenbrock->cause = cause;

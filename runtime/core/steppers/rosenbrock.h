@@ -38,7 +38,7 @@ typedef struct sd_rosenbrock {
     double *met;              /* [n] max |y| */
     const int32_t *test, *power;   /* [n] as in bdf.h; what is left out there is tested too where power is 0 */
     /* state of the integration */
-    double t, h, h_used, h_accepted, error_accepted;
+    double t, h, h_used, h_accepted, error_accepted, h_refused, error_refused;
     int32_t rejected;
     double *phi, *yd;         /* [n] the last accepted point */
     double *last;             /* [n] the one before it */
