@@ -341,7 +341,7 @@ class System(Facts):
         return self.steep_sizes(t, np.ones(self.form.written)) != 0.0
 
     def steep_sizes(self, t: float, y: Floats) -> Floats:
-        """Sums of the magnitudes of the terms of rows that hold a steep law [rows], of rates as large as y; 0: others."""
+        """Sums of the magnitudes of the terms of rows that hold a steep law [rows], rates as large as y; else 0."""
         found = np.zeros(max(self.rows, 1))
         at = self._buffer(y)
         for k in range(len(self.form.scales)):
