@@ -145,20 +145,22 @@ class Statements(Declarations):
 
     def initial(self, s: syntax.Init, override: bool = False) -> None:
         """`init ref = value`, in a model or (override) in a scene."""
+        outer = len(self.resolver.loops)
         with ExitStack() as stack:
             target = self._sliced(s.target, stack)
-            self.in_parts(lambda: self._initial(s, target, override), s.span)
+            self.in_parts(lambda: self._initial(s, target, override, outer), s.span)
 
-    def _initial(self, s: syntax.Init, target_syntax: syntax.Expr, override: bool) -> None:
+    def _initial(self, s: syntax.Init, target_syntax: syntax.Expr, override: bool, outer: int) -> None:
         with self.resolver.leniently():
             target = self.resolver.scalar(target_syntax)
         message = f"'{target.node}' is in {dim.show(target.dimension)} but starts at {{}}"
-        value = self.resolver.wanted(s.initial.value, target.dimension or NONE, "E207", message)
-        for inner in ex.variables(value):
-            message = f"the initial value of '{target.node}' depends on '{inner}'"
-            raise self.resolver.fail("E807", message, s.initial.value.span, help="parameters and constants only")
-        fixed = s.initial.kind == "fixed"
-        self.add_initial(Initial(target.node, value, fixed, self.resolver.loops, self.place(s.span)), override)
+        given = self.values_at_start(target.node, s.initial.value, target.dimension or NONE, message, outer)
+        for one, value, loops in given:
+            for inner in ex.variables(value):
+                message = f"the initial value of '{one}' depends on '{inner}'"
+                raise self.resolver.fail("E807", message, s.initial.value.span, help="parameters and constants only")
+            fixed = s.initial.kind == "fixed"
+            self.add_initial(Initial(one, value, fixed, loops, self.place(s.span)), override)
 
     def _sliced(self, target: syntax.Expr, stack: ExitStack) -> syntax.Expr:
         """`x[1..n].f` becomes a loop over x[i].f."""

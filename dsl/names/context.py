@@ -34,13 +34,17 @@ Value = Typed | Vector
 
 @dataclass(slots=True)
 class Use:
-    """An index used on a family, to be checked against its shape once the sizes are known."""
+    """An index used on a family, to be checked against its shape once the sizes are known.
+
+    given: of a list of values for the elements from shape[0] on, of which the last has index `value`, how many it has.
+    """
 
     shape: tuple[Node, Node]
     value: Node
     loops: tuple[Loop, ...]
     name: str
     place: Place
+    given: int | None = None
 
 
 @dataclass(slots=True)

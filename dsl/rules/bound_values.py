@@ -254,7 +254,11 @@ def _indices(model: Elaborator, known: Values, report: Report) -> None:
         if any(math.isnan(v) for v in (low, high, first, last)) or low > high:
             continue
         wrong = low if low < first else high if high > last else None
-        if wrong is not None:
+        if use.given is not None:
+            if low != first + use.given - 1.0:
+                message = f"'{use.name}' has {low - first + 1.0:g} elements there, {use.given} are given"
+                report.error("E805", message, use.place, help="a value for each element, or one for all")
+        elif wrong is not None:
             span = use.place.span
             written = " ".join(use.place.source.text[span.start : span.end].split())
             message = f"index {wrong:g} of '{use.name}' is outside {first:g}..{last:g}: {use.name}[{written}]"
