@@ -183,8 +183,14 @@ class Members(Quantities):
 
     def _two_port(self, symbol: TwoPortSymbol, base: Located, e: syntax.Member) -> Value:
         members = {f"{letter}{k}": (letter, k) for k in (1, 2) for letter in "efqp"}
+        if e.name in ("power", "energy"):  # what both sides absorb: zero, but for what a run leaves of it
+            both = []
+            for branch in symbol.branches:
+                at = self.indices(symbol.name, branch.family.shape, self._all(base, branch, e))
+                both.append(self._changed(self.branch_quantity(branch, at, e.name, e), base.change))
+            return Typed(ex.add(*(side.node for side in both)), both[0].dimension)
         if e.name not in members:
-            raise self.no_member(symbol.name, e, members)
+            raise self.no_member(symbol.name, e, (*members, "power", "energy"))
         letter, k = members[e.name]
         branch = symbol.branches[k - 1]
         at = self.indices(symbol.name, branch.family.shape, self._all(base, branch, e))

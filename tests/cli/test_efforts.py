@@ -257,3 +257,28 @@ def test_a_port_whose_power_has_no_closed_form_is_refused(inside, tmp_path, caps
     code, answer = run_json(capsys, "simulate", write(tmp_path, text))
     assert code == 1
     assert [d["code"] for d in answer["diagnostics"] if d["severity"] == "error"] == ["E608"]
+
+
+LEVER = """
+model lever {
+  node x, y: translation
+  A: kinetic(p = 1 kg*f) x
+  B: kinetic(p = 2 kg*f) y
+  T: transformer(f1 = (2 + sin(3*t/(1 s)))*f2) x -> ground, y -> ground
+  F: effort(e = 4 N) ground -> x
+  init x.f = 1 m/s
+}
+scene s of lever {
+  time 0 s to 1 s
+  trace T.power, T.energy, T.e1*T.f1 as one, A.energy
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", [*PRIMAL, "co_lagrangian", "co_hamiltonian"])
+def test_a_two_port_absorbs_nothing(formulation, tmp_path):
+    """Any element has a power and an energy; those of a transformer, however its ratio moves, are zero."""
+    got = traced(write(tmp_path, LEVER), formulation=formulation, output=str(tmp_path / "o.h5"))
+    assert np.abs(got["one"]).max() > 1.0
+    assert np.abs(got["T.power"]).max() < 1e-10 * np.abs(got["one"]).max()
+    assert np.abs(got["T.energy"]).max() < 1e-4 * np.abs(got["A.energy"]).max()
