@@ -19,7 +19,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.depth import deep
 from sysdyn.dsl.model.network import Network, Parameter, Scene
-from sysdyn.dsl.model.rewriting import nodes_read, with_common_sizes
+from sysdyn.dsl.model.rewriting import nodes_read, with_common_sizes, with_literal_ranges
 from sysdyn.dsl.model.units import Dimension
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
@@ -165,7 +165,7 @@ def _judged(
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
         floating(elaborator, reader.observations, report)
-    found = with_common_sizes(_result(elaborator, reader, read_scene))
+    found = with_literal_ranges(with_common_sizes(_result(elaborator, reader, read_scene)), known.number)
     laws.run(found, known, report)
     return None if report.failed or _incomplete(report) else found
 

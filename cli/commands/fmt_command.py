@@ -66,7 +66,7 @@ def difference(source: SourceText, text: str, what: str = "formatted") -> list[s
 
 def replace(path: Path, text: str) -> None:
     """Write beside the file, then rename: a file is never half written."""
-    target = path.resolve()
+    target = Path(os.path.realpath(path))
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=".sd")
     try:
         with os.fdopen(handle, "w", encoding="utf-8", newline="") as stream:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -98,7 +99,7 @@ def record(
     label, scene_name, model_name = chosen
     place = Path(folder) / (name or Path(file).stem)
     known = read(place) if (place / BOOK).is_file() else ()
-    if any(g.model.resolve() != Path(file).resolve() for g in known):
+    if any(Path(os.path.realpath(g.model)) != Path(os.path.realpath(file)) for g in known):
         raise UsageError(f"{place} is of {known[0].model}: --name gives another folder")
     if any(g.name == label for g in known):
         raise UsageError(f"{place.name}/{label} is recorded already: 'sysdyn golden accept' renews it, with a reason")

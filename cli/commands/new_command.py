@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 from pathlib import Path
 
 import click
@@ -17,7 +18,7 @@ def command(console: Console, name: Path) -> int:
     """Begin a project in the folder NAME: a model with scenes, a golden trace, a file for CI. It passes as it is."""
     from sysdyn.cli.project import skeleton
 
-    folder = name.resolve()
+    folder = Path(os.path.realpath(name))
     written = skeleton.write(folder)
     model = skeleton.named(folder)
     said = _recorded(folder, f"{model}.sd")

@@ -46,7 +46,7 @@ def command(
     request = Request(**options)
     if request.file == "-" and output is None and not only:
         raise UsageError("a text from standard input: -o names the reduced one")
-    target = Path(output) if output else Path(request.file).with_name(f"{Path(request.file).stem}-reduced.sd")
+    target = Path(output) if output else Path(request.file).parent / f"{Path(request.file).stem}-reduced.sd"
     if target.exists() and Path(request.file).exists() and target.samefile(request.file):
         raise UsageError(f"-o {target} is the model itself")
     if plot is not None and Path(plot).suffix not in KINDS:

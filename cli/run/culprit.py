@@ -46,7 +46,8 @@ def culprit(prepared: Prepared, system: System, error: SolverFailure) -> Culprit
     blocks = [b for b in prepared.compiled.form.blocks if b.name not in (*WITHOUT_ENTRIES, "initial")]
     rates = np.where(np.isfinite(yd), yd, 0.0)
     times = (*(s * error.step for s in STEPS), *(a * max(abs(t), error.step) for a in AHEAD))
-    points = [(t + ahead, y + ahead * rates, yd) for ahead in times]
+    with np.errstate(over="ignore"):  # a last state at the end of all numbers
+        points = [(t + ahead, y + ahead * rates, yd) for ahead in times]
     if error.cause == "nonfinite":  # it has been met: by an iterate, if no rate leads there
         points += [(t, y + side * np.maximum(np.abs(y), 1.0), yd) for side in BESIDE]
     for point in points:

@@ -137,10 +137,10 @@ class Loaded:
     @cached_property
     def sizes(self) -> frozenset[str]:
         """Sizes that are part of the text, and what they follow from: where events, inequalities or corners stand for
-        each element, and those of components in arrays.
+        each element, or a nonlinear function of a sum, and those of components in arrays.
         """
         network = self.first.prepared.network
-        written = network.events or network.switches or self.first.prepared.compiled.form.kinks
+        written = network.literal or network.events or network.switches or self.first.prepared.compiled.form.kinks
         found = {p.name for p in network.parameters if p.whole and (written or p.shape)}
         waiting = list(found)
         while waiting:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -63,7 +64,7 @@ def path_of(file: str) -> Path:
 def hashes(source: SourceText, items: tuple[syntax.TopLevel, ...]) -> dict[str, str]:
     """sha256 of a text, of what it imports from its own folder, and of its tables' files, by name beside it."""
     found: dict[str, str] = {}
-    top = Path(source.name).resolve().parent
+    top = Path(os.path.realpath(source.name)).parent
 
     def name(path: Path) -> str:
         return path.relative_to(top).as_posix() if path.is_relative_to(top) else str(path)
@@ -78,7 +79,7 @@ def hashes(source: SourceText, items: tuple[syntax.TopLevel, ...]) -> dict[str, 
             elif other.is_file():
                 found[name(other)] = hashlib.sha256(other.read_bytes()).hexdigest()
 
-    take(Path(source.name).resolve(), items)
+    take(Path(os.path.realpath(source.name)), items)
     return dict(sorted(found.items()))
 
 
@@ -86,9 +87,9 @@ def _files(folder: Path, items: tuple[syntax.TopLevel, ...]) -> Iterator[Path]:
     """Files that the statements of a file read, without the library."""
     for item in items:
         if isinstance(item, syntax.Import) and item.module.names[0] != "std":
-            yield folder.joinpath(*item.module.names).with_suffix(".sd").resolve()
+            yield Path(os.path.realpath(folder.joinpath(*item.module.names).with_suffix(".sd")))
         elif isinstance(item, syntax.Table) and item.file is not None:
-            path = (folder / item.file).resolve()
+            path = Path(os.path.realpath(folder / item.file))
             if path.is_relative_to(folder):
                 yield path
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from pathlib import Path
 
@@ -15,7 +16,7 @@ NAME = "ci.toml"
 
 def sizes(file: str) -> tuple[Path, tuple[tuple[str, str], ...]]:
     """The file of sizes of a model's file, and its settings for it: () where there is none.  OSError, UsageError."""
-    model = Path(file).resolve()
+    model = Path(os.path.realpath(file))
     path = model.parent.parent / NAME
     if file == "-" or not path.is_file():
         return path, ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import field
 from pathlib import Path
 
@@ -52,11 +53,11 @@ class Reader:
 
     def __init__(self, source: SourceText, report: Report) -> None:
         self.report = report
-        self.folder = Path(source.name).resolve().parent
+        self.folder = Path(os.path.realpath(source.name)).parent
         title, found = cards(source)
         self.netlist = Netlist(title, Circuit(Path(source.name).stem))
         self._open = [self.netlist.top]
-        self._included = {Path(source.name).resolve()}
+        self._included = {Path(os.path.realpath(source.name))}
         self._take(source, found)
         if len(self._open) > 1:
             report.error("E941", f"subcircuit '{self._open[-1].name}' has no .ends", source.place(0, 0))
@@ -131,7 +132,7 @@ class Reader:
     def _include(self, source: SourceText, card: Card) -> None:
         """A file of the netlist's own folder or below it."""
         name = card.text.split(None, 1)[1].strip().strip("\"'") if len(card.words) > 1 else ""
-        path = (Path(source.name).resolve().parent / name).resolve()
+        path = Path(os.path.realpath(Path(os.path.realpath(source.name)).parent / name))
         if not path.is_relative_to(self.folder) or not path.is_file():
             raise Unreadable(f"'{name}' is no file of the netlist's folder")
         if path in self._included:

@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import count
-from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -186,7 +185,7 @@ def results(
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
         raise UsageError("--dask needs Dask: pip install 'sysdyn[dask]'") from None
-    whole = replace(request, file=str(Path(request.file).resolve()))
+    whole = replace(request, file=os.path.realpath(request.file))
     try:
         client = distributed.Client(address, timeout=10)
     except (OSError, ValueError) as error:

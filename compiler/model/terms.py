@@ -162,7 +162,8 @@ def _elements(node: Node, args: tuple[Node, ...], place: Place, what: str) -> No
     first, last, body = args
     if first.op != "const" or last.op != "const" or last.data - first.data >= LARGEST_LITERAL:
         text = f"a {operator} over a range inside a nonlinear expression is not supported yet in {what}"
-        raise ModelError([Diagnostic("N608", text, place, "literal bounds are written out")])
+        help_ = f"bounds that follow no loop variable are written out, {LARGEST_LITERAL} elements at most"
+        raise ModelError([Diagnostic("N608", text, place, help_)])
     parts = [substitute(body, {index(name): const(k)}) for k in range(int(first.data), int(last.data) + 1)]
     match operator:
         case "sum":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Coordinate, Initial, Loop, NodeFamily, Parameter, State, Unknown
 from sysdyn.dsl.model.units import NONE, Dimension, si
 from sysdyn.dsl.names.calls import walk
+from sysdyn.dsl.names.context import Use
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.symbols import (
     BundleNode,
@@ -142,14 +144,36 @@ class Declarations(Parameters):
     ) -> None:
         """The initial value in a declaration: for all elements of the family, in a `for` for those of its variables."""
         message = f"'{decl.name}' is in {dim.show(dimension)} but starts at {{}}"
+        outer = len(self.resolver.loops)
         with ExitStack() as stack:
             at = tuple(
                 self.looped(index) or ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", *bounds)).index)
                 for k, (index, bounds) in enumerate(zip(decl.indices, family.shape, strict=True))
             )
-            value = self.resolver.wanted(init.value, dimension, "E207", message)
             target = ex.var(family.name, kind, *family.prefix, *at)
-            self.add_initial(Initial(target, value, init.kind == "fixed", self.resolver.loops, self.place(init.span)))
+            for one, value, loops in self.values_at_start(target, init.value, dimension, message, outer):
+                self.add_initial(Initial(one, value, init.kind == "fixed", loops, self.place(init.span)))
+
+    def values_at_start(
+        self, target: Node, written: syntax.Expr, dimension: Dimension, message: str, outer: int
+    ) -> Iterator[tuple[Node, Node, tuple[Loop, ...]]]:
+        """What begins with which value, under which loops: the elements over the loops behind the first `outer` with
+        one value for all, or by a list with one for each.
+        """
+        found, loops = self.resolver.resolve(written), self.resolver.loops
+        if not isinstance(found, Vector) or len(loops) != outer + 1:
+            one = self.resolver.one_number(found, written)
+            yield target, self.resolver.fitting(one, written, dimension, "E207", message), loops
+            return
+        own, items = loops[-1], found.items
+        name = str(target).partition("[")[0]
+        self.resolver.uses.append(
+            Use((own.first, own.last), own.last, loops[:outer], name, self.place(written.span), len(items))
+        )
+        for k, item in enumerate(items):
+            at = {ex.index(own.index): ex.add(own.first, ex.const(k))}
+            value = self.resolver.fitting(item, written, dimension, "E207", message)
+            yield ex.substitute(target, at), ex.substitute(value, at), loops[:outer]
 
     def add_initial(self, initial: Initial, override: bool = False) -> None:
         """Enter an initial value; override: of a scene.  What stands further outside goes before (language, 34)."""
@@ -166,10 +190,11 @@ class Declarations(Parameters):
     def _state(self, statement: syntax.State) -> None:
         """A dynamic variable; its unit is said, or that of its initial value."""
         decl = statement.decl
-        value = None if statement.value is None else self.resolver.scalar(statement.value)
         unit = self.unit(statement.unit) if statement.unit else None
         if unit is None:
-            unit = si((value.dimension or NONE) if value is not None else NONE)
+            value = None if statement.value is None else self.resolver.resolve(statement.value)
+            first = value.items[0] if isinstance(value, Vector) else value
+            unit = si((first.dimension or NONE) if first is not None else NONE)
         family = self.current.family(decl.name, self.shape(decl))
         self._unknown(decl, "s", family, unit.dimension, None, False)
         self.parts.states.append(State(family.name, family.whole, unit, self.place(decl.span)))

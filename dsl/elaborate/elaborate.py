@@ -18,13 +18,14 @@ from sysdyn.dsl.elaborate.head import Body
 from sysdyn.dsl.elaborate.instances import Instances
 from sysdyn.dsl.elaborate.moulds import Likeness, law_of_cast, required_of
 from sysdyn.dsl.elaborate.parts import flatten
+from sysdyn.dsl.elaborate.port_efforts import NotSaidError, conjugate_of
 from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Dynamic, Initial, Loop, Observation, State
 from sysdyn.dsl.model.units import Dimension, si
 from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
-from sysdyn.dsl.names.symbols import Definition, Scope, Space, Typed
-from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.names.symbols import Definition, End, Scope, Space, Typed
+from sysdyn.dsl.text.diagnostics import Place, Related, Report
 from sysdyn.dsl.tree import syntax
 
 _ALONE = (syntax.Input, syntax.Port, syntax.Branch, syntax.Law, syntax.Level)
@@ -43,6 +44,7 @@ class Elaborator(Instances):
         self.source = files.file.source
         self.space = Space("", Scope(files.scope), files.scope, self.source, component=model.name.name)
         self._body = Body(flatten(model.body))
+        self.resolver.taken = self.taken
 
     def names(self) -> None:
         """Bring the model's names into scope; values of inputs may change until `elements`."""
@@ -130,11 +132,25 @@ class Elaborator(Instances):
             loops = tuple(Loop(f"#e{k}", first, last) for k, (first, last) in enumerate(found.shape))
             at = tuple(ex.index(loop.index) for loop in loops)
             state = ex.var(name, "s", *at)
+            try:
+                power = found.power() if callable(found.power) else found.power
+            except Failed:
+                continue
             self.parts.states.append(State(name, found.shape, si(found.dimension), found.place))
-            self.parts.dynamics.append(Dynamic(state, found.power, loops, found.place))
+            self.parts.dynamics.append(Dynamic(state, power, loops, found.place))
             self.parts.given.add(name)
             target = state if found.first is None else ex.sub(state, found.first)
             self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
+
+    def taken(self, path: str, end: End, place: Place) -> ex.Node:
+        """What an instance takes in at an end; place: where that is read."""
+        try:
+            return conjugate_of(self.parts, path, end)
+        except NotSaidError as error:
+            message = f"what goes into '{path}' through this port is not told yet: a statement inside {error}"
+            related = (Related("this one", error.place),)
+            self.report.note("N608", message, place, related=related, help="elements inside, which end at the port")
+            raise Failed from None
 
     def _speed(self, symbol: Definition, node: ex.Node, dimension: Dimension) -> None:
         name = symbol.space.family(symbol.name).name

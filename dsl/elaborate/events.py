@@ -326,7 +326,7 @@ def _stick_in_plane(
     )
     labels = (name, f"{name} across")
     for label, flow in zip(labels, flows, strict=True):
-        frame.parts.constraints.append(Constraint("psi", label, at, flow, loops, unit, place))
+        frame.said(Constraint("psi", label, at, flow, loops, unit, place))
     multipliers = tuple(ex.var(label, "mu", *at) for label in labels)
     along = ex.add(*(ex.mul(a, b) for a, b in zip(n, flows, strict=True)))
     value = ex.sub(along, ex.scale(0.5, node))
@@ -373,7 +373,7 @@ def _stick(
     """Dry friction: a set-valued effort with its bound and the sense of the motion."""
     (at, loops), (value, bound, sense) = where, what
     unit = si(NONE)
-    frame.parts.constraints.append(Constraint("psi", name, at, value, loops, unit, place))
+    frame.said(Constraint("psi", name, at, value, loops, unit, place))
     multiplier = ex.var(name, "mu", *at)
     frame.parts.drafts.append(
         Draft(name, at, loops, "friction", place, unit, value, multiplier, element, bound, sense)

@@ -109,6 +109,7 @@ class NetworkBuilder:
     couplings: list[Coupling] = field(default_factory=list)
     inputs: dict[str, tuple[Unit, Place]] = field(default_factory=dict)  # of the model, which a scene may set
     given: set[str] = field(default_factory=set)  # states that have a dynamic, sound or not
+    owned: dict[str, list[Energy | Work | Constraint]] = field(default_factory=dict)  # by the path of their instance
 
 
 class _Entered:
@@ -212,6 +213,13 @@ class ElaborationContext:
     def place(self, span: syntax.Span) -> Place:
         """A span of the present text."""
         return Place(self.resolver.source, span)
+
+    def said(self, statement: Energy | Work | Constraint) -> None:
+        """Takes in what the present model or instance says."""
+        kinds: dict[type, list[Any]] = {Energy: self.parts.energies, Work: self.parts.works}
+        kinds.get(type(statement), self.parts.constraints).append(statement)
+        if self.current.path:
+            self.parts.owned.setdefault(self.current.path, []).append(statement)
 
     def enter(self, symbol: Symbol) -> None:
         """Bring a name into scope; E106 where it is there already."""

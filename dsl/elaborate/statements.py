@@ -47,7 +47,7 @@ class Statements(Declarations):
         node = ex.sub(left.node, right.node)
         constraint = Constraint(s.kind, family.name, at, node, self.resolver.loops, si(dimension), place)
         constraint = events.guarded(self, s, constraint)
-        self.parts.constraints.append(constraint)
+        self.said(constraint)
         self.resolver.constraints.setdefault(family.name, []).append(constraint)
 
     def _sides(self, what: str, left: Typed, right: Typed, where: syntax.Expr, *within: syntax.Expr) -> Dimension:
@@ -69,13 +69,13 @@ class Statements(Declarations):
 
     def _energy(self, s: syntax.Energy) -> None:
         node = self._wants(f"energy {s.function}", s.value, dim.ENERGY)
-        self.parts.energies.append(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
+        self.said(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
 
     def _content(self, s: syntax.Content) -> None:
         node = self._wants(f"content {s.function}", s.value, dim.POWER)
         if s.function == "D":
             node = events.set_valued(self, node, self.resolver.loops, self.place(s.span))
-        self.parts.energies.append(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
+        self.said(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
 
     def _work(self, s: syntax.Work) -> None:
         effort = self.resolver.scalar(s.effort)
@@ -94,8 +94,7 @@ class Statements(Declarations):
                 raise self.resolver.fail("E208", message, s.effort.span, help=help_)
         along = self.virtual(on.node, "quasi(w): w", s.on.span) if quasi else ((ex.const(1.0), on.node),)
         for coefficient, node in along:
-            work = Work(ex.mul(effort.node, coefficient), node, self.resolver.loops, self.place(s.span))
-            self.parts.works.append(work)
+            self.said(Work(ex.mul(effort.node, coefficient), node, self.resolver.loops, self.place(s.span)))
 
     def _quasi(self, on: syntax.Call) -> Typed:
         """The quasi-velocity w of quasi(w), in the dimension of the displacement along it."""
@@ -145,20 +144,22 @@ class Statements(Declarations):
 
     def initial(self, s: syntax.Init, override: bool = False) -> None:
         """`init ref = value`, in a model or (override) in a scene."""
+        outer = len(self.resolver.loops)
         with ExitStack() as stack:
             target = self._sliced(s.target, stack)
-            self.in_parts(lambda: self._initial(s, target, override), s.span)
+            self.in_parts(lambda: self._initial(s, target, override, outer), s.span)
 
-    def _initial(self, s: syntax.Init, target_syntax: syntax.Expr, override: bool) -> None:
+    def _initial(self, s: syntax.Init, target_syntax: syntax.Expr, override: bool, outer: int) -> None:
         with self.resolver.leniently():
             target = self.resolver.scalar(target_syntax)
         message = f"'{target.node}' is in {dim.show(target.dimension)} but starts at {{}}"
-        value = self.resolver.wanted(s.initial.value, target.dimension or NONE, "E207", message)
-        for inner in ex.variables(value):
-            message = f"the initial value of '{target.node}' depends on '{inner}'"
-            raise self.resolver.fail("E807", message, s.initial.value.span, help="parameters and constants only")
-        fixed = s.initial.kind == "fixed"
-        self.add_initial(Initial(target.node, value, fixed, self.resolver.loops, self.place(s.span)), override)
+        given = self.values_at_start(target.node, s.initial.value, target.dimension or NONE, message, outer)
+        for one, value, loops in given:
+            for inner in ex.variables(value):
+                message = f"the initial value of '{one}' depends on '{inner}'"
+                raise self.resolver.fail("E807", message, s.initial.value.span, help="parameters and constants only")
+            fixed = s.initial.kind == "fixed"
+            self.add_initial(Initial(one, value, fixed, loops, self.place(s.span)), override)
 
     def _sliced(self, target: syntax.Expr, stack: ExitStack) -> syntax.Expr:
         """`x[1..n].f` becomes a loop over x[i].f."""

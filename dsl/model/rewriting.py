@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from sysdyn.dsl.model.expression import Node, substitute, topological
+from sysdyn.dsl.model.expression import Node, const, rebuild, substitute, topological
 from sysdyn.dsl.model.network import Network
 
 EXPRESSIONS = {
@@ -83,6 +84,68 @@ def with_common_sizes(network: Network) -> Network:
         if len(common) == before:
             break
     return everywhere(network, change) if common else network
+
+
+DIFFERENTIATED = ("energies", "works", "constraints", "dynamics", "branches", "couplings")
+"""Statements whose sums within nonlinear functions are written out, for they are differentiated."""
+
+
+def with_literal_ranges(network: Network, number: Callable[[Node], float]) -> Network:
+    """The network with numbers as the bounds of reductions within nonlinear functions, where these follow no loop
+    variable: tanh(sum(i in 1..n: x[i])) is written out, so that n is part of the text.
+
+    number: the value of an expression of parameters, NaN of another.
+    """
+    done: dict[Node, Node] = {}
+
+    def literal(node: Node, args: tuple[Node, ...]) -> Node:
+        if node.op == "reduce" and not (args[0].op == args[1].op == "const"):
+            bounds = [number(a) for a in args[:2]]
+            if not any(map(math.isnan, bounds)):
+                args = (*map(const, bounds), args[2])
+        return rebuild(node, args)
+
+    def change(root: Node) -> Node:
+        found = {n: _within(n, literal) for n in _nonlinear(root)}
+        found = {n: new for n, new in found.items() if new is not n}
+        done.update(found)
+        return substitute(root, found) if found else root
+
+    new = rewritten(network, change, DIFFERENTIATED)
+    return replace(new, literal=True) if done else network
+
+
+def _within(root: Node, change: Callable[[Node, tuple[Node, ...]], Node]) -> Node:
+    made: dict[Node, Node] = {}
+    for node in topological([root]):
+        made[node] = change(node, tuple(made[a] for a in node.args))
+    return made[root]
+
+
+def _nonlinear(root: Node) -> list[Node]:
+    """The largest parts with a reduction in which no sum over a range can be taken apart into terms over a loop."""
+    reduced = dict[Node, bool]()
+    for node in topological([root]):
+        reduced[node] = node.op == "reduce" or any(reduced[a] for a in node.args)
+    found, left = dict[Node, None](), [root] if reduced[root] else []
+    while left:
+        node = left.pop()
+        if node.op == "sum":
+            left += [a for a in node.args if reduced[a]]
+        elif node.op == "reduce" and node.data[0] == "sum":
+            left += [node.args[2]] if reduced[node.args[2]] else []
+        elif node.op == "mul":
+            for exponent, factor in zip(node.data, node.args, strict=True):
+                whole = exponent > 0 and exponent == int(exponent)
+                apart = factor.op == "sum" or (factor.op == "reduce" and factor.data[0] == "sum")
+                if reduced[factor]:
+                    if whole and apart:
+                        left.append(factor)
+                    else:
+                        found[factor] = None
+        else:
+            found[node] = None
+    return list(found)
 
 
 def nodes_read(said: Any) -> frozenset[str]:

@@ -19,6 +19,7 @@ from sysdyn.dsl.names.failures import Failed, Part, SeveralError
 from sysdyn.dsl.names.fitting import Sight
 from sysdyn.dsl.names.symbols import (
     Definition,
+    End,
     InstanceSymbol,
     Scope,
     Space,
@@ -34,23 +35,27 @@ Value = Typed | Vector
 
 @dataclass(slots=True)
 class Use:
-    """An index used on a family, to be checked against its shape once the sizes are known."""
+    """An index used on a family, to be checked against its shape once the sizes are known.
+
+    given: of a list of values for the elements from shape[0] on, of which the last has index `value`, how many it has.
+    """
 
     shape: tuple[Node, Node]
     value: Node
     loops: tuple[Loop, ...]
     name: str
     place: Place
+    given: int | None = None
 
 
 @dataclass(slots=True)
 class Quadrature:
     """The integral of a power since the start (J): a dynamic variable that only reading it brings into being.
 
-    first: the expression whose initial value it starts from; None: zero.
+    first: the expression whose initial value it starts from; None: zero; power: found once all that is said is known.
     """
 
-    power: Node
+    power: Node | Callable[[], Node]
     shape: tuple[tuple[Node, Node], ...]
     dimension: Dimension
     place: Place
@@ -106,6 +111,7 @@ class Context:
         self.laws: dict[str, Any] = {}  # of branches, by family (laws.LawOf)
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
+        self.taken: Callable[[str, End, Place], Node]  # what an instance takes in at an end (elaborate/port_efforts.py)
         self.constraints: dict[str, list[Constraint]] = {}
         self._quantities: dict[tuple[int, int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number, unit
         self._values: dict[tuple[Definition, bool], Value | None] = {}

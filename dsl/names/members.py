@@ -5,12 +5,12 @@ A last name that is no symbol where its path leads (paths.py) is a quantity of w
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Constraint, Domain
+from sysdyn.dsl.model.network import Constraint, Domain
 from sysdyn.dsl.model.paynter import EFFORT_CLASSES
 from sysdyn.dsl.model.units import NONE, Dimension, multiply
 from sysdyn.dsl.names import habits
@@ -183,15 +183,21 @@ class Members(Quantities):
 
     def _two_port(self, symbol: TwoPortSymbol, base: Located, e: syntax.Member) -> Value:
         members = {f"{letter}{k}": (letter, k) for k in (1, 2) for letter in "efqp"}
+        if e.name in ("power", "energy"):  # what both sides absorb: zero, but for what a run leaves of it
+            both = []
+            for branch in symbol.branches:
+                at = self.indices(symbol.name, branch.family.shape, self._all(base, branch, e))
+                both.append(self._changed(self.branch_quantity(branch, at, e.name, e), base.change))
+            return Typed(ex.add(*(side.node for side in both)), both[0].dimension)
         if e.name not in members:
-            raise self.no_member(symbol.name, e, members)
+            raise self.no_member(symbol.name, e, (*members, "power", "energy"))
         letter, k = members[e.name]
         branch = symbol.branches[k - 1]
         at = self.indices(symbol.name, branch.family.shape, self._all(base, branch, e))
         return self._changed(self.branch_quantity(branch, at, letter, e), base.change)
 
-    def port_power(self, e: syntax.Expr) -> tuple[str, Node, Dimension]:
-        """Name and power of `instance.port`: what the branches inside absorb through it."""
+    def port_power(self, e: syntax.Expr) -> tuple[str, Callable[[], Node], Dimension]:
+        """Name and power of `instance.port`: what is inside absorbs through it."""
         base = self.located(e.base) if isinstance(e, syntax.Member) else None
         if base is None or not isinstance(e, syntax.Member) or not isinstance(base.symbol, InstanceSymbol):
             raise self.fail("E102", "energy_through(label.port) wants a port of a component", e.span)
@@ -201,25 +207,20 @@ class Members(Quantities):
             raise self.fail("E407", f"'{self._shown(e.base)}' has no port '{e.name}'", e.span)
         if change or space.around:
             raise self.fail("N608", "energy_through of an array of components is not supported yet", e.span)
-        end, terms = port.end, []
-        common = "f" if end.domain.common == "effort" else "e"
-        for branch in self.connected(space.path):
-            for terminal, sign in ((branch.plus, 1.0), (branch.minus, -1.0)):
-                name = None if end.node is None else end.node.family.name
-                if terminal is not None and terminal.node == name and terminal.at == end.at and name is not None:
-                    terms.append((sign, ex.var(branch.name, f"b{common}", *branch.at)))
-        other = self.node_quantity(end, syntax.Member(e, "e" if common == "f" else "f", e.span))
+        end, place = port.end, self.place(e.span)
+        for other_port in (s for s in space.scope.symbols.values() if isinstance(s, PortSymbol) and s is not port):
+            if other_port.end.node is end.node is not None and other_port.end.at == end.at:
+                message = f"'{e.name}' and '{other_port.name}' are at one node: what goes through each is not told yet"
+                raise self.fail("N608", message, e.span, help="a node for each")
+        own = "e" if end.domain.common == "effort" else "f"
+        other = self.node_quantity(end, syntax.Member(e, own, e.span)).node
         power = multiply(end.domain.effort.dimension, end.domain.flow.dimension)
-        return f"{space.path}.{e.name}.energy", ex.mul(ex.linear(0.0, terms), other.node), power
+        return f"{space.path}.{e.name}.energy", lambda: ex.mul(self.taken(space.path, end, place), other), power
 
     def through(self, port: syntax.Expr) -> Typed:
         """The energy that has gone into a component through one of its ports."""
         name, node, power = self.port_power(port)
         return Typed(self.quadrature(name, node, (), power, (), port), multiply(power, dim.TIME))
-
-    def connected(self, path: str) -> Iterable[Branch]:
-        """Branches inside an instance."""
-        return [b for b in self.branches if b.name == path or b.name.startswith(f"{path}.")]
 
     def _instance(self, symbol: InstanceSymbol, base: Located, e: syntax.Member) -> Value:
         """A member of an instance: a quantity of its branch, or what its component declares."""

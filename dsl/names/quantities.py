@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
@@ -119,7 +119,7 @@ class Quantities(Paths):
     def quadrature(
         self,
         name: str,
-        power: Node,
+        power: Node | Callable[[], Node],
         shape: tuple[tuple[Node, Node], ...],
         dimension: Dimension,
         at: tuple[Node, ...],

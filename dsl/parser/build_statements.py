@@ -40,6 +40,7 @@ def import_(v: Values, span: Span, notes: Notes) -> s.Import:
 
 def domain(v: Values, span: Span, notes: Notes) -> s.Domain:
     """`domain NAME { _body{role} }`."""
+    notes.declared(v[0])
     return s.Domain(v[0], tuple(v[1:]), span, notes.doc(span))
 
 
@@ -68,6 +69,7 @@ def domain_pseudo(v: Values, span: Span, notes: Notes) -> s.DomainPseudo:
 
 def bundle(v: Values, span: Span, notes: Notes) -> s.Bundle:
     """`bundle NAME { _body{bundle_member} }`."""
+    notes.declared(v[0])
     return s.Bundle(v[0], tuple(v[1:]), span, notes.doc(span))
 
 
@@ -122,11 +124,13 @@ def row(v: Values, span: Span, notes: Notes) -> s.Row:
 
 def component(v: Values, span: Span, notes: Notes) -> s.Component:
     """`component NAME block`."""
+    notes.declared(v[0])
     return s.Component(v[0], v[1], span, notes.doc(span))
 
 
 def model(v: Values, span: Span, notes: Notes) -> s.Model:
     """`model NAME block`."""
+    notes.declared(v[0])
     return s.Model(v[0], v[1], span, notes.doc(span))
 
 

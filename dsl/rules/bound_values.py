@@ -18,8 +18,11 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Coordinate, Dynamic, Loop, NodeFamily, Shape, State, Unknown
 from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.model.values import Values, as_constants
-from sysdyn.dsl.rules.checks import expressions_of, nodes_of
+from sysdyn.dsl.rules.checks import looped_expressions_of, nodes_of
 from sysdyn.dsl.text.diagnostics import Place, Report
+
+LOOKED_AT = 1000
+"""Elements of an array whose divisors are looked at."""
 
 
 def run(model: Elaborator, known: Values, report: Report) -> None:
@@ -34,9 +37,9 @@ def run(model: Elaborator, known: Values, report: Report) -> None:
                 shown = shown or ", ".join(f"{i} = {v:g}" for i, v in at.items())
                 report.error("E322", f"require {text} fails: {shown}", r.place, help=f"values for which {text}")
                 break
-    for node, place in expressions_of(model):
+    for node, loops, place in looped_expressions_of(model):
         if not _undefined(node, place, report):
-            _divisions(model, node, place, known, report)
+            _divisions(model, node, tuple(loops), place, known, report)
     _sizes(model, known, report)
     _dynamics(model, known, report)
     _branches(model, known, report)
@@ -69,16 +72,54 @@ def _undefined(root: Node, place: Place, report: Report) -> bool:
     return False
 
 
-def _divisions(model: Elaborator, node: Node, place: Place, known: Values, report: Report) -> None:
-    for inner in _always(node) if any(a.args for a in node.args) else (node,):
-        if inner.op != "mul" or not any(e < 0 for e in inner.data):
+def _divisions(
+    model: Elaborator, root: Node, loops: tuple[Loop, ...], place: Place, known: Values, report: Report
+) -> None:
+    """E324 where what is divided by is zero, of an array by the first element where it is."""
+    for node, within in _under(root, loops):
+        if node.op != "mul" or not any(e < 0 for e in node.data):
             continue
-        for exponent, factor in zip(inner.data, inner.args, strict=True):
-            if exponent < 0 and _is_constant(factor) and known.number(factor) == 0.0:
-                names = _parameters(factor)
-                shown = ", ".join(_valued(n, known.number(n), model) for n in names) or f"{factor} = 0"
-                report.error("E324", f"division by zero with the values bound: {inner}, {shown}", place)
+        for exponent, factor in zip(node.data, node.args, strict=True):
+            if exponent < 0 and _is_constant(factor) and (at := _root(factor, within, known)) is not None:
+                names = _parameters(ex.substitute(factor, as_constants(at)))
+                told = ex.substitute(node, as_constants(at)) if names else _as_written(node)
+                shown = ", ".join(_valued(n, known.number(n), model) for n in names) or f"{_as_written(factor)} = 0"
+                report.error("E324", f"division by zero with the values bound: {told}, {shown}", place)
                 return
+
+
+def _as_written(root: Node) -> Node:
+    """With the author's names of loop variables, of which several sums may have one (names/context.py)."""
+    inner = [n for n in ex.topological([root]) if n.op == "index"]
+    return ex.substitute(root, {n: ex.index(re.sub(r"_\d+$", "", n.data)) for n in inner})
+
+
+def _root(factor: Node, loops: tuple[Loop, ...], known: Values) -> dict[Node, float] | None:
+    """The first values of the loop variables, of LOOKED_AT, with which a constant is zero."""
+    read = {n.data for n in ex.topological([factor]) if n.op == "index"}
+    if not read:
+        return {} if known.number(factor) == 0.0 else None
+    deepest = max((k for k, loop in enumerate(loops) if loop.index in read), default=-1)
+    cases = known.iterations(loops[: deepest + 1])
+    return next((at for at in itertools.islice(cases, LOOKED_AT) if known.number(factor, at) == 0.0), None)
+
+
+def _under(root: Node, loops: tuple[Loop, ...]) -> Iterable[tuple[Node, tuple[Loop, ...]]]:
+    """What is evaluated whatever conditions say, with the loops and the ranges of sums under which it stands."""
+    if not any(a.args for a in root.args):
+        return [(root, loops)]
+    found, left = dict[Node, tuple[Loop, ...]](), [(root, loops)]
+    while left:
+        node, within = left.pop()
+        if node in found:
+            continue
+        found[node] = within
+        if node.op == "reduce":
+            left += [(a, within) for a in node.args[:2]]
+            left.append((node.args[2], (*within, Loop(node.data[1], *node.args[:2]))))
+        else:
+            left += [(a, within) for a in (node.args[:1] if node.op == "cond" else node.args)]
+    return found.items()
 
 
 def _always(root: Node) -> Iterable[Node]:
@@ -93,7 +134,7 @@ def _always(root: Node) -> Iterable[Node]:
 
 
 def _is_constant(node: Node) -> bool:
-    return all(n.op not in ("var", "time", "index", "table") for n in ex.topological([node]))
+    return all(n.op not in ("var", "time", "table") for n in ex.topological([node]))
 
 
 def _sizes(model: Elaborator, known: Values, report: Report) -> None:
@@ -213,7 +254,11 @@ def _indices(model: Elaborator, known: Values, report: Report) -> None:
         if any(math.isnan(v) for v in (low, high, first, last)) or low > high:
             continue
         wrong = low if low < first else high if high > last else None
-        if wrong is not None:
+        if use.given is not None:
+            if low != first + use.given - 1.0:
+                message = f"'{use.name}' has {low - first + 1.0:g} elements there, {use.given} are given"
+                report.error("E805", message, use.place, help="a value for each element, or one for all")
+        elif wrong is not None:
             span = use.place.span
             written = " ".join(use.place.source.text[span.start : span.end].split())
             message = f"index {wrong:g} of '{use.name}' is outside {first:g}..{last:g}: {use.name}[{written}]"

@@ -13,7 +13,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, signals_held
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Observation
+from sysdyn.dsl.model.network import Loop, Observation
 from sysdyn.dsl.rules.letters import letter, samples, unknowns_of
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
 
@@ -238,24 +238,30 @@ def nodes_of(root: Node) -> Sequence[Node]:
 
 def expressions_of(model: Elaborator) -> Iterable[tuple[Node, Place]]:
     """Every expression that the model's equations are made of."""
+    return ((node, place) for node, _, place in looped_expressions_of(model))
+
+
+def looped_expressions_of(model: Elaborator) -> Iterable[tuple[Node, Sequence[Loop], Place]]:
+    """The same with the loops under which each stands."""
     for b in model.parts.branches:
         if b.law is not None:
-            yield b.law, b.place
+            yield b.law, b.loops, b.place
     for coupling in model.parts.couplings:
-        yield coupling.ratio, coupling.place
+        yield coupling.ratio, coupling.loops, coupling.place
     for e in model.parts.energies:
-        yield e.expression, e.place
+        yield e.expression, e.loops, e.place
     for w in model.parts.works:
-        yield ex.add(w.effort, w.on) if w.effort is not w.on else w.on, w.place
+        yield ex.add(w.effort, w.on) if w.effort is not w.on else w.on, w.loops, w.place
     for c in model.parts.constraints:
-        yield c.expression, c.place
+        yield c.expression, c.loops, c.place
     for d in model.parts.dynamics:
-        yield d.expression, d.place
+        yield d.expression, d.loops, d.place
     for i in model.parts.initials:
-        yield i.value, i.place
+        yield i.value, i.loops, i.place
     for p in model.parts.parameters.values():
+        loops = [Loop(name, *bounds) for name, bounds in zip(p.indices, p.shape, strict=False)]
         for value in p.values:
-            yield value, p.place
+            yield value, loops, p.place
 
 
 def run(model: Elaborator, report: Report, *, required: bool) -> None:

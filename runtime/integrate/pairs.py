@@ -27,6 +27,8 @@ PARTED, MUCH = 10.0, 0.3
 """Of all that a quantity was before, times; and of what it is: a difference by more is of runs that parted."""
 LOOSE = 1e-5
 """Tolerances above, with which two runs may run away alike (Robertson's falls through zero)."""
+ABOUT = 2
+"""Instants before and behind one, whose values are those that a run takes about there."""
 BEND = 4.0
 """Of the slopes between steps beside a row: rates beyond are of what relaxes at once."""
 ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
@@ -61,10 +63,26 @@ class Sampled:
 
 
 def apart(coarse: Sampled, fine: Sampled) -> Floats:
-    """How far two runs' values are from each other [instants, quantities], within the time tolerance."""
+    """How far two runs' values are from each other [instants, quantities], within the time tolerance, both ways: what
+    one of them has must be between values that the other one takes about there.  At the end, where a quantity grows
+    without bound (x' = x^2 at its pole), its rate allows any difference, but only one of them has been so far.
+    """
     values, late = coarse.own
     late = np.minimum(np.fmax(np.fmax(late, fine.late), 0.0), LARGEST)  # no number: no time tolerance
-    return np.asarray(np.fmax(np.abs(fine.values - values) - late, 0.0 * fine.values * values))
+    over = np.fmax(_outside(values, fine.values, late), _outside(fine.values, values, late))
+    return np.asarray(np.fmax(over, 0.0 * fine.values * values))
+
+
+def _outside(values: Floats, others: Floats, late: Floats) -> Floats:
+    """How far values are from those that the others [instants, quantities] take at most ABOUT instants away and no
+    farther than `late` from what they are.
+    """
+    low, high = others.copy(), others.copy()
+    for k in range(1, min(ABOUT, len(others) - 1) + 1):
+        for found, least in ((low, np.fmin), (high, np.fmax)):
+            found[k:] = least(found[k:], others[:-k])
+            found[:-k] = least(found[:-k], others[k:])
+    return np.fmax(np.fmax(low, others - late) - values, values - np.fmin(high, others + late))
 
 
 def lateness(time: Floats, values: Floats, rates: Floats, tolerance: float) -> Floats:

@@ -33,7 +33,7 @@ BESIDE = 1e-3
 class Roles:
     """test [unknowns]: -1 left out, 0 tested, 1 tested with h; power [unknowns]: of h in Newton's norm.
 
-    state [unknowns]: carry the state; differential [unknowns]: their derivative occurs;
+    state [unknowns]: carry the state across a jump; differential [unknowns]: their derivative occurs;
     smooth [unknowns]: it is determined; common [unknowns]: number of the group of flows of which differences alone are
     states (-1: of none); idle [unknowns]: steep laws may leave them open where their slopes underflow.
     """
@@ -80,8 +80,9 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     flows, implicit = system.are("f"), system.are("e")
     differential = system.differential(jyd)
     smooth = unique(system, jyd)
-    state = system.are("q", "p", "s") | (flows & differential)
-    test = np.where(state, 0, -1)
+    state = system.are("q", "p", "s") | (flows & _inertial(system, jyd))
+    stepped = state | (flows & differential)  # of index 1 and 0 also those whose rates derived constraints hold
+    test = np.where(stepped, 0, -1)
     power = np.zeros(system.unknowns, dtype=np.int32)
     multiplier = system.are("kappa", "mu", "nu")
     if index >= 2:
@@ -95,13 +96,23 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
         power[system.are("kappa", "mu")] = 2
         power[system.are("f", "p") & state] = 1
         test[system.are("f", "p") & state] = 1
-    if not state.any():
+    if not stepped.any():
         test[flows] = 0
     if (test < 0).all():
         test[:] = 0
     idle = multiplier | implicit | (flows & ~differential)
-    common = _common(system, jyd, flows & state & ~smooth if index < 2 else np.zeros_like(flows))
+    common = _common(system, jyd, flows & stepped & ~smooth if index < 2 else np.zeros_like(flows))
     return Roles(test.astype(np.int32), power, state, differential, smooth, idle, common)
+
+
+def _inertial(system: System, jyd: Floats) -> NDArray[np.bool_]:
+    """Unknowns whose derivative occurs in a balance: rates that derived constraints alone hold carry nothing across a
+    jump.
+    """
+    there = (jyd != 0.0) & system.of_groups("dynamics")[system.pattern.row]
+    found = np.zeros(system.unknowns, dtype=bool)
+    found[system.pattern.columns_of()[there]] = True
+    return found
 
 
 def _common(system: System, jyd: Floats, shared: NDArray[np.bool_]) -> Ints:

@@ -197,3 +197,88 @@ def test_the_drift_is_what_a_projection_removes(tmp_path):
 def test_what_no_effort_class_is(text, options, code, tmp_path, capsys):
     found = run_json(capsys, "simulate", str(write(tmp_path, text)), "--backend", "numpy", *options)[1]
     assert code in {d["code"] for d in found["diagnostics"]}
+
+
+PORTS = """
+component carriage {
+  port p: translation
+  port v: electrical
+  node inner, far: translation
+  energy V = 1/2*(100 N/m)*(p.q - inner.q)^2
+  content D = 1/2*(2 N.s/m)*(p.f - inner.f)^2 + 0.5 N*abs(p.f)
+  work 0.3 N*sin(10*t/(1 s)) on p.q
+  phi lever: 2*p.q = far.q
+  M: kinetic(p = 2 kg*f) inner
+  H: kinetic(p = 0.1 kg*f) far
+  K: potential(e = 30 N/m*q) on p.q^2/(1 m)
+  R: dissipator(e = 3 ohm*f) v -> ground
+}
+component nested {
+  port p: translation
+  port v: electrical
+  C: carriage() p = p, v = v
+}
+model rig {
+  node x: translation
+  node v: electrical
+  M: kinetic(p = 1 kg*f) x
+  F: effort(e = 4 N) ground -> x
+  S: effort(e = 2 V) v
+  X: nested() p = x, v = v
+  init x.q = 0.1 m
+  init x.f = 0.5 m/s
+}
+scene s of rig {
+  time 0 s to 0.5 s
+  trace M.energy, F.energy, energy_through(X.p) as port, energy_through(X.v) as heat
+  accuracy 1e-6
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", PRIMAL)
+def test_what_goes_through_a_port_counts_every_statement_inside(formulation, tmp_path):
+    """State functions, friction, work, constraints, elements along expressions, of components within too: a node
+    passes on what it is given.
+    """
+    got = traced(write(tmp_path, PORTS), formulation=formulation, output=str(tmp_path / "o.h5"))
+    assert np.abs(got["port"]).max() > 0.1
+    assert np.abs(got["port"] + got["M.energy"] + got["F.energy"]).max() < 1e-5 * np.abs(got["port"]).max()
+    assert got["heat"] == pytest.approx(4.0 / 3.0 * got["t"], rel=1e-6)
+
+
+@pytest.mark.parametrize("inside", ["energy T* = 1/2*(1 kg)*p.f^2", "phi stop: p.q >= -1 m"])
+def test_a_port_whose_power_has_no_closed_form_is_refused(inside, tmp_path, capsys):
+    text = (
+        f"component part {{\n  port p: translation\n  {inside}\n}}\n"
+        "model m {\n  node x: translation\n  A: part() p = x\n  M: kinetic(p = 1 kg*f) x\n  init x.q = 1 m\n}\n"
+        "scene s of m {\n  time 0 s to 1 s\n  trace energy_through(A.p)\n}\n"
+    )
+    code, answer = run_json(capsys, "simulate", write(tmp_path, text))
+    assert code == 1
+    assert [d["code"] for d in answer["diagnostics"] if d["severity"] == "error"] == ["E608"]
+
+
+LEVER = """
+model lever {
+  node x, y: translation
+  A: kinetic(p = 1 kg*f) x
+  B: kinetic(p = 2 kg*f) y
+  T: transformer(f1 = (2 + sin(3*t/(1 s)))*f2) x -> ground, y -> ground
+  F: effort(e = 4 N) ground -> x
+  init x.f = 1 m/s
+}
+scene s of lever {
+  time 0 s to 1 s
+  trace T.power, T.energy, T.e1*T.f1 as one, A.energy
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", [*PRIMAL, "co_lagrangian", "co_hamiltonian"])
+def test_a_two_port_absorbs_nothing(formulation, tmp_path):
+    """Any element has a power and an energy; those of a transformer, however its ratio moves, are zero."""
+    got = traced(write(tmp_path, LEVER), formulation=formulation, output=str(tmp_path / "o.h5"))
+    assert np.abs(got["one"]).max() > 1.0
+    assert np.abs(got["T.power"]).max() < 1e-10 * np.abs(got["one"]).max()
+    assert np.abs(got["T.energy"]).max() < 1e-4 * np.abs(got["A.energy"]).max()

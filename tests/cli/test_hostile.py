@@ -122,3 +122,13 @@ def test_odd_files(tmp_path, capsys, data):
     path.write_bytes(data)
     assert run(["check", str(path)]) in (0, 1)
     assert "fault" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["check", "fmt", "simulate", "verify", "reduce", "compile", "golden record", "new"])
+def test_a_link_to_itself_and_no_name_are_unreadable_files(tmp_path, capsys, monkeypatch, command):
+    """Exit 5, never a fault inside."""
+    monkeypatch.chdir(tmp_path)
+    Path("loop.sd").symlink_to("loop.sd")
+    for name in ("loop.sd",) if command == "new" else ("loop.sd", ""):
+        assert run([*command.split(), name]) == 5, name
+        assert "fault" not in capsys.readouterr().err

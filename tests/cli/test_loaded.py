@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from sysdyn.api import ModelError, NotMet, SolverFailure, Trace, UsageError, check, load, simulate
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -181,3 +182,39 @@ def test_a_mass_may_become_zero_in_hamiltons_form_which_divides_by_it(tmp_path):
         assert ends[formulation][0] == ends[formulation][2]
     assert np.allclose(ends["lagrangian"], ends["hamiltonian"], rtol=0.0, atol=1e-4)
     assert abs(ends["lagrangian"][0] - ends["lagrangian"][1]) > 1e-3
+
+
+NEURONS = """
+model neurons {
+  param n = 3
+  param w[1..n, 1..n] = 0.5
+  state s[1..n]: 1 = 0.1
+  state r: 1 = 1
+  for i in 1..n { dynamic s[i]' = (tanh(sum(j in 1..n: w[i, j]*s[j]*j) + 0.1*i) - s[i])/(1 s) }
+  dynamic r' = (max(i in 1..n: s[i]) - r*exp(-sum(i in 1..n: s[i])) - prod(i in 1..n: 1 + s[i]))/(1 s)
+}
+scene fire of neurons {
+  time 0 s to 3 s
+  trace s[n] as last, r
+  accuracy 1e-7
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "co_hamiltonian"])
+def test_functions_of_sums_over_a_size_follow_the_size(tmp_path, formulation):
+    """Written out for each size that is asked for: the same model runs with 3, with 5 and with 3 again."""
+    path = tmp_path / "neurons.sd"
+    path.write_text(NEURONS)
+    model = load(path, scene="fire", formulation=formulation)
+
+    def rates(t, z):
+        s, r = z[:-1], z[-1]
+        i = np.arange(1.0, s.size + 1)
+        grown = s.max() - r * np.exp(-s.sum()) - np.prod(1.0 + s)
+        return np.append(np.tanh(0.5 * (s * i).sum() + 0.1 * i) - s, grown)
+
+    for n in (3, 5, 3):
+        found = model.run({"n": n} if n != 3 else {})
+        wanted = solve_ivp(rates, (0.0, 3.0), np.append(np.full(n, 0.1), 1.0), rtol=1e-11, atol=1e-12).y[-2:, -1]
+        assert [found["last"][-1], found["r"][-1]] == pytest.approx(wanted, rel=1e-6)

@@ -107,6 +107,39 @@ def test_an_own_initial_value_is_that_of_every_element():
     assert (initial.loops[0].first, initial.loops[0].last) == (ex.const(1.0), ex.param("n"))
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        "coord x[0..2]: translation = [1 m, 20 mm, 3 m]",
+        "coord x[0..2]: translation; init x = [1 m, 20 mm, 3 m]",
+        "param n = 2; coord x[0..n]: translation; init x[0..n] = [1 m, 20 mm, 3 m]",
+        "param a[1..3] = [1 m, 0.02 m, 3 m]; coord x[0..2]: translation = a[1..3]",
+    ],
+)
+def test_a_list_gives_each_element_its_own_initial_value(body):
+    elaborator, said = made(f"model m {{ {body}\n energy T* = 1/2*1 kg*x[0]'^2 }}")
+    assert said == []
+    known = Values(elaborator.parts.parameters, [])
+    found = {known.number(i.target.args[0]): known.number(i.value) for i in elaborator.parts.initials}
+    assert found == {0.0: 1.0, 1.0: 0.02, 2.0: 3.0}
+    assert not any(i.loops for i in elaborator.parts.initials)
+
+
+@pytest.mark.parametrize(("n", "told"), [(3, []), (2, [("E805", 2)]), (5, [("E805", 5)])])
+def test_a_list_has_as_many_values_as_there_are_elements(n, told):
+    """Once sizes are known, those of the scene among them."""
+    text = (
+        "model m {\n  param n = 3\n  state x[1..n]: m = [1 m, 2 m, 3 m]\n"
+        "  for i in 1..n { dynamic x[i]' = 0 m/s }\n}\n"
+        f"scene s of m {{\n  time 0 s to 1 s\n  set n = {n}\n  trace x[1]\n}}\n"
+    )
+    report = Report()
+    document = load.document(SourceText("m.sd", text), report)
+    load.network(document, document.models["m"], document.scenes["s"], report)
+    assert [d.code for d in report] == [code for code, _ in told]
+    assert [d.message for d in report] == [f"'x' has {k} elements there, 3 are given" for _, k in told]
+
+
 def test_a_dynamic_variable_takes_the_unit_of_its_initial_value():
     elaborator, said = made("model m { state s = 3 m/s }")
     assert said == []

@@ -196,6 +196,26 @@ def test_a_division_by_a_parameter_that_is_zero():
     assert [(c, at) for c, _, at in judged(ratio)] == [("E324", "T: transformer(e2 = 1/r*e1) a -> ground, b -> ground")]
 
 
+def test_an_element_of_an_array_that_is_zero_where_it_divides():
+    """Of elements, under sums, by the index itself, and of parameters that follow others; not where none is."""
+    body = "param n = 3\nparam c[1..n] = [1 s, {} s, 3 s]\nstate x[1..n]: 1 = 1\n"
+    each = body + "for i in 1..n {{ dynamic x[i]' = -x[i]/c[i] }}"
+    assert judged(each.format(2)) == []
+    assert [m for _, m, _ in judged(each.format(0))] == [
+        "division by zero with the values bound: x[2]/c[2], c[2] = 0 s"
+    ]
+    summed = "param n = 3\nnode x[1..n]: translation\nfor i in 1..n {{ M[i]: kinetic(p = 1 kg*f) x[i] }}\n{}"
+    told = [
+        ("energy V = sum(i in 1..n: 1 N/m*x[i].q^2/(i - 2))", "x[i].q^2/(i - 2), i - 2 = 0"),
+        ("energy V = sum(i in 1..n: if i == 2 then 0 J else 1 N/m*x[i].q^2/(i - 2))", None),
+        ("energy V = sum(i in 1..n: 1 N/m*x[i].q^2/(i - 4))", None),
+        ("for i in 0..n { param k[i] = 1 N/m / i }\nenergy V = k[1]*x[1].q^2", "1/i, i = 0"),
+    ]
+    for line, found in told:
+        wanted = [] if found is None else [f"division by zero with the values bound: {found}"]
+        assert [m for _, m, _ in judged(summed.format(line))] == wanted
+
+
 @pytest.mark.parametrize("constant", ["sqrt(-1)", "ln(0)", "(-8)^(1/3)", "asin(2)", "mod(3, 0)", "0*inf"])
 def test_a_constant_that_is_no_number(constant):
     for factor in ("2", "t/(1 s)"):

@@ -150,7 +150,7 @@ def test_what_a_name_stands_for(read, text, value, unit):
         ("R.g", "E102", "'R' has no member 'g'", "nearest: 'G'"),
         ("R.T", "E102", "'R' has no member 'T': it is not a kinetic store", None),
         ("x.dot", "E102", "'x' has no member 'dot'", "x'"),
-        ("T.e3", "E102", "'T' has no member 'e3'", "it has e1, f1, q1, p1, e2, f2, q2, p2"),
+        ("T.e3", "E102", "'T' has no member 'e3'", "it has e1, f1, q1, p1, e2, f2, q2, p2, power, energy"),
         ("X.q3", "E102", "'X' has no member 'q3'", None),
         ("n.e", "E102", "'n' has no member 'e': it is a parameter", "elements that have members: X, R, T, C"),
         ("nope.e", "E101", "unknown name 'nope'", "declare it by param nope = ..., let, coord or node"),

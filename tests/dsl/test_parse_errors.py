@@ -41,6 +41,15 @@ def test_the_examples_of_the_other_codes_parse(code):
         assert parse(SourceText("t.sd", text))[1] == ()
 
 
+@pytest.mark.parametrize("text", ["model {}", "component {}", "domain {}", "bundle {}"])
+@pytest.mark.parametrize("name", ["t", "pi", "ground", "audit"])
+def test_what_a_file_holds_hides_no_predefined_name(text, name):
+    """A model t would hide the time in itself."""
+    inner = {"domain": "effort e: V\n flow f: A\n node common effort", "bundle": "x: translation"}
+    source = SourceText("t.sd", f"{text.format(name)} {{\n {inner.get(text.split()[0], '')}\n}}\n")
+    assert [d.code for d in parse(source)[1]] == ["E108"]
+
+
 CASES = [
     ("time 0 s to 4 s", "E107", 3, "'time' belongs in a scene, not in a model", None),
     ("trace x", "E107", 3, "'trace' belongs in a scene", None),

@@ -99,3 +99,13 @@ def test_zeros_at_the_start_count_as_a_part_of_their_like(tmp_path, monkeypatch)
     # x'' = w^2 x along the rod
     along = np.hypot(np.asarray(run.trace["x"]), np.asarray(run.trace["y"]))
     assert np.abs(along - 0.7 * np.cosh(5.0 * np.asarray(run.trace.time))).max() <= 1e-4 * along.max()
+
+
+@pytest.mark.parametrize("method", ["auto", "dopri", "radau", "bdf", "rosenbrock"])
+def test_a_run_that_ends_at_a_pole_is_not_met(tmp_path, method):
+    """1/(1 - t) has no value at 1 s; just before it is met."""
+    run = ran(tmp_path, FILE, method=method, scene="pole_run")
+    assert not run.met
+    before = ran(tmp_path, FILE, method=method, until="0.99", scene="pole_run")
+    assert before.met
+    assert before.at("y", 0.99) == pytest.approx(100.0, rel=1e-4)

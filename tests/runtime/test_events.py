@@ -52,3 +52,34 @@ def test_a_ball_bounces_at_the_exact_instants(tmp_path, formulation, method):
         assert trace["v"][here[1]] == pytest.approx(v, rel=1e-9)
     end = 2.5 - times[-1]
     assert trace["h"][-1] == pytest.approx(after[-1] * end - 0.5 * G * end**2, abs=1e-9)
+
+
+LEAK = """
+model leak {
+  discrete k = 1
+  node a, m: electrical
+  Vs: effort(e = 10 V) a
+  R: dissipator(e = 1 kohm*f) a -> m
+  C: potential(q = 1 uF*e) m
+  drain: dissipator(f = k*e/(10 kohm)) m -> ground
+  when C.e > 2 V { k := 3 }
+  init C.e = 0 V
+}
+scene s of leak {
+  time 0 s to 5 ms
+  trace C.e as u
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.parametrize("how", [("bdf", "1"), ("radau", "1"), ("bdf", "0"), ("rosenbrock", "auto"), ("dopri", "auto")])
+def test_a_resistance_jumps_in_every_index_form(tmp_path, formulation, how):
+    """No flow has inertia: each follows anew, also where the rates of derived constraints stand beside them."""
+    method, index = how
+    trace = run(LEAK, tmp_path, formulation=formulation, method=method, index=index, accuracy=1e-6)
+    before, after = 1e3 * 1e4 / 11e3 * 1e-6, 1e3 * 1e4 / 13e3 * 1e-6
+    jump = -before * np.log(1.0 - 2.0 / (100.0 / 11.0))
+    assert [e.time for e in trace.events] == pytest.approx([jump], rel=1e-6)
+    end = 100.0 / 13.0 + (2.0 - 100.0 / 13.0) * np.exp(-(5e-3 - jump) / after)
+    assert trace["u"][-1] == pytest.approx(end, rel=1e-6)
