@@ -117,13 +117,16 @@ def _cpu(outcome: Outcome) -> float:
 
 
 class Reference:
-    """A run at `rtol` with rows at all instants of the runs it is to judge, and the time tolerance beside them."""
+    """A run at `rtol` with rows at all instants of the runs it is to judge, and the time tolerance beside them.  Where a
+    law jumps Newton's iteration keeps radau from it (tube): rosenbrock near its finest tolerance is off by 1e-7 there.
+    """
 
     def __init__(self, bench: Bench, runs: list[Measured], rtol: float = 1e-15) -> None:
         self.late = TIMING * (bench.options.t_end - bench.options.t_start)
         times = np.unique(np.concatenate([run.time for run in runs]))
         at = np.unique(np.clip([times - self.late, times, times + self.late], times[0], times[-1]))
-        found = bench.run(accuracy=None, rtol=rtol, method="radau", index="auto", at=tuple(at), max_wall=120.0)
+        asked = {"accuracy": None, "index": "auto", "at": tuple(at), "max_wall": 60.0}
+        found = bench.run(**asked, rtol=rtol, method="radau") or bench.run(**asked, rtol=3e-10, method="rosenbrock")
         if found is None:
             raise NoSuchForm("no reference within its time")
         self.found = found
