@@ -15,7 +15,7 @@ from sysdyn.cli.page.document import escape, table
 from sysdyn.compiler.model.energies import flows
 from sysdyn.compiler.model.terms import canonical, local_variables, split, terms
 from sysdyn.dsl.model import dimensions as dim
-from sysdyn.dsl.model.calculus import derivative, rate
+from sysdyn.dsl.model.calculus import differential, rate
 from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, reduction, sub, substitute, var
 from sysdyn.dsl.model.network import Branch, Dynamic, Energy, Initial, Loop, Network, Observation, State, Work
 from sysdyn.dsl.model.units import si
@@ -177,7 +177,8 @@ def _named(loops: Sequence[Loop], body: Node) -> Node:
 
 
 def _along(expression: Node, kinds: Sequence[str]) -> Node:
-    return add(*(mul(f, derivative(expression, f)) for f in local_variables(expression, kinds)))
+    """The sum of f d/df, elements under sums within functions among them."""
+    return differential(expression, {f: f for f in local_variables(expression, kinds)})
 
 
 def _stored(statement: Energy) -> Node:
@@ -199,7 +200,7 @@ def _work(statement: Work) -> Node:
     pieces = []
     for term in split(on, nest, statement.place):
         moving = local_variables(term.expression, ("q", "nq", "bq"))
-        speed = add(*(mul(r, derivative(term.expression, q)) for q in moving if (r := rate(q)) is not None))
+        speed = differential(term.expression, {q: r for q in moving if (r := rate(q)) is not None})
         pieces.append(_named(term.loops[len(nest) :], speed))
     return _named(nest, mul(effort, add(*pieces)))
 

@@ -58,7 +58,7 @@ def _source(
     """The judged quantities up to an instant (at instants alone where given), their magnitudes the reference's."""
     within = trace.time <= until if instants is None else np.isin(trace.time, instants) & (trace.time <= until)
     largest: dict[str, float] = {}
-    for name in reference.names:
+    for name in dict.fromkeys((*reference.names, *(name for name in judged if name in reference))):  # audit.* too
         unit = reference[name].units
         largest[unit] = max(largest.get(unit, 0.0), reference[name].nominal or 0.0)
     known = [name for name in judged if name in trace]

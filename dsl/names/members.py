@@ -187,8 +187,9 @@ class Members(Quantities):
             both = []
             for branch in symbol.branches:
                 at = self.indices(symbol.name, branch.family.shape, self._all(base, branch, e))
-                both.append(self._changed(self.branch_quantity(branch, at, e.name, e), base.change))
-            return Typed(ex.add(*(side.node for side in both)), both[0].dimension)
+                both.append(self.branch_quantity(branch, at, e.name, e))
+            whole = Typed(ex.add(*(side.node for side in both)), both[0].dimension)
+            return self._changed(whole, base.change)
         if e.name not in members:
             raise self.no_member(symbol.name, e, (*members, "power", "energy"))
         letter, k = members[e.name]

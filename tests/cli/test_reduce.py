@@ -332,3 +332,34 @@ def test_the_picture_shows_activities_and_where_the_energy_went(tmp_path, kind):
     else:
         assert drawn.startswith(b"\x89PNG")
     assert run(["reduce", file, "--activity", "--plot", str(tmp_path / "energy.pdf"), "--quiet"]) == 2
+
+
+SHELL = """\
+model shell {
+  param n = 3
+  coord x[1..n]: translation = 0 m
+  energy T* = sum(i in 1..n: 1/2*(1 kg)*x[i]'^2)
+  energy V = 2 J*cosh(sum(i in 1..n: x[i])/(1 m)) + sum(i in 1..n: 1/2*(10 N/m)*i*x[i]^2)
+  work 1 N*sin(2*t/(1 s)) on sqrt(sum(i in 1..n: (x[i] + 1 m)^2))
+  init x[3]' = 0.2 m/s
+}
+scene c of shell {
+  time 0 s to 2 s
+  trace x[1], audit.energy
+  accuracy 1e-6
+}
+"""
+
+
+def test_work_along_a_function_of_a_sum_and_a_traced_balance(tmp_path, capsys):
+    """The activity of the work is the variation of what it supplied; audit.energy has a unit of its own."""
+    path = write(tmp_path, SHELL)
+    code, answer = run_json(capsys, "reduce", path, "--scene", "c", "-o", str(tmp_path / "r.sd"))
+    assert code == 0, answer["diagnostics"]
+    found = {a["element"].partition(" (")[0]: a["activity"] for a in answer["result"]["activity"]}
+    got = api.simulate(path, scene="c", output=str(tmp_path / "t.h5"), accuracy=1e-6)
+    trace = api.simulate(write(tmp_path, SHELL.replace("audit.energy", "audit.supplied")), scene="c",
+                         output=str(tmp_path / "s.h5"))  # fmt: skip
+    assert np.abs(got["audit.energy"].values).max() < 1e-5
+    supplied = trace["audit.supplied"].values
+    assert found["work"] == pytest.approx(np.abs(np.diff(supplied)).sum(), rel=0.02)
