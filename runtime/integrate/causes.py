@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
+from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.structure.structure import DENSE, null_place
 
 if TYPE_CHECKING:
@@ -48,12 +49,14 @@ def placed(run: Integration, cause: str) -> SolverFailure:
 
 
 def _null_place(run: Integration) -> tuple[tuple[str, ...], int]:
-    """Unknowns and row of a singular pencil at the last accepted point; () where it is regular."""
+    """Unknowns and row of a singular pencil at the last accepted point; () where it is regular, or not finite."""
     y, yd = run.method.point()
     jy, jyd = run.system.jacobian(run.method.contents.t, y, yd)
-    if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
+    try:
+        with np.errstate(all="ignore"):
+            return null_place(run.system, jy, jyd)
+    except NotFiniteError:  # nor need slopes be that lie too far apart (a junction far above its voltage)
         return (), -1
-    return null_place(run.system, jy, jyd)
 
 
 def _worst(run: Integration) -> str:

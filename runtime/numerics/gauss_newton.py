@@ -95,8 +95,9 @@ class Problem:
 
     jacobian(x): values at (rows, columns); guess, scale, weight [unknowns]; levels: unknowns [masks] whose moves are
     the least in this order, each with what stands before it held, the others then (of what is too large for full
-    matrices weights alone say so); work: what all problems of one search draw on; core: the same rows and entries
-    there, at an instant t [s], used where there are no levels; check: raises what a callback of them raised.
+    matrices weights alone say so); idle: unknowns whose least nobody asks for where rows leave them open; work: what
+    all problems of one search draw on; core: the same rows and entries there, at an instant t [s], used where there are
+    no levels; check: raises what a callback of them raised.
     """
 
     residual: Callable[[Floats], Floats]
@@ -110,6 +111,7 @@ class Problem:
     scale: Floats
     weight: Floats
     levels: tuple[Mask, ...] = ()
+    idle: Mask | None = None
     work: Work = field(default_factory=Work)
     core: tuple[lib.RowsOfStart, float] | None = None
     check: Callable[[], None] | None = None
@@ -184,7 +186,8 @@ class _Linear:
         del r
         if ordered:
             return stays + in_order(self.shape, (i, j, v), aim, levels)
-        return stays + least_norm(self.shape, (i, j, v), aim, spent=True)
+        idle = None if self.problem.idle is None else self.problem.idle[self.problem.free]
+        return stays + least_norm(self.shape, (i, j, v), aim, spent=True, idle=idle)
 
 
 def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:

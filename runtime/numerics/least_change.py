@@ -41,10 +41,16 @@ _PROXIMAL = 6
 
 
 def least_norm(
-    shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats, *, spent: bool = False
+    shape: tuple[int, int],
+    entries: tuple[Any, Any, Floats],
+    aim: Floats,
+    *,
+    spent: bool = False,
+    idle: Mask | None = None,
 ) -> Floats:
     """The u of least norm with A u = aim; A [rows, unknowns] by its entries (row, column, value).  spent: nobody else
-    needs values and aim, which are overwritten: of a large matrix the room counts.
+    needs values and aim, which are overwritten: of a large matrix the room counts.  idle: unknowns of which nobody asks
+    for the least where rows leave them open.
     """
     i, j, v = entries
     if not (np.isfinite(v).all() and np.isfinite(aim).all()):
@@ -60,7 +66,7 @@ def least_norm(
         return float(np.abs(miss * back).max(initial=0.0))
 
     if max(shape) > SINGULAR_VALUES:
-        only = determined(shape, (i, j, v), aim, lambda found: missed_by(found) <= small)
+        only = determined(shape, (i, j, v), aim, lambda found: missed_by(found) <= small, idle)
         if only is not None:
             return only
     for way in _DENSE if max(shape) <= SINGULAR_VALUES else _SPARSE:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.ordering import tall_order
@@ -78,17 +78,24 @@ def _in_order(i: Any, j: Any) -> bool:
 
 
 def determined(
-    shape: tuple[int, int], entries: Entries, aim: Floats, met: Callable[[Floats], bool] = lambda _: True
+    shape: tuple[int, int],
+    entries: Entries,
+    aim: Floats,
+    met: Callable[[Floats], bool] = lambda _: True,
+    idle: NDArray[np.bool_] | None = None,
 ) -> Floats | None:
     """The u that rows determine, unknowns that stand in none of them zero; None where they leave others open, or it is
     not `met`: rows in excess are not looked at.  By factors where rows do not determine one unknown after the other.
+
+    idle: unknowns [mask] that rows may leave open, as long as they move none but these: some of those are zero then.
     """
-    columns = _columns(shape, entries, fewer=False)
+    columns = _columns(shape, entries, fewer=idle is not None)
     if columns is None:
         return None
-    for way in (_substituted, _factored):
+    aim = np.append(aim, np.zeros(columns.pattern.rows - shape[0]))
+    for way in (_substituted, _factored if idle is None else _beside(idle[columns.used])):
         found = np.zeros(columns.pattern.unknowns)
-        failed = way(shape[0], columns, aim, found)
+        failed = way(columns, aim, found)
         if failed == MEMORY:
             raise MemoryError
         whole = None if failed else columns.whole(found)
@@ -97,15 +104,35 @@ def determined(
     return None
 
 
-def _substituted(rows: int, columns: _Columns, aim: Floats, found: Floats) -> int:
-    places = (lib.pointer(item) for item in columns.arrays())
+def _substituted(columns: _Columns, aim: Floats, found: Floats) -> int:
+    places, rows = (lib.pointer(item) for item in columns.arrays()), columns.pattern.rows
     return int(lib.core.sd_substituted(rows, found.size, *places, PIVOT, lib.pointer(aim), lib.pointer(found)))
 
 
-def _factored(rows: int, columns: _Columns, aim: Floats, found: Floats) -> int:
-    order, limits = tall_order(columns.pattern), (PIVOT, FILLED * columns.pattern.entries)
-    places = (lib.pointer(item) for item in (*columns.arrays(), order))
-    return int(lib.core.sd_determined(rows, found.size, *places, *limits, lib.pointer(aim), lib.pointer(found)))
+def _factored(
+    columns: _Columns, aim: Floats | None, found: Floats | None, idle: Ints | None = None, along: Floats | None = None
+) -> int:
+    """Of core/linear/tall.h."""
+    pattern, arrays = columns.pattern, (*columns.arrays(), tall_order(columns.pattern), idle)
+    limits, answers = (PIVOT, FILLED * pattern.entries), (aim, found, along)
+    places, last = ([lib.pointer(item) for item in some] for some in (arrays, answers))
+    return int(lib.core.sd_determined(pattern.rows, pattern.unknowns, *places, *limits, *last))
+
+
+def _beside(idle: NDArray[np.bool_]) -> Callable[[_Columns, Floats, Floats], int]:
+    """The same with unknowns that may be left open."""
+
+    def factored(columns: _Columns, aim: Floats, found: Floats) -> int:
+        along = _generic(idle.size)
+        failed = _factored(columns, aim, found, idle.astype(np.int32), along)  # A along = 0: what it moves is open
+        return failed or int((np.abs(along[~idle]) > OPEN * np.abs(along).max(initial=0.0)).any())
+
+    return factored
+
+
+def _generic(number: int) -> Floats:
+    """Numbers of which no row's coefficients make zero by chance; half to one."""
+    return np.asarray(0.75 + 0.25 * np.cos(2.0 * np.pi * uniform(number)))
 
 
 def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
@@ -114,13 +141,8 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
     """
     columns = _columns(shape, entries, fewer=True)
     assert columns is not None
-    # numbers of which no row's coefficients make zero by chance; half to one
-    found = 0.75 + 0.25 * np.cos(2.0 * np.pi * uniform(columns.pattern.unknowns))
-    arrays = *columns.arrays(), tall_order(columns.pattern)
-    limits = PIVOT, FILLED * columns.pattern.entries
-    failed = lib.core.sd_left_open(
-        columns.pattern.rows, found.size, *(lib.pointer(item) for item in arrays), *limits, lib.pointer(found)
-    )
+    found = _generic(columns.pattern.unknowns)
+    failed = _factored(columns, None, None, along=found)
     if failed == MEMORY:
         raise MemoryError
     if failed:

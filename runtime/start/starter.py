@@ -384,6 +384,7 @@ def problem_of(
         scale=scale,
         weight=starter.weights(t, x, scale),
         levels=levels,
+        idle=np.arange(x.size) >= starter.n,
         work=starter.work,
         core=None if starter.summed else (starter.core, t),
         check=starter.settled.failure.check,

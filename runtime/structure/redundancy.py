@@ -114,7 +114,7 @@ def _combined(found: Reactions, weights: Floats) -> Floats:
     values, weights = np.bincount(slot, found.value, pattern.entries), weights.copy()
     order = np.arange(m, dtype=np.int32)
     arrays = (lib.pointer(item) for item in (pattern.column, pattern.row, values, order))
-    if lib.core.sd_left_open(pattern.rows, m, *arrays, TOLERANCE, 0, lib.pointer(weights)):
+    if lib.core.sd_determined(pattern.rows, m, *arrays, None, TOLERANCE, 0, None, None, lib.pointer(weights)):
         raise MemoryError
     return weights
 

@@ -1,8 +1,11 @@
 """What a run that cannot go on says: when, which unknown, which row, the last good point; closed forms."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import small_models as models
+from sysdyn.runtime.integrate.causes import _null_place
 from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import SolverFailure
@@ -55,3 +58,12 @@ def test_a_row_that_is_no_number_is_named(method):
     assert (found.cause, found.row.label, found.row.line) == ("nonfinite", "x", 1)
     assert 1.0 - 1e-12 < found.time < 1.0
     assert y == pytest.approx([-0.25, -1.0], abs=2e-3)
+
+
+def test_slopes_that_no_factors_bring_together_are_no_place_of_singularity():
+    """A junction that blocks and one far above its voltage, 1e467 apart in one column: a failure says what it knows."""
+    slopes = np.array([[9.4e-236, 0.0, 0.0], [0.0, 5.4e5, 1.1e65], [1.4e231, -4.4e-4, 0.0]])
+    inertia = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 2.8e5], [0.0, 0.0, 0.0]])
+    system = SimpleNamespace(jacobian=lambda *_: (slopes, inertia), dense=lambda values: values)
+    run = SimpleNamespace(system=system, method=SimpleNamespace(point=lambda: (0, 0), contents=SimpleNamespace(t=0.0)))
+    assert _null_place(run) == ((), -1)

@@ -200,7 +200,7 @@ def test_an_unknown_does_not_follow_by_an_entry_that_is_next_to_none():
     shape, (i, j, v) = _sums()
     faint = np.where((j == 9) & (np.isin(i, i[(j == 9) & (v > 0.5)])), 1e-12, v)
     columns = tall._columns(shape, (i, j, faint), fewer=False)
-    assert tall._substituted(shape[0], columns, np.ones(shape[0]), np.zeros(N)) == 1
+    assert tall._substituted(columns, np.ones(shape[0]), np.zeros(N)) == 1
 @pytest.mark.parametrize("n", [150, 500])
 def test_what_stands_in_every_row_is_eliminated_last(n):
     """Each of the others fills nothing; taken first it would fill everything."""
@@ -214,3 +214,66 @@ def test_what_stands_in_every_row_is_eliminated_last(n):
     assert order.paired
     assert hub in order.columns[-2:]
     assert order.filled <= 4 * n
+
+
+def _pairs(n=60):
+    """A chain of N unknowns x, and n pairs behind it: u_k = x_k, u_k = 2 (a_k - b_k), and that difference once more."""
+    shape, (i, j, v) = _chain()
+    k = np.arange(n)
+    u, a, b = N + k, N + n + k, N + 2 * n + k
+    tie, apart, again = shape[0] + k, shape[0] + n + k, shape[0] + 2 * n + k
+    rows = np.concatenate([i, tie, tie, apart, apart, apart, again, again])
+    columns = np.concatenate([j, u, k, u, a, b, a, b])
+    one = np.ones(n)
+    values = np.concatenate([v, one, -one, one, -2.0 * one, 2.0 * one, one, -one])
+    aim = np.concatenate([np.ones(shape[0]), np.zeros(2 * n), 0.25 * (N - k) * (k + 1)])
+    return (shape[0] + 3 * n, N + 3 * n), (rows, columns, values), aim, np.arange(N + 3 * n) >= N + n
+
+
+def test_what_may_stay_open_is_left_where_others_are_determined():
+    """Of pairs the difference alone is told: it holds, and all else is what it is without them."""
+    n = 60
+    shape, entries, aim, idle = _pairs(n)
+    assert determined(shape, entries, aim) is None
+    found = determined(shape, entries, aim, idle=idle)
+    k = np.arange(1, N + 1)
+    assert found[:N] == pytest.approx(0.5 * k * (N + 1 - k), rel=1e-11)
+    assert found[N : N + n] == pytest.approx(found[:n], rel=1e-13)
+    a, b = found[N + n : N + 2 * n], found[N + 2 * n :]
+    assert a - b == pytest.approx(0.5 * found[:n], rel=1e-12)
+    assert (np.minimum(np.abs(a), np.abs(b)) == 0.0).all()
+    assert np.flatnonzero(free_unknowns(shape, entries)).tolist() == np.flatnonzero(idle).tolist()
+
+
+def test_what_others_open_ones_move_is_not_determined():
+    """The pairs' first ones may stay open, their second ones, which move with them, may not."""
+    shape, entries, aim, idle = _pairs()
+    idle[-60:] = False
+    assert determined(shape, entries, aim, idle=idle) is None
+
+
+def test_rows_may_be_fewer_by_what_may_stay_open():
+    """x_k determined, of each a_k - b_k the difference: half as many rows as unknowns of pairs."""
+    n = 200
+    k = np.arange(n)
+    rows, columns = np.concatenate([k, n + k, n + k]), np.concatenate([k, n + k, 2 * n + k])
+    entries = rows, columns, np.concatenate([2.0 * np.ones(n), np.ones(n), -np.ones(n)])
+    idle = np.arange(3 * n) >= n
+    found = determined((2 * n, 3 * n), entries, np.cos(np.arange(2.0 * n)), idle=idle)
+    assert found[:n] == pytest.approx(0.5 * np.cos(k), rel=1e-14)
+    assert found[n : 2 * n] - found[2 * n :] == pytest.approx(np.cos(n + k), rel=1e-13)
+
+
+def test_the_saddle_point_is_not_asked_where_rates_alone_stay_open(monkeypatch):
+    monkeypatch.setattr(least_change, "_SPARSE", ())
+    shape, entries, aim, idle = _pairs()
+    found = least_norm(shape, entries, aim, idle=idle)
+    assert _times(shape, entries, found) == pytest.approx(aim, rel=1e-10, abs=1e-7)  # of 20 000
+
+
+def test_rows_in_excess_of_open_ones_are_met_or_refused():
+    """The difference of a pair, said twice and not alike: no u meets both."""
+    shape, entries, aim, idle = _pairs()
+    aim[-1] += 1.0
+    missed = lambda found: np.abs(_times(shape, entries, found) - aim).max() < 1e-6  # noqa: E731
+    assert determined(shape, entries, aim, missed, idle) is None

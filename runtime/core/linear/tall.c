@@ -32,19 +32,28 @@ static void refine(sd_sparse *lu, const int32_t *column, const int32_t *row, con
 }
 
 int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
-                  const int32_t *order, double least, int64_t most, const double *b, double *x)
+                  const int32_t *order, const int32_t *idle, double least, int64_t most, const double *b, double *x, double *along)
 {
     sd_sparse *lu = sd_sparse_new(rows, columns, order);
-    double *rest = malloc(((size_t)rows + (size_t)columns + 1) * sizeof *rest);
+    double *rest = calloc(2 * (size_t)rows + (size_t)columns + 1, sizeof *rest);
+    const double *none = rest + rows + columns; /* A x = 0 */
     int failed = lu && rest ? 0 : 2;
     if (!failed) {
         lu->most = most;
         lu->dropped = ROUND_OFF;
+        lu->null_pivot = along ? least : 0.0;
+        lu->idle = idle;
         failed = sd_sparse_pivot(lu, column, row, value);
-        failed = failed == 2 ? 2 : failed || !(lu->smallest >= least);
+        failed = failed ? failed : !(lu->smallest >= least);
     }
-    memset(x, 0, (size_t)columns * sizeof *x);
-    if (!failed)
+    for (int32_t k = 0; k < columns && !failed && along; k++)
+        if (lu->source[k] >= 0)
+            along[lu->order[k]] = 0.0;
+    if (!failed && along && lu->rank < columns)
+        refine(lu, column, row, value, none, along, rest);
+    if (x)
+        memset(x, 0, (size_t)columns * sizeof *x);
+    if (!failed && x)
         refine(lu, column, row, value, b, x, rest);
     free(rest);
     sd_sparse_free(lu);
@@ -112,28 +121,5 @@ int sd_substituted(int32_t rows, int32_t columns, const int32_t *column, const i
     }
     free(pivot);
     free(rest);
-    return failed;
-}
-
-int sd_left_open(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
-                 const int32_t *order, double least, int64_t most, double *x)
-{
-    sd_sparse *lu = sd_sparse_new(rows, columns, order);
-    double *rest = calloc(2 * (size_t)rows + (size_t)columns + 1, sizeof *rest);
-    double *none = rest + rows + columns; /* A x = 0 */
-    int failed = lu && rest ? 0 : 2;
-    if (!failed) {
-        lu->most = most;
-        lu->null_pivot = least;
-        lu->dropped = ROUND_OFF;
-        failed = sd_sparse_pivot(lu, column, row, value);
-        for (int32_t k = 0; k < columns && !failed; k++)
-            if (lu->source[k] >= 0)
-                x[lu->order[k]] = 0.0;
-    }
-    if (!failed)
-        refine(lu, column, row, value, none, x, rest);
-    free(rest);
-    sd_sparse_free(lu);
     return failed;
 }

@@ -1,4 +1,4 @@
-/* A x = b of a sparse matrix with as many rows as columns or more, where every column is determined.
+/* A x = b of a sparse matrix with as many rows as columns or more, and what it leaves open.
  *
  * As many rows as there are columns pivot, chosen by size (sparse.h); the others must agree, and whoever asks looks at
  * them.  Where every column has a pivot the solution is the only one, and so the one of least norm: one factorisation of the rows
@@ -10,10 +10,13 @@
 #include <stdint.h>
 
 /* column [columns + 1], row, value [entries]: A by columns; order [columns] of elimination; least: pivot, as part of its
- * column, below which a column counts as not determined; most: entries of the factors; b [rows] -> x [columns].
- * 0 done, 1 not determined, 2 no memory */
+ * column, below which a column counts as not determined; most: entries of the factors (0: any number); b [rows] -> x
+ * [columns], NULL: nobody asks.
+ * along [columns], NULL: every column must have a pivot.  Else those may have none that are idle [columns] (NULL: all): they
+ * are zero in x and as they came in along, which becomes a direction with A along = 0; zero where A determines x.
+ * 0 done, 1 not determined, 2 no memory, 3 the factors fill too much */
 int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
-                  const int32_t *order, double least, int64_t most, const double *b, double *x);
+                  const int32_t *order, const int32_t *idle, double least, int64_t most, const double *b, double *x, double *along);
 
 /* The same where each row in turn has one unknown left: substitution needs no order and no factors, and makes the rows that
  * it takes hold to round-off.  0 done, 1 some unknown does not follow so, 2 no memory */
@@ -23,10 +26,5 @@ int sd_substituted(int32_t rows, int32_t columns, const int32_t *column, const i
 /* out += A x of a matrix by its entries: row, column, value [entries] */
 void sd_add_product(int32_t entries, const int32_t *row, const int32_t *column, const double *value, const double *x,
                     double *out);
-
-/* A direction that A leaves open: x [columns] with A x = 0, its entries in the columns that follow from the others as
- * they are on entry; 0 where every column has a pivot.  0 done, 2 no memory, 3 the factors fill too much */
-int sd_left_open(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
-                 const int32_t *order, double least, int64_t most, double *x);
 
 #endif
