@@ -46,12 +46,25 @@ def _spans(full: NDArray[np.integer], number: NDArray[np.integer]) -> tuple[NDAr
 
 
 class Room:
-    """Where points, rows and matrices of whole systems are evaluated, one after the other."""
+    """Where points, rows and matrices of whole systems are evaluated, one after the other; made when asked for."""
 
     def __init__(self, *systems: System) -> None:
-        unknowns = max(max(system.form.extended, system.unknowns) for system in systems) + 8
-        self.y, self.yd = np.zeros(unknowns), np.zeros(unknowns)
-        self.r = self.slope = np.zeros(max(max(system.pattern.entries, system.rows) for system in systems) + 1)
+        self._systems = systems
+
+    @cached_property
+    def y(self) -> Floats:
+        """A point [unknowns]."""
+        return np.zeros(max(max(system.form.extended, system.unknowns) for system in self._systems) + 8)
+
+    @cached_property
+    def yd(self) -> Floats:
+        """Its rates."""
+        return np.zeros(self.y.size)
+
+    @cached_property
+    def slope(self) -> Floats:
+        """Rows or entries of a matrix."""
+        return np.zeros(max(max(system.pattern.entries, system.rows) for system in self._systems) + 1)
 
 
 class Condensed:
@@ -76,7 +89,6 @@ class Condensed:
         self._lay_out(columns)
         if self.unknowns == self.rows > SMALL and self._pair():
             self._lay_out(columns)
-        self._make()
 
     def _pair(self) -> bool:
         """Kept rows in the order of the unknowns that they belong to: those whose rate they read, then any matching.
@@ -159,7 +171,6 @@ class Condensed:
     def fix(self) -> None:
         """Lets go of what only other numbers would need: `renew` is not asked again."""
         del self._composition, self._shared
-        self._straights.fix()
         found, nothing = self.sums, np.zeros(0, dtype=np.int32)
         self.sums = Sums(found.place, np.zeros(0), nothing, nothing, np.zeros(0), found.kept, found.unread)
 
@@ -220,14 +231,14 @@ class Condensed:
         self._keep += [calls, whole.slots]  # the places that the calls write to
         return calls
 
-    def _make(self) -> None:
+    def make(self) -> None:
+        """The core's structures; once."""
         whole = self.whole
         self._own = self._own_rows()
         self._trim = self._trimmed()
         unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
         rate = self._spans(self.kept, self._rated())
         rest = self._spans(self.kept_rows, self.kept_rows >= (whole.form.k_row.size if self._own.size else 0))
-        self.renew(self.sums)
         room = self._room
         self.condensed = lib.Condensed(
             full=c.addressof(self._trim),
@@ -252,7 +263,7 @@ class Condensed:
             share=self._hold(self._share),
             y=lib.pointer(room.y),
             yd=lib.pointer(room.yd),
-            r=lib.pointer(room.r),
+            r=lib.pointer(room.slope),
             slope=lib.pointer(room.slope),
         )
         self.core = lib.System(
@@ -358,22 +369,23 @@ class _Condenser:
         del jy, zero, constant
         if not np.isfinite(numbers.constant).all():
             return None
+        if whole.unknowns > LARGE:  # the room counts: other numbers find all anew
+            self._allowed, self._found = allowed[:0].copy(), None
+            whole.forget_once("may leave")
+            held = [found, numbers]
+            del found, numbers, allowed
+            return self._made(held)
         if self._forms is None:
-            self._forms = self._made(found, numbers)
+            self._forms = self._made([found, numbers])
         elif not numbers.same(self._forms.stepped.sums):
             self._forms.stepped.renew(numbers)
             self._forms.settled.renew(numbers)
-        if whole.unknowns <= LARGE:
-            return self._forms
-        # of a large one the room counts: other numbers find all anew
-        forms, self._found, self._forms = self._forms, None, None
-        self._allowed = allowed[:0].copy()
-        whole.forget_once("may leave")
-        for form in () if forms is None else (forms.stepped, forms.settled):
-            form.fix()
-        return forms
+        return self._forms
 
-    def _made(self, found: Elimination, numbers: Sums) -> Forms | None:
+    def _made(self, held: list[Any]) -> Forms | None:
+        """The forms of an elimination and its sums, which are taken out of held: what they need no more goes."""
+        numbers: Sums = held.pop()
+        found: Elimination = held.pop()
         whole = self.whole
         rows = np.ones(whole.rows, dtype=bool)
         rows[found.row] = False
@@ -382,11 +394,21 @@ class _Condenser:
         if kept is None:
             return None
         places = places_of(rows), places_of(kept)
+        del found, rows, kept
         room, terms, straights = Room(whole, self.settled), numbers.composed(whole.unknowns), Straights(numbers)
         stepped, settled = (
             Condensed(system, numbers, terms, straights, rows, room)
             for system, rows in zip((whole, self.settled), places, strict=True)
         )
+        for form in (stepped, settled):
+            form.renew(numbers)
+        if whole.unknowns > LARGE:
+            del terms, numbers
+            straights.fix()
+            stepped.fix()
+            settled.fix()
+        for form in (stepped, settled):
+            form.make()
         return Forms(stepped, settled)
 
 

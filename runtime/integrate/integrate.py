@@ -63,7 +63,8 @@ class Integration:
         self.cpu = 0.0
         alone = origin is None and request.events is None
         system.trim()  # of the run before
-        self.origin = origin = origin or Origin(system, start, request.index)
+        self.origin: Origin | None = origin or Origin(system, start, request.index)
+        origin = self.origin
         self._factors = origin.factors
         self.y, self.yd, self.start_rate = origin.point(own=alone)
         self.roles: Roles = origin.roles
@@ -80,6 +81,10 @@ class Integration:
         at = start.t, self.y, self.yd
         self.settlers = Settlers(system, self.forms, request, self.sizes, self.roles, at)
         self.settler = self.settlers.settler
+        if system.unknowns > LARGE:
+            del origin, at
+            self._leave_origin()
+        self._put_away()
         self._stepper()
         keeps = self.settlers.keeps
         self.driver = Driver(system, request, self.method, self.settler, keeps, self.start_rate, self._drift())
@@ -89,16 +94,22 @@ class Integration:
         self._spare()
         self._put_away()
         if system.unknowns > LARGE:
-            del self.origin, self.yd
-            self.sizes.let_go()
-            if self.forms is not None:  # of what is kept the method has its own
-                nothing = np.zeros(0, dtype=np.int32)
-                self.roles = replace(self.roles, test=nothing, power=nothing)
+            del self.yd
+
+    def _leave_origin(self) -> None:
+        """Lets go of the start as one system sees it: of a large model each run has its own."""
+        self.origin = None
+        self.sizes.let_go()
+        if self.forms is not None:  # of what is kept the method has its own
+            nothing = np.zeros(0, dtype=np.int32)
+            self.roles = replace(self.roles, test=nothing, power=nothing, common=nothing)
 
     def _spare(self) -> None:
         """Lets go of what a large model found on its way here, and would find again."""
         if self.system.unknowns > LARGE:
-            self.origin.let_go()
+            if self.origin is not None:
+                self.origin.let_go()
+            self.sizes.spare()
             self.system.spare()
             self.system.trim()
 
@@ -111,6 +122,7 @@ class Integration:
 
     def _weigh(self) -> None:
         """The factors of the rows q' - f; the magnitudes of nu follow them."""
+        assert self.origin is not None
         scale = kinematic_scale(self.system, self.sizes.magnitude, self.origin.jy, self.origin.jyd)
         if (scale != self.system.kinematic_scale).any():
             self.system.kinematic_scale[:] = scale
@@ -126,6 +138,11 @@ class Integration:
         if self.system.unknowns > LARGE:
             self.system.put_away(whole=True)  # found again, if it is what is stepped
         found = condensed(self.system, self.start.t, self.y, self.yd)
+        if found is not None:
+            assert self.origin is not None
+            if self.origin.kept is None:
+                self.origin.kept = self._kept_roles(found.stepped.whole, found.stepped.kept)
+            self._kept = self.origin.kept
         self._spare()
         return found
 
@@ -179,10 +196,7 @@ class Integration:
     def _tell(self) -> None:
         kept, found = None, self.roles
         if self.forms is not None:
-            kept = self.forms.stepped.kept
-            if self.origin.kept is None:
-                self.origin.kept = self._kept_roles(self.forms.stepped.whole, kept)
-            found = self.origin.kept
+            kept, found = self.forms.stepped.kept, self._kept
         self.told = Told(self.system, self.request, self.sizes, found, kept)
         self.told.tell(self.method)
         if self.system.form.scales and self.underlying is None:
@@ -190,7 +204,7 @@ class Integration:
 
     def _kept_roles(self, whole: System, kept: Ints) -> Roles:
         """Roles of what is kept; constraints between displacements are left by their rates: no index above 2."""
-        _, jyd = whole.jacobian(self.start.t, self.y, self.yd)
+        jyd = whole.rate_slopes(self.start.t, self.y, self.yd)
         jyd = general_rates(whole, self.start.t, self.y, self.yd, jyd)
         return roles(whole, self.start.t, jyd, min(self.request.index, 2)).kept(kept)
 

@@ -48,6 +48,10 @@ class Sizes:
     def let_go(self) -> None:
         """Of what the start knows: found again if asked."""
         self._origin = None
+        self.spare()
+
+    def spare(self) -> None:
+        """Of what follows from that: made again if asked."""
         self.__dict__.pop("least", None)
 
     def stepped(self, kept: Ints | None) -> tuple[Floats, Floats]:

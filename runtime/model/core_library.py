@@ -133,6 +133,8 @@ def _load() -> Any:
     core = c.CDLL(str(_core.__file__))
     signatures: dict[str, tuple[Any, list[Any]]] = {
         "sd_residual": (None, [_P, _D, _P, _P, _P]),
+        "sd_slopes": (None, [_P, _D, _P, _P, c.c_int, _P]),
+        "sd_first_bad": (c.c_int32, [_I, _P]),
         "sd_jacobian": (c.c_int32, [_P, _D, _P, _P, _P, _P, _P]),
         "sd_linear_new": (c.POINTER(Linear), [_I, _P, _P, _P]),
         "sd_linear_ordered": (c.POINTER(Linear), [_I, _P, _P, _P]),
@@ -209,6 +211,8 @@ def _load() -> Any:
         "sd_threads_use": (None, [c.c_int]),
         "sd_determined": (c.c_int, [_I, _I, *[_P] * 4, _D, _L, _P, _P]),
         "sd_substituted": (c.c_int, [_I, _I, *[_P] * 3, _D, _P, _P]),
+        "sd_add_sizes": (None, [_I, *[_P] * 5]),
+        "sd_to_size_one": (c.c_int, [_I, _I, _P, _D, _P, _P]),
         "sd_add_product": (None, [_I, *[_P] * 5]),
         "sd_left_open": (c.c_int, [_I, _I, *[_P] * 4, _D, _L, _P]),
         "sd_match": (_I, [_I, _I, _P, _P, _I, _P, _P]),
@@ -218,7 +222,7 @@ def _load() -> Any:
         "sd_row_sizes": (c.c_int, [_P, _D, _I, _I, _P, _P, _I, _P, _P, _I, _P]),
         "sd_relaxed": (c.c_int, [_P, _P, _I, *[_P] * 4, _D, _P]),
         "sd_response": (c.c_int, [_P, _P, _P, _D, _D, _D, *[_P] * 4]),
-        "sd_magnitudes": (c.c_int, [_P, _P, _D, _D, *[_P] * 8]),
+        "sd_magnitudes": (c.c_int, [_P, _P, _D, _D, *[_P] * 6, c.c_int, _P, _P]),
         "sd_compliance": (c.c_int, [_P] * 4),
         "sd_confirmed": (c.c_int, [_P, _P, _D, _P, _P, _P]),
         "sd_unresolved": (c.c_int, [*[_P] * 5]),

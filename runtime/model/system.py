@@ -193,6 +193,8 @@ class System(Facts):
         room = self.description.room
         if not room or room[0].size < entries:
             room[:] = [np.zeros(entries)]
+            for system in self.description.alive.values():
+                system._scratch, system._core.v = room[0], lib.pointer(room[0])
         return room[0]
 
     def switch(self) -> None:
@@ -329,6 +331,17 @@ class System(Facts):
         lib.core.sd_jacobian(c.byref(self.core), t, *at, None, *slopes)
         self.failure.check()
         return jy[:-1], jyd[:-1]
+
+    def rate_slopes(self, t: float, y: Floats, yd: Floats) -> Floats:
+        """Values of dF/dyd [entries] alone, as `jacobian` says them: half the room."""
+        found = np.empty(self.pattern.entries + 1)
+        a, b = self._buffer(y), self._buffer(yd)
+        for rate in (0, 1):
+            lib.core.sd_slopes(c.byref(self.core), t, lib.pointer(a), lib.pointer(b), rate, lib.pointer(found))
+            self.failure.check()
+            if lib.core.sd_first_bad(self.pattern.entries, lib.pointer(found)) >= 0:
+                return self.jacobian(t, y, yd)[1]
+        return found[:-1]
 
     def dense(self, values: Floats) -> Floats:
         """Values on the pattern as a full matrix [rows, unknowns]."""

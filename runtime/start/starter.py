@@ -14,6 +14,7 @@ import functools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.gauss_newton import Problem, Work
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
-from sysdyn.runtime.numerics.products import add_product
+from sysdyn.runtime.numerics.products import add_sizes
 from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.values import dataclass
@@ -81,7 +82,7 @@ def remembered(
 
     @functools.wraps(ask)
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
-        here = t, self.generous, x.tobytes()
+        here = t, self.generous, sha256(x).digest() if x.size > LARGE else x.tobytes()
         if here != self.here:
             self.here = here
             self.known.clear()
@@ -220,10 +221,11 @@ class Starter:
         of what is summed, which may cancel.
         """
         known, size = self.equations, np.zeros(self.settled.rows)
-        add_product(known.rows, known.columns, np.abs(self._slopes(t, x)), np.maximum(scale, np.abs(x)), size)
+        add_sizes(known.rows, known.columns, self._slopes(t, x), np.maximum(scale, np.abs(x)), size)
         if self.summed:
             size[self._places] = np.abs(self._sums) @ size[self._summed]
-        return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
+        size[~(size > 0.0)] = 1.0
+        return np.divide(1.0, size, out=size)
 
     def with_sums(self, values: Floats) -> Floats:
         """Values of all rows [rows, k] with the sums of rows in their places."""
@@ -307,6 +309,8 @@ class Starter:
             inert = own_inertia(self.system, *self.system.jacobian(t, *self.expand(x)))
             content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
         measured = content / largest_of_group(self.measures, content)
+        if x.size > LARGE:
+            self.__dict__.pop("measures", None)
         measured[self.n :] = 1.0  # rates have magnitudes of their own each
         return np.asarray(weight * measured)
 
@@ -321,8 +325,9 @@ class Starter:
         kinds = {"q": "", "s": "", "f": "p", "slack": "", "unsaid": ""}
         named = [kinds.get(f.kind, f.kind) + (effort if f.kind in "fp" else {}).get(f.owner, f.unit) for f in families]
         number: dict[str, int] = {}
-        of_y = np.array([*(number.setdefault(s, len(number)) for s in named), 0])[self.settled.family_of]
-        return np.append(of_y, np.full(self.rates.size, len(number))).astype(np.int32)
+        of_family = np.array([*(number.setdefault(s, len(number)) for s in named), 0], dtype=np.int32)
+        of_y = of_family[self.settled.family_of]
+        return np.append(of_y, np.full(self.rates.size, len(number), dtype=np.int32))
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
@@ -342,7 +347,7 @@ class Starter:
         values, free = self.jacobian(t, x), self.residual(t, x)
         rows, missed = known.guessed
         told = np.where(np.isin(self.rows, rows) & np.isfinite(values), values, 0.0) if missed.size else 0.0
-        sized = values - told
+        sized = values - told if missed.size or not values.flags.writeable else values
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
         sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * self.generous, lib.pointer(found)

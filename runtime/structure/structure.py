@@ -271,9 +271,8 @@ def structure(system: System, state: ConsistentState) -> Structure:
     """Facts of a model at a consistent state; system: any form."""
     system = system if system.form.name == "3" else system.another("3")
     y, yd = state.for_form(system)
-    jy, _ = system.jacobian(state.t, y, yd)
     index, undetermined = _highest_index(system, state)
-    found = reactions(system, jy)
+    found = reactions(system, system.jacobian(state.t, y, yd)[0])
     left = dependent(found)
     zero = vanished(system, state)
     lowest = np.union1d(left, zero).size if zero.size else left.size

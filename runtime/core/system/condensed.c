@@ -25,7 +25,7 @@ static inline __attribute__((always_inline)) void evaluate_alike(const sd_straig
     double *restrict out = x + straight->place;
     const double *restrict c = rate ? NULL : straight->constant, *restrict a = x + straight->source[0];
     const double *restrict b = straight->terms > 1 ? x + straight->source[1] : NULL;
-    const double fa = straight->factor[0], fb = b ? straight->factor[n] : 0.0;
+    const double fa = straight->factor[0], fb = b ? straight->factor[straight->alike] : 0.0;
     if (b)
         for (int32_t i = 0; i < n; i++)
             out[i] = fa * a[i] + fb * b[i];

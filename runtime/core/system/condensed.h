@@ -23,12 +23,12 @@ typedef struct sd_span {
     int32_t full, kept, number;
 } sd_span;
 
-/* y[place + i] = constant[i] + sum over k of factor[k * number + i] * y[source[k] + i]; alike: of factor[k * number], for
- * the others of its term are the same */
+/* y[place + i] = constant[i] + sum over k of factor[k * number + i] * y[source[k] + i]; alike, where each term has one
+ * factor: how far those of its terms stand apart, else 0 */
 typedef struct sd_straight {
     int32_t place, number, terms, alike;
     const int32_t *source;  /* [terms] */
-    const double *factor;   /* [terms][number] */
+    const double *factor;   /* [terms][number], or [terms][alike] */
     const double *constant; /* [number], NULL: zeros */
 } sd_straight;
 
