@@ -49,7 +49,7 @@ class Room:
     """Where points, rows and matrices of whole systems are evaluated, one after the other; made when asked for."""
 
     def __init__(self, *systems: System) -> None:
-        self._systems = systems
+        self._systems, self.entries = systems, 0
 
     @cached_property
     def y(self) -> Floats:
@@ -64,7 +64,7 @@ class Room:
     @cached_property
     def slope(self) -> Floats:
         """Rows or entries of a matrix."""
-        return np.zeros(max(max(system.pattern.entries, system.rows) for system in self._systems) + 1)
+        return np.zeros(max(self.entries, *(system.rows for system in self._systems)) + 1)
 
 
 class Condensed:
@@ -209,33 +209,38 @@ class Condensed:
         kept = np.zeros(whole.rows, dtype=bool)
         kept[self.kept_rows] = True
         here = kept[form.k_row]
-        parts = (form.k_row, form.k_q, form.k_f, *whole.slots[:2])
+        number = self._number
+        parts = (form.k_row, form.k_q, form.k_f, *(number[slots] for slots in whole.slots[:2]))
         kept_parts = [np.ascontiguousarray(part[here]) for part in parts]
         row, q, f, slot_q, slot_f = map(self._hold, kept_parts)
         spans = stretches(*kept_parts[:3])
-        made = lib.System.from_buffer_copy(whole.core)
-        made.kinematics, made.column, made.row = kept_parts[0].size, None, None  # nothing reads its pattern
+        redirected = whole.redirected(number, number, self.places)
+        self._keep.append(redirected)
+        made = redirected.core
+        made.kinematics = kept_parts[0].size
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
         made.k_scale = self._hold(np.ones(kept_parts[0].size))
         made.k_span, made.k_spans = self._hold(spans), 0 if self._own.size else len(spans)
-        made.call = c.addressof(self._calls(kept))
+        for k, planned in enumerate(form.calls):  # without loops that add to rows that are not kept alone
+            whole.spare_loops(redirected.calls[k], planned.block, kept, planned.to)
         return made
 
-    def _calls(self, kept: Mask) -> c.Array[lib.Call]:
-        """The calls of the whole system without loops that add to rows that are not kept alone."""
-        whole = self.whole
-        calls = (lib.Call * max(len(whole.form.calls), 1))()
-        for k, planned in enumerate(whole.form.calls):
-            calls[k] = whole.calls[k]
-            whole.spare_loops(calls[k], planned.block, kept, planned.to)
-        self._keep += [calls, whole.slots]  # the places that the calls write to
-        return calls
+    def renumber(self) -> None:
+        """Gives the entries that are read numbers of their own, and the others one place together: once."""
+        read = np.zeros(self.whole.pattern.entries, dtype=bool)
+        read[self._from] = True
+        self.places = int(read.sum()) + 1
+        self._number = np.cumsum(read, dtype=np.int32)
+        self._number -= 1
+        self._number[~read] = self.places - 1
+        self._from = self._number[self._from]
 
     def make(self) -> None:
-        """The core's structures; once."""
+        """The core's structures, of entries that are numbered: once."""
         whole = self.whole
         self._own = self._own_rows()
         self._trim = self._trimmed()
+        del self._number
         unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
         rate = self._spans(self.kept, self._rated())
         rest = self._spans(self.kept_rows, self.kept_rows >= (whole.form.k_row.size if self._own.size else 0))
@@ -407,6 +412,9 @@ class _Condenser:
             straights.fix()
             stepped.fix()
             settled.fix()
+        for form in (stepped, settled):
+            form.renumber()
+        room.entries = max(stepped.places, settled.places)
         for form in (stepped, settled):
             form.make()
         return Forms(stepped, settled)

@@ -118,7 +118,7 @@ class Integration:
         if self.system.unknowns > LARGE and self.forms is not None:
             self.system.put_away(whole=True)
             for form in (self.forms.stepped, self.forms.settled):
-                form.whole.put_away(whole=False)
+                form.whole.put_away(whole=True)
 
     def _weigh(self) -> None:
         """The factors of the rows q' - f; the magnitudes of nu follow them."""

@@ -177,7 +177,7 @@ def _load() -> Any:
         "sd_settle_pivoted": (_P, [_P]),
         "sd_condensed_bind": (None, [_P, _P]),
         "sd_expanded_new": (c.POINTER(Expanded), [_P, _P, _I]),
-        "sd_expanded_show": (None, [_P]),
+        "sd_expanded_show": (None, [_P, _P, _P]),
         "sd_expanded_free": (None, [_P]),
         "sd_expanded_stepper": (_P, [_P]),
         "sd_expanded_start": (None, [_P, _D, _P, _P, _D]),

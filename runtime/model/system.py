@@ -19,6 +19,7 @@ from sysdyn.runtime.model.forms import Form, plan
 from sysdyn.runtime.model.held_rows import LeftOut
 from sysdyn.runtime.model.layout import Layout, laid_out
 from sysdyn.runtime.model.patterns import Pattern, read_only, spared
+from sysdyn.values import dataclass
 
 LARGE = 100_000
 """Unknowns beyond which what can be found again is let go: of a large model the room counts."""
@@ -28,6 +29,20 @@ costs a line of 500000 unknowns a tenth of its CPU time to the first step, and s
 _NOWHERE: Callable[[int], int | None] = lambda _: None  # noqa: E731
 SETS = 4096
 """Active sets whose rows are kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Redirected:
+    """A system whose blocks write elsewhere: the core's structure, its calls, and what both point to."""
+
+    core: lib.System
+    calls: Any
+    keep: list[Any]
+
+    @property
+    def address(self) -> int:
+        """Of the core's structure."""
+        return c.addressof(self.core)
 
 
 class System(Facts):
@@ -90,6 +105,24 @@ class System(Facts):
         """Hands memory that was let go back to the machine, where it counts more than the time to ask for it again."""
         if self.unknowns > HUGE:
             lib.core.sd_trim()
+
+    @property
+    def plain(self) -> bool:
+        """Whether blocks alone write into the matrix, whatever holds."""
+        return not self.form.k_row.size and not self._may_hold[0].size
+
+    def redirected(self, dy: Ints, dyd: Ints, entries: int) -> Redirected:
+        """The core's structure with the entries of dF/dy, dF/dyd in other places: dy, dyd [entries of the pattern]."""
+        made = lib.System.from_buffer_copy(self.core)
+        calls = (lib.Call * max(len(self.form.calls), 1))()
+        keep: list[Any] = [calls, self._scratch]
+        for k in range(len(self.form.calls)):
+            calls[k] = self.calls[k]
+            slots = dy[self.slots[2 * k + 2]], dyd[self.slots[2 * k + 3]]
+            calls[k].slot_dy, calls[k].slot_dyd = map(lib.pointer, slots)
+            keep.append(slots)
+        made.call, made.entries, made.column, made.row = c.addressof(calls), entries, None, None
+        return Redirected(made, calls, keep)
 
     def put_away(self, *, whole: bool) -> None:
         """Lets go of the pattern, found again when it is asked for; whole: of the places of the Jacobian's entries too.

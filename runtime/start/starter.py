@@ -112,7 +112,7 @@ class Starter:
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
         if known.unknowns > LARGE:
-            settled.put_away(whole=False)
+            settled.put_away(whole=self.core.both is not None)
             settled.forget_once("structural")
         self.n, self.rates, self.measured = known.n, known.rates, known.measured
         self._momentum, self._flow = known.momentum, known.flow

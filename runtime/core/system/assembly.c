@@ -96,6 +96,16 @@ static int32_t steep_beyond(const sd_system *system, const double *jy, const dou
     return system->row ? system->row[e >= 0 ? e : sd_first_bad(system->entries, jyd)] : 0;
 }
 
+/* beside := a point near y at which slopes may be numbers */
+static void move_beside(const sd_system *system, const double *y, const double *size, int way, double *beside)
+{
+    double apart = 0.0;
+    for (int32_t j = 0; j < system->unknowns; j++) {
+        apart = sd_next_part(apart);
+        beside[j] = y[j] + way * (1.0 + apart) * (ROOT_BESIDE * fmax(fabs(y[j]), size ? size[j] : 0.0) + ROOT_LEAST);
+    }
+}
+
 int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *yd, const double *size, double *jy,
                     double *jyd)
 {
@@ -104,16 +114,36 @@ int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *
     int32_t bad = steep_beyond(system, jy, jyd);
     double *beside = bad < 0 ? NULL : malloc(((size_t)system->unknowns + SD_LANES) * sizeof *beside);
     for (int way = 1; way >= -1 && bad >= 0 && beside; way -= 2) {
-        double apart = 0.0;
-        for (int32_t j = 0; j < system->unknowns; j++) {
-            apart = sd_next_part(apart);
-            beside[j] = y[j] + way * (1.0 + apart) * (ROOT_BESIDE * fmax(fabs(y[j]), size ? size[j] : 0.0) + ROOT_LEAST);
-        }
+        move_beside(system, y, size, way, beside);
         evaluate_slopes(system, t, beside, yd, jy, jyd);
         bad = steep_beyond(system, jy, jyd);
     }
     free(beside);
     return bad;
+}
+
+static int evaluate_both(const sd_system *system, double t, const double *y, const double *yd, double *values)
+{
+    memset(values, 0, (size_t)system->entries * sizeof *values);
+    for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++) {
+        add_entries(call->dy, &call->frame, call->n_dy, call->slot_dy, t, y, yd, system->v, values);
+        add_entries(call->dyd, &call->frame, call->n_dyd, call->slot_dyd, t, y, yd, system->v, values);
+    }
+    return sd_finite(system->entries, values);
+}
+
+int sd_both_slopes(const sd_system *system, double t, const double *y, const double *yd, double *values)
+{
+    if (evaluate_both(system, t, y, yd, values))
+        return 0;
+    double *beside = malloc(((size_t)system->unknowns + SD_LANES) * sizeof *beside);
+    int failed = beside ? 1 : -2;
+    for (int way = 1; way >= -1 && failed > 0; way -= 2) {
+        move_beside(system, y, NULL, way, beside);
+        failed = !evaluate_both(system, t, beside, yd, values);
+    }
+    free(beside);
+    return failed < 0 ? failed : 0;
 }
 
 void sd_steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s)

@@ -82,6 +82,9 @@ int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *
                     double *jyd);
 /* one of them, of a system that is not condensed; rate: dF/dyd */
 void sd_slopes(const sd_system *system, double t, const double *y, const double *yd, int rate, double *values);
+/* both in one list [entries], of a system without rows q' - f and held ones whose slots are places in it; slopes that are no
+ * numbers as above.  0; -2: no memory */
+int sd_both_slopes(const sd_system *system, double t, const double *y, const double *yd, double *values);
 /* s := magnitudes of the terms of steep rows at (t, y), zero in others; rate as below */
 void sd_steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s);
 /* The first steep row whose residual r is more than `limit` of the magnitudes of its terms at (t, y), -1 where every one
