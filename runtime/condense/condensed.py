@@ -344,12 +344,17 @@ class _Condenser:
     """What runs of one system are condensed to: structures of the run before where the same unknowns may leave."""
 
     def __init__(self, system: System) -> None:
-        self.whole, self.settled = system.another("2v"), system.another("settled")
+        self.whole = system.another("2v")
         self._allowed = np.zeros(0, dtype=bool)
         self._found: Elimination | None = None
         self._forms: Forms | None = None
         self._last: tuple[Forms | None, bytes] | None = None
         """What came of the last numbers asked, and their digest."""
+
+    @cached_property
+    def settled(self) -> System:
+        """What points are settled with: made when rows are left for it."""
+        return self.whole.another("settled")
 
     def forms(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         """With the numbers of now; of the same start and parameters those of the last time."""
@@ -361,7 +366,7 @@ class _Condenser:
 
     def _renewed(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         whole = self.whole
-        jy, zero = whole.jacobian(t, y, yd)[0], np.zeros(whole.unknowns)
+        jy, zero = whole.slopes(t, y, yd, rate=False), np.zeros(whole.unknowns)
         constant = whole.residual(t, zero, zero)
         allowed = definable(whole, jy, constant)
         if self._found is None or not np.array_equal(allowed, self._allowed):
@@ -395,12 +400,14 @@ class _Condenser:
         rows = np.ones(whole.rows, dtype=bool)
         rows[found.row] = False
         rows[whole.form.k_row[np.isin(whole.form.k_q, found.unread)]] = False
+        del found
+        terms, straights = numbers.composed(whole.unknowns), Straights(numbers)
         kept = settled_rows(whole, self.settled, ~rows, numbers)
         if kept is None:
             return None
         places = places_of(rows), places_of(kept)
-        del found, rows, kept
-        room, terms, straights = Room(whole, self.settled), numbers.composed(whole.unknowns), Straights(numbers)
+        del rows, kept
+        room = Room(whole, self.settled)
         stepped, settled = (
             Condensed(system, numbers, terms, straights, rows, room)
             for system, rows in zip((whole, self.settled), places, strict=True)

@@ -117,8 +117,14 @@ class Integration:
         """Lets go of patterns of a large model that no step reads: those of what is condensed."""
         if self.system.unknowns > LARGE and self.forms is not None:
             self.system.put_away(whole=True)
-            for form in (self.forms.stepped, self.forms.settled):
-                form.whole.put_away(whole=True)
+            self._put_away_of(self.forms)
+
+    @staticmethod
+    def _put_away_of(forms: Forms) -> None:
+        """Lets go of the patterns of the systems that these were made of."""
+        assert forms.settled.rates is not None  # found by its pattern
+        for form in (forms.stepped, forms.settled):
+            form.whole.put_away(whole=True)
 
     def _weigh(self) -> None:
         """The factors of the rows q' - f; the magnitudes of nu follow them."""
@@ -143,6 +149,8 @@ class Integration:
             if self.origin.kept is None:
                 self.origin.kept = self._kept_roles(found.stepped.whole, found.stepped.kept)
             self._kept = self.origin.kept
+            if self.system.unknowns > LARGE:
+                self._put_away_of(found)
         self._spare()
         return found
 
@@ -204,7 +212,7 @@ class Integration:
 
     def _kept_roles(self, whole: System, kept: Ints) -> Roles:
         """Roles of what is kept; constraints between displacements are left by their rates: no index above 2."""
-        jyd = whole.rate_slopes(self.start.t, self.y, self.yd)
+        jyd = whole.slopes(self.start.t, self.y, self.yd, rate=True)
         jyd = general_rates(whole, self.start.t, self.y, self.yd, jyd)
         return roles(whole, self.start.t, jyd, min(self.request.index, 2)).kept(kept)
 

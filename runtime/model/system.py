@@ -365,15 +365,17 @@ class System(Facts):
         self.failure.check()
         return jy[:-1], jyd[:-1]
 
-    def rate_slopes(self, t: float, y: Floats, yd: Floats) -> Floats:
-        """Values of dF/dyd [entries] alone, as `jacobian` says them: half the room."""
+    def slopes(self, t: float, y: Floats, yd: Floats, *, rate: bool) -> Floats:
+        """Values of dF/dy, or of dF/dyd [entries], as `jacobian` says them; of a large system in half the room."""
+        if self.unknowns <= LARGE:
+            return self.jacobian(t, y, yd)[rate]
         found = np.empty(self.pattern.entries + 1)
         a, b = self._buffer(y), self._buffer(yd)
-        for rate in (0, 1):
-            lib.core.sd_slopes(c.byref(self.core), t, lib.pointer(a), lib.pointer(b), rate, lib.pointer(found))
+        for side in (not rate, rate):
+            lib.core.sd_slopes(c.byref(self.core), t, lib.pointer(a), lib.pointer(b), side, lib.pointer(found))
             self.failure.check()
             if lib.core.sd_first_bad(self.pattern.entries, lib.pointer(found)) >= 0:
-                return self.jacobian(t, y, yd)[1]
+                return self.jacobian(t, y, yd)[rate]
         return found[:-1]
 
     def dense(self, values: Floats) -> Floats:

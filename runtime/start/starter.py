@@ -289,7 +289,7 @@ class Starter:
 
         Of a momentum and its flow the one that is written carries the state, else the momentum.
         """
-        _, jyd = self.system.jacobian(t, *self.expand(x))
+        jyd = self.system.slopes(t, *self.expand(x), rate=True)
         state = self.settled.are(*STATE)
         carries = state & ~self.measured
         carries[: self.system.unknowns] &= self.system.differential(jyd)
@@ -306,7 +306,11 @@ class Starter:
         weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
         content = scale.copy()
         if self.balanced:
-            inert = own_inertia(self.system, *self.system.jacobian(t, *self.expand(x)))
+            y, yd = self.expand(x)
+            some = self._momentum.size > 0
+            jy, jyd = self.system.jacobian(t, y, yd) if some else (None, self.system.slopes(t, y, yd, rate=True))
+            inert = own_inertia(self.system, jy, jyd)
+            del y, yd, jy, jyd
             content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
         measured = content / largest_of_group(self.measures, content)
         if x.size > LARGE:
