@@ -85,6 +85,7 @@ class Integration:
             del origin, at
             self._leave_origin()
         self._put_away()
+        system.trim(LARGE)  # what is made now stays, and little of it fits where something was let go
         self._stepper()
         keeps = self.settlers.keeps
         self.driver = Driver(system, request, self.method, self.settler, keeps, self.start_rate, self._drift())
@@ -313,6 +314,7 @@ class Integration:
                 before = time.process_time()
                 cross(self, segment)
                 self._put_away()
+                self.system.trim(LARGE)
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)
         return Finished(

@@ -101,9 +101,11 @@ class System(Facts):
         self._slots: list[Ints] = []
         self._assemble()
 
-    def trim(self) -> None:
-        """Hands memory that was let go back to the machine, where it counts more than the time to ask for it again."""
-        if self.unknowns > HUGE:
+    def trim(self, least: int = HUGE) -> None:
+        """Hands memory that was let go back to the machine, where it counts more than the time to ask for it again: of
+        more unknowns than these.
+        """
+        if self.unknowns > least:
             lib.core.sd_trim()
 
     @property
