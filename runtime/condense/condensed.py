@@ -20,6 +20,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import stretches
+from sysdyn.runtime.model.lines import stretches_of, table
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import least_norm
@@ -227,6 +228,11 @@ class Condensed:
 
     def renumber(self) -> None:
         """Gives the entries that are read numbers of their own, and the others one place together: once."""
+        column = self.whole.pattern.columns_of()[self._from]
+        begin = np.flatnonzero(np.diff(column, prepend=-1))
+        width = np.diff(begin, append=column.size)
+        change = np.flatnonzero(np.diff(width, prepend=-1))
+        self._shapes = list(zip(np.diff(change, append=width.size).tolist(), width[change].tolist(), strict=True))
         read = np.zeros(self.whole.pattern.entries, dtype=bool)
         read[self._from] = True
         self.places = int(read.sum()) + 1
@@ -262,10 +268,7 @@ class Condensed:
             own=self._hold(self._own),
             straight=c.addressof(self._straights.array),
             observed_rates=int(self._observed_rates()),
-            products=self._from.size,
-            from_=self._hold(self._from),
-            to=self._hold(self._to),
-            share=self._hold(self._share),
+            **self._told_products(),
             y=lib.pointer(room.y),
             yd=lib.pointer(room.yd),
             r=lib.pointer(room.slope),
@@ -282,6 +285,23 @@ class Condensed:
             together=whole.core.together,
         )
         lib.core.sd_condensed_bind(c.byref(self.condensed), c.byref(self.core))
+
+    def _told_products(self) -> dict[str, int | None]:
+        """The products as the core has them: of a large system by stretches, where these are few."""
+        found = None
+        if self.whole.unknowns > LARGE:
+            found = stretches_of([self._from, self._to], self._shapes, self._share)
+        if found is None:
+            places = {"from_": self._hold(self._from), "to": self._hold(self._to), "share": self._hold(self._share)}
+            return {"products": self._from.size, **places}
+        made = (lib.Shares * max(len(found), 1))()
+        for k, (at, number, width) in enumerate(found):
+            tables = (*table(self._from, found[k]), *table(self._to, found[k]), self._share[at : at + width].copy())
+            made[k] = lib.Shares(number, width, *map(self._hold, tables))
+        self._keep.append(made)
+        nothing = np.zeros(0, dtype=np.int32)
+        self._from, self._to, self._share = nothing, nothing, np.zeros(0)
+        return {"stretches": len(found), "shares": c.addressof(made)}
 
     @cached_property
     def key(self) -> tuple[int | bytes, ...]:

@@ -18,6 +18,7 @@ from sysdyn.runtime.model.facts import Facts, Found, Mask
 from sysdyn.runtime.model.forms import Form, plan
 from sysdyn.runtime.model.held_rows import LeftOut
 from sysdyn.runtime.model.layout import Layout, laid_out
+from sysdyn.runtime.model.lines import shapes_of, stretches_of, table
 from sysdyn.runtime.model.patterns import Pattern, read_only, spared
 from sysdyn.values import dataclass
 
@@ -118,13 +119,31 @@ class System(Facts):
         made = lib.System.from_buffer_copy(self.core)
         calls = (lib.Call * max(len(self.form.calls), 1))()
         keep: list[Any] = [calls, self._scratch]
-        for k in range(len(self.form.calls)):
+        for k, planned in enumerate(self.form.calls):
             calls[k] = self.calls[k]
-            slots = dy[self.slots[2 * k + 2]], dyd[self.slots[2 * k + 3]]
-            calls[k].slot_dy, calls[k].slot_dyd = map(lib.pointer, slots)
-            keep.append(slots)
+            for which, number, slots in (("dy", dy, self.slots[2 * k + 2]), ("dyd", dyd, self.slots[2 * k + 3])):
+                keep.append(self._told_by_lines(calls[k], planned.block, which, number[slots]))
         made.call, made.entries, made.column, made.row = c.addressof(calls), entries, None, None
         return Redirected(made, calls, keep)
+
+    def _told_by_lines(self, call: lib.Call, block: str, which: str, slots: Ints) -> Any:
+        """Tells a call where the entries of its list dy or dyd stand; of a large system by stretches, where these are
+        few.  What has to be kept for it.
+        """
+        found = None
+        if self.unknowns > LARGE:
+            found = stretches_of([slots], shapes_of(self.description.blocks[block], which, self.description.ix))
+        if found is None:
+            setattr(call, f"slot_{which}", lib.pointer(slots))
+            return slots
+        tables = [table(slots, stretch) for stretch in found]
+        lines = (lib.Lines * max(len(found), 1))()
+        for k, ((_, number, width), (first, step)) in enumerate(zip(found, tables, strict=True)):
+            lines[k] = lib.Lines(number, width, lib.pointer(first), lib.pointer(step))
+        setattr(call, f"slot_{which}", None)
+        setattr(call, f"stretches_{which}", len(found))
+        setattr(call, f"lines_{which}", c.addressof(lines))
+        return tables, lines
 
     def put_away(self, *, whole: bool) -> None:
         """Lets go of the pattern, found again when it is asked for; whole: of the places of the Jacobian's entries too.

@@ -48,15 +48,26 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
     add_rows(system, t, y, yd, r);
 }
 
-/* adds one block's entries into their places; entries of one place add up */
-static void add_entries(sd_entries *block, const sd_frame *frame, int32_t n, const int32_t *slot, double t,
-                        const double *y, const double *yd, double *v, double *values)
+/* adds entries into their places, of a list that is told by its stretches */
+static void add_lines(int32_t stretches, const sd_lines *lines, const double *v, double *values)
 {
+    for (const sd_lines *end = lines + stretches; lines < end; lines++)
+        for (int32_t i = 0; i < lines->number; i++)
+            for (int32_t k = 0; k < lines->width; k++)
+                values[lines->first[k] + (int64_t)i * lines->step[k]] += *v++;
+}
+
+/* adds one block's entries into their places; entries of one place add up */
+static void add_entries(const sd_call *call, int rate, double t, const double *y, const double *yd, double *v, double *values)
+{
+    const int32_t n = rate ? call->n_dyd : call->n_dy, *slot = rate ? call->slot_dyd : call->slot_dy;
     if (n == 0)
         return;
-    block(frame, t, y, yd, v);
-    for (int32_t e = 0; e < n; e++)
+    (rate ? call->dyd : call->dy)(&call->frame, t, y, yd, v);
+    for (int32_t e = 0; e < n && slot; e++)
         values[slot[e]] += v[e];
+    if (!slot)
+        add_lines(rate ? call->stretches_dyd : call->stretches_dy, rate ? call->lines_dyd : call->lines_dy, v, values);
 }
 
 void sd_slopes(const sd_system *system, double t, const double *y, const double *yd, int rate, double *values)
@@ -64,11 +75,8 @@ void sd_slopes(const sd_system *system, double t, const double *y, const double 
     memset(values, 0, (size_t)system->entries * sizeof *values);
     for (int32_t i = 0; i < system->kinematics; i++)
         values[rate ? system->k_slot_q[i] : system->k_slot_f[i]] += rate ? system->k_scale[i] : -system->k_scale[i];
-    for (int32_t c = 0; c < system->calls; c++) {
-        const sd_call *call = &system->call[c];
-        add_entries(rate ? call->dyd : call->dy, &call->frame, rate ? call->n_dyd : call->n_dy,
-                    rate ? call->slot_dyd : call->slot_dy, t, y, yd, system->v, values);
-    }
+    for (int32_t c = 0; c < system->calls; c++)
+        add_entries(&system->call[c], rate, t, y, yd, system->v, values);
     for (int32_t i = 0; i < system->clear; i++)
         values[system->cleared[i]] = 0.0;
     for (int32_t i = 0; i < system->held; i++)
@@ -126,8 +134,8 @@ static int evaluate_both(const sd_system *system, double t, const double *y, con
 {
     memset(values, 0, (size_t)system->entries * sizeof *values);
     for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++) {
-        add_entries(call->dy, &call->frame, call->n_dy, call->slot_dy, t, y, yd, system->v, values);
-        add_entries(call->dyd, &call->frame, call->n_dyd, call->slot_dyd, t, y, yd, system->v, values);
+        add_entries(call, 0, t, y, yd, system->v, values);
+        add_entries(call, 1, t, y, yd, system->v, values);
     }
     return sd_finite(system->entries, values);
 }

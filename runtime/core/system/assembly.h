@@ -26,6 +26,13 @@
 
 #include <math.h>
 
+/* A stretch of a list of entries: `number` lines of `width` entries, of which the k-th of line i stands in place
+ * first[k] + i step[k]. */
+typedef struct sd_lines {
+    int32_t number, width;
+    const int32_t *first, *step;
+} sd_lines;
+
 typedef struct sd_call {
     sd_rows *rows;
     sd_entries *dy;
@@ -33,6 +40,8 @@ typedef struct sd_call {
     sd_frame frame;
     int32_t n_dy, n_dyd;
     const int32_t *slot_dy, *slot_dyd;
+    int32_t stretches_dy, stretches_dyd; /* of the lists, where there are no slots */
+    const sd_lines *lines_dy, *lines_dyd;
 } sd_call;
 
 typedef struct sd_system sd_system;

@@ -32,6 +32,13 @@ typedef struct sd_straight {
     const double *constant; /* [number], NULL: zeros */
 } sd_straight;
 
+/* A stretch of products, told as sd_lines are; share [width]: of every line */
+typedef struct sd_shares {
+    int32_t number, width;
+    const int32_t *from, *from_step, *to, *to_step;
+    const double *share;
+} sd_shares;
+
 typedef struct sd_condensed {
     sd_left left;
     sd_system *full;
@@ -41,8 +48,10 @@ typedef struct sd_condensed {
     const int32_t *own;
     const sd_straight *straight;
     int64_t products;
-    const int32_t *from, *to;
+    const int32_t *from, *to;       /* NULL: products are told by their stretches */
     const double *share;
+    int64_t stretches;
+    const sd_shares *shares;
     double *y, *yd, *r, *slope;
 } sd_condensed;
 
