@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
-PIECE = 1 << 12
+PIECE = 1 << 14
 """Numbers of which products are made at a time."""
 
 
@@ -32,5 +33,10 @@ def _added(function: Any, rows: Any, columns: Any, values: Floats, x: Floats, ou
 
 def largest_product(x: Floats, y: Floats) -> float:
     """The largest |x y|, piece by piece; no number where one is none."""
-    pieces = (np.abs(x[k : k + PIECE] * y[k : k + PIECE]).max() for k in range(0, x.size, PIECE))
-    return float(np.max(np.fromiter(pieces, dtype=np.float64), initial=0.0))
+    found = (np.abs(x[here] * y[here]).max() for here in pieces(x.size))
+    return float(np.max(np.fromiter(found, dtype=np.float64), initial=0.0))
+
+
+def pieces(size: int) -> Iterator[slice]:
+    """Of an array of a large model, worked through without a second one as long."""
+    return (slice(k, k + PIECE) for k in range(0, size, PIECE))

@@ -396,5 +396,6 @@ def problem_of(
         work=starter.work,
         core=None if starter.summed else (starter.core, t),
         check=starter.settled.failure.check,
+        spare=lambda: starter.system.trim(LARGE),
     )
 

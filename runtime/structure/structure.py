@@ -297,5 +297,5 @@ def structure(system: System, state: ConsistentState) -> Structure:
     names = tuple(_place(system, int(places[k])) for k in left)
     if system.unknowns > LARGE:
         system.spare()
-        system.trim()
+        system.trim(LARGE)
     return Structure(index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, int(left.size), group, lost, names)
