@@ -22,6 +22,7 @@ from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import stretches
 from sysdyn.runtime.model.lines import stretches_of, table
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
+from sysdyn.runtime.model.redirected import redirected
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.matching import matched
@@ -215,15 +216,15 @@ class Condensed:
         kept_parts = [np.ascontiguousarray(part[here]) for part in parts]
         row, q, f, slot_q, slot_f = map(self._hold, kept_parts)
         spans = stretches(*kept_parts[:3])
-        redirected = whole.redirected(number, number, self.places)
-        self._keep.append(redirected)
-        made = redirected.core
+        elsewhere = redirected(whole, number, number, self.places)
+        self._keep.append(elsewhere)
+        made = elsewhere.core
         made.kinematics = kept_parts[0].size
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
         made.k_scale = self._hold(np.ones(kept_parts[0].size))
         made.k_span, made.k_spans = self._hold(spans), 0 if self._own.size else len(spans)
         for k, planned in enumerate(form.calls):  # without loops that add to rows that are not kept alone
-            whole.spare_loops(redirected.calls[k], planned.block, kept, planned.to)
+            whole.spare_loops(elsewhere.calls[k], planned.block, kept, planned.to)
         return made
 
     def renumber(self) -> None:
@@ -296,8 +297,9 @@ class Condensed:
             return {"products": self._from.size, **places}
         made = (lib.Shares * max(len(found), 1))()
         for k, (at, number, width) in enumerate(found):
-            tables = (*table(self._from, found[k]), *table(self._to, found[k]), self._share[at : at + width].copy())
-            made[k] = lib.Shares(number, width, *map(self._hold, tables))
+            tables = *table(self._from, found[k]), *table(self._to, found[k])
+            held = [*(self._hold(item) for item in tables), self._hold(self._share[at : at + width].copy())]
+            made[k] = lib.Shares(number, width, *held)
         self._keep.append(made)
         nothing = np.zeros(0, dtype=np.int32)
         self._from, self._to, self._share = nothing, nothing, np.zeros(0)

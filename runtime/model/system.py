@@ -18,9 +18,7 @@ from sysdyn.runtime.model.facts import Facts, Found, Mask
 from sysdyn.runtime.model.forms import Form, plan
 from sysdyn.runtime.model.held_rows import LeftOut
 from sysdyn.runtime.model.layout import Layout, laid_out
-from sysdyn.runtime.model.lines import shapes_of, stretches_of, table
 from sysdyn.runtime.model.patterns import Pattern, read_only, spared
-from sysdyn.values import dataclass
 
 LARGE = 100_000
 """Unknowns beyond which what can be found again is let go: of a large model the room counts."""
@@ -30,20 +28,6 @@ costs a line of 500000 unknowns a tenth of its CPU time to the first step, and s
 _NOWHERE: Callable[[int], int | None] = lambda _: None  # noqa: E731
 SETS = 4096
 """Active sets whose rows are kept."""
-
-
-@dataclass(frozen=True, slots=True)
-class Redirected:
-    """A system whose blocks write elsewhere: the core's structure, its calls, and what both point to."""
-
-    core: lib.System
-    calls: Any
-    keep: list[Any]
-
-    @property
-    def address(self) -> int:
-        """Of the core's structure."""
-        return c.addressof(self.core)
 
 
 class System(Facts):
@@ -114,37 +98,6 @@ class System(Facts):
         """Whether blocks alone write into the matrix, whatever holds."""
         return not self.form.k_row.size and not self._may_hold[0].size
 
-    def redirected(self, dy: Ints, dyd: Ints, entries: int) -> Redirected:
-        """The core's structure with the entries of dF/dy, dF/dyd in other places: dy, dyd [entries of the pattern]."""
-        made = lib.System.from_buffer_copy(self.core)
-        calls = (lib.Call * max(len(self.form.calls), 1))()
-        keep: list[Any] = [calls, self._scratch]
-        for k, planned in enumerate(self.form.calls):
-            calls[k] = self.calls[k]
-            for which, number, slots in (("dy", dy, self.slots[2 * k + 2]), ("dyd", dyd, self.slots[2 * k + 3])):
-                keep.append(self._told_by_lines(calls[k], planned.block, which, number[slots]))
-        made.call, made.entries, made.column, made.row = c.addressof(calls), entries, None, None
-        return Redirected(made, calls, keep)
-
-    def _told_by_lines(self, call: lib.Call, block: str, which: str, slots: Ints) -> Any:
-        """Tells a call where the entries of its list dy or dyd stand; of a large system by stretches, where these are
-        few.  What has to be kept for it.
-        """
-        found = None
-        if self.unknowns > LARGE:
-            found = stretches_of([slots], shapes_of(self.description.blocks[block], which, self.description.ix))
-        if found is None:
-            setattr(call, f"slot_{which}", lib.pointer(slots))
-            return slots
-        tables = [table(slots, stretch) for stretch in found]
-        lines = (lib.Lines * max(len(found), 1))()
-        for k, ((_, number, width), (first, step)) in enumerate(zip(found, tables, strict=True)):
-            lines[k] = lib.Lines(number, width, lib.pointer(first), lib.pointer(step))
-        setattr(call, f"slot_{which}", None)
-        setattr(call, f"stretches_{which}", len(found))
-        setattr(call, f"lines_{which}", c.addressof(lines))
-        return tables, lines
-
     def put_away(self, *, whole: bool) -> None:
         """Lets go of the pattern, found again when it is asked for; whole: of the places of the Jacobian's entries too.
         Nobody may hold addresses of what goes.
@@ -189,7 +142,7 @@ class System(Facts):
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
         self.kinematic_scale = np.ones(form.k_row.size)
-        self._scratch = self._work(layout.entries)
+        self.work = self._work(layout.entries)
         self._keep += [calls]
         self._reads_rate, self._may_hold = layout.reads_rate, layout.may_hold
         self._core = lib.System(
@@ -207,7 +160,7 @@ class System(Facts):
             k_scale=lib.pointer(self.kinematic_scale),
             scales=len(form.scales),
             scale=c.addressof(scales),
-            v=lib.pointer(self._scratch),
+            v=lib.pointer(self.work),
             stop=lib.pointer(self.failure.flag),
             together=isinstance(self.carrier, LibraryCarrier),
         )
@@ -248,7 +201,7 @@ class System(Facts):
         if not room or room[0].size < entries:
             room[:] = [np.zeros(entries)]
             for system in self.description.alive.values():
-                system._scratch, system._core.v = room[0], lib.pointer(room[0])
+                system.work, system._core.v = room[0], lib.pointer(room[0])
         return room[0]
 
     def switch(self) -> None:

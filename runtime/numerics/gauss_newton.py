@@ -102,8 +102,8 @@ class Problem:
 
     residual: Callable[[Floats], Floats]
     jacobian: Callable[[Floats], Floats]
-    rows: NDArray[np.int64]
-    columns: NDArray[np.int64]
+    rows: NDArray[np.integer]
+    columns: NDArray[np.integer]
     number: int
     use: Mask
     free: Mask

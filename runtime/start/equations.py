@@ -13,6 +13,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.inertia import with_flows
+from sysdyn.runtime.model.redirected import redirected
 from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates_of
@@ -91,7 +92,7 @@ class Equations:
         found.rate, found.k_q, found.k_f = map(lib.pointer, arrays)
         places = self._places(settled)
         if self.unknowns > LARGE and settled.plain:  # the room counts
-            both = settled.redirected(*self._numbered(settled, *places), self.plain + self.rated)
+            both = redirected(settled, *self._numbered(settled, *places), self.plain + self.rated)
             found.both, entry = both.address, None
         else:
             both, entry = None, np.concatenate(places)
