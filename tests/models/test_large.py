@@ -95,8 +95,8 @@ def test_a_section_of_a_large_line_takes_few_bytes_to_the_first_step(tmp_path, m
     ids=["ladder", "sections"],
 )
 def test_a_section_of_a_run_holds_few_bytes(tmp_path, model, sections, most):
-    """Of arrays and of the core, while it steps: 1206 of a ladder by the bdf and 2448 of a line by radau today, 1633 and
-    2932 where runs kept the start as they saw it, every place of their matrices, and vectors that nothing read.
+    """Of arrays and of the core, while it steps: 1206 of a ladder by the bdf, 2448 of a line by radau today; 1633, 2932
+    where runs kept the start as they saw it, every place of their matrices, and vectors that nothing read.
     """
     assert _bytes(HELD, tmp_path, *model, "--max-steps", "3", sections=sections) < most
 
