@@ -23,8 +23,9 @@ from sysdyn.runtime.model.patterns import Pattern, read_only, spared
 LARGE = 100_000
 """Unknowns beyond which what can be found again is let go: of a large model the room counts."""
 HUGE = 1_000_000
-"""Unknowns beyond which pages that a stage left go back to the machine: it asks for them again for the next one, which
-costs a line of 500000 unknowns a tenth of its CPU time to the first step, and saves it a sixth of its memory."""
+"""Unknowns beyond which pages that a stage left go back to the machine wherever something large was let go: it asks for
+them again for the next one, which costs a line of 500000 unknowns a tenth of its CPU time to the first step.  Of LARGE
+ones they go back behind a start, a structure and a jump, and before a method is made."""
 _NOWHERE: Callable[[int], int | None] = lambda _: None  # noqa: E731
 SETS = 4096
 """Active sets whose rows are kept."""
