@@ -20,7 +20,9 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import stretches
+from sysdyn.runtime.model.lines import stretches_of, table
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
+from sysdyn.runtime.model.redirected import redirected
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.matching import matched
@@ -46,12 +48,25 @@ def _spans(full: NDArray[np.integer], number: NDArray[np.integer]) -> tuple[NDAr
 
 
 class Room:
-    """Where points, rows and matrices of whole systems are evaluated, one after the other."""
+    """Where points, rows and matrices of whole systems are evaluated, one after the other; made when asked for."""
 
     def __init__(self, *systems: System) -> None:
-        unknowns = max(max(system.form.extended, system.unknowns) for system in systems) + 8
-        self.y, self.yd = np.zeros(unknowns), np.zeros(unknowns)
-        self.r = self.slope = np.zeros(max(max(system.pattern.entries, system.rows) for system in systems) + 1)
+        self._systems, self.entries = systems, 0
+
+    @cached_property
+    def y(self) -> Floats:
+        """A point [unknowns]."""
+        return np.zeros(max(max(system.form.extended, system.unknowns) for system in self._systems) + 8)
+
+    @cached_property
+    def yd(self) -> Floats:
+        """Its rates."""
+        return np.zeros(self.y.size)
+
+    @cached_property
+    def slope(self) -> Floats:
+        """Rows or entries of a matrix."""
+        return np.zeros(max(self.entries, *(system.rows for system in self._systems)) + 1)
 
 
 class Condensed:
@@ -76,7 +91,6 @@ class Condensed:
         self._lay_out(columns)
         if self.unknowns == self.rows > SMALL and self._pair():
             self._lay_out(columns)
-        self._make()
 
     def _pair(self) -> bool:
         """Kept rows in the order of the unknowns that they belong to: those whose rate they read, then any matching.
@@ -159,7 +173,6 @@ class Condensed:
     def fix(self) -> None:
         """Lets go of what only other numbers would need: `renew` is not asked again."""
         del self._composition, self._shared
-        self._straights.fix()
         found, nothing = self.sums, np.zeros(0, dtype=np.int32)
         self.sums = Sums(found.place, np.zeros(0), nothing, nothing, np.zeros(0), found.kept, found.unread)
 
@@ -198,36 +211,46 @@ class Condensed:
         kept = np.zeros(whole.rows, dtype=bool)
         kept[self.kept_rows] = True
         here = kept[form.k_row]
-        parts = (form.k_row, form.k_q, form.k_f, *whole.slots[:2])
+        number = self._number
+        parts = (form.k_row, form.k_q, form.k_f, *(number[slots] for slots in whole.slots[:2]))
         kept_parts = [np.ascontiguousarray(part[here]) for part in parts]
         row, q, f, slot_q, slot_f = map(self._hold, kept_parts)
         spans = stretches(*kept_parts[:3])
-        made = lib.System.from_buffer_copy(whole.core)
-        made.kinematics, made.column, made.row = kept_parts[0].size, None, None  # nothing reads its pattern
+        elsewhere = redirected(whole, number, number, self.places)
+        self._keep.append(elsewhere)
+        made = elsewhere.core
+        made.kinematics = kept_parts[0].size
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
         made.k_scale = self._hold(np.ones(kept_parts[0].size))
         made.k_span, made.k_spans = self._hold(spans), 0 if self._own.size else len(spans)
-        made.call = c.addressof(self._calls(kept))
+        for k, planned in enumerate(form.calls):  # without loops that add to rows that are not kept alone
+            whole.spare_loops(elsewhere.calls[k], planned.block, kept, planned.to)
         return made
 
-    def _calls(self, kept: Mask) -> c.Array[lib.Call]:
-        """The calls of the whole system without loops that add to rows that are not kept alone."""
-        whole = self.whole
-        calls = (lib.Call * max(len(whole.form.calls), 1))()
-        for k, planned in enumerate(whole.form.calls):
-            calls[k] = whole.calls[k]
-            whole.spare_loops(calls[k], planned.block, kept, planned.to)
-        self._keep += [calls, whole.slots]  # the places that the calls write to
-        return calls
+    def renumber(self) -> None:
+        """Gives the entries that are read numbers of their own, and the others one place together: once."""
+        column = self.whole.pattern.columns_of()[self._from]
+        begin = np.flatnonzero(np.diff(column, prepend=-1))
+        width = np.diff(begin, append=column.size)
+        change = np.flatnonzero(np.diff(width, prepend=-1))
+        self._shapes = list(zip(np.diff(change, append=width.size).tolist(), width[change].tolist(), strict=True))
+        read = np.zeros(self.whole.pattern.entries, dtype=bool)
+        read[self._from] = True
+        self.places = int(read.sum()) + 1
+        self._number = np.cumsum(read, dtype=np.int32)
+        self._number -= 1
+        self._number[~read] = self.places - 1
+        self._from = self._number[self._from]
 
-    def _make(self) -> None:
+    def make(self) -> None:
+        """The core's structures, of entries that are numbered: once."""
         whole = self.whole
         self._own = self._own_rows()
         self._trim = self._trimmed()
+        del self._number
         unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
         rate = self._spans(self.kept, self._rated())
         rest = self._spans(self.kept_rows, self.kept_rows >= (whole.form.k_row.size if self._own.size else 0))
-        self.renew(self.sums)
         room = self._room
         self.condensed = lib.Condensed(
             full=c.addressof(self._trim),
@@ -246,13 +269,10 @@ class Condensed:
             own=self._hold(self._own),
             straight=c.addressof(self._straights.array),
             observed_rates=int(self._observed_rates()),
-            products=self._from.size,
-            from_=self._hold(self._from),
-            to=self._hold(self._to),
-            share=self._hold(self._share),
+            **self._told_products(),
             y=lib.pointer(room.y),
             yd=lib.pointer(room.yd),
-            r=lib.pointer(room.r),
+            r=lib.pointer(room.slope),
             slope=lib.pointer(room.slope),
         )
         self.core = lib.System(
@@ -266,6 +286,24 @@ class Condensed:
             together=whole.core.together,
         )
         lib.core.sd_condensed_bind(c.byref(self.condensed), c.byref(self.core))
+
+    def _told_products(self) -> dict[str, int | None]:
+        """The products as the core has them: of a large system by stretches, where these are few."""
+        found = None
+        if self.whole.unknowns > LARGE:
+            found = stretches_of([self._from, self._to], self._shapes, self._share)
+        if found is None:
+            places = {"from_": self._hold(self._from), "to": self._hold(self._to), "share": self._hold(self._share)}
+            return {"products": self._from.size, **places}
+        made = (lib.Shares * max(len(found), 1))()
+        for k, (at, number, width) in enumerate(found):
+            tables = *table(self._from, found[k]), *table(self._to, found[k])
+            held = [*(self._hold(item) for item in tables), self._hold(self._share[at : at + width].copy())]
+            made[k] = lib.Shares(number, width, *held)
+        self._keep.append(made)
+        nothing = np.zeros(0, dtype=np.int32)
+        self._from, self._to, self._share = nothing, nothing, np.zeros(0)
+        return {"stretches": len(found), "shares": c.addressof(made)}
 
     @cached_property
     def key(self) -> tuple[int | bytes, ...]:
@@ -328,12 +366,17 @@ class _Condenser:
     """What runs of one system are condensed to: structures of the run before where the same unknowns may leave."""
 
     def __init__(self, system: System) -> None:
-        self.whole, self.settled = system.another("2v"), system.another("settled")
+        self.whole = system.another("2v")
         self._allowed = np.zeros(0, dtype=bool)
         self._found: Elimination | None = None
         self._forms: Forms | None = None
         self._last: tuple[Forms | None, bytes] | None = None
         """What came of the last numbers asked, and their digest."""
+
+    @cached_property
+    def settled(self) -> System:
+        """What points are settled with: made when rows are left for it."""
+        return self.whole.another("settled")
 
     def forms(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         """With the numbers of now; of the same start and parameters those of the last time."""
@@ -345,7 +388,7 @@ class _Condenser:
 
     def _renewed(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         whole = self.whole
-        jy, zero = whole.jacobian(t, y, yd)[0], np.zeros(whole.unknowns)
+        jy, zero = whole.slopes(t, y, yd, rate=False), np.zeros(whole.unknowns)
         constant = whole.residual(t, zero, zero)
         allowed = definable(whole, jy, constant)
         if self._found is None or not np.array_equal(allowed, self._allowed):
@@ -358,35 +401,51 @@ class _Condenser:
         del jy, zero, constant
         if not np.isfinite(numbers.constant).all():
             return None
+        if whole.unknowns > LARGE:  # the room counts: other numbers find all anew
+            self._allowed, self._found = allowed[:0].copy(), None
+            whole.forget_once("may leave")
+            held = [found, numbers]
+            del found, numbers, allowed
+            return self._made(held)
         if self._forms is None:
-            self._forms = self._made(found, numbers)
+            self._forms = self._made([found, numbers])
         elif not numbers.same(self._forms.stepped.sums):
             self._forms.stepped.renew(numbers)
             self._forms.settled.renew(numbers)
-        if whole.unknowns <= LARGE:
-            return self._forms
-        # of a large one the room counts: other numbers find all anew
-        forms, self._found, self._forms = self._forms, None, None
-        self._allowed = allowed[:0].copy()
-        whole.forget_once("may leave")
-        for form in () if forms is None else (forms.stepped, forms.settled):
-            form.fix()
-        return forms
+        return self._forms
 
-    def _made(self, found: Elimination, numbers: Sums) -> Forms | None:
+    def _made(self, held: list[Any]) -> Forms | None:
+        """The forms of an elimination and its sums, which are taken out of held: what they need no more goes."""
+        numbers: Sums = held.pop()
+        found: Elimination = held.pop()
         whole = self.whole
         rows = np.ones(whole.rows, dtype=bool)
         rows[found.row] = False
         rows[whole.form.k_row[np.isin(whole.form.k_q, found.unread)]] = False
+        del found
+        terms, straights = numbers.composed(whole.unknowns), Straights(numbers)
         kept = settled_rows(whole, self.settled, ~rows, numbers)
         if kept is None:
             return None
         places = places_of(rows), places_of(kept)
-        room, terms, straights = Room(whole, self.settled), numbers.composed(whole.unknowns), Straights(numbers)
+        del rows, kept
+        room = Room(whole, self.settled)
         stepped, settled = (
             Condensed(system, numbers, terms, straights, rows, room)
             for system, rows in zip((whole, self.settled), places, strict=True)
         )
+        for form in (stepped, settled):
+            form.renew(numbers)
+        if whole.unknowns > LARGE:
+            del terms, numbers
+            straights.fix()
+            stepped.fix()
+            settled.fix()
+        for form in (stepped, settled):
+            form.renumber()
+        room.entries = max(stepped.places, settled.places)
+        for form in (stepped, settled):
+            form.make()
         return Forms(stepped, settled)
 
 

@@ -125,10 +125,23 @@ class Straights:
         self._some = some
         for number, entry, size in self._long:
             factor = self._factors[entry : entry + size].reshape(self.array[number].terms, -1)
-            self.array[number].alike = int((factor == factor[:, :1]).all())
+            self.array[number].alike = factor.shape[1] if (factor == factor[:, :1]).all() else 0
 
     def fix(self) -> None:
-        """Lets go of what only other numbers would need, and of constants that are all zero."""
+        """Lets go of what only other numbers would need, of factors that repeat one, of constants that are all zero."""
         self._order = self._order[:0].copy()
+        kept = np.ones(self._factors.size, dtype=bool)
+        for number, entry, size in self._long:
+            if length := self.array[number].alike:
+                kept[entry : entry + size].reshape(-1, length)[:, 1:] = False
+                self.array[number].alike = 1
+        place = np.append(np.int32(0), np.cumsum(kept, dtype=np.int32))
+        old = lib.pointer(self._factors)
+        self._factors = self._factors[kept]
+        new = lib.pointer(self._factors)
+        assert old is not None
+        assert new is not None
+        for k in range(self.number):
+            self.array[k].factor = new + 8 * int(place[(self.array[k].factor - old) // 8])
         if not self._some.any():
             self._constants = self._constants[:0].copy()

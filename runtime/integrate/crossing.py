@@ -57,5 +57,6 @@ def go_on(
     run.sizes.begin_to_move(t, y, run.start_rate)
     run.sizes.resolve(t, y, yd, run.roles.state)
     run.sizes.hand_down()
+    run.method.begin(y, yd)
     pointers = (lib.pointer(item) for item in (y, yd, *before))
     lib.core.sd_run_restart(run.driver.core, t, label, *pointers)

@@ -63,7 +63,8 @@ class Integration:
         self.cpu = 0.0
         alone = origin is None and request.events is None
         system.trim()  # of the run before
-        self.origin = origin = origin or Origin(system, start, request.index)
+        self.origin: Origin | None = origin or Origin(system, start, request.index)
+        origin = self.origin
         self._factors = origin.factors
         self.y, self.yd, self.start_rate = origin.point(own=alone)
         self.roles: Roles = origin.roles
@@ -80,6 +81,11 @@ class Integration:
         at = start.t, self.y, self.yd
         self.settlers = Settlers(system, self.forms, request, self.sizes, self.roles, at)
         self.settler = self.settlers.settler
+        if system.unknowns > LARGE:
+            del origin, at
+            self._leave_origin()
+        self._put_away()
+        system.trim(LARGE)  # what is made now stays, and little of it fits where something was let go
         self._stepper()
         keeps = self.settlers.keeps
         self.driver = Driver(system, request, self.method, self.settler, keeps, self.start_rate, self._drift())
@@ -89,16 +95,22 @@ class Integration:
         self._spare()
         self._put_away()
         if system.unknowns > LARGE:
-            del self.origin, self.yd
-            self.sizes.let_go()
-            if self.forms is not None:  # of what is kept the method has its own
-                nothing = np.zeros(0, dtype=np.int32)
-                self.roles = replace(self.roles, test=nothing, power=nothing)
+            del self.yd
+
+    def _leave_origin(self) -> None:
+        """Lets go of the start as one system sees it: of a large model each run has its own."""
+        self.origin = None
+        self.sizes.let_go()
+        if self.forms is not None:  # of what is kept the method has its own
+            nothing = np.zeros(0, dtype=np.int32)
+            self.roles = replace(self.roles, test=nothing, power=nothing, common=nothing)
 
     def _spare(self) -> None:
         """Lets go of what a large model found on its way here, and would find again."""
         if self.system.unknowns > LARGE:
-            self.origin.let_go()
+            if self.origin is not None:
+                self.origin.let_go()
+            self.sizes.spare()
             self.system.spare()
             self.system.trim()
 
@@ -106,11 +118,18 @@ class Integration:
         """Lets go of patterns of a large model that no step reads: those of what is condensed."""
         if self.system.unknowns > LARGE and self.forms is not None:
             self.system.put_away(whole=True)
-            for form in (self.forms.stepped, self.forms.settled):
-                form.whole.put_away(whole=False)
+            self._put_away_of(self.forms)
+
+    @staticmethod
+    def _put_away_of(forms: Forms) -> None:
+        """Lets go of the patterns of the systems that these were made of."""
+        assert forms.settled.rates is not None  # found by its pattern
+        for form in (forms.stepped, forms.settled):
+            form.whole.put_away(whole=True)
 
     def _weigh(self) -> None:
         """The factors of the rows q' - f; the magnitudes of nu follow them."""
+        assert self.origin is not None
         scale = kinematic_scale(self.system, self.sizes.magnitude, self.origin.jy, self.origin.jyd)
         if (scale != self.system.kinematic_scale).any():
             self.system.kinematic_scale[:] = scale
@@ -126,6 +145,13 @@ class Integration:
         if self.system.unknowns > LARGE:
             self.system.put_away(whole=True)  # found again, if it is what is stepped
         found = condensed(self.system, self.start.t, self.y, self.yd)
+        if found is not None:
+            assert self.origin is not None
+            if self.origin.kept is None:
+                self.origin.kept = self._kept_roles(found.stepped.whole, found.stepped.kept)
+            self._kept = self.origin.kept
+            if self.system.unknowns > LARGE:
+                self._put_away_of(found)
         self._spare()
         return found
 
@@ -179,10 +205,7 @@ class Integration:
     def _tell(self) -> None:
         kept, found = None, self.roles
         if self.forms is not None:
-            kept = self.forms.stepped.kept
-            if self.origin.kept is None:
-                self.origin.kept = self._kept_roles(self.forms.stepped.whole, kept)
-            found = self.origin.kept
+            kept, found = self.forms.stepped.kept, self._kept
         self.told = Told(self.system, self.request, self.sizes, found, kept)
         self.told.tell(self.method)
         if self.system.form.scales and self.underlying is None:
@@ -190,7 +213,7 @@ class Integration:
 
     def _kept_roles(self, whole: System, kept: Ints) -> Roles:
         """Roles of what is kept; constraints between displacements are left by their rates: no index above 2."""
-        _, jyd = whole.jacobian(self.start.t, self.y, self.yd)
+        jyd = whole.slopes(self.start.t, self.y, self.yd, rate=True)
         jyd = general_rates(whole, self.start.t, self.y, self.yd, jyd)
         return roles(whole, self.start.t, jyd, min(self.request.index, 2)).kept(kept)
 
@@ -291,6 +314,7 @@ class Integration:
                 before = time.process_time()
                 cross(self, segment)
                 self._put_away()
+                self.system.trim(LARGE)
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)
         return Finished(

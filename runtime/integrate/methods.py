@@ -8,11 +8,12 @@ from __future__ import annotations
 import ctypes as c
 from typing import Any
 
+import numpy as np
 from sysdyn.runtime.condense.condensed import Condensed
 from sysdyn.runtime.integrate.factors import Factorisation, Factors
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import Order
 
@@ -66,6 +67,7 @@ class Method:
             self.expanded = lib.core.sd_expanded_new(self._stepper(), condensed, self._n)
             if not self.expanded:
                 raise MemoryError
+            self._unread: Ints = system.sums.unread
 
     @property
     def complex(self) -> tuple[int, ...]:
@@ -92,13 +94,22 @@ class Method:
     def start(self, t: float, y: Floats, yd: Floats) -> None:
         """From (t, y, yd) with a step of its own choice."""
         name, core = ("expanded", self.expanded) if self.expanded else (self.name, self._core)
+        self.begin(y, yd)
         getattr(lib.core, f"sd_{name}_start")(core, t, lib.pointer(y), lib.pointer(yd), 0.0)
+
+    def begin(self, y: Floats, yd: Floats) -> None:
+        """Notes what no step moves of the point that it starts from."""
+        if self.expanded:
+            self._stays = y[self._unread], yd[self._unread]
 
     def point(self) -> tuple[Floats, Floats]:
         """y, yd [unknowns] of the last accepted point."""
         if self.expanded:
-            lib.core.sd_expanded_show(self.expanded)
-        stepper = self.expanded.contents.face if self.expanded else self.contents.stepper
+            y, yd = np.empty(self._n), np.empty(self._n)
+            y[self._unread], yd[self._unread] = self._stays
+            lib.core.sd_expanded_show(self.expanded, lib.pointer(y), lib.pointer(yd))
+            return y, yd
+        stepper = self.contents.stepper
         return lib.reader(stepper.y, self._n).copy(), lib.reader(stepper.yd, self._n).copy()
 
     def __del__(self) -> None:

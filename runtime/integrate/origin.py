@@ -8,7 +8,7 @@ from sysdyn.runtime.integrate.underlying import Accelerations, underlying_form
 from sysdyn.runtime.integrate.unknown_roles import Roles, general_rates, roles, without_rate
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import magnitudes, unresolved
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.start.start import ConsistentState
 
@@ -67,7 +67,10 @@ class Origin:
             order = net_order_of(self.system)
             far = self.jy, self.jyd, self.yd, order.address
             y = self.start.without_noise(self.y)
-            self._sized = t_end, magnitudes(self.system, self.t, t_end, y, self.yd, far)
+            spent = self.system.unknowns > LARGE
+            self._sized = t_end, magnitudes(self.system, self.t, t_end, y, self.yd, far, spent=spent)
+            if spent:
+                self._matrix = None
         return self._sized[1]
 
     @property

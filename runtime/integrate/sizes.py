@@ -48,6 +48,10 @@ class Sizes:
     def let_go(self) -> None:
         """Of what the start knows: found again if asked."""
         self._origin = None
+        self.spare()
+
+    def spare(self) -> None:
+        """Of what follows from that: made again if asked."""
         self.__dict__.pop("least", None)
 
     def stepped(self, kept: Ints | None) -> tuple[Floats, Floats]:
@@ -97,7 +101,7 @@ class Sizes:
         if (np.abs(y) <= 2.0 * self.resolved).all():
             return
         np.maximum(self.resolved, np.abs(y), out=self.resolved)
-        jy = self.system.jacobian(t, y, yd)[0]
+        jy = self.system.slopes(t, y, yd, rate=False)
         open_ = np.where(carries, 0.0, noise(self.system, y, jy, self.time))
         least = UNRESOLVED * open_ / max(self._request.rtol, 1e-15)
         np.maximum(self.magnitude, least, out=self.magnitude)

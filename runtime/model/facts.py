@@ -140,7 +140,7 @@ class Facts:
     @property
     def nominal(self) -> Floats:
         """Nominal magnitudes from the manifest; 0 where it names none; read-only."""
-        return self.once("nominal", self._nominal)
+        return self.once_if_small("nominal", self._nominal)
 
     def _nominal(self) -> Floats:
         values = [0.0 if family.nominal is None else family.nominal for family in self.description.families]

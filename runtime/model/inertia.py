@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 
 
@@ -20,25 +20,27 @@ def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
     return found
 
 
-def own_unknown(system: System, group: str, kind: str) -> NDArray[np.int64]:
+def own_unknown(system: System, group: str, kind: str) -> Ints:
     """The unknown of a kind in whose coordinate's row of a group each row is [rows]; -1 elsewhere."""
     families = system.description.families
     own = {family.owner: k for k, family in enumerate(families) if family.kind == kind}
-    place = np.full(system.rows, -1, dtype=np.int64)
+    place = np.full(system.rows, -1, dtype=np.int32)
     for name, family, first in system.form.groups:
         row = system.description.rows[family]
         unknown = own.get(row.owner)
         if name == group and unknown is not None and families[unknown].size == row.size:
-            place[first : first + row.size] = system.form.at[unknown] + np.arange(row.size)
+            place[first : first + row.size] = system.form.at[unknown] + np.arange(row.size, dtype=np.int32)
     return place
 
 
-def own_inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
+def own_inertia(system: System, jy: Floats | None, jyd: Floats) -> Floats:
     """Diagonal of M at the places of the flows [unknowns], where no others are joined; 0 where there is none.
 
-    jy, jyd [entries]: dF/dy, dF/dyd.
+    jy, jyd [entries]: dF/dy, dF/dyd; jy None: of a system without momenta.
     """
     found = _own(system, jyd, "dynamics", "f")
+    if jy is None:
+        return found
     by_flow, by_momentum = _own(system, jy, "momentum", "f"), _own(system, jy, "momentum", "p")
     momenta, flows = with_flows(system)
     one, other = by_flow[flows], by_momentum[momenta]

@@ -87,6 +87,11 @@ def _iterations(kernel: Kernel, ix: Ints) -> list[Longs]:
     return columns
 
 
+def iterations(kernel: Kernel, ix: Ints) -> int:
+    """How many iterations a kernel has."""
+    return int(_iterations(kernel, ix)[0].size) if kernel.loops else 1
+
+
 def _positions(reference: Reference, shape: Shape, loops: list[Longs], number: int, ix: Ints) -> Longs:
     """Row-major position in its family in each iteration [number]."""
     position: Longs | None = None

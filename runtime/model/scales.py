@@ -200,12 +200,13 @@ def _own_momentum(system: System) -> NDArray[np.bool_]:
 
 
 def magnitudes(
-    system: System, t0: float, t_end: float, y: Floats, yd: Floats, far: Far | None = None
+    system: System, t0: float, t_end: float, y: Floats, yd: Floats, far: Far | None = None, *, spent: bool = False
 ) -> tuple[Floats, float]:
     """Magnitude of each unknown [unknowns], all positive, and the time scale of the start [s].
 
     far: the motion linearised at the start, which says how far each unknown gets (sd_relaxed, start/sizing.h): dF/dy,
-    dF/dyd [entries], rates [unknowns], the address of an order of elimination; None: as its rate says.
+    dF/dyd [entries], rates [unknowns], the address of an order of elimination; None: as its rate says.  spent: nobody
+    else needs these entries, which are overwritten: of a large system the room counts.
     """
     span = max(t_end - t0, 0.0) or 1.0
     a, b = (system._buffer(np.where(np.isfinite(item), item, 0.0)) for item in (y, yd))
@@ -213,7 +214,7 @@ def magnitudes(
     motion = (None, None, None, None) if far is None else (*map(lib.pointer, far[:3]), far[3])
     answers = lib.pointer(found), lib.pointer(tau)
     core = c.byref(sizing(system).core), c.byref(system.core)
-    if lib.core.sd_magnitudes(*core, t0, span, lib.pointer(a), lib.pointer(b), *motion, *answers):
+    if lib.core.sd_magnitudes(*core, t0, span, lib.pointer(a), lib.pointer(b), *motion, spent, *answers):
         raise MemoryError
     system.failure.check()
     return found, float(tau[0])

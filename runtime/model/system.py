@@ -23,8 +23,9 @@ from sysdyn.runtime.model.patterns import Pattern, read_only, spared
 LARGE = 100_000
 """Unknowns beyond which what can be found again is let go: of a large model the room counts."""
 HUGE = 1_000_000
-"""Unknowns beyond which pages that a stage left go back to the machine: it asks for them again for the next one, which
-costs a line of 500000 unknowns a tenth of its CPU time to the first step, and saves it a sixth of its memory."""
+"""Unknowns beyond which pages that a stage left go back to the machine wherever something large was let go: it asks for
+them again for the next one, which costs a line of 500000 unknowns a tenth of its CPU time to the first step.  Of LARGE
+ones they go back behind a start, a structure and a jump, and before a method is made."""
 _NOWHERE: Callable[[int], int | None] = lambda _: None  # noqa: E731
 SETS = 4096
 """Active sets whose rows are kept."""
@@ -86,10 +87,17 @@ class System(Facts):
         self._slots: list[Ints] = []
         self._assemble()
 
-    def trim(self) -> None:
-        """Hands memory that was let go back to the machine, where it counts more than the time to ask for it again."""
-        if self.unknowns > HUGE:
+    def trim(self, least: int = HUGE) -> None:
+        """Hands memory that was let go back to the machine, where it counts more than the time to ask for it again: of
+        more unknowns than these.
+        """
+        if self.unknowns > least:
             lib.core.sd_trim()
+
+    @property
+    def plain(self) -> bool:
+        """Whether blocks alone write into the matrix, whatever holds."""
+        return not self.form.k_row.size and not self._may_hold[0].size
 
     def put_away(self, *, whole: bool) -> None:
         """Lets go of the pattern, found again when it is asked for; whole: of the places of the Jacobian's entries too.
@@ -135,7 +143,7 @@ class System(Facts):
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
         self.kinematic_scale = np.ones(form.k_row.size)
-        self._scratch = self._work(layout.entries)
+        self.work = self._work(layout.entries)
         self._keep += [calls]
         self._reads_rate, self._may_hold = layout.reads_rate, layout.may_hold
         self._core = lib.System(
@@ -153,7 +161,7 @@ class System(Facts):
             k_scale=lib.pointer(self.kinematic_scale),
             scales=len(form.scales),
             scale=c.addressof(scales),
-            v=lib.pointer(self._scratch),
+            v=lib.pointer(self.work),
             stop=lib.pointer(self.failure.flag),
             together=isinstance(self.carrier, LibraryCarrier),
         )
@@ -193,6 +201,8 @@ class System(Facts):
         room = self.description.room
         if not room or room[0].size < entries:
             room[:] = [np.zeros(entries)]
+            for system in self.description.alive.values():
+                system.work, system._core.v = room[0], lib.pointer(room[0])
         return room[0]
 
     def switch(self) -> None:
@@ -329,6 +339,19 @@ class System(Facts):
         lib.core.sd_jacobian(c.byref(self.core), t, *at, None, *slopes)
         self.failure.check()
         return jy[:-1], jyd[:-1]
+
+    def slopes(self, t: float, y: Floats, yd: Floats, *, rate: bool) -> Floats:
+        """Values of dF/dy, or of dF/dyd [entries], as `jacobian` says them; of a large system in half the room."""
+        if self.unknowns <= LARGE:
+            return self.jacobian(t, y, yd)[rate]
+        found = np.empty(self.pattern.entries + 1)
+        a, b = self._buffer(y), self._buffer(yd)
+        for side in (not rate, rate):
+            lib.core.sd_slopes(c.byref(self.core), t, lib.pointer(a), lib.pointer(b), side, lib.pointer(found))
+            self.failure.check()
+            if lib.core.sd_first_bad(self.pattern.entries, lib.pointer(found)) >= 0:
+                return self.jacobian(t, y, yd)[rate]
+        return found[:-1]
 
     def dense(self, values: Floats) -> Floats:
         """Values on the pattern as a full matrix [rows, unknowns]."""

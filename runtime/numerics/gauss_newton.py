@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES, Mask, in_order, least_norm
-from sysdyn.runtime.numerics.products import add_product
+from sysdyn.runtime.numerics.products import add_product, add_sizes, pieces
 from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
 from sysdyn.values import dataclass
 
@@ -97,13 +97,13 @@ class Problem:
     the least in this order, each with what stands before it held, the others then (of what is too large for full
     matrices weights alone say so); idle: unknowns whose least nobody asks for where rows leave them open; work: what
     all problems of one search draw on; core: the same rows and entries there, at an instant t [s], used where there are
-    no levels; check: raises what a callback of them raised.
+    no levels; check: raises what a callback of them raised; spare: hands back what a solution let go of.
     """
 
     residual: Callable[[Floats], Floats]
     jacobian: Callable[[Floats], Floats]
-    rows: NDArray[np.int64]
-    columns: NDArray[np.int64]
+    rows: NDArray[np.integer]
+    columns: NDArray[np.integer]
     number: int
     use: Mask
     free: Mask
@@ -115,6 +115,7 @@ class Problem:
     work: Work = field(default_factory=Work)
     core: tuple[lib.RowsOfStart, float] | None = None
     check: Callable[[], None] | None = None
+    spare: Callable[[], None] = lambda: None
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,42 +127,56 @@ class Solution:
     scaled: Floats
 
 
+def _numbered(places: Any, used: Mask) -> Any:
+    """Places by their numbers among those in use."""
+    return places if used.all() else (np.cumsum(used, dtype=np.int32) - 1)[places]
+
+
 class _Linear:
     """The linearised rows at a point: A [used rows, free unknowns] in scaled unknowns and rows."""
 
     def __init__(self, problem: Problem, x: Floats) -> None:
-        self.unit, self.problem = problem.scale / problem.weight, problem
+        self.problem = problem
         self._values = problem.jacobian(x)
         taken = problem.use[problem.rows] & problem.free[problem.columns] & np.isfinite(self._values)
-        self._values = np.where(taken, self._values, 0.0)
+        if not taken.all():
+            self._values = np.where(taken, self._values, 0.0)
+        del taken
         # a row is as large as its terms are, in magnitudes
         size = np.zeros(problem.number)
-        add_product(problem.rows, problem.columns, np.abs(self._values), problem.scale, size)
-        self.row_scale = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
+        add_sizes(problem.rows, problem.columns, self._values, problem.scale, size)
+        size[~(size > 0.0)] = 1.0
+        self.row_scale = np.divide(1.0, size, out=size)
         self.shape = int(problem.use.sum()), int(problem.free.sum())
 
-    def _taken(self) -> tuple[Any, Any, Floats]:
-        """Rows, columns and values of the entries in use; factors would fill from zeros too."""
+    @property
+    def unit(self) -> Floats:
+        """What u counts each free unknown in; made when asked."""
+        return self.problem.scale[self.problem.free] / self.problem.weight[self.problem.free]
+
+    def _taken(self, *, spent: bool = False) -> tuple[Any, Any, Floats]:
+        """Rows, columns and values of the entries in use; factors would fill from zeros too.  spent: at last."""
         take = self._values != 0.0
-        return self.problem.rows[take], self.problem.columns[take], self._values[take]
+        values = self._values[take]
+        if spent:
+            del self._values
+        return self.problem.rows[take], self.problem.columns[take], values
 
     def entries(self) -> tuple[Any, Any, Floats]:
         """A by its entries, asked for once where a point does not hold: of a large one the room counts."""
-        rows, columns, values = self._taken()
-        del self._values
-        values *= self.unit[columns]
-        values *= self.row_scale[rows]
-        return *self._numbered(rows, columns), values
-
-    def _numbered(self, rows: Any, columns: Any) -> tuple[Any, Any]:
-        """Rows and columns by their numbers among those in use."""
-        numbers = (np.cumsum(mask, dtype=np.int32) - 1 for mask in (self.problem.use, self.problem.free))
-        return next(numbers)[rows], next(numbers)[columns]
+        rows, columns, values = self._taken(spent=True)
+        problem = self.problem
+        for here in pieces(values.size):
+            values[here] *= problem.scale[columns[here]] / problem.weight[columns[here]]
+            values[here] *= self.row_scale[rows[here]]
+        rows = _numbered(rows, problem.use)
+        columns = _numbered(columns, problem.free)
+        return rows, columns, values
 
     def determined(self, u: Floats, r: Floats, *, beside: bool) -> Floats | None:
         """The same where the rows, as they are, determine the step (core/linear/graded.h); None where they do not."""
         rows, columns, values = self._taken()
-        rows, columns = self._numbered(rows, columns)
+        rows, columns = _numbered(rows, self.problem.use), _numbered(columns, self.problem.free)
         a, step = np.zeros(self.shape), np.zeros(u.size)
         np.add.at(a, (rows, columns), values)
         aim, stands = -r / self.row_scale[self.problem.use], np.zeros(u.size, dtype=bool)
@@ -169,10 +184,10 @@ class _Linear:
         failed = lib.core.sd_graded(*a.shape, lib.pointer(a), lib.pointer(aim), lib.pointer(step))
         if failed < 0:
             raise MemoryError
-        return None if failed else np.where(stands | beside, u + step / self.unit[self.problem.free], 0.0)
+        return None if failed else np.where(stands | beside, u + step / self.unit, 0.0)
 
     def nearest(self, u: Floats, r: Floats, *, beside: bool) -> Floats:
-        """The least u with A u = A u_now - r; beside it, the least step: its round-off is its own."""
+        """The least u with A u = A u_now - r; beside it, the least step: its round-off is its own.  r is spent."""
         levels = [level[self.problem.free] for level in self.problem.levels]
         ordered = any(level.any() for level in levels) and max(self.shape) <= DENSE
         if not ordered and max(self.shape) <= SINGULAR_VALUES:
@@ -182,7 +197,7 @@ class _Linear:
         i, j, v = self.entries()
         # what costs nothing stays where it is as far as it may
         stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else 0.0
-        aim = add_product(i, j, v, u - stays, -r)
+        aim = add_product(i, j, v, u - stays, np.negative(r, out=r))
         del r
         if ordered:
             return stays + in_order(self.shape, (i, j, v), aim, levels)
@@ -222,7 +237,6 @@ def _in_core(
 
 
 def _solve(problem: Problem, x: Floats, most: int) -> Solution:
-    x = x.copy()
     best = Solution(x, np.inf, np.full(problem.number, np.inf))
     stale, taken, lost = 0, 0, 0
     for _ in range(most + _FOLDS):
@@ -247,18 +261,20 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             break
         if problem.work.done:
             break
-        u = (x - problem.guess)[problem.free] / linear.unit[problem.free]
+        u = (x - problem.guess)[problem.free] / linear.unit
+        norm, rows = float(np.linalg.norm(scaled)), [scaled[problem.use]]
+        del scaled
         try:
-            target = linear.nearest(u, scaled[problem.use], beside=size < _BESIDE and stale > 1)
+            target = linear.nearest(u, rows.pop(), beside=size < _BESIDE and stale > 1)
         except NotFiniteError:
             break
+        problem.spare()
         if not np.isfinite(target).all():
             break
-        norm = float(np.linalg.norm(scaled))
         step, tried = 1.0, x
         for _ in range(_HALVINGS):
             tried = x.copy()
-            tried[problem.free] += step * (target - u) * linear.unit[problem.free]
+            tried[problem.free] += step * (target - u) * linear.unit
             now = float(np.linalg.norm(measure(tried)[1]))
             if np.isfinite(now) and now <= max((1.0 - 0.1 * step) * norm, 1e-11):
                 lost = 0
@@ -277,10 +293,10 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
 def stepped(problem: Problem, x: Floats) -> Floats:
     """The point one whole step from x.  NotFiniteError."""
     linear, free = _Linear(problem, x), problem.free
-    u = (x - problem.guess)[free] / linear.unit[free]
+    u = (x - problem.guess)[free] / linear.unit
     r = (problem.residual(x) * linear.row_scale)[problem.use]
     found = x.copy()
-    found[free] = problem.guess[free] + linear.nearest(u, r, beside=False) * linear.unit[free]
+    found[free] = problem.guess[free] + linear.nearest(u, r, beside=False) * linear.unit
     return found
 
 
@@ -294,7 +310,7 @@ def corrected(problem: Problem, x: Floats) -> Floats | None:
     found = x.copy()
     if step is None or not np.isfinite(step).all():
         return None
-    found[free] += step * linear.unit[free]
+    found[free] += step * linear.unit
     return found
 
 
@@ -319,7 +335,7 @@ def least_residual(problem: Problem, x: Floats) -> Floats:
                 full = np.vstack([a, np.sqrt(damping) * np.eye(a.shape[1])])
                 step = least_squares(full, np.concatenate([-r, np.zeros(a.shape[1])]), 1e-15)
                 tried = x.copy()
-                tried[problem.free] += step * linear.unit[problem.free]
+                tried[problem.free] += step * linear.unit
                 now = measure(tried)
                 if np.isfinite(now).all() and now @ now < r @ r:
                     break

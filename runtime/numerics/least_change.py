@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors, sparse_factors
-from sysdyn.runtime.numerics.products import add_product
+from sysdyn.runtime.numerics.products import add_product, largest_product
 from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
 from sysdyn.runtime.numerics.symmetric import Symmetric
 from sysdyn.runtime.numerics.tall import determined
@@ -58,12 +59,11 @@ def least_norm(
     v = v if spent else v.copy()
     back = _to_size_one(i, v, shape[0])
     aim = np.divide(aim, back, out=aim if spent else None)
-    small = MET * float(np.abs(aim * back).max(initial=0.0))
+    small = MET * largest_product(aim, back)
     tried: list[tuple[float, Floats]] = []
 
     def missed_by(found: Floats) -> float:
-        miss = add_product(i, j, v, found, -aim)
-        return float(np.abs(miss * back).max(initial=0.0))
+        return largest_product(add_product(i, j, v, found, -aim), back)
 
     if max(shape) > SINGULAR_VALUES:
         only = determined(shape, (i, j, v), aim, lambda found: missed_by(found) <= small, idle)
@@ -81,15 +81,10 @@ def least_norm(
 
 def _to_size_one(i: Any, v: Floats, rows: int) -> Floats:
     """Divides entries v in rows i by the sizes [rows] of these: a row of small coefficients is no redundant one."""
-    # by a power of two before squares are formed, which could overflow
-    largest = np.zeros(rows)
-    np.maximum.at(largest, i, np.abs(v))
-    power = np.ldexp(1.0, np.frexp(np.where(largest > EMPTY, largest, 1.0))[1])
-    v /= power[i]
-    size = np.bincount(i, v * v, rows).astype(np.float64, copy=False)
-    size = np.where(size > 0.0, np.sqrt(size), 1.0)
-    v /= size[i]
-    return size * power
+    size, row = np.empty(rows), np.ascontiguousarray(i, dtype=np.int32)
+    if lib.core.sd_to_size_one(rows, v.size, lib.pointer(row), EMPTY, lib.pointer(v), lib.pointer(size)):
+        raise MemoryError
+    return size
 
 
 def in_order(

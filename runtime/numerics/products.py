@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,33 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
+PIECE = 1 << 14
+"""Numbers of which products are made at a time."""
+
 
 def add_product(rows: Any, columns: Any, values: Floats, x: Floats, out: Floats) -> Floats:
     """Out [rows] += A x, which is handed back; values of A at (rows, columns) [entries]; x [columns]."""
+    return _added(lib.core.sd_add_product, rows, columns, values, x, out)
+
+
+def add_sizes(rows: Any, columns: Any, values: Floats, x: Floats, out: Floats) -> Floats:
+    """Out [rows] += |A| x, the same way."""
+    return _added(lib.core.sd_add_sizes, rows, columns, values, x, out)
+
+
+def _added(function: Any, rows: Any, columns: Any, values: Floats, x: Floats, out: Floats) -> Floats:
     arrays: list[NDArray[Any]] = [np.ascontiguousarray(item, dtype=np.int32) for item in (rows, columns)]
     arrays += [*(np.ascontiguousarray(item, dtype=np.float64) for item in (values, x)), out]
-    lib.core.sd_add_product(values.size, *(lib.pointer(item) for item in arrays))
+    function(values.size, *(lib.pointer(item) for item in arrays))
     return out
+
+
+def largest_product(x: Floats, y: Floats) -> float:
+    """The largest |x y|, piece by piece; no number where one is none."""
+    found = (np.abs(x[here] * y[here]).max() for here in pieces(x.size))
+    return float(np.max(np.fromiter(found, dtype=np.float64), initial=0.0))
+
+
+def pieces(size: int) -> Iterator[slice]:
+    """Of an array of a large model, worked through without a second one as long."""
+    return (slice(k, k + PIECE) for k in range(0, size, PIECE))

@@ -62,11 +62,14 @@ def _columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> _Colum
         if not fewer:
             return None
         rows = unknowns
-    number = np.cumsum(used, dtype=np.int32) - 1
     if _in_order(i, j):
-        begin = np.append(np.int32(0), np.cumsum(np.bincount(j, minlength=shape[1])[used], dtype=np.int32))
+        begin = np.empty(unknowns + 1, dtype=np.int32)
+        begin[0], begin[-1] = 0, j.size
+        begin[1:-1] = np.flatnonzero(j[1:] != j[:-1])
+        begin[1:-1] += 1
         row, values = np.ascontiguousarray(i, dtype=np.int32), np.ascontiguousarray(v, dtype=np.float64)
         return _Columns(used, Pattern(rows, unknowns, begin, row), values)
+    number = np.cumsum(used, dtype=np.int32) - 1
     pattern, (slot,) = compress(rows, unknowns, [Places(i, number[j])])
     values = np.bincount(slot, weights=v, minlength=pattern.entries).astype(np.float64, copy=False)
     return _Columns(used, pattern, values)

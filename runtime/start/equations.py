@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
+from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.inertia import with_flows
+from sysdyn.runtime.model.redirected import redirected
 from sysdyn.runtime.model.scales import alike
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates_of
 
 Mask = NDArray[np.bool_]
@@ -45,12 +47,20 @@ class Equations:
         """Those of dF/dy, of dF/dy' where the derivative is an unknown."""
         pattern = settled.pattern
         columns = pattern.columns_of()
-        moved = columns_of_rates(self.n, self.rates, columns)
+        plain, rated = self._places(settled)
+        self.plain, self.rated = plain.size, rated.size
+        self.rows = np.empty(plain.size + rated.size, dtype=np.int32)
+        self.columns = np.empty_like(self.rows)
+        np.take(pattern.row, plain, out=self.rows[: plain.size])
+        np.take(pattern.row, rated, out=self.rows[plain.size :])
+        np.take(columns, plain, out=self.columns[: plain.size])
+        self.columns[plain.size :] = columns_of_rates(self.n, self.rates, columns[rated])
+
+    def _places(self, settled: System) -> tuple[Ints, Ints]:
+        """Of these entries in the pattern."""
         in_y, in_rate = settled.structural()
-        plain, rated = (np.flatnonzero(some).astype(np.int32) for some in (in_y, in_rate & (moved >= 0)))
-        self.plain, self.entry = plain.size, np.concatenate([plain, rated])
-        self.rows = pattern.row[self.entry]
-        self.columns = np.concatenate([columns[plain], moved[rated]])
+        moving = columns_of_rates(self.n, self.rates, settled.pattern.columns_of()) >= 0
+        return np.flatnonzero(in_y).astype(np.int32), np.flatnonzero(in_rate & moving).astype(np.int32)
 
     def _kinds(self, settled: System) -> None:
         kinds = alike(settled)
@@ -77,8 +87,22 @@ class Equations:
         balance = Balance(settled.rows, self.rows, self.columns, self.alike)
         found.system, found.balance, found.extended = c.addressof(settled.core), balance.core, settled.form.extended
         found.written, found.rates = self.n, self.rates.size
-        found.plain, found.rated, found.kinematics = self.plain, self.entry.size - self.plain, form.k_q.size
-        arrays = self.rates, self.entry, form.k_q, form.k_f
-        found.rate, found.entry, found.k_q, found.k_f = map(lib.pointer, arrays)
-        found.kept = balance
+        found.plain, found.rated, found.kinematics = self.plain, self.rated, form.k_q.size
+        arrays = self.rates, form.k_q, form.k_f
+        found.rate, found.k_q, found.k_f = map(lib.pointer, arrays)
+        places = self._places(settled)
+        if self.unknowns > LARGE and settled.plain:  # the room counts
+            both = redirected(settled, *self._numbered(settled, *places), self.plain + self.rated)
+            found.both, entry = both.address, None
+        else:
+            both, entry = None, np.concatenate(places)
+        found.entry = lib.pointer(entry)
+        found.kept = balance, both, entry
         return found
+
+    def _numbered(self, settled: System, plain: Ints, rated: Ints) -> tuple[Ints, Ints]:
+        """Of each place in the pattern the number of its entry in dF/dy, in dF/dyd; -1: none."""
+        numbers = np.full((2, settled.pattern.entries), -1, dtype=np.int32)
+        numbers[0, plain] = np.arange(plain.size, dtype=np.int32)
+        numbers[1, rated] = plain.size + np.arange(rated.size, dtype=np.int32)
+        return numbers[0], numbers[1]

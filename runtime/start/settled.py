@@ -118,9 +118,8 @@ class Settler:
     ) -> None:
         self.system, self._points = settled, settled.unknowns
         self._left = settled if condensed is None else condensed
-        self.rates = rates_of(settled)
+        self.rates = rates_of(settled) if condensed is None else condensed.rates
         if condensed is not None:
-            self.rates = condensed.rates
             magnitude, state = magnitude[condensed.kept], state[condensed.kept]
         n, k = self._left.unknowns, int(self.rates.size)
         self._n, self._moves = n, n + k
@@ -219,6 +218,8 @@ class Settler:
         core.k_q, core.k_f = (lib.pointer(item) for item in self._k)
         core.kinematics = self._k[0].size
         lib.reader(core.scale, self._moves)[:] = self.scale
+        if self._moves > LARGE:  # the core has its own
+            self.scale = self.scale[:0].copy()
 
     def _basis(self) -> tuple[Pattern, list[Ints], Ints]:
         """Pattern of G^T, the places of dF/dy and dF/dyd in it, the order of its columns."""

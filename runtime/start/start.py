@@ -233,5 +233,5 @@ def _consistent(
     if best.x.size > LARGE:
         starter.forget()
         del starter, guess
-        system.trim()
+        system.trim(LARGE)
     return ConsistentState(t0, y, yd, moved, best.residual, strategy, zeros)

@@ -14,6 +14,7 @@ import functools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.gauss_newton import Problem, Work
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
-from sysdyn.runtime.numerics.products import add_product
+from sysdyn.runtime.numerics.products import add_sizes
 from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.values import dataclass
@@ -81,7 +82,7 @@ def remembered(
 
     @functools.wraps(ask)
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
-        here = t, self.generous, x.tobytes()
+        here = t, self.generous, sha256(np.ascontiguousarray(x).data).digest() if x.size > LARGE else x.tobytes()
         if here != self.here:
             self.here = here
             self.known.clear()
@@ -111,7 +112,7 @@ class Starter:
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
         if known.unknowns > LARGE:
-            settled.put_away(whole=False)
+            settled.put_away(whole=self.core.both is not None)
             settled.forget_once("structural")
         self.n, self.rates, self.measured = known.n, known.rates, known.measured
         self._momentum, self._flow = known.momentum, known.flow
@@ -220,10 +221,11 @@ class Starter:
         of what is summed, which may cancel.
         """
         known, size = self.equations, np.zeros(self.settled.rows)
-        add_product(known.rows, known.columns, np.abs(self._slopes(t, x)), np.maximum(scale, np.abs(x)), size)
+        add_sizes(known.rows, known.columns, self._slopes(t, x), np.maximum(scale, np.abs(x)), size)
         if self.summed:
             size[self._places] = np.abs(self._sums) @ size[self._summed]
-        return np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 1.0)
+        size[~(size > 0.0)] = 1.0
+        return np.divide(1.0, size, out=size)
 
     def with_sums(self, values: Floats) -> Floats:
         """Values of all rows [rows, k] with the sums of rows in their places."""
@@ -287,7 +289,7 @@ class Starter:
 
         Of a momentum and its flow the one that is written carries the state, else the momentum.
         """
-        _, jyd = self.system.jacobian(t, *self.expand(x))
+        jyd = self.system.slopes(t, *self.expand(x), rate=True)
         state = self.settled.are(*STATE)
         carries = state & ~self.measured
         carries[: self.system.unknowns] &= self.system.differential(jyd)
@@ -304,9 +306,15 @@ class Starter:
         weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
         content = scale.copy()
         if self.balanced:
-            inert = own_inertia(self.system, *self.system.jacobian(t, *self.expand(x)))
+            y, yd = self.expand(x)
+            some = self._momentum.size > 0
+            jy, jyd = self.system.jacobian(t, y, yd) if some else (None, self.system.slopes(t, y, yd, rate=True))
+            inert = own_inertia(self.system, jy, jyd)
+            del y, yd, jy, jyd
             content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
         measured = content / largest_of_group(self.measures, content)
+        if x.size > LARGE:
+            self.__dict__.pop("measures", None)
         measured[self.n :] = 1.0  # rates have magnitudes of their own each
         return np.asarray(weight * measured)
 
@@ -321,8 +329,9 @@ class Starter:
         kinds = {"q": "", "s": "", "f": "p", "slack": "", "unsaid": ""}
         named = [kinds.get(f.kind, f.kind) + (effort if f.kind in "fp" else {}).get(f.owner, f.unit) for f in families]
         number: dict[str, int] = {}
-        of_y = np.array([*(number.setdefault(s, len(number)) for s in named), 0])[self.settled.family_of]
-        return np.append(of_y, np.full(self.rates.size, len(number))).astype(np.int32)
+        of_family = np.array([*(number.setdefault(s, len(number)) for s in named), 0], dtype=np.int32)
+        of_y = of_family[self.settled.family_of]
+        return np.append(of_y, np.full(self.rates.size, len(number), dtype=np.int32))
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
@@ -342,7 +351,7 @@ class Starter:
         values, free = self.jacobian(t, x), self.residual(t, x)
         rows, missed = known.guessed
         told = np.where(np.isin(self.rows, rows) & np.isfinite(values), values, 0.0) if missed.size else 0.0
-        sized = values - told
+        sized = values - told if missed.size or not values.flags.writeable else values
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
         sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * self.generous, lib.pointer(found)
@@ -388,5 +397,6 @@ def problem_of(
         work=starter.work,
         core=None if starter.summed else (starter.core, t),
         check=starter.settled.failure.check,
+        spare=lambda: starter.system.trim(LARGE),
     )
 

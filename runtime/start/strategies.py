@@ -47,6 +47,7 @@ def rescaled(
         if not np.isfinite(best.residual):
             break
         at = starter.without_noise(best.x, problem.scale)
+        del problem  # of a large model the room counts
         if best.residual < EXACT:
             clean = next((c for c in (at, best.x) if own_residual(starter, t, at, c) < OWN), None)
             if clean is not None:

@@ -41,7 +41,7 @@ def _nudges(number: int) -> list[tuple[Floats, Floats]]:
 def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:
     """[observed]: elements of block observe whose derivative follows from the equations."""
     y, yd = start.for_form(system)
-    _, jyd = system.jacobian(start.t, y, yd)
+    jyd = system.slopes(start.t, y, yd, rate=True)
     free = ~unique(system, jyd)
     free[with_flows(system)[1]] = False  # functions of the tested momenta
     if not free.any():

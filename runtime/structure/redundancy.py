@@ -121,7 +121,7 @@ def _combined(found: Reactions, weights: Floats) -> Floats:
 
 def _moves(system: System, state: ConsistentState) -> tuple[Floats, Floats]:
     """How large displacements are [unknowns as written], 0 for all else; seeded moves of them [POINTS, unknowns]."""
-    size = balanced(system, state.y, system.jacobian(state.t, state.y, state.yd)[0]) * system.are("q")
+    size = balanced(system, state.y, system.slopes(state.t, state.y, state.yd, rate=False)) * system.are("q")
     return size, size * system.once_if_small(("directions", size.size), lambda: normal(POINTS, size.size))
 
 

@@ -258,7 +258,7 @@ def _highest_index(system: System, state: ConsistentState) -> tuple[int | None, 
     try:
         switches.set(np.ones_like(before))
         y, yd = state.for_form(system)
-        found = reactions(system, system.jacobian(state.t, y, yd)[0])
+        found = reactions(system, system.slopes(state.t, y, yd, rate=False))
         left = {_place(system, int(found.multipliers[k])) for k in dependent(found)}
         switches.set(np.array([before[k] or place not in left for k, place in enumerate(switches.places)]))
         most, _ = index_of(system, state)
@@ -271,9 +271,8 @@ def structure(system: System, state: ConsistentState) -> Structure:
     """Facts of a model at a consistent state; system: any form."""
     system = system if system.form.name == "3" else system.another("3")
     y, yd = state.for_form(system)
-    jy, _ = system.jacobian(state.t, y, yd)
     index, undetermined = _highest_index(system, state)
-    found = reactions(system, jy)
+    found = reactions(system, system.slopes(state.t, y, yd, rate=False))
     left = dependent(found)
     zero = vanished(system, state)
     lowest = np.union1d(left, zero).size if zero.size else left.size
@@ -298,5 +297,5 @@ def structure(system: System, state: ConsistentState) -> Structure:
     names = tuple(_place(system, int(places[k])) for k in left)
     if system.unknowns > LARGE:
         system.spare()
-        system.trim()
+        system.trim(LARGE)
     return Structure(index, undetermined, n, m1, m2, rank, n - rank, n - rank_q, int(left.size), group, lost, names)

@@ -159,7 +159,7 @@ def test_equations_of_a_start_are_rows_and_unknowns_of_the_settled_form():
     assert starter.system.once(EQUATIONS, lambda: None) is known  # once a text
     assert known.unknowns == known.n + known.rates.size
     assert known.written == starter.settled.form.written
-    assert known.rows.size == known.columns.size == known.entry.size
+    assert known.rows.size == known.columns.size == known.plain + known.rated
     assert known.columns.max() < known.unknowns
     # kinds: rates are other ones than what they are rates of
     assert not set(known.alike[: known.n]) & set(known.alike[known.n :])

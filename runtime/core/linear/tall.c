@@ -66,6 +66,39 @@ void sd_add_product(int32_t entries, const int32_t *row, const int32_t *column, 
         out[row[e]] += value[e] * x[column[e]];
 }
 
+void sd_add_sizes(int32_t entries, const int32_t *row, const int32_t *column, const double *value, const double *x, double *out)
+{
+    for (int32_t e = 0; e < entries; e++)
+        out[row[e]] += fabs(value[e]) * x[column[e]];
+}
+
+int sd_to_size_one(int32_t rows, int32_t entries, const int32_t *row, double empty, double *value, double *size)
+{
+    double *power = calloc((size_t)rows + 1, sizeof *power);
+    if (!power)
+        return 2;
+    for (int32_t e = 0; e < entries; e++)
+        power[row[e]] = fmax(power[row[e]], fabs(value[e]));
+    for (int32_t i = 0; i < rows; i++) { /* by a power of two before squares are formed, which could overflow */
+        int exponent;
+        frexp(power[i] > empty ? power[i] : 1.0, &exponent);
+        power[i] = ldexp(1.0, exponent);
+        size[i] = 0.0;
+    }
+    for (int32_t e = 0; e < entries; e++) {
+        value[e] /= power[row[e]];
+        size[row[e]] += value[e] * value[e];
+    }
+    for (int32_t i = 0; i < rows; i++)
+        size[i] = size[i] > 0.0 ? sqrt(size[i]) : 1.0;
+    for (int32_t e = 0; e < entries; e++)
+        value[e] /= size[row[e]];
+    for (int32_t i = 0; i < rows; i++)
+        size[i] *= power[i];
+    free(power);
+    return 0;
+}
+
 /* pivot [columns] := the places of the entries by which rows determine one unknown after the other, of := the columns of these;
  * 0 where some are left.  room [3 rows] */
 static int find_sequence(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
@@ -106,9 +139,12 @@ static int find_sequence(int32_t rows, int32_t columns, const int32_t *column, c
 int sd_substituted(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
                    double least, const double *b, double *x)
 {
-    int32_t *pivot = malloc((2 * (size_t)columns + 3 * (size_t)rows + 1) * sizeof *pivot), *of = pivot + columns;
-    double *rest = malloc(((size_t)rows + 1) * sizeof *rest);
-    int failed = !pivot || !rest ? 2 : !find_sequence(rows, columns, column, row, value, least, pivot, of, of + columns);
+    int32_t *pivot = malloc((2 * (size_t)columns + 1) * sizeof *pivot), *of = pivot + columns;
+    int32_t *room = malloc((3 * (size_t)rows + 1) * sizeof *room);
+    int failed = !pivot || !room ? 2 : !find_sequence(rows, columns, column, row, value, least, pivot, of, room);
+    free(room);
+    double *rest = failed ? NULL : malloc(((size_t)rows + 1) * sizeof *rest);
+    failed = failed || rest ? failed : 2;
     memset(x, 0, (size_t)columns * sizeof *x);
     for (int pass = 0; pass <= REFINEMENTS && !failed; pass++) {
         miss(rows, columns, column, row, value, b, x, rest);

@@ -26,5 +26,12 @@ int sd_substituted(int32_t rows, int32_t columns, const int32_t *column, const i
 /* out += A x of a matrix by its entries: row, column, value [entries] */
 void sd_add_product(int32_t entries, const int32_t *row, const int32_t *column, const double *value, const double *x,
                     double *out);
+/* the same of the sizes of the values */
+void sd_add_sizes(int32_t entries, const int32_t *row, const int32_t *column, const double *value, const double *x,
+                  double *out);
+
+/* Divides entries value [entries] in rows row by the sizes [rows] of these, which are handed on: the root of the sum of
+ * their squares, of an empty row, whose entries are `empty` at most, one.  2 no memory */
+int sd_to_size_one(int32_t rows, int32_t entries, const int32_t *row, double empty, double *value, double *size);
 
 #endif

@@ -138,7 +138,7 @@ static int sized(sd_many *many)
             pass->yd[i] = pass->start_rate[i];
     sd_jacobian(many->system, many->t0, pass->y, pass->start_rate, NULL, many->form_jy, many->form_jyd);
     return sd_magnitudes(many->sizing, many->system, many->t0, many->t1 - many->t0, pass->y, pass->yd, many->form_jy,
-                         many->form_jyd, pass->yd, many->order, many->found, &many->tau);
+                         many->form_jyd, pass->yd, many->order, 0, many->found, &many->tau);
 }
 
 int sd_many_begin(sd_many *many, const double *anchor)

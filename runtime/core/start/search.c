@@ -56,10 +56,16 @@ static int beside_roots(const sd_rows_of_start *s, double t, const double *y, co
 
 int sd_start_jacobian(const sd_rows_of_start *s, double t, const double *x, double *values)
 {
-    int32_t entries = s->system->entries, whole = 1;
+    int32_t entries = s->both ? 0 : s->system->entries, whole = 1;
     double *y = malloc((2 * (size_t)s->extended + (size_t)entries + 1) * sizeof *y), *yd = y + s->extended;
     if (!y)
         return -2;
+    if (s->both) { /* of a large system the room counts */
+        expand(s, x, y, yd);
+        int missing = sd_both_slopes(s->both, t, y, yd, values);
+        free(y);
+        return missing;
+    }
     double *slope = yd + s->extended;
     expand(s, x, y, yd);
     /* one side after the other: of a large system the room counts */

@@ -296,7 +296,7 @@ static int bounded(const sd_sizing *s, sd_system *system, const sd_order *order,
 }
 
 int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span, const double *y, const double *yd,
-                  const double *jy, const double *jyd, const double *rate, const sd_order *order, double *found,
+                  double *jy, double *jyd, const double *rate, const sd_order *order, int spent, double *found,
                   double *tau)
 {
     const sd_balance *b = s->balance;
@@ -315,8 +315,8 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     if (rate && !failed)
         failed |= sd_relaxed(system, order, s->rungs, s->rung, jy, jyd, rate, *tau, moves);
     /* of a large system the room counts: what factors do not need follows them */
-    size_t borne = system->scales > 0 ? 2 * n + rows + entries + SD_LANES : 0;
-    double *memory = calloc(4 * n + (size_t)system->kinematics + rows + 2 * entries + kinds + 2 + borne, sizeof *memory);
+    size_t borne = system->scales > 0 ? 2 * n + rows + entries + SD_LANES : 0, own = spent ? 0 : 2 * entries + 2;
+    double *memory = calloc(4 * n + (size_t)system->kinematics + rows + own + kinds + borne + 1, sizeof *memory);
     int32_t *carries = calloc(n + 1, sizeof *carries);
     if (!memory || !carries) {
         free(first);
@@ -326,7 +326,7 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     }
     double *divisor = memory, *room = divisor + n; /* [3 n + kinds], of the compliance; behind that of these: */
     double *kept = room, *balanced = kept + n, *least = balanced + n, *row = room + 3 * n + kinds + system->kinematics;
-    double *own_jy = row + rows, *own_jyd = own_jy + entries + 1, *size = own_jy;
+    double *own_jy = spent ? jy : row + rows, *own_jyd = spent ? jyd : own_jy + entries + 1, *size = own_jy;
     sd_jacobian(system, t0, y, yd, NULL, own_jy, own_jyd);
     carriers(s, own_jyd, carries);
     for (size_t k = 0; k < n; k++)
@@ -338,7 +338,7 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
         size[e] = fabs(own_jy[e]) + fabs(own_jyd[e]) / *tau;
         size[e] = isfinite(size[e]) ? size[e] : 0.0;
     }
-    sd_bearing bearing = {system, t0, y, yd, own_jyd + entries + 1};
+    sd_bearing bearing = {system, t0, y, yd, row + rows + own};
     failed |= balanced_sizes(s, carries, size, excited, borne ? &bearing : NULL, found, kept, balanced, row);
     group_largest(b, found, most);
     for (size_t k = 0; k < n; k++)

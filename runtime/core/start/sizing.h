@@ -39,9 +39,9 @@ int sd_relaxed(const sd_system *system, const sd_order *order, int32_t rungs, co
 
 /* found [n]: magnitudes at (t0, y, yd) of a run over the span, *tau: the time scale of the start; y, yd with room for the
  * audit, finite.  jy, jyd [entries], rate [n], order: of sd_relaxed, what says how far unknowns get (NULL: their rates
- * alone do).  0; -1: no memory. */
+ * alone do); spent: jy, jyd may be overwritten.  0; -1: no memory. */
 int sd_magnitudes(const sd_sizing *sizing, sd_system *system, double t0, double span, const double *y, const double *yd,
-                  const double *jy, const double *jyd, const double *rate, const sd_order *order, double *found,
+                  double *jy, double *jyd, const double *rate, const sd_order *order, int spent, double *found,
                   double *tau);
 
 /* divisor [n]: what each unknown is divided by to compare it with its like, by the entries jy, jyd at a point.

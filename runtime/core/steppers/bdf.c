@@ -8,6 +8,7 @@
 #include <string.h>
 
 #define VECTORS 13
+#define SELDOM 4 /* of these: where rows are judged or points projected */
 #define ITERATIONS 4        /* of Newton a step */
 #define NEWTON_TOLERANCE 0.33 /* of the error tolerance (Brenan, Campbell & Petzold) */
 #define TRUST 0.02          /* least contraction assumed of a first correction (an exponential law may lie ahead) */
@@ -49,7 +50,9 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
         return NULL;
     size_t m = (size_t)sd_whole_lanes(system->unknowns), nnz = (size_t)sd_whole_lanes(system->entries);
     size_t steep = system->scales > 0; /* whose rows are judged by the matrix as it is */
-    bdf->memory = calloc((SD_MAX_ORDER + 2 + VECTORS) * m + (2 + steep) * nnz + 1, sizeof(double));
+    /* neither judged nor projected: of a large one the room counts */
+    size_t vectors = steep || !system->left ? VECTORS : VECTORS - SELDOM;
+    bdf->memory = calloc((SD_MAX_ORDER + 2 + vectors) * m + (2 + steep) * nnz + 1, sizeof(double));
     bdf->powered = calloc(m + m / SD_LANES + 1, sizeof *bdf->powered);
     if (!bdf->memory || !bdf->powered) {
         sd_bdf_free(bdf);
@@ -59,10 +62,10 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     double *next = bdf->memory;
     for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
         bdf->phi[i] = next;
-    double **vectors[] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->delta, &bdf->moved, &bdf->moved_d, &bdf->scale,
-                          &bdf->terms, &bdf->rate, &bdf->own, &bdf->newton_power, &bdf->test_power};
-    for (int i = 0; i < VECTORS; i++, next += m)
-        *vectors[i] = next;
+    double **vector[VECTORS] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->delta, &bdf->scale, &bdf->own,
+                                &bdf->newton_power, &bdf->test_power, &bdf->moved, &bdf->moved_d, &bdf->terms, &bdf->rate};
+    for (size_t i = 0; i < vectors; i++, next += m)
+        *vector[i] = next;
     bdf->jy = next;
     bdf->jyd = bdf->jy + nnz;
     bdf->g = steep ? bdf->jyd + nnz : linear->scaled;

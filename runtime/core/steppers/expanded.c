@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-void sd_expanded_show(sd_expanded *expanded)
+void sd_expanded_show(const sd_expanded *expanded, double *y, double *yd)
 {
-    sd_condensed_expand(expanded->condensed, expanded->inner->y, expanded->y, 0);
-    sd_condensed_expand(expanded->condensed, expanded->inner->yd, expanded->yd, 1);
+    sd_condensed_expand(expanded->condensed, expanded->inner->y, y, 0);
+    sd_condensed_expand(expanded->condensed, expanded->inner->yd, yd, 1);
 }
 
 /* what is looked at after each step: magnitudes, the points of the quadrature */
@@ -77,8 +77,9 @@ void sd_expanded_start(sd_expanded *expanded, double t, const double *y, const d
     sd_condensed_gather(expanded->condensed, y, expanded->z);
     sd_condensed_gather(expanded->condensed, yd, expanded->zd);
     expanded->inner->start(expanded->inner->self, t, expanded->z, expanded->zd, h);
-    memmove(expanded->y, y, size);
-    memmove(expanded->yd, yd, size);
+    if (expanded->y)
+        memmove(expanded->y, y, size);
+    expanded->face.y = y;
     expanded->face.nodes = expanded->inner->nodes;
     expanded->face.node = expanded->inner->node;
     expanded->face.node_weight = expanded->inner->node_weight;
@@ -87,25 +88,23 @@ void sd_expanded_start(sd_expanded *expanded, double t, const double *y, const d
 sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, int32_t unknowns)
 {
     sd_expanded *expanded = calloc(1, sizeof *expanded);
-    size_t n = (size_t)unknowns + 8, m = (size_t)condensed->unknowns + 8;
+    size_t m = (size_t)condensed->unknowns + 8, n = condensed->full->scales > 0 ? (size_t)unknowns + 8 : 0;
     if (!expanded)
         return NULL;
-    expanded->memory = calloc(2 * n + 2 * m, sizeof(double));
+    expanded->memory = calloc(2 * m + n, sizeof(double));
     if (!expanded->memory) {
         sd_expanded_free(expanded);
         return NULL;
     }
     expanded->inner = inner;
     expanded->condensed = condensed;
-    expanded->y = expanded->memory;
-    expanded->yd = expanded->y + n;
-    expanded->z = expanded->yd + n;
+    expanded->z = expanded->memory;
     expanded->zd = expanded->z + m;
+    expanded->y = n ? expanded->zd + m : NULL;
     expanded->face = *inner;
     expanded->face.self = expanded;
     expanded->face.n = unknowns;
-    expanded->face.y = expanded->y;
-    expanded->face.yd = expanded->yd;
+    expanded->face.y = expanded->face.yd = NULL;
     expanded->face.step = step;
     expanded->face.dense = dense;
     expanded->face.refine = inner->refine ? refine : NULL;

@@ -48,15 +48,26 @@ void sd_residual(sd_system *system, double t, const double *y, const double *yd,
     add_rows(system, t, y, yd, r);
 }
 
-/* adds one block's entries into their places; entries of one place add up */
-static void add_entries(sd_entries *block, const sd_frame *frame, int32_t n, const int32_t *slot, double t,
-                        const double *y, const double *yd, double *v, double *values)
+/* adds entries into their places, of a list that is told by its stretches */
+static void add_lines(int32_t stretches, const sd_lines *lines, const double *v, double *values)
 {
+    for (const sd_lines *end = lines + stretches; lines < end; lines++)
+        for (int32_t i = 0; i < lines->number; i++)
+            for (int32_t k = 0; k < lines->width; k++)
+                values[lines->first[k] + (int64_t)i * lines->step[k]] += *v++;
+}
+
+/* adds one block's entries into their places; entries of one place add up */
+static void add_entries(const sd_call *call, int rate, double t, const double *y, const double *yd, double *v, double *values)
+{
+    const int32_t n = rate ? call->n_dyd : call->n_dy, *slot = rate ? call->slot_dyd : call->slot_dy;
     if (n == 0)
         return;
-    block(frame, t, y, yd, v);
-    for (int32_t e = 0; e < n; e++)
+    (rate ? call->dyd : call->dy)(&call->frame, t, y, yd, v);
+    for (int32_t e = 0; e < n && slot; e++)
         values[slot[e]] += v[e];
+    if (!slot)
+        add_lines(rate ? call->stretches_dyd : call->stretches_dy, rate ? call->lines_dyd : call->lines_dy, v, values);
 }
 
 void sd_slopes(const sd_system *system, double t, const double *y, const double *yd, int rate, double *values)
@@ -64,11 +75,8 @@ void sd_slopes(const sd_system *system, double t, const double *y, const double 
     memset(values, 0, (size_t)system->entries * sizeof *values);
     for (int32_t i = 0; i < system->kinematics; i++)
         values[rate ? system->k_slot_q[i] : system->k_slot_f[i]] += rate ? system->k_scale[i] : -system->k_scale[i];
-    for (int32_t c = 0; c < system->calls; c++) {
-        const sd_call *call = &system->call[c];
-        add_entries(rate ? call->dyd : call->dy, &call->frame, rate ? call->n_dyd : call->n_dy,
-                    rate ? call->slot_dyd : call->slot_dy, t, y, yd, system->v, values);
-    }
+    for (int32_t c = 0; c < system->calls; c++)
+        add_entries(&system->call[c], rate, t, y, yd, system->v, values);
     for (int32_t i = 0; i < system->clear; i++)
         values[system->cleared[i]] = 0.0;
     for (int32_t i = 0; i < system->held; i++)
@@ -96,6 +104,16 @@ static int32_t steep_beyond(const sd_system *system, const double *jy, const dou
     return system->row ? system->row[e >= 0 ? e : sd_first_bad(system->entries, jyd)] : 0;
 }
 
+/* beside := a point near y at which slopes may be numbers */
+static void move_beside(const sd_system *system, const double *y, const double *size, int way, double *beside)
+{
+    double apart = 0.0;
+    for (int32_t j = 0; j < system->unknowns; j++) {
+        apart = sd_next_part(apart);
+        beside[j] = y[j] + way * (1.0 + apart) * (ROOT_BESIDE * fmax(fabs(y[j]), size ? size[j] : 0.0) + ROOT_LEAST);
+    }
+}
+
 int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *yd, const double *size, double *jy,
                     double *jyd)
 {
@@ -104,16 +122,36 @@ int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *
     int32_t bad = steep_beyond(system, jy, jyd);
     double *beside = bad < 0 ? NULL : malloc(((size_t)system->unknowns + SD_LANES) * sizeof *beside);
     for (int way = 1; way >= -1 && bad >= 0 && beside; way -= 2) {
-        double apart = 0.0;
-        for (int32_t j = 0; j < system->unknowns; j++) {
-            apart = sd_next_part(apart);
-            beside[j] = y[j] + way * (1.0 + apart) * (ROOT_BESIDE * fmax(fabs(y[j]), size ? size[j] : 0.0) + ROOT_LEAST);
-        }
+        move_beside(system, y, size, way, beside);
         evaluate_slopes(system, t, beside, yd, jy, jyd);
         bad = steep_beyond(system, jy, jyd);
     }
     free(beside);
     return bad;
+}
+
+static int evaluate_both(const sd_system *system, double t, const double *y, const double *yd, double *values)
+{
+    memset(values, 0, (size_t)system->entries * sizeof *values);
+    for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++) {
+        add_entries(call, 0, t, y, yd, system->v, values);
+        add_entries(call, 1, t, y, yd, system->v, values);
+    }
+    return sd_finite(system->entries, values);
+}
+
+int sd_both_slopes(const sd_system *system, double t, const double *y, const double *yd, double *values)
+{
+    if (evaluate_both(system, t, y, yd, values))
+        return 0;
+    double *beside = malloc(((size_t)system->unknowns + SD_LANES) * sizeof *beside);
+    int failed = beside ? 1 : -2;
+    for (int way = 1; way >= -1 && failed > 0; way -= 2) {
+        move_beside(system, y, NULL, way, beside);
+        failed = !evaluate_both(system, t, beside, yd, values);
+    }
+    free(beside);
+    return failed < 0 ? failed : 0;
 }
 
 void sd_steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s)

@@ -26,6 +26,13 @@
 
 #include <math.h>
 
+/* A stretch of a list of entries: `number` lines of `width` entries, of which the k-th of line i stands in place
+ * first[k] + i step[k]. */
+typedef struct sd_lines {
+    int32_t number, width;
+    const int32_t *first, *step;
+} sd_lines;
+
 typedef struct sd_call {
     sd_rows *rows;
     sd_entries *dy;
@@ -33,6 +40,8 @@ typedef struct sd_call {
     sd_frame frame;
     int32_t n_dy, n_dyd;
     const int32_t *slot_dy, *slot_dyd;
+    int32_t stretches_dy, stretches_dyd; /* of the lists, where there are no slots */
+    const sd_lines *lines_dy, *lines_dyd;
 } sd_call;
 
 typedef struct sd_system sd_system;
@@ -82,6 +91,9 @@ int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *
                     double *jyd);
 /* one of them, of a system that is not condensed; rate: dF/dyd */
 void sd_slopes(const sd_system *system, double t, const double *y, const double *yd, int rate, double *values);
+/* both in one list [entries], of a system without rows q' - f and held ones whose slots are places in it; slopes that are no
+ * numbers as above.  0; -2: no memory */
+int sd_both_slopes(const sd_system *system, double t, const double *y, const double *yd, double *values);
 /* s := magnitudes of the terms of steep rows at (t, y), zero in others; rate as below */
 void sd_steep_terms(sd_system *system, double t, const double *y, const double *rate, double *s);
 /* The first steep row whose residual r is more than `limit` of the magnitudes of its terms at (t, y), -1 where every one

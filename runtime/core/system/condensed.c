@@ -25,7 +25,7 @@ static inline __attribute__((always_inline)) void evaluate_alike(const sd_straig
     double *restrict out = x + straight->place;
     const double *restrict c = rate ? NULL : straight->constant, *restrict a = x + straight->source[0];
     const double *restrict b = straight->terms > 1 ? x + straight->source[1] : NULL;
-    const double fa = straight->factor[0], fb = b ? straight->factor[n] : 0.0;
+    const double fa = straight->factor[0], fb = b ? straight->factor[straight->alike] : 0.0;
     if (b)
         for (int32_t i = 0; i < n; i++)
             out[i] = fa * a[i] + fb * b[i];
@@ -154,15 +154,27 @@ static void residual(const sd_left *left, double t, const double *z, const doubl
     write_own(condensed, zd, r);
 }
 
+/* values += share * slope of the products */
+static void add_products(const sd_condensed *condensed, double *values)
+{
+    const double *slope = condensed->slope;
+    for (int64_t p = 0; p < condensed->products && condensed->from; p++)
+        values[condensed->to[p]] += condensed->share[p] * slope[condensed->from[p]];
+    for (int64_t s = 0; s < condensed->stretches; s++) {
+        const sd_shares *lines = &condensed->shares[s];
+        for (int64_t i = 0; i < lines->number; i++)
+            for (int32_t k = 0; k < lines->width; k++)
+                values[lines->to[k] + i * lines->to_step[k]] += lines->share[k] * slope[lines->from[k] + i * lines->from_step[k]];
+    }
+}
+
 static void jacobian(const sd_left *left, double t, const double *z, const double *zd, double *jz, double *jzd)
 {
     const sd_condensed *condensed = (const sd_condensed *)left;
     place(condensed, z, zd);
     for (int rate = 0; rate < 2; rate++) { /* one room for both: of a large system it is long */
-        double *values = rate ? jzd : jz;
         sd_slopes(condensed->full, t, condensed->y, condensed->yd, rate, condensed->slope);
-        for (int64_t p = 0; p < condensed->products; p++)
-            values[condensed->to[p]] += condensed->share[p] * condensed->slope[condensed->from[p]];
+        add_products(condensed, rate ? jzd : jz);
     }
 }
 

@@ -23,14 +23,21 @@ typedef struct sd_span {
     int32_t full, kept, number;
 } sd_span;
 
-/* y[place + i] = constant[i] + sum over k of factor[k * number + i] * y[source[k] + i]; alike: of factor[k * number], for
- * the others of its term are the same */
+/* y[place + i] = constant[i] + sum over k of factor[k * number + i] * y[source[k] + i]; alike, where each term has one
+ * factor: how far those of its terms stand apart, else 0 */
 typedef struct sd_straight {
     int32_t place, number, terms, alike;
     const int32_t *source;  /* [terms] */
-    const double *factor;   /* [terms][number] */
+    const double *factor;   /* [terms][number], or [terms][alike] */
     const double *constant; /* [number], NULL: zeros */
 } sd_straight;
+
+/* A stretch of products, told as sd_lines are; share [width]: of every line */
+typedef struct sd_shares {
+    int32_t number, width;
+    const int32_t *from, *from_step, *to, *to_step;
+    const double *share;
+} sd_shares;
 
 typedef struct sd_condensed {
     sd_left left;
@@ -41,8 +48,10 @@ typedef struct sd_condensed {
     const int32_t *own;
     const sd_straight *straight;
     int64_t products;
-    const int32_t *from, *to;
+    const int32_t *from, *to;       /* NULL: products are told by their stretches */
     const double *share;
+    int64_t stretches;
+    const sd_shares *shares;
     double *y, *yd, *r, *slope;
 } sd_condensed;
 

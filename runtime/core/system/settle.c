@@ -33,7 +33,8 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
     size_t nnz = (size_t)system->entries + 1, m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1;
     size_t kept = system->left ? (size_t)system->unknowns + 8 : 0;
     size_t most = linear && (size_t)linear->entries > 2 * m ? (size_t)linear->entries : 2 * m;
-    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 7 * n + 2 * kept, sizeof(double));
+    size_t steep = system->scales > 0 ? n : 0;
+    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 6 * n + steep + 2 * kept, sizeof(double));
     if (!settle->memory) {
         free(settle);
         return NULL;
@@ -54,7 +55,7 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
     settle->step = settle->scale + n; /* unknowns, rates and rows */
     settle->met = settle->step + n + m;
     settle->usual = settle->met + n;
-    settle->matrix = settle->usual + n;
+    settle->matrix = settle->usual + steep;
     settle->room = settle->matrix + most + 1;
     return settle;
 }

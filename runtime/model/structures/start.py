@@ -52,6 +52,7 @@ class RowsOfStart(c.Structure):
         ("k_q", P),
         ("k_f", P),
         ("extended", I),
+        ("both", P),
     ]
 
 

@@ -41,7 +41,7 @@ class Expanded(c.Structure):
 
     _fields_ = [
         ("face", Stepper),
-        *[(name, P) for name in ["inner", "condensed", "y", "yd", "z", "zd", "memory", "met", "magnitude"]],
+        *[(name, P) for name in ["inner", "condensed", "z", "zd", "memory", "y", "met", "magnitude"]],
     ]
 
 

@@ -21,6 +21,18 @@ class Frame(c.Structure):
     _fields_ = [("p", P), ("ix", P), ("at", P), ("to", P), ("spared", P)]
 
 
+class Lines(c.Structure):
+    """sd_lines."""
+
+    _fields_ = [("number", I), ("width", I), ("first", P), ("step", P)]
+
+
+class Shares(c.Structure):
+    """sd_shares."""
+
+    _fields_ = [("number", I), ("width", I), *[(name, P) for name in ["from_", "from_step", "to", "to_step", "share"]]]
+
+
 class Call(c.Structure):
     """sd_call."""
 
@@ -33,6 +45,10 @@ class Call(c.Structure):
         ("n_dyd", I),
         ("slot_dy", P),
         ("slot_dyd", P),
+        ("stretches_dy", I),
+        ("stretches_dyd", I),
+        ("lines_dy", P),
+        ("lines_dyd", P),
     ]
 
 
@@ -102,7 +118,9 @@ class Condensed(c.Structure):
         ("observed_rates", I),
         *[(name, P) for name in ["unknown", "row", "rate", "rest", "own", "straight"]],
         ("products", L),
-        *[(name, P) for name in ["from_", "to", "share", "y", "yd", "r", "slope"]],
+        *[(name, P) for name in ["from_", "to", "share"]],
+        ("stretches", L),
+        *[(name, P) for name in ["shares", "y", "yd", "r", "slope"]],
     ]
 
 
