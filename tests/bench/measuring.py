@@ -118,7 +118,7 @@ def _cpu(outcome: Outcome) -> float:
 
 class Reference:
     """A run at `rtol` with rows at all instants of the runs it is to judge, and the time tolerance beside them.  Where a
-    law jumps Newton's iteration keeps radau from it (tube): rosenbrock near its finest tolerance is off by 1e-7 there.
+    law jumps, which radau's iteration does not pass (tube), one of rosenbrock near its finest tolerance: 1e-7 there.
     """
 
     def __init__(self, bench: Bench, runs: list[Measured], rtol: float = 1e-15) -> None:
