@@ -117,7 +117,7 @@ def _cpu(outcome: Outcome) -> float:
 
 
 class Reference:
-    """A run at `rtol` with rows at all instants of the runs that it judges, and the time tolerance beside them.  Where a
+    """A run at `rtol` with rows at all instants of the runs it judges, and the time tolerance beside them.  Where a
     law jumps, which radau's iteration does not pass (tube), one of rosenbrock near its finest tolerance: 1e-7 there.
     """
 
