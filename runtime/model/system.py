@@ -361,7 +361,7 @@ class System(Facts):
 
     def steep_rows(self, t: float) -> Mask:
         """Rows that hold a steep law [rows]: those for which a scale is compiled."""
-        return self.steep_sizes(t, np.ones(self.form.written)) != 0.0
+        return np.asarray(self.steep_sizes(t, np.ones(self.form.written)) != 0.0)
 
     def steep_sizes(self, t: float, y: Floats) -> Floats:
         """Sums of the magnitudes of the terms of rows that hold a steep law [rows], rates as large as y; else 0."""
