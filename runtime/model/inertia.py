@@ -6,11 +6,18 @@ give it as -(dr/dp)^-1 dr/df (Hamilton).
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 
+Places = NDArray[np.integer[Any]]
+Entries = tuple[Places, Places, Floats]
+
+CANCELS = 1e-12
+"""Sum of a column of M over that of its magnitudes that is round-off."""
 
 def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
     """The entry of each unknown of a kind in its coordinate's row of a group [unknowns]; 0 where there is none."""
@@ -48,34 +55,94 @@ def own_inertia(system: System, jy: Floats | None, jyd: Floats) -> Floats:
     return found
 
 
+class Inertia:
+    """M by the rows of a form: entries of balances at rates of flows, of rows of momentum at flows and at momenta, each
+    (row, column, value) by the flows of their coordinates.  jy, jyd [entries]: dF/dy, dF/dyd.
+    """
+
+    def __init__(self, system: System, jy: Floats, jyd: Floats) -> None:
+        moving = system.are("f")
+        self.size = int(moving.sum())
+        flow = np.where(moving, np.cumsum(moving) - 1, -1)
+        momentum = np.full(system.unknowns, -1, dtype=np.int64)
+        momenta, flows = with_flows(system)
+        momentum[momenta] = flow[flows]
+        self.without = ~np.isin(np.arange(self.size), momentum)  # a momentum
+        columns = system.pattern.columns_of()
+
+        def entries(group: str, unknown: NDArray[np.int64], values: Floats) -> Entries:
+            own = own_unknown(system, group, "f")[system.pattern.row]
+            column = unknown[columns]
+            take = (own >= 0) & (column >= 0)
+            return flow[own[take]], column[take], values[take]
+
+        self.balances = entries("dynamics", flow, jyd)
+        self.by_flow, self.by_momentum = entries("momentum", flow, jy), entries("momentum", momentum, jy)
+
+    def joined(self) -> Places:
+        """Pairs of flows [2, k] of which one has an inertia in the other's rows."""
+        parts = self.balances, self.by_flow, self.by_momentum
+        return np.hstack([np.stack([i[v != 0.0], j[v != 0.0]]) for i, j, v in parts])
+
+    def blocks(self, members: Places) -> Floats:
+        """M [k, s, s] of groups of flows [k, s] that nothing joins with others; no numbers where momenta do not
+        determine their flows.
+        """
+        number, s = members.shape
+        group, place = np.full(self.size, -1, dtype=np.int64), np.zeros(self.size, dtype=np.int64)
+        group[members], place[members] = np.arange(number)[:, None], np.arange(s)
+
+        def block(entries: Entries) -> Floats:
+            i, j, values = entries
+            take = (group[i] >= 0) & (group[i] == group[j])
+            found = np.zeros((number, s, s))
+            np.add.at(found, (group[i[take]], place[i[take]], place[j[take]]), values[take])
+            return found
+
+        slopes = block(self.by_momentum)
+        k, at = np.nonzero(self.without[members])
+        slopes[k, at, at] = 1.0
+        try:
+            carried = np.linalg.solve(slopes, block(self.by_flow))
+        except np.linalg.LinAlgError:
+            return np.full((number, s, s), np.nan)
+        return np.asarray(block(self.balances) - carried)
+
+    def cancels(self, members: Places) -> bool:
+        """Whether the balances of flows, added up, have no rate left; momenta are to be given by their own rows."""
+        mine = np.zeros(self.size, dtype=bool)
+        mine[members] = True
+        own = np.ones(self.size)
+        i, j, values = self.by_momentum
+        if (values[(i != j) & mine[i]] != 0.0).any():
+            return False
+        own[i[i == j]] = values[i == j]
+        total, size = np.zeros(self.size), np.zeros(self.size)
+        for (i, j, values), over in ((self.balances, None), (self.by_flow, own)):
+            part = values if over is None else -values / over[i]
+            np.add.at(total, j[mine[i]], part[mine[i]])
+            np.add.at(size, j[mine[i]], np.abs(part[mine[i]]))
+        return bool((np.abs(total) <= CANCELS * size).all())
+
+
+def joins(system: System) -> bool:
+    """Whether a coordinate's rows may hold inertia of another one's flow."""
+    columns, flows = system.pattern.columns_of(), system.are("f")
+    in_y, in_rate = system.structural()
+    for group, there in (("dynamics", in_rate), ("momentum", in_y)):
+        own = own_unknown(system, group, "f")[system.pattern.row]
+        if (there & (own >= 0) & flows[columns] & (own != columns)).any():
+            return True
+    return False
+
+
 def inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
     """M [flows, flows] as a full matrix; no numbers where momenta do not determine their flows.
 
     jy, jyd [entries]: dF/dy, dF/dyd.
     """
-    moving = system.are("f")
-    size, flow = int(moving.sum()), np.where(moving, np.cumsum(moving) - 1, -1)
-    momentum = np.full(system.unknowns, -1, dtype=np.int64)
-    momenta, flows = with_flows(system)
-    momentum[momenta] = flow[flows]
-
-    def gathered(group: str, unknown: NDArray[np.int64], values: Floats) -> Floats:
-        """Entries of a group's rows at unknowns, both by the flow of their coordinate (unknown: of each, or -1)."""
-        own = own_unknown(system, group, "f")[system.pattern.row]
-        column = unknown[system.pattern.columns_of()]
-        take = (own >= 0) & (column >= 0)
-        found = np.zeros((size, size))
-        np.add.at(found, (flow[own[take]], column[take]), values[take])
-        return found
-
-    slopes = gathered("momentum", momentum, jy)
-    without = ~np.isin(np.arange(size), momentum)
-    slopes[without, without] = 1.0
-    try:
-        carried = np.linalg.solve(slopes, gathered("momentum", flow, jy))
-    except np.linalg.LinAlgError:
-        return np.full((size, size), np.nan)
-    return gathered("dynamics", flow, jyd) - carried
+    found = Inertia(system, jy, jyd)
+    return np.asarray(found.blocks(np.arange(found.size)[None])[0])
 
 
 def own_places(system: System) -> tuple[NDArray[np.int64], ...]:

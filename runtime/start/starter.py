@@ -19,19 +19,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import START, Floats, Initial, Ints, stated
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
-from sysdyn.runtime.model.inertia import inertia, own_inertia, own_unknown
+from sysdyn.runtime.model.inertia import Inertia, joins, own_inertia, own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.gauss_newton import Problem, Work
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.numerics.products import add_sizes
-from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.equations import Equations
+from sysdyn.runtime.start.sums import Sums, of_few, of_many
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
@@ -118,13 +119,11 @@ class Starter:
         self._momentum, self._flow = known.momentum, known.flow
         self.every = ~known.unsettled  # rows that must hold
         self.rows, self.columns = known.rows, known.columns
-        self._summed = np.flatnonzero(known.unsettled)
-        self._sums = self._floating(self._summed)
-        self._places = self._summed[: len(self._sums)]  # where these stand
+        unsettled = np.flatnonzero(known.unsettled)
+        self._sums = Sums(self._floating(unsettled), unsettled, (known.rows, known.columns), known.unknowns)
+        self.every[self._sums.places] = True
         if self.summed:
-            self.every[self._places] = True
-            self.rows = np.append(self.rows, np.repeat(self._places, known.unknowns))
-            self.columns = np.append(self.columns, np.tile(np.arange(known.unknowns), self._places.size))
+            self.rows, self.columns = np.append(self.rows, self._sums.rows), np.append(self.columns, self._sums.columns)
         self.guess = np.append(self.given.guess, np.zeros(self.rates.size))
         self.given = replace(self.given, guess=self.guess[: self.n])
         self.free = np.append(~self.given.fixed, np.ones(self.rates.size, dtype=bool))
@@ -208,13 +207,8 @@ class Starter:
 
     def jacobian(self, t: float, x: Floats) -> Floats:
         """Values at (self.rows, self.columns)."""
-        known, values = self.equations, self._slopes(t, x)
-        if not self.summed:
-            return values
-        full = np.zeros((self.settled.rows, known.unknowns))
-        np.add.at(full, (known.rows, known.columns), values)
-        alone = np.where(np.isin(known.rows, self._summed), 0.0, values)
-        return np.append(alone, self._sums @ full[self._summed])
+        values = self._slopes(t, x)
+        return self._sums.slopes(values) if self.summed else values
 
     def row_scale(self, t: float, x: Floats, scale: Floats) -> Floats:
         """One over the size of the terms of each row [rows], by the larger of magnitudes and values; of sums over that
@@ -223,7 +217,7 @@ class Starter:
         known, size = self.equations, np.zeros(self.settled.rows)
         add_sizes(known.rows, known.columns, self._slopes(t, x), np.maximum(scale, np.abs(x)), size)
         if self.summed:
-            size[self._places] = np.abs(self._sums) @ size[self._summed]
+            self._sums.put(size, sizes=True)
         size[~(size > 0.0)] = 1.0
         return np.divide(1.0, size, out=size)
 
@@ -231,7 +225,7 @@ class Starter:
         """Values of all rows [rows, k] with the sums of rows in their places."""
         if self.summed:
             values = values.copy()
-            values[self._places] = self._sums @ values[self._summed]
+            self._sums.put(values)
         return values
 
     @property
@@ -257,25 +251,28 @@ class Starter:
         found[: self.n] = self.settled.are(*kinds)
         return found
 
-    def _floating(self, unsettled: Places) -> Floats:
-        """Sums [k, unsettled] of balances with inertia that read none: T* holds nothing but differences of their flows.
+    def _floating(self, unsettled: Places) -> csr_array:
+        """Sums [k, unsettled] of balances with inertia that read none: T* holds fewer combinations of their flows.
 
-        They are taken from the matrix of inertia at two points: what moves with the state is left out.
+        They are taken from the inertia at two points: what moves with the state is left out.
         """
-        if unsettled.size and self.n <= DENSE:
-            matrix = np.hstack([self._inertia(unsettled, shift) for shift in (0.0, 0.1)])
-            if np.isfinite(matrix).all():
-                size = np.abs(matrix).max(axis=0)
-                return null_space((matrix / np.where(size > 0.0, size, 1.0)).T).T
-        return np.zeros((0, unsettled.size))
+        settled = self.settled
+        few, many = unsettled.size and self.n <= DENSE, unsettled.size and self.n > DENSE and joins(settled)
+        if not (few or many):
+            return csr_array((0, unsettled.size))
+        points = [self._inertia(shift) for shift in (0.0, 0.1)]
+        number = np.cumsum(settled.are("f")) - 1
+        own = own_unknown(settled, "dynamics_rate", "f")[unsettled]
+        own = np.where(own >= 0, number[own], -1)
+        if many:
+            return of_many(points, own, DENSE)
+        whole = np.arange(points[0].size)[None]
+        return of_few(np.hstack([np.where((own >= 0)[:, None], p.blocks(whole)[0][own], 0.0) for p in points]))
 
-    def _inertia(self, unsettled: Places, shift: float) -> Floats:
-        """The matrix of inertia beside a state [dynamics_rate rows, flows]; zeros where a row is no flow's balance."""
+    def _inertia(self, shift: float) -> Inertia:
+        """Inertia beside the state that the text says."""
         y = self.given.guess + shift * (1.0 + np.abs(self.given.guess)) * np.cos(np.arange(self.n))
-        matrix = inertia(self.settled, *self.settled.jacobian(0.0, y, np.zeros(self.n)))
-        number = np.cumsum(self.settled.are("f")) - 1
-        own = own_unknown(self.settled, "dynamics_rate", "f")[unsettled]
-        return np.where((own >= 0)[:, None], matrix[number[own]], 0.0)
+        return Inertia(self.settled, *self.settled.jacobian(0.0, y, np.zeros(self.n)))
 
     @property
     def balanced(self) -> bool:

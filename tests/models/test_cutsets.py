@@ -256,3 +256,54 @@ def test_a_mass_on_a_lever_between_springs(tmp_path, formulation):
     for name, value in {"x": x, "y": -2 / 3 * x, "v": v, "w": -2 / 3 * v}.items():
         assert trace[name].values == pytest.approx(value, abs=2e-6), name
     assert trace["w"].values[0] == pytest.approx(-1.4 / 3, rel=1e-12)
+
+
+LEVERS = """
+model levers {{
+  param n = {n}
+  coord x[1..n], y[1..n]: translation
+  for i in 1..n {{
+    energy T* = 1/2*(1 kg)*(x[i]' - 2*y[i]')^2
+    energy V = 1/2*(1 N/m)*x[i]^2 + 1/2*(3 N/m)*y[i]^2
+    init x[i] = 1 m
+    init x[i]' = 0.7 m/s
+  }}
+}}
+scene go of levers {{ time 0 s to 3 s; accuracy 1e-6; trace x[n] as x, y[n] as y, y[n]' as w every 0.1 s }}
+"""
+
+
+@pytest.mark.parametrize("n", [3, 300])
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_however_many_levers_begin_where_their_balances_say(tmp_path, formulation, n):
+    """2 x + 3 y = 0 follows from both balances, and its rate: x'' = -3/7 x, a mass of 7/3 kg on a spring of 1 N/m."""
+    trace = trace_of(tmp_path, LEVERS.format(n=n), scene="go", formulation=formulation)
+    t, rate = trace.time, np.sqrt(3 / 7)
+    x, v = np.cos(rate * t) + 0.7 / rate * np.sin(rate * t), -rate * np.sin(rate * t) + 0.7 * np.cos(rate * t)
+    for name, exact in (("x", x), ("y", -2 / 3 * x), ("w", -2 / 3 * v)):
+        assert np.abs(trace[name].values - exact).max() < 1e-6, name
+
+
+INERTERS = """
+model inerters {{
+  param n = {n}
+  coord x[1..n]: translation
+  for i in 1..n-1 {{ energy T* = 1/2*(1 kg)*(x[i]' - x[i+1]')^2 }}
+  for i in 1..n {{ energy V = 1/2*(1 N/m)*(1 + i/n)*x[i]^2 }}
+  init x[1] = 1 m
+  init x[1]' = 0.7 m/s
+}}
+scene go of inerters {{
+  time 0 s to 0.1 s
+  trace sum(i in 1..n: (1 + i/n)*x[i]) as s, sum(i in 1..n: (1 + i/n)*x[i]') as r, x[1] every 0.1 s
+}}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_a_long_chain_of_inerters_begins_where_its_springs_balance(tmp_path, formulation):
+    """All balances added up have no rate left: sum k x = 0, and so have rates."""
+    trace = trace_of(tmp_path, INERTERS.format(n=450), scene="go", formulation=formulation)
+    assert abs(trace["x[1]"].values[0] - 1.0) < 1e-12
+    assert abs(trace["s"].values[0]) < 1e-12
+    assert abs(trace["r"].values[0]) < 1e-11

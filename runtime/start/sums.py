@@ -1,0 +1,99 @@
+"""Sums of balances in which no rate of an inertia is left: rows of a start alone.
+
+T* may hold flows in fewer combinations than there are flows (differences of floating nodes, levers): what the others do
+follows from the balances, summed so that the rates go.  A sum stands in the place of one of its balances.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.inertia import Inertia, Places
+from sysdyn.runtime.numerics.rank import TOLERANCE, null_space
+
+Entries = tuple[Places, Places]
+
+
+class Sums:
+    """weights [sums, summed]: of the rows `summed` (places); rows, columns: the entries of the sums' derivatives.
+
+    entries: rows and columns of what is summed, of as many unknowns.
+    """
+
+    def __init__(self, weights: csr_array, summed: Places, entries: Entries, unknowns: int) -> None:
+        self.weights, self.summed = weights, summed
+        self.places = summed[: weights.shape[0]]
+        self.rows = self.columns = np.zeros(0, dtype=np.int64)
+        if not self.places.size:
+            return
+        place = np.full(int(max(entries[0].max(), summed.max())) + 1, -1)
+        place[summed] = np.arange(summed.size)
+        row = place[entries[0]]
+        self._mine = np.flatnonzero(row >= 0)
+        self._mine = self._mine[np.argsort(row[self._mine], kind="stable")]
+        begin = np.searchsorted(row[self._mine], np.arange(summed.size + 1))
+        terms = weights.tocoo()
+        number = np.diff(begin)[terms.col]
+        of = np.repeat(np.arange(terms.nnz), number)
+        within = np.arange(of.size) - np.repeat(np.cumsum(number) - number, number)
+        self._entry, self._weight = self._mine[begin[terms.col][of] + within], terms.data[of]
+        key = terms.row[of].astype(np.int64) * unknowns + entries[1][self._entry]
+        keys, self._slot = np.unique(key, return_inverse=True)
+        self.rows, self.columns = self.places[keys // unknowns], keys % unknowns
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def slopes(self, values: Floats) -> Floats:
+        """Values of what is summed with those of the sums behind them; of summed rows by themselves none are left."""
+        own = np.bincount(self._slot, self._weight * values[self._entry], minlength=self.rows.size)
+        alone = values.copy()
+        alone[self._mine] = 0.0
+        return np.append(alone, own)
+
+    def put(self, values: Floats, *, sizes: bool = False) -> None:
+        """The sums of values [rows] or [rows, k] in their places; sizes: of magnitudes, which do not cancel."""
+        values[self.places] = (abs(self.weights) if sizes else self.weights) @ values[self.summed]
+
+
+def of_few(matrix: Floats) -> csr_array:
+    """Sums [k, rows] of the rows of a full matrix of inertia that are nothing."""
+    if not np.isfinite(matrix).all():
+        return csr_array((0, len(matrix)))
+    size = np.abs(matrix).max(axis=0)
+    return csr_array(null_space((matrix / np.where(size > 0.0, size, 1.0)).T).T)
+
+
+def of_many(points: list[Inertia], own: Places, most: int) -> csr_array:
+    """The same of flows that inertia joins in groups, each at most `most` large; of larger ones the plain sum if it is
+    one.  points: inertia at several points; own [rows]: the flow whose balance a row is, or -1.
+    """
+    number = points[0].size
+    joined = np.hstack([point.joined() for point in points])
+    graph = csr_array((np.ones(joined.shape[1]), (joined[0], joined[1])), shape=(number, number))
+    label = connected_components(graph, directed=False)[1]
+    place = np.full(number, -1)
+    place[own[own >= 0]] = np.flatnonzero(own >= 0)
+    order = np.argsort(label, kind="stable")
+    begin = np.searchsorted(label[order], np.arange(int(label.max(initial=-1)) + 2))
+    size = np.diff(begin)
+    found: list[tuple[Places, Floats]] = []
+    for s in np.unique(size[(size > 1) & (size <= most)]):
+        members = order[begin[:-1][size == s][:, None] + np.arange(s)]
+        members = members[(place[members] >= 0).all(axis=1)]
+        blocks = np.concatenate([point.blocks(members) for point in points], axis=2)
+        members, blocks = (item[np.isfinite(blocks).all(axis=(1, 2))] for item in (members, blocks))
+        scale = np.abs(blocks).max(axis=1, keepdims=True)
+        u, sigma, _ = np.linalg.svd(blocks / np.where(scale > 0.0, scale, 1.0), full_matrices=True)
+        least = sigma <= TOLERANCE * sigma.max(axis=1, keepdims=True)
+        for block, k in zip(*np.nonzero(least), strict=True):
+            found.append((place[members[block]], u[block, :, k]))
+    for c in np.flatnonzero(size > most):
+        members = order[begin[c] : begin[c + 1]]
+        if (place[members] >= 0).all() and all(point.cancels(members) for point in points):
+            found.append((place[members], np.full(members.size, members.size**-0.5)))
+    row = np.repeat(np.arange(len(found)), [len(p) for p, _ in found])
+    columns, values = (np.concatenate([item[k] for item in found] or [np.zeros(0)]) for k in (0, 1))
+    return csr_array((values, (row, columns.astype(np.int64))), shape=(len(found), own.size))
