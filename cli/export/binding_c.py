@@ -170,7 +170,7 @@ def _call(name: str, k: int, call: Call) -> str:
     )
     frame = f"{{NULL, ix, {name}_at_{k}, {name}_to_{k}, NULL}}"
     numbers = f"{call.dy.size}, {call.dyd.size}, {name}_dy_{k}, {name}_dyd_{k}"
-    return f"    {{sd_{call.block}_rows, {dy}, {dyd}, {frame}, {numbers}}},"
+    return f"    {{sd_{call.block}_rows, {dy}, {dyd}, {frame}, {numbers}, 0, 0, NULL, NULL}},"
 
 
 def _whole(tables: Tables) -> Iterable[str]:

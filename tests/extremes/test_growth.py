@@ -84,8 +84,8 @@ def test_zeros_at_the_start_count_as_a_part_of_their_like(tmp_path, monkeypatch)
     """Not as what they move in the shortest time about: beside that what moves at last is without bounds."""
     found = []
 
-    def magnitudes(*arguments):
-        magnitude, time = scales.magnitudes(*arguments)
+    def magnitudes(*arguments, **named):
+        magnitude, time = scales.magnitudes(*arguments, **named)
         found.append(magnitude.copy())  # a run's own grow
         return magnitude, time
 

@@ -1,5 +1,7 @@
 """What constant sums define leaves the system: results are those of the equations, every unknown is there again."""
 
+import ctypes
+
 import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
@@ -9,6 +11,7 @@ from sysdyn.api import load, simulate
 from sysdyn.cli.main import run
 from sysdyn.runtime.condense import condensed as condensing
 from sysdyn.runtime.integrate import integrate, settlers
+from sysdyn.runtime.model import core_library as lib
 
 N = 30
 LINE = """
@@ -118,11 +121,11 @@ def _same_rows(left, t, n, _):
     gone = whole.form.k_row[np.isin(whole.form.k_q, found.unread)]
     scale = np.abs(r).max()
     assert np.abs(r[np.setdiff1d(defining, gone)]).max() < 1e-13 * scale
-    jy, _ = whole.jacobian(t, y, yd)
     dense = np.zeros((left.rows, left.unknowns))
-    products = np.zeros(left.pattern.entries)
-    np.add.at(products, left._to, left._share * jy[left._from])
-    dense[left.pattern.row, left.pattern.columns_of()] = products
+    slopes, rates = np.zeros((2, left.pattern.entries + 1))
+    points = (lib.pointer(np.append(item, np.zeros(8))) for item in (z, zd))
+    lib.core.sd_jacobian(ctypes.byref(left.core), t, *points, None, lib.pointer(slopes), lib.pointer(rates))
+    dense[left.pattern.row, left.pattern.columns_of()] = slopes[:-1]
     moved = random.normal(size=left.unknowns)
     y2 = y.copy()
     y2[left.kept] += moved
