@@ -9,7 +9,8 @@
  *   Y_i = y + sum_(j<i) a_ij u_j,   Z_i = z + sum_(j<i) a_ij v_j,   s_i = sum_(j<i) C_ij u_j / h
  * E may depend on y; what occurs undifferentiated follows from its own rows, whose remainders the next step takes in.
  * The last stage is the solution, y = Y_8 + u_8, and u_8 the difference to the embedded one of order 4: the error test.
- * It sees what follows from the state too, which no iteration brings onto its rows.
+ * It sees what follows from the state too, which no iteration brings onto its rows; where a law jumps, that jumps in a step
+ * however short, which is told by its error (stays), and the error of the state decides.
  * Values within a step: the method's own polynomial, of order 4.
  */
 #ifndef SYSDYN_ROSENBROCK_H
