@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import START, Floats, Initial, Ints, stated
@@ -32,7 +31,7 @@ from sysdyn.runtime.numerics.gauss_newton import Problem, Work
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.numerics.products import add_sizes
 from sysdyn.runtime.start.equations import Equations
-from sysdyn.runtime.start.sums import Sums, of_few, of_many
+from sysdyn.runtime.start.sums import Sums, Weights, of_few, of_many, weights
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
@@ -251,15 +250,15 @@ class Starter:
         found[: self.n] = self.settled.are(*kinds)
         return found
 
-    def _floating(self, unsettled: Places) -> csr_array:
-        """Sums [k, unsettled] of balances with inertia that read none: T* holds fewer combinations of their flows.
+    def _floating(self, unsettled: Places) -> Weights:
+        """Sums of `unsettled` balances with inertia that read none: T* holds fewer combinations of their flows.
 
         They are taken from the inertia at two points: what moves with the state is left out.
         """
         settled = self.settled
         few, many = unsettled.size and self.n <= DENSE, unsettled.size and self.n > DENSE and joins(settled)
         if not (few or many):
-            return csr_array((0, unsettled.size))
+            return weights(np.zeros((0, unsettled.size)))
         points = [self._inertia(shift) for shift in (0.0, 0.1)]
         number = np.cumsum(settled.are("f")) - 1
         own = own_unknown(settled, "dynamics_rate", "f")[unsettled]

@@ -6,25 +6,48 @@ follows from the balances, summed so that the rates go.  A sum stands in the pla
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import Inertia, Places
 from sysdyn.runtime.numerics.rank import TOLERANCE, null_space
+from sysdyn.values import dataclass
 
 Entries = tuple[Places, Places]
 
 
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """Of `number` sums of rows: sum, row and value of each [k]."""
+
+    number: int
+    sum: Places
+    row: Places
+    value: Floats
+
+    def __matmul__(self, values: Floats) -> Floats:
+        """The sums of values [rows] or [rows, columns]."""
+        found = np.zeros((self.number, *values.shape[1:]))
+        np.add.at(found, self.sum, (self.value * values[self.row].T).T)
+        return found
+
+
+def weights(matrix: Floats) -> Weights:
+    """Those of a full matrix [sums, rows]."""
+    total, row = np.nonzero(matrix)
+    return Weights(len(matrix), total, row, matrix[total, row])
+
+
 class Sums:
-    """weights [sums, summed]: of the rows `summed` (places); rows, columns: the entries of the sums' derivatives.
+    """weights: of the rows `summed` (places); rows, columns: the entries of the sums' derivatives.
 
     entries: rows and columns of what is summed, of as many unknowns.
     """
 
-    def __init__(self, weights: csr_array, summed: Places, entries: Entries, unknowns: int) -> None:
+    def __init__(self, weights: Weights, summed: Places, entries: Entries, unknowns: int) -> None:
         self.weights, self.summed = weights, summed
-        self.places = summed[: weights.shape[0]]
+        self.places = summed[: weights.number]
         self.rows = self.columns = np.zeros(0, dtype=np.int64)
         if not self.places.size:
             return
@@ -34,12 +57,11 @@ class Sums:
         self._mine = np.flatnonzero(row >= 0)
         self._mine = self._mine[np.argsort(row[self._mine], kind="stable")]
         begin = np.searchsorted(row[self._mine], np.arange(summed.size + 1))
-        terms = weights.tocoo()
-        number = np.diff(begin)[terms.col]
-        of = np.repeat(np.arange(terms.nnz), number)
+        number = np.diff(begin)[weights.row]
+        of = np.repeat(np.arange(weights.row.size), number)
         within = np.arange(of.size) - np.repeat(np.cumsum(number) - number, number)
-        self._entry, self._weight = self._mine[begin[terms.col][of] + within], terms.data[of]
-        key = terms.row[of].astype(np.int64) * unknowns + entries[1][self._entry]
+        self._entry, self._weight = self._mine[begin[weights.row][of] + within], weights.value[of]
+        key = weights.sum[of].astype(np.int64) * unknowns + entries[1][self._entry]
         keys, self._slot = np.unique(key, return_inverse=True)
         self.rows, self.columns = self.places[keys // unknowns], keys % unknowns
 
@@ -55,21 +77,26 @@ class Sums:
 
     def put(self, values: Floats, *, sizes: bool = False) -> None:
         """The sums of values [rows] or [rows, k] in their places; sizes: of magnitudes, which do not cancel."""
-        values[self.places] = (abs(self.weights) if sizes else self.weights) @ values[self.summed]
+        own = self.weights
+        own = replace(own, value=np.abs(own.value)) if sizes else own
+        values[self.places] = own @ values[self.summed]
 
 
-def of_few(matrix: Floats) -> csr_array:
+def of_few(matrix: Floats) -> Weights:
     """Sums [k, rows] of the rows of a full matrix of inertia that are nothing."""
     if not np.isfinite(matrix).all():
-        return csr_array((0, len(matrix)))
+        return weights(np.zeros((0, len(matrix))))
     size = np.abs(matrix).max(axis=0)
-    return csr_array(null_space((matrix / np.where(size > 0.0, size, 1.0)).T).T)
+    return weights(null_space((matrix / np.where(size > 0.0, size, 1.0)).T).T)
 
 
-def of_many(points: list[Inertia], own: Places, most: int) -> csr_array:
+def of_many(points: list[Inertia], own: Places, most: int) -> Weights:
     """The same of flows that inertia joins in groups, each at most `most` large; of larger ones the plain sum if it is
     one.  points: inertia at several points; own [rows]: the flow whose balance a row is, or -1.
     """
+    from scipy.sparse import csr_array  # small models do without
+    from scipy.sparse.csgraph import connected_components
+
     number = points[0].size
     joined = np.hstack([point.joined() for point in points])
     graph = csr_array((np.ones(joined.shape[1]), (joined[0], joined[1])), shape=(number, number))
@@ -96,4 +123,4 @@ def of_many(points: list[Inertia], own: Places, most: int) -> csr_array:
             found.append((place[members], np.full(members.size, members.size**-0.5)))
     row = np.repeat(np.arange(len(found)), [len(p) for p, _ in found])
     columns, values = (np.concatenate([item[k] for item in found] or [np.zeros(0)]) for k in (0, 1))
-    return csr_array((values, (row, columns.astype(np.int64))), shape=(len(found), own.size))
+    return Weights(len(found), row, columns.astype(np.int64), values)
