@@ -15,6 +15,7 @@ from sysdyn.dsl.format.format import format_text
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.decoding import decode
 from sysdyn.dsl.text.diagnostics import SourceText
+from sysdyn.dsl.text.source import real
 
 
 @with_console("fmt")
@@ -66,7 +67,7 @@ def difference(source: SourceText, text: str, what: str = "formatted") -> list[s
 
 def replace(path: Path, text: str) -> None:
     """Write beside the file, then rename: a file is never half written."""
-    target = Path(os.path.realpath(path))
+    target = real(path)
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=".sd")
     try:
         with os.fdopen(handle, "w", encoding="utf-8", newline="") as stream:

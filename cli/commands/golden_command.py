@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, USAGE, UsageError
 from sysdyn.cli.options import FORMULATIONS, Setting, side_by_side
 from sysdyn.cli.page.columns import aligned
+from sysdyn.dsl.text.source import real
 
 if TYPE_CHECKING:
     from sysdyn.cli.golden.book import Golden
@@ -99,7 +99,7 @@ def record(
     label, scene_name, model_name = chosen
     place = Path(folder) / (name or Path(file).stem)
     known = read(place) if (place / BOOK).is_file() else ()
-    if any(Path(os.path.realpath(g.model)) != Path(os.path.realpath(file)) for g in known):
+    if any(real(g.model) != real(file) for g in known):
         raise UsageError(f"{place} is of {known[0].model}: --name gives another folder")
     if any(g.name == label for g in known):
         raise UsageError(f"{place.name}/{label} is recorded already: 'sysdyn golden accept' renews it, with a reason")

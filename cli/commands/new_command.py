@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 from pathlib import Path
 
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import FAULT
+from sysdyn.dsl.text.source import real
 
 
 @with_console("new")
@@ -18,7 +18,7 @@ def command(console: Console, name: Path) -> int:
     """Begin a project in the folder NAME: a model with scenes, a golden trace, a file for CI. It passes as it is."""
     from sysdyn.cli.project import skeleton
 
-    folder = Path(os.path.realpath(name))
+    folder = real(name)
     written = skeleton.write(folder)
     model = skeleton.named(folder)
     said = _recorded(folder, f"{model}.sd")

@@ -6,12 +6,12 @@ the first that has one counts. What a scene says (accuracy, formulation, ...) is
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from sysdyn.cli.failures import UsageError
+from sysdyn.dsl.text.source import real
 
 FILES = ("sysdyn.toml", "pyproject.toml")
 _RUNS = ("simulate", "report", "sweep", "trade", "verify", "reduce")
@@ -91,7 +91,7 @@ def _found(arguments: Sequence[str]) -> tuple[Path, Mapping[str, Any]] | None:
     """The file that counts, and its table."""
     given = next((Path(a) for a in arguments[1:] if not a.startswith("-") and Path(a).exists()), Path())
     start = given if given.is_dir() else given.parent
-    folder = Path(os.path.realpath(start))
+    folder = real(start)
     for level in (folder, *folder.parents):
         for name in FILES:
             path = level / name
@@ -158,6 +158,6 @@ def _instead(table: str, key: str) -> str:
 def _relative(path: Path) -> Path:
     """A path from the current folder, where it lies below."""
     try:
-        return Path(os.path.realpath(path)).relative_to(Path.cwd())
+        return real(path).relative_to(Path.cwd())
     except ValueError:
         return path

@@ -16,8 +16,9 @@ from sysdyn.compiler.model.energies import flows
 from sysdyn.compiler.model.terms import canonical, local_variables, split, terms
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.calculus import differential, rate
-from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, reduction, sub, substitute, var
+from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, sub, substitute, var
 from sysdyn.dsl.model.network import Branch, Dynamic, Energy, Initial, Loop, Network, Observation, State, Work
+from sysdyn.dsl.model.rewriting import summed
 from sysdyn.dsl.model.units import si
 from sysdyn.dsl.text.diagnostics import ModelError, Place
 from sysdyn.runtime.trace.trace import Trace
@@ -120,7 +121,7 @@ def _of_branches(branches: Sequence[Branch]) -> Iterator[list[Part]]:
         if first.kind not in ROLES or first.domain.pseudo:
             continue
         power = [
-            _over(b.loops, mul(var(b.name, "be", *b.at), var(b.name, "bf", *b.at))) for b in pieces if b.kind in ROLES
+            summed(mul(var(b.name, "be", *b.at), var(b.name, "bf", *b.at)), b.loops) for b in pieces if b.kind in ROLES
         ]
         label = shown(name) + (f"[{_ranges(pieces)}]" if first.at else "")
         yield [Part(f"power of {name}", label, ROLES[first.kind], True, add(*power), first.place, first.domain.name)]
@@ -163,17 +164,11 @@ def _measure(statement: Energy | Work) -> tuple[str, bool, Node]:
     return "held", False, _stored(statement)
 
 
-def _over(loops: Sequence[Loop], body: Node) -> Node:
-    for loop in reversed(loops):
-        body = reduction("sum", loop.index, loop.first, loop.last, body)
-    return body
-
-
 def _named(loops: Sequence[Loop], body: Node) -> Node:
     """A sum over canonical loops, whose variables get names of their own."""
     change = {index(loop.index): index(f"of{loop.index}") for loop in loops}
     renamed = [Loop(f"of{loop.index}", substitute(loop.first, change), substitute(loop.last, change)) for loop in loops]
-    return _over(renamed, substitute(body, change))
+    return summed(substitute(body, change), renamed)
 
 
 def _along(expression: Node, kinds: Sequence[str]) -> Node:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from sysdyn.cli.options import FORMULATIONS, INDICES
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.text.source import real
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
@@ -64,7 +64,7 @@ def path_of(file: str) -> Path:
 def hashes(source: SourceText, items: tuple[syntax.TopLevel, ...]) -> dict[str, str]:
     """sha256 of a text, of what it imports from its own folder, and of its tables' files, by name beside it."""
     found: dict[str, str] = {}
-    top = Path(os.path.realpath(source.name)).parent
+    top = real(source.name).parent
 
     def name(path: Path) -> str:
         return path.relative_to(top).as_posix() if path.is_relative_to(top) else str(path)
@@ -79,7 +79,7 @@ def hashes(source: SourceText, items: tuple[syntax.TopLevel, ...]) -> dict[str, 
             elif other.is_file():
                 found[name(other)] = hashlib.sha256(other.read_bytes()).hexdigest()
 
-    take(Path(os.path.realpath(source.name)), items)
+    take(real(source.name), items)
     return dict(sorted(found.items()))
 
 
@@ -87,9 +87,9 @@ def _files(folder: Path, items: tuple[syntax.TopLevel, ...]) -> Iterator[Path]:
     """Files that the statements of a file read, without the library."""
     for item in items:
         if isinstance(item, syntax.Import) and item.module.names[0] != "std":
-            yield Path(os.path.realpath(folder.joinpath(*item.module.names).with_suffix(".sd")))
+            yield real(folder.joinpath(*item.module.names).with_suffix(".sd"))
         elif isinstance(item, syntax.Table) and item.file is not None:
-            path = Path(os.path.realpath(folder / item.file))
+            path = real(folder / item.file)
             if path.is_relative_to(folder):
                 yield path
 

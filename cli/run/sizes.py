@@ -5,18 +5,18 @@
 
 from __future__ import annotations
 
-import os
 import tomllib
 from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
+from sysdyn.dsl.text.source import real
 
 NAME = "ci.toml"
 
 
 def sizes(file: str) -> tuple[Path, tuple[tuple[str, str], ...]]:
     """The file of sizes of a model's file, and its settings for it: () where there is none.  OSError, UsageError."""
-    model = Path(os.path.realpath(file))
+    model = real(file)
     path = model.parent.parent / NAME
     if file == "-" or not path.is_file():
         return path, ()

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import field
 from pathlib import Path
 
 from sysdyn.cli.spice.netlist import Card, Unreadable, cards, value
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.dsl.text.source import SourceText
+from sysdyn.dsl.text.source import SourceText, real
 from sysdyn.values import dataclass
 
 IGNORED = (".end", ".title", ".options", ".option", ".global", ".width", ".nodeset")
@@ -53,11 +52,11 @@ class Reader:
 
     def __init__(self, source: SourceText, report: Report) -> None:
         self.report = report
-        self.folder = Path(os.path.realpath(source.name)).parent
+        self.folder = real(source.name).parent
         title, found = cards(source)
         self.netlist = Netlist(title, Circuit(Path(source.name).stem))
         self._open = [self.netlist.top]
-        self._included = {Path(os.path.realpath(source.name))}
+        self._included = {real(source.name)}
         self._take(source, found)
         if len(self._open) > 1:
             report.error("E941", f"subcircuit '{self._open[-1].name}' has no .ends", source.place(0, 0))
@@ -132,7 +131,7 @@ class Reader:
     def _include(self, source: SourceText, card: Card) -> None:
         """A file of the netlist's own folder or below it."""
         name = card.text.split(None, 1)[1].strip().strip("\"'") if len(card.words) > 1 else ""
-        path = Path(os.path.realpath(Path(os.path.realpath(source.name)).parent / name))
+        path = real(real(source.name).parent / name)
         if not path.is_relative_to(self.folder) or not path.is_file():
             raise Unreadable(f"'{name}' is no file of the netlist's folder")
         if path in self._included:

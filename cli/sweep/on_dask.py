@@ -25,6 +25,7 @@ from sysdyn.cli.run.crew import DEATHS
 from sysdyn.cli.sweep.kept import Item, Kept
 from sysdyn.cli.sweep.one_run import Runner, Task
 from sysdyn.cli.sweep.workers import Answer, Chunk, Queue, answer
+from sysdyn.dsl.text.source import real
 
 DEPTH = 2
 """Chunks that a worker has at a time: one at work, one that waits."""
@@ -185,7 +186,7 @@ def results(
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
         raise UsageError("--dask needs Dask: pip install 'sysdyn[dask]'") from None
-    whole = replace(request, file=os.path.realpath(request.file))
+    whole = replace(request, file=str(real(request.file)))
     try:
         client = distributed.Client(address, timeout=10)
     except (OSError, ValueError) as error:

@@ -12,7 +12,8 @@ from sysdyn.dsl.elaborate.parts import NetworkBuilder
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Constraint, Energy, Loop, Work
+from sysdyn.dsl.model.network import Constraint, Energy, Work
+from sysdyn.dsl.model.rewriting import summed
 from sysdyn.dsl.names.reactions import reaction
 from sysdyn.dsl.names.symbols import End
 from sysdyn.dsl.text.diagnostics import Place
@@ -41,7 +42,7 @@ def conjugate_of(parts: NetworkBuilder, path: str, end: End) -> Node:
         for terminal, sign in ((branch.plus, 1.0), (branch.minus, -1.0)):
             if terminal is not None and terminal.node == name and terminal.at == end.at:
                 own = ex.var(branch.name, f"b{held}", *branch.at)
-                terms.append(_summed(ex.scale(sign, own), branch.loops))
+                terms.append(summed(ex.scale(sign, own), branch.loops))
     said = [s for owner, statements in parts.owned.items() if _inside(owner, path) for s in statements]
     along = [b for b in parts.branches if b.on is not None and _inside(b.name, path)]
     if end.domain.common == "effort":
@@ -51,11 +52,11 @@ def conjugate_of(parts: NetworkBuilder, path: str, end: End) -> Node:
                 raise NotSaidError("acts on its effort", s.place)
         return ex.add(*terms)
     q, f, p = (ex.var(name, f"n{letter}", *end.at) for letter in "qfp")
-    terms += [_summed(ex.mul(ex.var(b.name, "be", *b.at), derivative(b.on, q)), b.loops) for b in along if b.on]
+    terms += [summed(ex.mul(ex.var(b.name, "be", *b.at), derivative(b.on, q)), b.loops) for b in along if b.on]
     jumps = {draft.label: draft.place for draft in parts.drafts if draft.kind in ("phi", "psi", "guarded")}
     for s in said:
         if any({q, f, p} & ex.variables(root) for root in _roots(s)):
-            terms.append(_summed(_asked(s, q, f, jumps), s.loops))
+            terms.append(summed(_asked(s, q, f, jumps), s.loops))
     return ex.add(*terms)
 
 
@@ -65,12 +66,6 @@ def _inside(name: str, path: str) -> bool:
 
 def _roots(s: Energy | Work | Constraint) -> Sequence[Node]:
     return (s.on, s.effort) if isinstance(s, Work) else (s.expression,)
-
-
-def _summed(node: Node, loops: Sequence[Loop]) -> Node:
-    for loop in reversed(loops):
-        node = ex.reduction("sum", loop.index, loop.first, loop.last, node)
-    return node
 
 
 def _asked(s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Place]) -> Node:

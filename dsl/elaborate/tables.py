@@ -10,12 +10,12 @@ import stat
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
-from pathlib import Path
 
 from sysdyn.dsl.model.network import Table
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.text.source import real
 from sysdyn.dsl.tree import syntax
 
 MAX_BYTES = 50_000_000
@@ -78,8 +78,8 @@ def _written(item: syntax.Table, units: list[Unit], source: SourceText, report: 
 def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report: Report) -> list[Row]:
     place = Place(source, item.span)
     assert item.file is not None
-    folder = Path(source.name).resolve().parent
-    path = (folder / item.file).resolve()
+    folder = real(source.name).parent
+    path = real(folder / item.file)
     if not path.is_relative_to(folder):
         help_ = "put the file beside the model"
         report.error("E206", f"table {item.name.name}: '{item.file}' is outside the model's folder", place, help=help_)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from sysdyn.dsl.model.expression import Node, const, rebuild, substitute, topological
-from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.model.expression import Node, const, rebuild, reduction, substitute, topological
+from sysdyn.dsl.model.network import Loop, Network
 
 EXPRESSIONS = {
     "energies": ("expression",),
@@ -146,6 +146,13 @@ def _nonlinear(root: Node) -> list[Node]:
         else:
             found[node] = None
     return list(found)
+
+
+def summed(body: Node, loops: Sequence[Loop]) -> Node:
+    """The sum of what stands under loops, over all of them."""
+    for loop in reversed(loops):
+        body = reduction("sum", loop.index, loop.first, loop.last, body)
+    return body
 
 
 def nodes_read(said: Any) -> frozenset[str]:

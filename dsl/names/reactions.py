@@ -8,6 +8,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Domain
+from sysdyn.dsl.model.rewriting import summed
 
 
 def ledger(domain: Domain, branches: Iterable[Branch]) -> tuple[Node, Node]:
@@ -27,9 +28,7 @@ def ledger(domain: Domain, branches: Iterable[Branch]) -> tuple[Node, Node]:
             continue
         stores = b.kind == kind
         node = ex.scale(float(sign if stores else -sign), ex.var(b.name, content if stores else through, *b.at))
-        for loop in reversed(b.loops):
-            node = ex.reduction("sum", loop.index, loop.first, loop.last, node)
-        (held if stores else supplied).append(node)
+        (held if stores else supplied).append(summed(node, b.loops))
     return ex.add(*held), ex.add(*supplied)
 
 

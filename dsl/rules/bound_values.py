@@ -59,7 +59,7 @@ def _valued(node: Node, value: float, model: Elaborator) -> str:
 
 def _undefined(root: Node, place: Place, report: Report) -> bool:
     """E324 where a constant of an expression is no number, or infinite as a term of a sum."""
-    for node in _always(root) if root.args else (root,):
+    for node, _ in _always(root, ()):
         constants = (node.data,) if node.op == "const" else (node.data[0], *node.data[1]) if node.op == "sum" else ()
         if any(math.isnan(c) for c in constants):
             message, help_ = "a constant here is no number", "a root, a logarithm or a quotient where it is defined"
@@ -76,7 +76,8 @@ def _divisions(
     model: Elaborator, root: Node, loops: tuple[Loop, ...], place: Place, known: Values, report: Report
 ) -> None:
     """E324 where what is divided by is zero, of an array by the first element where it is."""
-    for node, within in _under(root, loops):
+    nested = any(a.args for a in root.args)
+    for node, within in _always(root, loops) if nested else ((root, loops),):
         if node.op != "mul" or not any(e < 0 for e in node.data):
             continue
         for exponent, factor in zip(node.data, node.args, strict=True):
@@ -104,10 +105,8 @@ def _root(factor: Node, loops: tuple[Loop, ...], known: Values) -> dict[Node, fl
     return next((at for at in itertools.islice(cases, LOOKED_AT) if known.number(factor, at) == 0.0), None)
 
 
-def _under(root: Node, loops: tuple[Loop, ...]) -> Iterable[tuple[Node, tuple[Loop, ...]]]:
+def _always(root: Node, loops: tuple[Loop, ...]) -> Iterable[tuple[Node, tuple[Loop, ...]]]:
     """What is evaluated whatever conditions say, with the loops and the ranges of sums under which it stands."""
-    if not any(a.args for a in root.args):
-        return [(root, loops)]
     found, left = dict[Node, tuple[Loop, ...]](), [(root, loops)]
     while left:
         node, within = left.pop()
@@ -120,17 +119,6 @@ def _under(root: Node, loops: tuple[Loop, ...]) -> Iterable[tuple[Node, tuple[Lo
         else:
             left += [(a, within) for a in (node.args[:1] if node.op == "cond" else node.args)]
     return found.items()
-
-
-def _always(root: Node) -> Iterable[Node]:
-    """What is evaluated whatever conditions say."""
-    found, left = dict[Node, None](), [root]
-    while left:
-        node = left.pop()
-        if node not in found:
-            found[node] = None
-            left += node.args[:1] if node.op == "cond" else node.args
-    return found
 
 
 def _is_constant(node: Node) -> bool:

@@ -6,6 +6,7 @@ ends at LF, CRLF or a lone CR.
 
 from __future__ import annotations
 
+import os
 import re
 from bisect import bisect_right
 from dataclasses import field
@@ -13,6 +14,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sysdyn.values import dataclass
+
+
+def real(path: str | Path) -> Path:
+    """The file or folder itself, absolute and without links; a link to itself as it is, where `Path.resolve` fails."""
+    return Path(os.path.realpath(path))
+
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 

@@ -124,6 +124,14 @@ def test_odd_files(tmp_path, capsys, data):
     assert "fault" not in capsys.readouterr().err
 
 
+def test_a_table_whose_file_is_a_link_to_itself(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("t.csv").symlink_to("t.csv")
+    Path("m.sd").write_text('table a(x: m) -> N linear clamp file "t.csv"\nmodel m { coord x: translation }\n')
+    assert run(["check", "m.sd"]) == 1
+    assert "E206" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", ["check", "fmt", "simulate", "verify", "reduce", "compile", "golden record", "new"])
 def test_a_link_to_itself_and_no_name_are_unreadable_files(tmp_path, capsys, monkeypatch, command):
     """Exit 5, never a fault inside."""
