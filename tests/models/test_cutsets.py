@@ -230,6 +230,12 @@ def test_an_inerter_between_springs_that_a_constraint_reads(tmp_path, formulatio
     assert trace["v"].values == pytest.approx(0.2 * np.cos(rate * t) - rate * np.sin(rate * t), abs=1e-6)
 
 
+def _levered(t):
+    """x and x' of 1 kg on a lever between springs: 2 x + 3 y = 0, so x' - 2 y' = 7/3 x', whose rate is -x."""
+    rate = np.sqrt(3 / 7)
+    return np.cos(rate * t) + 0.7 / rate * np.sin(rate * t), 0.7 * np.cos(rate * t) - rate * np.sin(rate * t)
+
+
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 def test_a_mass_on_a_lever_between_springs(tmp_path, formulation):
     """The sum of balances that reads no inertia weighs them 2 to 1: its rates ask for y' at the start."""
@@ -249,10 +255,7 @@ def test_a_mass_on_a_lever_between_springs(tmp_path, formulation):
     }
     """
     trace = trace_of(tmp_path, text, formulation=formulation)
-    # 2 x + 3 y = 0, so x' - 2 y' = 7/3 x', whose rate is -x
-    rate = np.sqrt(3 / 7)
-    x, v = (np.cos(rate * trace.time - shift) for shift in (0.0, -np.pi / 2))
-    x, v = x - 0.7 / rate * v, 0.7 * x + rate * v
+    x, v = _levered(trace.time)
     for name, value in {"x": x, "y": -2 / 3 * x, "v": v, "w": -2 / 3 * v}.items():
         assert trace[name].values == pytest.approx(value, abs=2e-6), name
     assert trace["w"].values[0] == pytest.approx(-1.4 / 3, rel=1e-12)
@@ -276,10 +279,9 @@ scene go of levers {{ time 0 s to 3 s; accuracy 1e-6; trace x[n] as x, y[n] as y
 @pytest.mark.parametrize("n", [3, 300])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 def test_however_many_levers_begin_where_their_balances_say(tmp_path, formulation, n):
-    """2 x + 3 y = 0 follows from both balances, and its rate: x'' = -3/7 x, a mass of 7/3 kg on a spring of 1 N/m."""
+    """2 x + 3 y = 0 follows from both balances of each, and its rate."""
     trace = trace_of(tmp_path, LEVERS.format(n=n), scene="go", formulation=formulation)
-    t, rate = trace.time, np.sqrt(3 / 7)
-    x, v = np.cos(rate * t) + 0.7 / rate * np.sin(rate * t), -rate * np.sin(rate * t) + 0.7 * np.cos(rate * t)
+    x, v = _levered(trace.time)
     for name, exact in (("x", x), ("y", -2 / 3 * x), ("w", -2 / 3 * v)):
         assert np.abs(trace[name].values - exact).max() < 1e-6, name
 
