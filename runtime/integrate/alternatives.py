@@ -75,10 +75,10 @@ def _of_steep_laws(
 ) -> tuple[Way, ...]:
     iterating = (other, way) if way.system.unknowns <= SMALL else (way, other)
     ways = _without_newton(way, options) + iterating + _differentiated(way, written, options)
-    if way.index != 2 or not FEW < way.system.unknowns <= SMALL or _turns(written, start, options):
+    if way.index != 2 or not FEW < way.system.unknowns <= SMALL:
         return ways
-    reduced = Way("rosenbrock", written.another("1"), 1, "1", reduced=True)
-    return _without_newton(reduced, options) + ways
+    reduced = _without_newton(Way("rosenbrock", written.another("1"), 1, "1", reduced=True), options)
+    return ways if not reduced or _turns(written, start, options) else reduced + ways
 
 
 def _turns(system: System, start: ConsistentState, options: Options) -> bool:

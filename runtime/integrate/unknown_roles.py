@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.components import components
 from sysdyn.runtime.numerics.points import uniform
 from sysdyn.runtime.structure.rates import unique
 from sysdyn.values import dataclass
@@ -126,28 +127,12 @@ def _common(system: System, jyd: Floats, shared: NDArray[np.bool_]) -> Ints:
     read[row[there & shared[column]]] = True
     there &= read[row]
     row, column, value = row[there], column[there], jyd[there]
-    group = _components(row, column, system.unknowns)
+    group = components(row, column, system.unknowns)
     total = np.bincount(row, value, system.rows), np.bincount(row, np.abs(value), system.rows)
     other = (np.abs(total[0]) > BALANCED * total[1])[row] | ~shared[column]
     good = ~np.isin(group[column], group[column[other]])
     found[column[good]] = group[column[good]]
     return found
-
-
-def _components(row: Ints, column: Ints, unknowns: int) -> Ints:
-    """Connected component of each column [unknowns] of a pattern: the least column in it.  Minima along rows, and of
-    the components that they name, until nothing changes.
-    """
-    label = np.arange(unknowns, dtype=np.int32)
-    least = np.full(int(row.max(initial=-1)) + 1, unknowns, dtype=np.int32)
-    while True:
-        before = label.copy()
-        np.minimum.at(least, row, label[column])
-        np.minimum.at(label, before[column], least[row])
-        np.minimum.at(label, column, least[row])
-        label = label[label]
-        if (label == before).all():
-            return label
 
 
 def without_rate(found: Roles, flows: NDArray[np.bool_]) -> Roles:

@@ -20,6 +20,7 @@ from sysdyn.values import dataclass
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+Places = NDArray[np.integer[Any]]
 Shape = tuple[tuple[int, int], ...]
 Index = tuple[int, ...]
 """(loop, slot, constant): the value is (loop variable or 0) + (ix[slot] or 0) + constant; loop, slot -1: none.

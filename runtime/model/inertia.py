@@ -6,14 +6,11 @@ give it as -(dr/dp)^-1 dr/df (Hamilton).
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.description import Floats, Ints, Places
 from sysdyn.runtime.model.system import System
 
-Places = NDArray[np.integer[Any]]
 Entries = tuple[Places, Places, Floats]
 
 CANCELS = 1e-12

@@ -9,6 +9,7 @@ above that, and below the conditioning of a model that a double can be trusted w
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import SMALL
@@ -58,6 +59,17 @@ def null_space(matrix: Floats) -> Floats:
     """Orthonormal columns [n, n - rank] that an equilibrated matrix [m, n] maps to zero.  NotFiniteError."""
     _, sigma, vt = decomposed(matrix)
     return np.asarray(vt[count(sigma) :].T)
+
+
+def left_null_vectors(blocks: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Of equilibrated matrices [k, m, n], finite ones: the number of each one's matrix and orthonormal rows [found, m]
+    that it maps to zero from the left.
+    """
+    u, sigma, _ = np.linalg.svd(blocks)
+    rest = np.ones((len(blocks), blocks.shape[1]), dtype=bool)
+    rest[:, : sigma.shape[1]] = sigma <= TOLERANCE * sigma.max(axis=1, keepdims=True)
+    matrix, place = np.nonzero(rest)
+    return matrix, u[matrix, :, place]
 
 
 def least_squares(matrix: Floats, aim: Floats, smallest: float = TOLERANCE) -> Floats:

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Ints
-from sysdyn.runtime.model.inertia import with_flows
+from sysdyn.runtime.model.inertia import joins, with_flows
 from sysdyn.runtime.model.redirected import redirected
 from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates_of
 
 Mask = NDArray[np.bool_]
-Places = NDArray[np.integer]
 
 
 class Equations:
@@ -27,7 +27,8 @@ class Equations:
 
     guessed: (rows of block initial that are guesses, the unknowns that they miss); unsettled [rows]: they need not
     hold; rows, columns [entries]: of what some block writes in the matrix; alike [unknowns]: number of the kind and
-    unit of each; member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them.
+    unit of each; member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them;
+    joined: of a large model whether coordinates hold inertia of each other.
     """
 
     def __init__(self, system: System, settled: System) -> None:
@@ -41,6 +42,7 @@ class Equations:
         self.guessed = self.rows[misses], self.columns[misses]
         self._kinds(settled)
         self.measured = self._measured(settled)
+        self.joined = self.n > DENSE and joins(settled)
         self.rated_rows = settled.of_groups("dynamics_rate").astype(np.int32)
 
     def _entries(self, settled: System) -> None:

@@ -10,7 +10,7 @@ are tried in order until the rows hold; the name of the one that found it stays 
 from __future__ import annotations
 
 import numpy as np
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Places
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.system import LARGE, System
@@ -25,7 +25,7 @@ from sysdyn.runtime.numerics.gauss_newton import (
 )
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.moved import moved_guesses
-from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Places, Starter, problem_of
+from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 from sysdyn.runtime.start.strategies import CLOSED, EXACT, OWN, applicable, first, rescaled
 from sysdyn.values import dataclass
 

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import LARGEST, Balance
-from sysdyn.runtime.model.description import START, Floats, Initial, Ints, stated
+from sysdyn.runtime.model.description import START, Floats, Initial, Ints, Places, stated
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
-from sysdyn.runtime.model.inertia import Inertia, joins, own_inertia, own_unknown
+from sysdyn.runtime.model.inertia import Inertia, own_inertia, own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
@@ -35,7 +35,6 @@ from sysdyn.runtime.start.sums import Sums, Weights, of_few, of_many, weights
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
-Places = NDArray[np.integer]
 STATE = ("q", "f", "p", "s", *START)
 WEIGHT = {"unwritten": 1e-3, "following": 1e-6}
 NOISE = 1e-13
@@ -256,14 +255,13 @@ class Starter:
         They are taken from the inertia at two points: what moves with the state is left out.
         """
         settled = self.settled
-        few, many = unsettled.size and self.n <= DENSE, unsettled.size and self.n > DENSE and joins(settled)
-        if not (few or many):
+        if not unsettled.size or (self.n > DENSE and not self.equations.joined):
             return weights(np.zeros((0, unsettled.size)))
         points = [self._inertia(shift) for shift in (0.0, 0.1)]
         number = np.cumsum(settled.are("f")) - 1
         own = own_unknown(settled, "dynamics_rate", "f")[unsettled]
         own = np.where(own >= 0, number[own], -1)
-        if many:
+        if self.n > DENSE:
             return of_many(points, own, DENSE)
         whole = np.arange(points[0].size)[None]
         return of_few(np.hstack([np.where((own >= 0)[:, None], p.blocks(whole)[0][own], 0.0) for p in points]))

@@ -6,12 +6,12 @@ follows from the balances, summed so that the rates go.  A sum stands in the pla
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.inertia import Inertia, Places
-from sysdyn.runtime.numerics.rank import TOLERANCE, null_space
+from sysdyn.runtime.model.description import Floats, Places
+from sysdyn.runtime.model.inertia import Inertia
+from sysdyn.runtime.numerics.components import components
+from sysdyn.runtime.numerics.products import add_product, add_sizes
+from sysdyn.runtime.numerics.rank import left_null_vectors, null_space
 from sysdyn.values import dataclass
 
 Entries = tuple[Places, Places]
@@ -25,12 +25,6 @@ class Weights:
     sum: Places
     row: Places
     value: Floats
-
-    def __matmul__(self, values: Floats) -> Floats:
-        """The sums of values [rows] or [rows, columns]."""
-        found = np.zeros((self.number, *values.shape[1:]))
-        np.add.at(found, self.sum, (self.value * values[self.row].T).T)
-        return found
 
 
 def weights(matrix: Floats) -> Weights:
@@ -77,34 +71,35 @@ class Sums:
 
     def put(self, values: Floats, *, sizes: bool = False) -> None:
         """The sums of values [rows] or [rows, k] in their places; sizes: of magnitudes, which do not cancel."""
-        own = self.weights
-        own = replace(own, value=np.abs(own.value)) if sizes else own
-        values[self.places] = own @ values[self.summed]
+        own, add = self.weights, add_sizes if sizes else add_product
+        for column in np.atleast_2d(values.T):
+            column[self.places] = add(own.sum, own.row, own.value, column[self.summed], np.zeros(own.number))
+
+
+def _scaled(matrix: Floats) -> Floats:
+    """Matrices [.., rows, columns] with columns of largest entry one."""
+    size = np.abs(matrix).max(axis=-2, keepdims=True)
+    return np.asarray(matrix / np.where(size > 0.0, size, 1.0))
 
 
 def of_few(matrix: Floats) -> Weights:
     """Sums [k, rows] of the rows of a full matrix of inertia that are nothing."""
     if not np.isfinite(matrix).all():
         return weights(np.zeros((0, len(matrix))))
-    size = np.abs(matrix).max(axis=0)
-    return weights(null_space((matrix / np.where(size > 0.0, size, 1.0)).T).T)
+    return weights(null_space(_scaled(matrix).T).T)
 
 
 def of_many(points: list[Inertia], own: Places, most: int) -> Weights:
     """The same of flows that inertia joins in groups, each at most `most` large; of larger ones the plain sum if it is
     one.  points: inertia at several points; own [rows]: the flow whose balance a row is, or -1.
     """
-    from scipy.sparse import csr_array  # small models do without
-    from scipy.sparse.csgraph import connected_components
-
     number = points[0].size
-    joined = np.hstack([point.joined() for point in points])
-    graph = csr_array((np.ones(joined.shape[1]), (joined[0], joined[1])), shape=(number, number))
-    label = connected_components(graph, directed=False)[1]
+    joined = np.hstack([np.tile(np.arange(number), (2, 1)), *(point.joined() for point in points)])
+    label = components(joined[0], joined[1], number)
     place = np.full(number, -1)
     place[own[own >= 0]] = np.flatnonzero(own >= 0)
     order = np.argsort(label, kind="stable")
-    begin = np.searchsorted(label[order], np.arange(int(label.max(initial=-1)) + 2))
+    begin = np.append(np.flatnonzero(np.diff(label[order], prepend=-1)), number)
     size = np.diff(begin)
     found: list[tuple[Places, Floats]] = []
     for s in np.unique(size[(size > 1) & (size <= most)]):
@@ -112,11 +107,8 @@ def of_many(points: list[Inertia], own: Places, most: int) -> Weights:
         members = members[(place[members] >= 0).all(axis=1)]
         blocks = np.concatenate([point.blocks(members) for point in points], axis=2)
         members, blocks = (item[np.isfinite(blocks).all(axis=(1, 2))] for item in (members, blocks))
-        scale = np.abs(blocks).max(axis=1, keepdims=True)
-        u, sigma, _ = np.linalg.svd(blocks / np.where(scale > 0.0, scale, 1.0), full_matrices=True)
-        least = sigma <= TOLERANCE * sigma.max(axis=1, keepdims=True)
-        for block, k in zip(*np.nonzero(least), strict=True):
-            found.append((place[members[block]], u[block, :, k]))
+        group, vectors = left_null_vectors(_scaled(blocks))
+        found += zip(place[members[group]], vectors, strict=True)
     for c in np.flatnonzero(size > most):
         members = order[begin[c] : begin[c + 1]]
         if (place[members] >= 0).all() and all(point.cancels(members) for point in points):

@@ -5,7 +5,16 @@ import pytest
 from sysdyn.runtime.numerics.equilibrate import equilibrated, factors, sparse_factors
 from sysdyn.runtime.numerics.points import distinct, normal, uniform
 from sysdyn.runtime.numerics.products import add_product
-from sysdyn.runtime.numerics.rank import TOLERANCE, NotFiniteError, count, decomposed, least_squares, null_space, rank
+from sysdyn.runtime.numerics.rank import (
+    TOLERANCE,
+    NotFiniteError,
+    count,
+    decomposed,
+    least_squares,
+    left_null_vectors,
+    null_space,
+    rank,
+)
 
 
 def orthogonal(random, n):
@@ -26,6 +35,18 @@ def test_the_rank_of_a_product_is_that_of_its_factors_in_any_units(seed):
     assert null.shape == (n, n - r)
     assert np.abs(scaled @ null).max(initial=0.0) < 1e-13
     assert np.abs(null.T @ null - np.eye(n - r)).max(initial=0.0) < 1e-13
+
+
+@pytest.mark.parametrize(("m", "n", "ranks"), [(3, 6, (3, 2, 0, 1)), (4, 2, (2, 1, 0, 2))])
+def test_rows_that_many_matrices_map_to_zero(m, n, ranks):
+    random = np.random.default_rng(m)
+    blocks = np.stack([random.standard_normal((m, r)) @ random.standard_normal((r, n)) for r in ranks])
+    matrix, rows = left_null_vectors(blocks)
+    for k, r in enumerate(ranks):
+        own = rows[matrix == k]
+        assert own.shape == (m - r, m)
+        assert np.abs(own @ blocks[k]).max(initial=0.0) < 1e-13
+        assert np.abs(own @ own.T - np.eye(m - r)).max(initial=0.0) < 1e-13
 
 
 def test_what_counts_as_zero_lies_between_round_off_and_bad_conditioning():
