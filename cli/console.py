@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 import click
-from sysdyn.cli.failures import envelope, plain, shown
+from sysdyn.cli.failures import OF_RUNS, SOLVER, envelope, plain, shown
 from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, ModelError, Report, shortened
 
 ROUTINE = ("N501", "N601", "N602", "N603", "N604")
@@ -77,6 +77,11 @@ class Console:
         else:
             self._render(found)
         return code
+
+    def unable(self) -> int:
+        """`finish` where the findings say why there is no result; a run that stopped is no error of the model."""
+        stopped = any(d.severity == "error" and d.code in OF_RUNS for d in self.report)
+        return self.finish(SOLVER if stopped else 1)
 
     def _routine(self, diagnostic: Diagnostic) -> bool:
         """Notes on what the compiler did by rule: for --json, and for whoever asks by --explain."""

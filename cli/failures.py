@@ -7,12 +7,21 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import click
 
 USAGE, SOLVER, FAULT, INPUT_OUTPUT, INTERRUPTED = 2, 3, 4, 5, 130
+OF_RUNS = ("E920", "E921", "E930", "E931", "E932", "E933", "E934")
+"""Findings of a run that stopped or is not met."""
+_PRECEDENCE = (INTERRUPTED, FAULT, INPUT_OUTPUT, USAGE, SOLVER, 1, 0)
+"""Of exits that hold together, the one that counts first."""
+
+
+def worst(codes: Iterable[int]) -> int:
+    """The exit that counts of several; 0 of none."""
+    return min(codes, key=_PRECEDENCE.index, default=0)
 
 
 class UsageError(click.UsageError):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.failures import SOLVER, USAGE, UsageError
+from sysdyn.cli.failures import SOLVER, USAGE, UsageError, worst
 from sysdyn.cli.options import FORMULATIONS, Setting, side_by_side
 from sysdyn.cli.page.columns import aligned
 from sysdyn.dsl.text.source import real
@@ -178,7 +178,7 @@ def _report(console: Console, cases: Sequence[Case], junit_file: str | None, htm
         else:
             near = max((c.ratio for c in cases), default=0.0)
             console.data(f"all {len(cases)} checks passed, the nearest at {near:.2g} of its limit")
-    return console.finish(max((c.exit for c in cases), default=0))
+    return console.finish(worst(c.exit for c in cases))
 
 
 def _mutants(console: Console, goldens: Sequence[Golden], jobs: int | None) -> int:
@@ -199,7 +199,7 @@ def _mutants(console: Console, goldens: Sequence[Golden], jobs: int | None) -> i
             console.say(f"{word:8} {mutant.golden} {mutant.parameter}{by}")
         if stopped is not None:
             console.complain(f"{golden.label}: {stopped[1]}", stopped[0])
-            code = max(code, stopped[0])
+            code = worst((code, stopped[0]))
     tried = [m for m in found if m.noticed is not None]
     missed = [m for m in found if m.noticed is False]
     zeros = len(found) - len(tried)
@@ -217,7 +217,7 @@ def _mutants(console: Console, goldens: Sequence[Golden], jobs: int | None) -> i
             console.data(f"  {m.golden}: {m.parameter}: {m.reason}")
         if zeros:
             console.data(f"  {zeros} parameter{' is' if zeros == 1 else 's are'} 0: a share of that changes nothing")
-    return console.finish(max(code, 1 if any(m.noticed is False and not m.insensitive for m in found) else 0))
+    return console.finish(worst((code, int(any(m.noticed is False and not m.insensitive for m in found)))))
 
 
 @_add("accept")
@@ -249,7 +249,7 @@ def accept(
     renewed = [golden if rtol is None else replace(golden, rtol=rtol) for golden in goldens]
     for golden, wanted, found in zip(goldens, renewed, _again(console, renewed, jobs), strict=True):
         if isinstance(found, int):
-            code = max(code, found)
+            code = worst((code, found))
             continue
         change, text = what_changed(golden, wanted, found)
         changes.append({"golden": golden.label, "change": change})
@@ -258,10 +258,10 @@ def accept(
         if change is None:
             continue
         if reason is None:
-            code = max(code, USAGE)
+            code = worst((code, USAGE))
             continue
         accepted = (*golden.accepted, book.Accepted(reason.strip(), change))
-        code = max(code, _keep(console, replace(_golden(wanted, found), accepted=accepted), found, size))
+        code = worst((code, _keep(console, replace(_golden(wanted, found), accepted=accepted), found, size)))
     console.result = {"changes": changes, "reason": reason}
     if code == USAGE:
         console.complain("nothing is recorded without a reason: --reason 'why the change is right'", USAGE)

@@ -22,6 +22,7 @@ def command(console: Console, file: str, output: str | None) -> int:
     R, C, L, K, V, I (DC, SIN, PULSE, PWL, EXP), D, Q, M of level 1, E, F, G, H, X; .param, .model, .subckt, .ic, and
     .include of its own folder. What cannot be said is an error with its line; what a model has beyond it a warning.
     """
+    output = None if output == "-" else output
     if output is not None and not output.endswith(".sd"):
         raise UsageError(f"-o {output}: a model's text ends in .sd")
     source = SourceText.read(file)

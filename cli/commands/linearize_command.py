@@ -11,6 +11,7 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import INDICES, chosen
 from sysdyn.cli.run.asked import Request
+from sysdyn.runtime.trace.opening import replaceable
 
 KINDS = ("bode", "nyquist", "step")
 DATA = (".h5", ".mat", ".json")
@@ -145,6 +146,8 @@ def _known(files: Iterable[str]) -> None:
     for file in files:
         if Path(file).suffix not in (*DATA, *PICTURES):
             raise UsageError(f"-o '{file}': one of {', '.join((*DATA, *PICTURES))}")
+        if Path(file).is_file() and Path(file).stat().st_size and (replaceable(file) or replaceable(file, sweep=True)):
+            raise UsageError(f"-o {file} holds runs: give another name, or remove it")
 
 
 def _write(

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.failures import UsageError
+from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
@@ -46,6 +46,8 @@ def command(
     request = Request(**options)
     if request.file == "-" and output is None and not only:
         raise UsageError("a text from standard input: -o names the reduced one")
+    if output is not None and Path(output).suffix != ".sd":
+        raise UsageError(f"-o {output}: a model's text ends in .sd")
     target = Path(output) if output else Path(request.file).parent / f"{Path(request.file).stem}-reduced.sd"
     if target.exists() and Path(request.file).exists() and target.samefile(request.file):
         raise UsageError(f"-o {target} is the model itself")
@@ -60,7 +62,7 @@ def command(
         finally:
             line.clear()
     if found is None:
-        return console.finish(1 if console.report.failed else 3)
+        return console.unable() if console.report.failed else console.finish(SOLVER)
     kept = any(t.kept for t in found.trials)
     console.result = _result(found, str(target) if kept else None, timings=not no_timings)
     console.data(_activity(found.found))

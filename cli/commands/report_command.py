@@ -42,7 +42,7 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         finally:
             line.clear()
         if study is None:
-            return console.finish(1)
+            return console.unable()
         text = page(study)
     target = output or _default(request.file, study.network.scene.name if study.network.scene else "")
     write(target, text)

@@ -47,8 +47,8 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
         )
     finally:
         line.clear()
-    if ran is None:  # a limit that is reached before the first step is one of the run
-        return console.finish(3 if any(d.code == "E934" for d in console.report) else 1)
+    if ran is None:
+        return console.unable()
     console.result = _result(ran)
     found = sought(ran.started.state)
     for text in (*shortened(described(ran.started.state)), *([found] if found else []), *ran.outcome.warnings):

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.failures import FAULT, SOLVER, UsageError
+from sysdyn.cli.failures import UsageError, worst
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
@@ -18,6 +18,7 @@ from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.cli.sweep.study import SAMPLES, read, study
 from sysdyn.cli.sweep.sweeping import Swept, axes_of, summary, sweep, to_json
+from sysdyn.runtime.trace.opening import replaceable
 
 SHOWN = 24
 """Runs in the table at most, and columns of traced quantities."""
@@ -87,6 +88,8 @@ def command(
     target = Path(output or said.get("output") or _default(file, runner))
     if target.suffix == ".sd" or (target.exists() and target.samefile(file)):
         raise UsageError(f"-o {target} is the model itself")
+    if target.is_file() and not replaceable(target, sweep=True):
+        raise UsageError(f"-o {target} exists and is no sweep of sysdyn: give another name, or remove it")
     line = ProgressLine("never" if console.quiet else progress)
     number = jobs or said.get("jobs") or cores()
     try:
@@ -117,15 +120,13 @@ def _shown(console: Console, found: Swept, plot: str | None) -> int:
     for kept in found.failed[:SHOWN]:
         console.complain(f"run {kept.run} ({_said(found, kept.run)}): {kept.reason}", kept.exit)
     if len(found.failed) > SHOWN:
-        console.complain(f"and {len(found.failed) - SHOWN} more: 'reason' in {found.output}", SOLVER)
+        console.complain(f"and {len(found.failed) - SHOWN} more: 'reason' in {found.output}", _exit(found))
     return console.finish(_exit(found))
 
 
 def _exit(found: Swept) -> int:
-    """The worst of the runs' exits: a fault, a run that failed or is not met, an expectation."""
-    if FAULT in found.exits:
-        return FAULT
-    return SOLVER if found.exits - {0, 1} or not found.met else max(found.exits)
+    """The worst of the runs' exits; a run that ended and is not met has SOLVER of its own."""
+    return worst(found.exits)
 
 
 def _said(found: Swept, run: int) -> str:

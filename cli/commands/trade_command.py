@@ -15,13 +15,14 @@ from sysdyn.cli.options import chosen, side_by_side, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.run import lock, targets
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.asked import Request, instants_of
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
 from sysdyn.cli.trade.reference import NoReference
 from sysdyn.cli.trade.search import tolerance
 from sysdyn.cli.trade.traded import Combination, Measured, Refusal, Traded, meets
 from sysdyn.cli.trade.trading import trade
-from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl import load
+from sysdyn.dsl.text.diagnostics import Report, SourceText
 
 KINDS = (".html", ".png", ".svg")
 
@@ -70,7 +71,7 @@ def command(
     finally:
         line.clear()
     if found is None:
-        return console.finish(1)
+        return console.unable()
     best = found.chosen
     use = "" if best is None else command_of(request, best, found.name)
     console.result = _result(found, use, timings=not no_timings)
@@ -97,12 +98,11 @@ def budget_of(text: str | None) -> float | None:
     """Seconds of wall time for all of it."""
     if text is None:
         return None
-    try:
-        seconds = float(text.removesuffix("s"))
-    except ValueError:
-        raise UsageError(f"--max-wall {text}: a number of seconds") from None
-    if not seconds > 0.0:
-        raise UsageError(f"--max-wall {text}: it must be positive")
+    report = Report()
+    nothing = load.document(SourceText("--max-wall", ""), report)
+    seconds = instants_of(Request("", max_wall=text), nothing, report)[2]
+    if seconds is None:
+        raise UsageError(f"--max-wall {text}: a number of seconds, or a time with its unit")
     return seconds
 
 

@@ -62,7 +62,7 @@ def command(
         stack.callback(line.clear)
         found = verify(request, console.report, folder, line, jobs)
     if found is None:
-        return console.finish(1)
+        return console.unable()
     console.result = _result(found, keep=output is not None, timings=not no_timings)
     console.data(_table(found, timings=not no_timings))
     return console.finish(_judged(found, console))

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.compare.diffing import common, differences, sentence
-from sysdyn.cli.golden.runs import APART, RUNS, Run, Stopped, between, run
+from sysdyn.cli.failures import OF_RUNS
+from sysdyn.cli.golden.runs import APART, Run, Stopped, between, run
 from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.crew import Lost, each
 from sysdyn.runtime.comparison.arrays import Arrays
@@ -84,7 +85,7 @@ def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | Non
         try:
             base, runs, golden = _reference(request, max(rtol * share, FINEST), rtol, atol, say)
         except Stopped as stopped:
-            if share == REFERENCE[0] or stopped.finding not in RUNS:
+            if share == REFERENCE[0] or stopped.finding not in OF_RUNS:
                 raise
             break  # finer than can be met: the last reference stands, or falls, by its own error
         first, *wider = _taus(golden, runs)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sysdyn.cli.failures import OF_RUNS
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.asked import Request, options_of
 from sysdyn.cli.run.running import Ran, integrate, ready
@@ -29,8 +30,6 @@ APART = 1e-12
 """Of the span: instants nearer than this are one, computed in two ways."""
 CLAIMS = ("E907", "E909")
 """Expectations are judged by `simulate`, at the scene's own accuracy."""
-RUNS = ("E920", "E921", "E930", "E931", "E932", "E933", "E934")
-"""What a run says of itself: it is no golden trace."""
 
 
 def between(time: Floats) -> Floats:
@@ -70,7 +69,7 @@ def run(request: Request, also: Floats | None = None) -> Run:
     with tempfile.TemporaryDirectory(prefix="sysdyn-golden-") as folder:
         path = Path(folder) / "trace.h5"
         ran = _ran(replace(request, output=str(path)), report, also)
-        later = (*CLAIMS, *RUNS)
+        later = (*CLAIMS, *OF_RUNS)
         errors = [d for d in report.diagnostics if d.severity == "error" and (ran is None or d.code not in later)]
         if ran is None or errors:
             first = next(iter(errors), None)
@@ -82,7 +81,7 @@ def run(request: Request, also: Floats | None = None) -> Run:
         if ran.failure:
             raise Stopped(3, ran.failure)
         if not ran.outcome.met:
-            unmet = next(d for d in report.diagnostics if d.code in RUNS)
+            unmet = next(d for d in report.diagnostics if d.code in OF_RUNS)
             raise Stopped(3, unmet.message, unmet.code)
         trace = Trace.open(path)
     energy, constraints = (_largest(trace[f"audit.{meter}"].values) for meter in ("energy", "constraints"))

@@ -57,9 +57,13 @@ class Activities:
 
 
 def activities(
-    request: Request, target: Target, report: Report, folder: Path, began: float, progress: Progress | None
+    request: Request, target: Target, report: Report, folder: Path, began: float, progress: Progress | None,
+    limit: float | None = None,
 ) -> Activities | None:
-    """The activities of all elements; None where the report says why there are none."""
+    """The activities of all elements; None where the report says why there are none.
+
+    limit: seconds of wall time from `began`.
+    """
     with ex.fresh():
         prepared = ready(replace(request, no_prune=True), target, report)
         options = options_of(request, target, prepared, report, began, progress) if prepared else None
@@ -73,7 +77,8 @@ def activities(
         own = prepared.network.traced
         cells = np.linspace(options.t_start, options.t_end, CELLS + 1)[1:-1]
         options = replace(
-            options, output=folder / "activity.h5", every=None, at=tuple(cells), watch=None, sampled_at=()
+            options, output=folder / "activity.h5", every=None, at=tuple(cells), watch=None, sampled_at=(),
+            max_wall=limit,
         )
         if options.accuracy is not None and own:  # of the scene's quantities alone
             options = replace(options, accuracy=None, accuracy_on=tuple((name, options.accuracy) for name in own))

@@ -101,7 +101,7 @@ def reduce(
     target = targets.one(document, request.file, request.model, request.scene, report)
     if target is None:
         return None
-    found = activities(request, target, report, folder, began, None)
+    found = activities(request, target, report, folder, began, None, budget)
     if found is None:
         return None
     text = document.file.source.text

@@ -88,6 +88,22 @@ def _redundancy(request: Request, network: Network) -> str:
     return request.redundancy or (network.scene.redundancy if network.scene else None) or "error"
 
 
+def instants_of(
+    request: Request, document: load.Document, report: Report
+) -> tuple[float | None, tuple[float, ...], float | None]:
+    """--until, --at and --max-wall in s; None, or left out, where they are not given or the report says why not."""
+
+    def instant(text: str, name: str) -> float | None:
+        return load.constant(document, text, dim.TIME, name, report)
+
+    until = None if request.until is None else instant(request.until, "--until")
+    at = [instant(text, "--at") for text in separate(request.at)] if request.at is not None else []
+    wall = None if request.max_wall is None else instant(request.max_wall, "--max-wall")
+    if wall is not None and not wall > 0.0:
+        raise UsageError(f"--max-wall {wall:g} s: it must be positive")
+    return until, tuple(t for t in at if t is not None), wall
+
+
 def options_of(
     request: Request,
     target: Target,
@@ -104,18 +120,13 @@ def options_of(
     scene = prepared.network.scene or Scene("", prepared.network.place)
     value = prepared.binding.evaluate
 
-    def instant(text: str, name: str) -> float | None:
-        return load.constant(target.document, text, dim.TIME, name, report)
-
     t0 = value(scene.start) if scene.start is not None else 0.0
     t1 = value(scene.end) if scene.end is not None else None
-    if request.until is not None:
-        t1 = instant(request.until, "--until")
-    elif t1 is None:
+    if request.until is None and t1 is None:
         raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
-    at = [instant(text, "--at") for text in separate(request.at)] if request.at else []
-    wall = instant(request.max_wall, "--max-wall") if request.max_wall else None
-    if t1 is None or None in at or report.failed:
+    until, at, wall = instants_of(request, target.document, report)
+    t1 = until if request.until is not None else t1
+    if t1 is None or report.failed:
         return None
     if not math.isfinite(t0) or not math.isfinite(t1):
         raise UsageError(f"the run is from {t0:g} s to {t1:g} s: finite instants are needed")
@@ -126,8 +137,6 @@ def options_of(
         raise UsageError(f"the interval of the trace is {every:g} s: it must be positive")
     if every is not None and (t1 - t0) / every > INSTANTS:
         raise UsageError(f"every {every:g} s from {t0:g} s to {t1:g} s is more than {INSTANTS:.0e} instants")
-    if wall is not None and not wall > 0.0:
-        raise UsageError(f"--max-wall {wall:g} s: it must be positive")
     accuracy, on = _accuracy(request, scene, prepared)
     solver = {name: value(node) for name, node in scene.solver_options}
     method = request.method or scene.solver or "auto"
@@ -142,7 +151,7 @@ def options_of(
         t_start=t0,
         t_end=t1,
         every=every,
-        at=tuple(t for t in at if t is not None),
+        at=at,
         sampled_at=tuple(t for t in claims if t0 <= t <= t1),
         accuracy=accuracy,
         accuracy_on=on,

@@ -5,13 +5,16 @@ A kill loses the runs under way and no more: the same command reads the journal 
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.sweep.kept import Block, Done, Item, Kept
+from sysdyn.runtime.model.failures import TraceError
 
 
 class Journal:
@@ -29,17 +32,27 @@ class Journal:
         """Takes in what is there; a line that a kill cut short is taken away."""
         if not self.path.exists():
             return
-        text = self.path.read_text(encoding="utf-8")
-        whole = text[: text.rfind("\n") + 1]
-        lines = [json.loads(line) for line in whole.splitlines()]
-        if lines and lines[0].get("study") != digest:
+        text = self.path.read_bytes()
+        whole = text[: text.rfind(b"\n") + 1]
+        with self._damaged():
+            lines = [json.loads(line) for line in whole.splitlines()]
+            other = bool(lines) and lines[0].get("study") != digest
+        if other:
             raise UsageError(
                 f"{self.path} holds runs of another study, or of another text: remove it, or give -o another name"
             )
+        with self._damaged():
+            for line in lines[1:]:
+                self.done.take(Block.from_json(line["block"]) if "block" in line else Kept(**line))
         if whole != text:
-            self.path.write_text(whole, encoding="utf-8")
-        for line in lines[1:]:
-            self.done.take(Block.from_json(line["block"]) if "block" in line else Kept(**line))
+            self.path.write_bytes(whole)
+
+    @contextlib.contextmanager
+    def _damaged(self) -> Iterator[None]:
+        try:
+            yield
+        except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
+            raise TraceError(f"{self.path} is damaged: remove it, and the sweep begins anew ({error})") from error
 
     def _line(self, item: dict[str, object]) -> None:
         self._file.write(json.dumps(item) + "\n")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from sysdyn import __version__
 from sysdyn.cli.run import lock
-from sysdyn.cli.run.asked import Request, model_digest
+from sysdyn.cli.run.asked import Request, instants_of, model_digest
 from sysdyn.cli.sweep import results
 from sysdyn.cli.sweep.axes import CHOICES, Axis, Evaluate, axis
 from sysdyn.cli.sweep.journal import Journal
@@ -26,6 +26,8 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.trace.claim import claimed
+from sysdyn.runtime.trace.opening import destination
 from sysdyn.values import dataclass
 
 REFRESH = 10.0
@@ -114,6 +116,9 @@ def sweep(
     cases = tuple(study.cases())
     runner.loaded().bound({n: v for n, v in cases[0].items() if n not in CHOICES and not n.startswith("level ")})
     target = runner.loaded().target
+    report = Report()
+    instants_of(request, target.document, report)
+    report.raise_if_failed()
     sha = model_digest(target)
     texts = lock.hashes(target.document.file.source, target.document.file.items)
     digest = study.digest(request=replace(request, output=None), texts=texts, version=__version__, keep=keep)
@@ -128,7 +133,8 @@ def sweep(
         "sample": study.sample if study.runs else "product",
         "seed": study.seed,
     }
-    with Journal(output, digest) as journal:
+    place = destination(output)
+    with claimed(place), Journal(place, digest) as journal:
         resumed = len(journal.done)
         tasks = ((k, case) for k, case in enumerate(cases) if k not in journal.done)
         left = len(cases) - resumed
@@ -145,11 +151,11 @@ def sweep(
                 ahead = (now - first[0]) / more * (left - number) if more > FORETOLD else None
                 progress(len(journal.done) / len(cases), ahead)
                 if now - written > max(REFRESH, 10.0 * cost):
-                    results.write(output, cases, journal.done, units, attributes, timings=timings)
+                    results.write(place, cases, journal.done, units, attributes, timings=timings)
                     written = time.monotonic()
                     cost = written - now
         finally:
-            results.write(output, cases, journal.done, units, attributes, timings=timings)
+            results.write(place, cases, journal.done, units, attributes, timings=timings)
         journal.remove()
     alone = runner.said(cases[0]) if journal.done.singles else ""
     return Swept(output, cases, journal.done, units, resumed, alone)

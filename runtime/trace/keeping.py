@@ -16,6 +16,7 @@ import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.trace.claim import claimed
+from sysdyn.runtime.trace.opening import destination
 from sysdyn.runtime.trace.trace import Quantity, Trace
 from sysdyn.runtime.trace.trace_store import BEFORE, Layout, clear
 from sysdyn.runtime.trace.writing import Met, TraceWriter
@@ -129,7 +130,7 @@ class Files:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._target = self.path.resolve()
+        self._target = destination(self.path)
         self._part = self._target.with_name(f".{self._target.name}.part")
 
     @contextlib.contextmanager

@@ -6,6 +6,7 @@ trace that somebody sends could so show the reader's own files; none of these is
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import stat
@@ -36,8 +37,22 @@ def regular(path: str | Path) -> None:
         raise OSError(errno.EINVAL, "this is no regular file", str(path))
 
 
-def replaceable(path: str | Path) -> bool:
-    """Nothing is lost where a new trace takes this path: there is nothing yet, an empty file, or a trace of sysdyn."""
+def destination(path: str | Path) -> Path:
+    """The file that a path of a result leads to.  OSError where it is none, or links lead in a circle."""
+    with contextlib.suppress(FileNotFoundError):
+        regular(path)
+    return Path(path).resolve()
+
+
+def of_sweep(file: Any) -> bool:
+    """Whether an open file holds the runs of a sweep."""
+    return "sample" in file.attrs and "run" in file
+
+
+def replaceable(path: str | Path, *, sweep: bool = False) -> bool:
+    """Nothing is lost where a new trace (sweep: a new sweep) takes this path: there is nothing yet, an empty file, or
+    one of sysdyn of the same kind.
+    """
     import h5py
 
     try:
@@ -45,7 +60,7 @@ def replaceable(path: str | Path) -> bool:
             return True
         regular(path)
         with h5py.File(path, "r") as file:
-            return _outside_but_parameters(file) is None and _is_ours(file)
+            return _outside_but_parameters(file) is None and _is_ours(file) and of_sweep(file) == sweep
     except FileNotFoundError:
         return True
     except (OSError, RuntimeError, ValueError, KeyError, TypeError):
@@ -53,7 +68,9 @@ def replaceable(path: str | Path) -> bool:
 
 
 def _is_ours(file: Any) -> bool:
-    return "time" in file and bytes(file.attrs.get("source", b"")).startswith(b"sysdyn")
+    source = file.attrs.get("source", b"")
+    said = source if isinstance(source, str) else bytes(source).decode("utf-8", "replace")
+    return ("time" in file or of_sweep(file)) and said.startswith("sysdyn")
 
 
 def _outside_but_parameters(file: Any) -> str | None:

@@ -16,7 +16,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.opening import opened
+from sysdyn.runtime.trace.opening import of_sweep, opened
 from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Parameter, Store, columns_of, input_output
 from sysdyn.values import dataclass
 
@@ -80,6 +80,11 @@ def _events(group: Any) -> tuple[Happened, ...]:
     return tuple(Happened(float(t), *said) for t, *said in zip(group["time"][()], *texts, strict=True))
 
 
+def _is_row(item: Any) -> bool:
+    """One number an instant."""
+    return getattr(item, "ndim", 0) == 1 and item.dtype.kind in "fiu"
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Trace:
     """A trace read from a file: trace["q1"], trace.time [s], trace.names, trace.attributes."""
@@ -106,6 +111,10 @@ class Trace:
             data = {name: item for name, item in source.items() if isinstance(item, h5py.Dataset)}
             if "time" not in data:
                 raise ValueError("no data set 'time': not a trace")
+            if of_sweep(source):
+                raise ValueError("the runs of a sweep, not a trace")
+            if not _is_row(data["time"]):
+                raise ValueError("'time' is no row of numbers: not a trace")
             group = {
                 f"{key}.{name}": item
                 for key in ("audit",)
@@ -113,15 +122,14 @@ class Trace:
                 if isinstance(item, h5py.Dataset)
             }
             rates = {n: item for n, item in source.get("derivatives", {}).items() if isinstance(item, h5py.Dataset)}
-            length = min(
-                item.shape[0] for item in (*data.values(), *group.values(), *rates.values()) if item.ndim == 1
-            )
+            length = min(item.shape[0] for item in (*data.values(), *group.values(), *rates.values()) if _is_row(item))
             quantities = {}
             for name, item in (*data.items(), *group.items()):
-                if name == "time" or item.ndim != 1:
+                if name == "time" or not _is_row(item):
                     continue
                 path_of = _plain(item.attrs.get("derivative", ""))
-                rate = np.asarray(source[path_of][:length]) if path_of and path_of in source else None
+                known = source[path_of] if path_of and path_of in source else None
+                rate = np.asarray(known[:length]) if _is_row(known) else None
                 quantities[name] = Quantity(
                     name,
                     np.asarray(item[:length]),
@@ -200,12 +208,12 @@ class Trace:
     @property
     def final(self) -> bool:
         """The run ended as asked."""
-        return bool(self.attributes.get("final", 1))
+        return bool(np.all(self.attributes.get("final", 1)))
 
     @property
     def met(self) -> bool:
         """The run met what it judged itself by; a trace that does not say counts as met."""
-        return bool(self.attributes.get("met", 1))
+        return bool(np.all(self.attributes.get("met", 1)))
 
     @property
     def judged(self) -> tuple[str, ...]:

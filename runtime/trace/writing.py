@@ -21,6 +21,7 @@ import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.opening import destination
 from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Store, input_output
 
 UNCHANGED = 1e-9
@@ -97,9 +98,7 @@ class TraceWriter:
         self._hidden: Store | None = None
         self.closed = False
         with input_output(self.path):
-            self.path = self.path.resolve()
-            if self.path.exists() and not self.path.is_file():
-                raise OSError(f"{self.path} is no regular file")
+            self.path = destination(self.path)
             self._token = os.urandom(4).hex()
             if shown:
                 self._visible = self._store("a")

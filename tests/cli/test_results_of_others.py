@@ -1,0 +1,196 @@
+"""One command where another one's result stands: what would be lost, what is no trace, which exit counts."""
+
+import json
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from sysdyn.cli.failures import worst
+from sysdyn.cli.main import run
+from sysdyn.runtime.trace.claim import claimed
+from texts import ENDLESS, PENDULUM, write
+
+DRIVEN = """\
+from std.electrical import resistor, capacitor, voltage
+
+model driven {
+  param r = 1 ohm
+  node a, b: electrical
+  V: voltage(v = 5 V*sin(2*pi*1 kHz*t)) a -> ground
+  R: resistor(R = r) a -> b
+  C: capacitor(C = 1 uF) b -> ground
+}
+
+scene long of driven {
+  time 0 s to 1e7 s
+  trace b.e
+}
+"""
+
+
+@pytest.fixture
+def model(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = write(tmp_path, PENDULUM)
+    assert run(["simulate", "-q", path, "-o", "trace.h5"]) == 0
+    assert run(["sweep", "-q", path, "--over", "l=2,3", "-o", "runs.h5"]) == 0
+    Path("notes.txt").write_text("a year of measurements\n")
+    return path
+
+
+OVER = ["--over", "l=2,3"]
+
+
+@pytest.mark.parametrize(
+    ("command", "output"),
+    [
+        (["sweep", *OVER], "notes.txt"),
+        (["sweep", *OVER], "trace.h5"),
+        (["simulate"], "runs.h5"),
+        (["simulate"], "notes.txt"),
+        (["linearize"], "trace.h5"),
+        (["linearize"], "runs.h5"),
+        (["reduce"], "trace.h5"),
+    ],
+)
+def test_a_result_takes_no_other_result_s_place(model, capsys, command, output):
+    before = Path(output).read_bytes()
+    assert run([*command, "-q", model, "-o", output]) == 2
+    assert output in capsys.readouterr().err
+    assert Path(output).read_bytes() == before
+
+
+def test_a_result_takes_the_place_of_its_like(model):
+    for command, output in ((["sweep", *OVER], "runs.h5"), (["simulate"], "trace.h5"), (["linearize"], "matrices.h5")):
+        Path("empty.h5").write_bytes(b"")
+        for name in (output, output, "empty.h5"):
+            assert run([*command, "-q", model, "-o", name]) == 0
+
+
+@pytest.mark.parametrize("command", [["simulate"], ["sweep", *OVER]], ids=["simulate", "sweep"])
+def test_an_output_that_leads_nowhere_is_one_of_input_and_output(model, capsys, command):
+    Path("circle.h5").symlink_to("circle.h5")
+    Path("folder.h5").mkdir()
+    for name in ("circle.h5", "folder.h5", "notes.txt/x.h5"):
+        assert run([*command, "-q", model, "-o", name]) == 5
+        said = capsys.readouterr().err
+        assert said.count(name) == 1, said
+        assert "part" not in said
+
+
+@pytest.mark.parametrize("command", [["simulate"], ["sweep", *OVER]], ids=["simulate", "sweep"])
+def test_an_output_that_is_a_link_stays_one(model, command):
+    kept = Path("trace.h5" if command == ["simulate"] else "runs.h5")
+    link = Path("link.h5")
+    link.symlink_to(kept)
+    before = kept.stat().st_ino
+    assert run([*command, "-q", model, "-o", str(link)]) == 0
+    assert link.is_symlink()
+    assert kept.stat().st_ino != before
+
+
+def test_a_sweep_is_no_trace(model, capsys):
+    for command in (["plot", "runs.h5"], ["plot", "trace.h5", "runs.h5"]):
+        assert run([*command, "-o", "p.png"]) == 5
+        assert "runs of a sweep" in capsys.readouterr().err
+    assert run(["diff", "trace.h5", "runs.h5"]) == 3
+
+
+@pytest.mark.parametrize("values", [np.full(101, b"text"), np.full(101, 1j)], ids=["texts", "complex"])
+def test_what_is_no_number_over_time_is_not_drawn(model, capsys, recwarn, values):
+    with h5py.File("trace.h5", "a") as file:
+        file["odd"] = values
+        file.attrs["final"] = [1, 1]
+    assert run(["plot", "trace.h5", "-o", "p.svg", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert "odd" not in found["result"]["quantities"]
+    assert not [w for w in recwarn if issubclass(w.category, np.exceptions.ComplexWarning)]
+
+
+@pytest.mark.parametrize(
+    "line", [b"no json\n", b"\xff\xfe\n", b"[]\n", b'{"study": 1}\n', b'{"block": {"runs": 3}}\n', b'{"odd": 3}\n']
+)
+def test_a_damaged_journal_is_named(model, capsys, line):
+    journal = Path(".runs.h5.runs")
+    poison = ["sweep", "-q", model, *OVER, "-o", "runs.h5"]
+    kept = Path("runs.h5").read_bytes()
+    begun = _begun(model)
+    for text in (line, begun + line) if b"study" not in line else (line,):
+        journal.write_bytes(text)
+        assert run(poison) in (2, 5)
+        assert journal.name in capsys.readouterr().err
+        assert Path("runs.h5").read_bytes() == kept
+        assert journal.read_bytes() == text
+
+
+def _begun(model):
+    """The first line of the journal of this sweep."""
+    from sysdyn.cli.sweep import journal
+
+    lines, kept = [], journal.Journal._line
+    journal.Journal._line = lambda self, item: (lines.append(item), kept(self, item))[1]
+    try:
+        assert run(["sweep", "-q", model, *OVER, "-o", "other.h5"]) == 0
+    finally:
+        journal.Journal._line = kept
+    return (json.dumps(lines[0]) + "\n").encode()
+
+
+def test_one_sweep_at_a_time_writes_a_file(model, capsys):
+    with claimed(Path("runs.h5").resolve()):
+        assert run(["sweep", "-q", model, *OVER, "-o", "runs.h5"]) == 5
+    assert "another run is writing" in capsys.readouterr().err
+    assert run(["sweep", "-q", model, *OVER, "-o", "runs.h5"]) == 0
+
+
+def test_the_exit_that_counts_first():
+    assert worst([]) == 0
+    assert worst([0, 1, 3, 2]) == 2
+    assert worst([1, 5, 4]) == 4
+    assert worst([4, 130]) == 130
+    assert worst([3, 1, 0]) == 3
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [(["--until", "1 m"], 1), (["--max-wall", "0"], 2), (["--max-wall", "1 V"], 1), (["--until", "-1"], 2)],
+)
+def test_wrong_usage_of_a_sweep_is_no_failure_of_its_runs(model, options, code):
+    assert run(["sweep", "-q", model, *OVER, "-o", "new.h5", *options]) == code
+    assert run(["simulate", "-q", model, "-o", "new.h5", *options]) == code
+
+
+@pytest.mark.parametrize("command", ["trade", "reduce"])
+def test_a_limit_of_wall_time_has_a_unit(model, capsys, command):
+    for text in ("1 m", "soon", "inf"):
+        assert run([command, model, "--max-wall", text]) == 2
+        assert "a number of seconds" in capsys.readouterr().err
+    assert run([command, "-q", model, "--max-wall", "1 min"]) == 0
+
+
+def test_the_limit_of_a_reduction_counts_from_its_first_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    path = write(tmp_path, DRIVEN)
+    began = time.monotonic()
+    assert run(["reduce", path, "--max-wall", "1"]) == 3
+    assert time.monotonic() - began < 20.0
+    assert "E934" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["simulate", "reduce", "report"])
+def test_a_limit_of_steps_ends_every_command_as_a_run(tmp_path, monkeypatch, capsys, command):
+    monkeypatch.chdir(tmp_path)
+    assert run([command, write(tmp_path, ENDLESS), "--max-steps", "3", "--json"]) == 3
+    assert "E934" in [d["code"] for d in json.loads(capsys.readouterr().out)["diagnostics"]]
+
+
+def test_a_netlist_goes_to_standard_output_by_its_name(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("f.cir").write_text("low pass\nV1 a 0 1\nR1 a b 1k\nC1 b 0 1u\n.tran 1u 5m\n.end\n")
+    assert run(["import", "f.cir"]) == 0
+    plain = capsys.readouterr().out
+    assert run(["import", "f.cir", "-o", "-"]) == 0
+    assert capsys.readouterr().out == plain
+    assert not Path("-").exists()
