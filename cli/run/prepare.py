@@ -132,8 +132,8 @@ def _compiled(
         compiled = compile_network(network, formulation, "c", traced=traced, gather=gather)
         try:
             return compiled, carrier.load(compiled.library()), "c"
-        except build.BuildError as error:  # none there, or one that cannot build (no headers, no room)
-            first = error.output.strip().splitlines()[:1]
+        except (build.BuildError, OSError) as error:  # no compiler, one that cannot build, a file that may not be run
+            first = getattr(error, "output", "").strip().splitlines()[:1]
             said = ": ".join([str(error), *first])
             report.note("N609", f"{said}: the NumPy backend takes over", network.place, help="--backend numpy")
     from sysdyn.cli.run.generated import module_of

@@ -89,7 +89,7 @@ def of_this_machine() -> tuple[str, ...]:
 
 
 def build(text: str, flags: tuple[str, ...] = FLAGS) -> Path:
-    """The shared library of a C text; BuildError where the compiler fails, OSError where the folder is not writable."""
+    """The shared library of a C text; BuildError where there is no compiler, it fails, or nothing can be written."""
     command, options = compiler()
     flags = (*flags, *of_this_machine())
     said = (*map(_identity, command), *flags, *options, text)
@@ -98,7 +98,14 @@ def build(text: str, flags: tuple[str, ...] = FLAGS) -> Path:
     if cache_.sound(entry, key):
         return entry
     _runs(command)
-    return _compile((*command, *flags, *options), text, entry.parent, key)
+    try:
+        return _compile((*command, *flags, *options), text, entry.parent, key)
+    except OSError:  # no room in the cache, or a folder that takes no files: one for this process
+        pass
+    try:
+        return _compile((*command, *flags, *options), text, cache_.folder_of_process(), key)
+    except OSError as error:
+        raise NoCompilerError(f"a library cannot be written: {error}") from error
 
 
 def _compile(command: tuple[str, ...], text: str, folder: Path, key: str) -> Path:

@@ -37,8 +37,8 @@ def folder() -> Path:
         real = asked.resolve(strict=True)
         private = _mine(real.stat()) and _trusted(real.parent.stat())
     except OSError:
-        return _folder_of_process()
-    return asked if private and os.access(asked, os.W_OK) else _folder_of_process()
+        return folder_of_process()
+    return asked if private and os.access(asked, os.W_OK) else folder_of_process()
 
 
 def wanted() -> Path:
@@ -72,7 +72,8 @@ def _trusted(parent: os.stat_result) -> bool:
 
 
 @cache
-def _folder_of_process() -> Path:
+def folder_of_process() -> Path:
+    """A folder that lives as long as this process.  OSError where there is none."""
     import tempfile
 
     made = Path(tempfile.mkdtemp(prefix="sysdyn-"))

@@ -86,14 +86,16 @@ class Carrier(Protocol):
 
 
 class LibraryCarrier:
-    """A C library that exports sd_contract and sd_<block>_rows, _dy, _dyd."""
+    """A C library that exports sd_contract and sd_<block>_rows, _dy, _dyd.  OSError where it cannot be loaded (a folder
+    from which nothing may be run); ContractError where it is no compiled model.
+    """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         try:
             self._library = c.CDLL(str(self.path.resolve()))
             version = c.c_int.in_dll(self._library, "sd_contract").value
-        except (OSError, ValueError) as error:
+        except ValueError as error:
             raise ContractError(f"{self.path}: not a compiled model: {error}") from error
         if version != CONTRACT:
             raise ContractError(f"{self.path}: contract {version}, this runtime reads {CONTRACT}")

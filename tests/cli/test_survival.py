@@ -145,9 +145,9 @@ def mounts(tmp_path_factory):
     """A function from a size in bytes to a folder on a disk of that size."""
     made = []
 
-    def mount(size):
+    def mount(size, options="rw"):
         folder = tmp_path_factory.mktemp("disk")
-        command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
+        command = ["mount", "-t", "tmpfs", "-o", f"size={size},{options}", "tmpfs", str(folder)]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
         except OSError as error:
@@ -183,6 +183,21 @@ def test_a_short_run_keeps_the_rows_that_fit(tmp_path, mounts):
     assert child.returncode == 5, (child.returncode, child.stderr)
     assert "holds what fitted" in child.stderr
     readable(disk / "out.h5", 1000)
+
+
+@pytest.mark.parametrize(("size", "options"), [(16384, "rw"), (1 << 24, "noexec"), (1 << 24, "ro")])
+def test_a_cache_that_takes_or_runs_nothing_costs_no_run(tmp_path, mounts, size, options):
+    """Too small for a library, a folder that nothing may be run from, one that is read only."""
+    disk = mounts(size, options)
+    output = str(tmp_path / "out.h5")
+    command = [sys.executable, "-m", "sysdyn.cli", "simulate", write(tmp_path, PENDULUM), "-o", output]
+    environment = {**os.environ, "SYSDYN_CACHE": str(disk / "own")}
+    child = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    assert child.returncode == 0, child.stderr
+    assert options == "ro" or "NumPy backend takes over" in child.stderr
+    trace = Trace.open(output)
+    assert trace.final
+    assert trace.time.size > 100
 
 
 def damaged(good, chance):

@@ -1,6 +1,7 @@
 """The cache of compiled models: what lies there is trusted only as far as its seal."""
 
 import ctypes
+import errno
 import os
 import shutil
 import stat
@@ -9,7 +10,7 @@ import sys
 
 import pytest
 from sysdyn.compiler.program import cache
-from sysdyn.compiler.program.build import build, compiler
+from sysdyn.compiler.program.build import NoCompilerError, build, compiler
 
 TEXT = "int sd_answer(void) { return %d; }"
 
@@ -106,9 +107,30 @@ def test_a_sound_entry_is_not_built_again(folder, monkeypatch):
 
 def test_a_build_that_is_cut_short_leaves_no_entry(folder, monkeypatch):
     monkeypatch.setattr(cache.os, "fsync", lambda handle: (_ for _ in ()).throw(OSError("no room")))
-    with pytest.raises(OSError, match="no room"):
+    with pytest.raises(NoCompilerError, match="no room"):
         build(TEXT % 5)
     assert not list(folder.iterdir())
+
+
+def test_a_cache_without_room_is_done_without(folder, monkeypatch):
+    put, tried = cache.put, []
+
+    def full(library, key):
+        tried.append(library)
+        if library.is_relative_to(folder) or monkeypatch.nowhere:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return put(library, key)
+
+    monkeypatch.nowhere = False
+    monkeypatch.setattr(cache, "put", full)
+    built = build(TEXT % 7)
+    assert answer(built) == "7"
+    assert not built.is_relative_to(folder)
+    assert len(tried) == 2
+    assert not list(folder.iterdir())
+    monkeypatch.nowhere = True
+    with pytest.raises(NoCompilerError, match="No space left"):
+        build(TEXT % 8)
 
 
 def test_the_cache_has_a_limit_and_what_was_used_longest_ago_goes(folder, monkeypatch):
