@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import click
 from sysdyn.cli.failures import OF_RUNS, SOLVER, envelope, plain, shown
+from sysdyn.cli.streams import put
 from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, ModelError, Report, shortened
 
 ROUTINE = ("N501", "N601", "N602", "N603", "N604")
@@ -47,19 +48,19 @@ class Console:
     def say(self, message: str) -> None:
         """A message for the person at the terminal."""
         if not (self.quiet or self.as_json):
-            print(shown(message), file=sys.stderr)
+            put(shown(message) + "\n", "stderr")
 
     def complain(self, message: str, code: int) -> None:
         """A finding that has no place in a text, with the exit code that it leads to; --quiet does not silence it."""
         self._plain.append(plain(message, code))
         if not (self.as_json or self.format):
-            print(shown(f"sysdyn: {message}"), file=sys.stderr)
+            put(shown(f"sysdyn: {message}") + "\n", "stderr")
 
     def data(self, text: str, *, verbatim: bool = False) -> None:
         """Data that was asked for; verbatim: the user's own text, which may go to a file."""
         if not self.as_json and text:
             text = text if verbatim and not sys.stdout.isatty() else shown(text)
-            sys.stdout.write(text if text.endswith("\n") else text + "\n")
+            put(text if text.endswith("\n") else text + "\n")
 
     def finish(self, code: int = 0) -> int:
         """Show the findings; the exit code (1 where there are errors)."""
@@ -70,7 +71,7 @@ class Console:
             diagnostics = [*(d.to_json() for d in found), *self._plain]
             if self.command == "check":
                 self.result["edits"] = [edited(k, d.edit) for k, d in enumerate(found) if d.edit is not None]
-            print(json.dumps(finite(envelope(self.command, code, diagnostics, self.result)), allow_nan=False))
+            put(json.dumps(finite(envelope(self.command, code, diagnostics, self.result)), allow_nan=False) + "\n")
         elif self.format is not None:
             kept = [d for d in found if d.severity == "error" or not (self.quiet or self._routine(d))]
             self.data(self.format(kept, self._plain), verbatim=True)
@@ -92,10 +93,10 @@ class Console:
 
         shown = [d for d in found if d.severity == "error" or d.code in ALWAYS or not (self.quiet or self._routine(d))]
         for diagnostic in shown:
-            print(render(diagnostic, color=self.color), file=sys.stderr)
+            put(render(diagnostic, color=self.color) + "\n", "stderr")
         errors = sum(d.severity == "error" for d in self.report)
         if errors > 1 or (errors and self.summary):
-            print(f"{errors} error{'s' * (errors > 1)}{self.summary}", file=sys.stderr)
+            put(f"{errors} error{'s' * (errors > 1)}{self.summary}\n", "stderr")
 
 
 def edited(number: int, edit: Edit) -> dict[str, object]:

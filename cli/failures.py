@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import click
+from sysdyn.cli.streams import flush, silence
 
 USAGE, SOLVER, FAULT, INPUT_OUTPUT, INTERRUPTED = 2, 3, 4, 5, 130
 OF_RUNS = ("E920", "E921", "E930", "E931", "E932", "E933", "E934")
@@ -33,14 +34,15 @@ def report_failure(error: BaseException, arguments: Sequence[str]) -> int:
     the code of input and output.
     """
     if isinstance(error, SystemExit):
+        if isinstance(error.__context__, BrokenPipeError):  # click's own way
+            return 0
         return error.code if isinstance(error.code, int) else 1
     code, message = classify(error)
     try:
         _say(error, code, message, arguments)
-        for stream in (sys.stdout, sys.stderr):
-            stream.flush()
+        flush()
     except OSError as other:
-        _silence()
+        silence()
         with contextlib.suppress(OSError):
             print(f"sysdyn: {classify(other)[1]}", file=sys.stderr, flush=True)
         return code if code in (INTERRUPTED, FAULT) else INPUT_OUTPUT
@@ -79,7 +81,7 @@ def classify(error: BaseException) -> tuple[int, str]:
     if isinstance(error, click.ClickException):
         return INPUT_OUTPUT, error.format_message()
     if isinstance(error, BrokenPipeError):
-        _silence()
+        silence()
         return 0, "the reader of the output went away"
     if isinstance(error, OSError):
         name = f"{error.filename}: " if error.filename else ""
@@ -103,11 +105,6 @@ def shown(message: str) -> str:
     from sysdyn.dsl.text.render import printable
 
     return "\n".join(printable(line) for line in message.split("\n"))
-
-
-def _silence() -> None:
-    """Python flushes standard output at exit: give it a place that takes it."""
-    sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115, PTH123
 
 
 def plain(message: str, code: int) -> dict[str, object]:

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 import click
 from sysdyn import __version__
-from sysdyn.cli.streams import standing_streams
+from sysdyn.cli.streams import flush, standing_streams
 from sysdyn.dsl.model.collecting import keep
 
 COMMANDS = {
@@ -129,8 +129,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     with _ended_like_an_interruption(), standing_streams():
         try:
             code = group.main(given, prog_name="sysdyn", standalone_mode=False, default_map=_defaults(given))
-            for stream in (sys.stdout, sys.stderr):
-                stream.flush()  # what a full disk refuses is found here, not at exit
+            flush()
             return code if isinstance(code, int) else 0
         except BaseException as error:
             from sysdyn.cli.failures import report_failure

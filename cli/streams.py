@@ -1,10 +1,11 @@
-"""Standard streams that were closed before the program began: writing to one is an error, not silence."""
+"""Standard streams: closed before the program began (writing is an error, not silence), or left by their reader."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
 import io
+import os
 import sys
 from collections.abc import Iterator
 
@@ -40,3 +41,25 @@ def standing_streams() -> Iterator[None]:
     finally:
         for name in closed:
             setattr(sys, name, None)
+
+
+def silence(name: str = "stdout") -> None:
+    """Python flushes standard streams at exit: give one that nobody reads any more a place that takes it."""
+    setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, PTH123
+
+
+def put(text: str, name: str = "stdout") -> None:
+    """Write to a standard stream; where its reader went away the rest is left out, and the exit is what it would be."""
+    try:
+        getattr(sys, name).write(text)
+    except BrokenPipeError:
+        silence(name)
+
+
+def flush() -> None:
+    """What a full disk refuses is found here, not at exit; a reader that went away is as for `put`."""
+    for name in ("stdout", "stderr"):
+        try:
+            getattr(sys, name).flush()
+        except BrokenPipeError:
+            silence(name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import os
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -68,7 +69,11 @@ def drawing(size: tuple[float, float], kind: str, draw: Callable[[Any], None]) -
     Under our settings, not a person's, and without a date: one picture of the same data is always the same bytes.
     """
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # says that it builds its font cache
-    import matplotlib as mpl
+    window = os.environ.pop("MPLBACKEND", None)  # none of ours opens one: whether it is there is nothing to us
+    try:
+        import matplotlib as mpl
+    finally:
+        os.environ |= {} if window is None else {"MPLBACKEND": window}
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -67,6 +67,7 @@ class Request:
     no_prune: bool = False
     no_lock: bool = False
     own: bool = False  # refuse a formulation whose rows are those of another
+    text: str | None = None  # what stood on standard input, for processes beside the one that read it
 
 
 def check_tolerances(request: Request) -> None:

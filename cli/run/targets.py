@@ -13,7 +13,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.load import Document
 from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.text.decoding import decode
-from sysdyn.dsl.text.diagnostics import Diagnostic, Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
@@ -33,10 +33,11 @@ class Target:
         return f"{self.scene.name.name} of {model}" if self.scene else model
 
 
-def read(path: str, report: Report) -> Document:
-    """Parse a file, or standard input where path is '-'."""
+def read(path: str, report: Report, text: str | None = None) -> Document:
+    """Parse a file, or standard input where path is '-'; text: what stood there, if it was read before."""
     if path == "-":
-        return load.document(decode("<stdin>", sys.stdin.buffer), report)
+        source = decode("<stdin>", sys.stdin.buffer) if text is None else SourceText("<stdin>", text)
+        return load.document(source, report)
     return load.read(path, report)
 
 

@@ -318,7 +318,8 @@ def bench_of(request: Request, folder: Path) -> Bench:
     if key not in _benches:
         report, own = Report(), folder / f"ahead-{os.getpid()}"
         own.mkdir(exist_ok=True)
-        target = targets.one(targets.read(request.file, report), request.file, request.model, request.scene, report)
+        document = targets.read(request.file, report, request.text)
+        target = targets.one(document, request.file, request.model, request.scene, report)
         assert target is not None
         _benches[key] = Bench(request, target, report, own, time.monotonic())
         _benches[key].prepare()

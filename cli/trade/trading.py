@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
@@ -53,6 +54,7 @@ def trade(
         raise UsageError("--method euler: trade compares methods that control their error")
     began = time.monotonic()
     document = targets.read(request.file, report)
+    request = replace(request, text=document.file.source.text if request.file == "-" else None)
     target = targets.one(document, request.file, request.model, request.scene, report)
     if target is None:
         return None

@@ -61,6 +61,7 @@ def verify(
     if request.method not in (None, "auto", *METHODS):
         raise UsageError(f"--method {request.method}: verify compares {' and '.join(METHODS)}")
     document = targets.read(request.file, report)
+    request = replace(request, text=document.file.source.text if request.file == "-" else None)
     target = targets.one(document, request.file, request.model, request.scene, report)
     return None if target is None else _Verification(request, target, report, folder, progress).all(jobs)
 
@@ -84,7 +85,8 @@ def _part(asked: tuple[Request, Path, str | None]) -> _Part:
     """One formulation (None: the reference) in a process of its own."""
     request, folder, name = asked
     report = Report()
-    target = targets.one(targets.read(request.file, report), request.file, request.model, request.scene, report)
+    document = targets.read(request.file, report, request.text)
+    target = targets.one(document, request.file, request.model, request.scene, report)
     assert target is not None
     before = set(report)
     own = _Verification(request, target, report, folder, None)

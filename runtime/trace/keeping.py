@@ -18,7 +18,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.trace.claim import claimed
 from sysdyn.runtime.trace.opening import destination
 from sysdyn.runtime.trace.trace import Quantity, Trace
-from sysdyn.runtime.trace.trace_store import BEFORE, Layout, clear
+from sysdyn.runtime.trace.trace_store import BEFORE, Layout, clear, input_output
 from sysdyn.runtime.trace.writing import Met, TraceWriter
 
 Attributes = Mapping[str, str | float | int]
@@ -130,7 +130,8 @@ class Files:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._target = destination(self.path)
+        with input_output(self.path):
+            self._target = destination(self.path)
         self._part = self._target.with_name(f".{self._target.name}.part")
 
     @contextlib.contextmanager

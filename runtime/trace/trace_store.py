@@ -82,7 +82,7 @@ def input_output(path: Path) -> Iterator[None]:
     try:
         yield
     except (OSError, RuntimeError, ValueError) as error:
-        raise TraceError(f"{path}: {error}") from error
+        raise TraceError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
 
 
 def _text(value: str) -> Any:

@@ -1,6 +1,9 @@
 """One command where another one's result stands: what would be lost, what is no trace, which exit counts."""
 
 import json
+import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -10,7 +13,7 @@ import pytest
 from sysdyn.cli.failures import worst
 from sysdyn.cli.main import run
 from sysdyn.runtime.trace.claim import claimed
-from texts import ENDLESS, PENDULUM, write
+from texts import BROKEN, ENDLESS, PENDULUM, process, write
 
 DRIVEN = """\
 from std.electrical import resistor, capacitor, voltage
@@ -194,3 +197,27 @@ def test_a_netlist_goes_to_standard_output_by_its_name(tmp_path, monkeypatch, ca
     assert run(["import", "f.cir", "-o", "-"]) == 0
     assert capsys.readouterr().out == plain
     assert not Path("-").exists()
+
+
+@pytest.mark.parametrize("command", [["verify"], ["trade", "--accuracy", "1e-2"]], ids=["verify", "trade"])
+def test_processes_side_by_side_read_standard_input_too(command):
+    run_ = [*command, "-", "--until", "0.2", "--no-timings", "--json"]
+    found = [process(*run_, "--jobs", n, input=PENDULUM) for n in ("1", "2")]
+    assert [ran.returncode for ran in found] == [0, 0], found[1].stdout
+    assert found[0].stdout == found[1].stdout
+
+
+@pytest.mark.parametrize(
+    ("command", "code"), [("help --json", 0), ("list {}", 0), ("check {0} --json", 1), ("check {0} 2>&1", 1)]
+)
+def test_a_reader_that_goes_away_changes_no_exit(tmp_path, command, code):
+    path = write(tmp_path, BROKEN if code else PENDULUM)
+    line = f"{sys.executable} -m sysdyn.cli {command.format(path)} | true; exit ${{PIPESTATUS[0]}}"
+    ran = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=60, check=False)
+    assert (ran.returncode, ran.stderr) == (code, "")
+
+
+def test_a_window_that_matplotlib_does_not_know_is_no_fault(model):
+    environment = {**os.environ, "MPLBACKEND": "none such"}
+    ran = process("plot", "trace.h5", "-o", "p.png", env=environment)
+    assert ran.returncode == 0, ran.stderr
