@@ -9,11 +9,15 @@ import os
 import sys
 from collections.abc import Iterator
 
-NAMES = {"stdout": "the standard output stream", "stderr": "the standard error stream"}
+NAMES = {
+    "stdin": "the standard input stream",
+    "stdout": "the standard output stream",
+    "stderr": "the standard error stream",
+}
 
 
 class Closed(io.TextIOBase):
-    """Nothing can be written to it: OSError, but for nothing."""
+    """Nothing can be read from it or written to it: OSError, but for nothing."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -24,9 +28,13 @@ class Closed(io.TextIOBase):
             raise OSError(errno.EBADF, f"{self.name} is closed")
         return 0
 
+    def read(self, size: int | None = -1, /) -> str:
+        """OSError."""
+        raise OSError(errno.EBADF, f"{self.name} is closed")
+
     @property
     def buffer(self) -> Closed:
-        """Bytes cannot be written either."""
+        """Bytes can be neither."""
         return self
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
@@ -10,6 +11,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.spice.circuit import Reader
 from sysdyn.cli.spice.model_text import Writer
 from sysdyn.dsl.format.format import format_text
+from sysdyn.dsl.text.decoding import decode
 from sysdyn.dsl.text.diagnostics import SourceText
 
 
@@ -25,7 +27,7 @@ def command(console: Console, file: str, output: str | None) -> int:
     output = None if output == "-" else output
     if output is not None and not output.endswith(".sd"):
         raise UsageError(f"-o {output}: a model's text ends in .sd")
-    source = SourceText.read(file)
+    source = decode("stdin", sys.stdin.buffer) if file == "-" else SourceText.read(file)
     reader = Reader(source, console.report)
     text = Writer(reader.netlist, source, console.report).text()
     if console.report.failed:

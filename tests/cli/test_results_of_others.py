@@ -221,3 +221,18 @@ def test_a_window_that_matplotlib_does_not_know_is_no_fault(model):
     environment = {**os.environ, "MPLBACKEND": "none such"}
     ran = process("plot", "trace.h5", "-o", "p.png", env=environment)
     assert ran.returncode == 0, ran.stderr
+
+
+@pytest.mark.parametrize("command", ["simulate -", "check -", "plot - -o p.png", "diff - trace.h5", "import -"])
+def test_a_closed_standard_input_is_one_of_input_and_output(model, command):
+    line = f"{sys.executable} -m sysdyn.cli {command} <&-"
+    ran = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=60, check=False)
+    assert ran.returncode == 5, ran.stderr
+    assert "the standard input stream is closed" in ran.stderr
+
+
+def test_a_netlist_comes_from_standard_input(tmp_path, monkeypatch):
+    netlist = "low pass\nV1 a 0 1\nR1 a b 1k\nC1 b 0 1u\n.tran 1u 5m\n.end\n"
+    monkeypatch.chdir(tmp_path)
+    Path("stdin.cir").write_text(netlist)
+    assert process("import", "-", input=netlist).stdout == process("import", "stdin.cir").stdout
