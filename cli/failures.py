@@ -74,7 +74,7 @@ def _asks_for_json(arguments: Sequence[str]) -> bool:
 
 def classify(error: BaseException) -> tuple[int, str]:
     """Exit code and message."""
-    if isinstance(error, (KeyboardInterrupt, click.Abort)):
+    if _interrupted(error):
         return INTERRUPTED, "interrupted"
     if isinstance(error, click.UsageError):
         return USAGE, error.format_message()
@@ -92,6 +92,15 @@ def classify(error: BaseException) -> tuple[int, str]:
         return INPUT_OUTPUT, str(error)
     how = f"{_where(error)}SYSDYN_DEBUG=1 shows the way there; please report it with the model"
     return FAULT, f"a fault in sysdyn: {type(error).__name__}: {error} ({how})"
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """By Ctrl-C, which Python wraps into an error of its own where it falls into the making of a class."""
+    while error is not None:
+        if isinstance(error, (KeyboardInterrupt, click.Abort)):
+            return True
+        error = error.__cause__
+    return False
 
 
 def _where(error: BaseException) -> str:

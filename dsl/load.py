@@ -301,7 +301,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
     file, problems = parse(source)
     inner.extend(problems)
     items = [i for i in file.items if isinstance(i, syntax.Const)]
-    if "\n" in text or len(items) != 1 or len(file.items) != 1:
+    if inner.failed or "\n" in text or len(items) != 1 or len(file.items) != 1:
         report.extend(inner)
         if not inner.failed:
             report.error("E207", f"{name} {text[:40]}: one expression is wanted", source.place(0, 0))

@@ -65,7 +65,8 @@ def command(
         if network is None:
             return console.finish(1)
         if dump == "network":
-            console.data(network_text.show(network))
+            console.result = {"stage": dump, "text": network_text.show(network)}
+            console.data(console.result["text"])
             return console.finish()
         prepared = prepare(network, console.report, formulation=formulation, backend=backend, prune=not no_prune)
         if prepared is None:
@@ -79,7 +80,8 @@ def command(
                 "descriptor": lambda: descriptor.show(prepared.compiled.form),
                 "program": lambda: program_text.show(prepared.compiled.program),
             }
-            console.data(stages[dump]())
+            console.result = {"stage": dump, "text": stages[dump]()}
+            console.data(console.result["text"])
         if dump is None or folder is not None:
             _write(console, prepared, index, Path(folder or "."))
     if explain:

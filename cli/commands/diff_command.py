@@ -68,6 +68,8 @@ def command(
     console.result = as_json(verdict)
     for path, why in unfinished:
         console.complain(f"{path} is of a run that {why}", 1)
+    if console.quiet and not console.as_json and not verdict.equal:
+        console.complain(headline(verdict), 1)
     if not (console.quiet or pages):
         console.data(headline(verdict) + "\n" + table(verdict))
     return console.finish(0 if verdict.equal and not unfinished else 1)

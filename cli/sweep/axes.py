@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import FORMULATIONS, INDICES, METHODS
 from sysdyn.cli.run.asked import separate
 from sysdyn.values import dataclass
 
@@ -26,6 +27,8 @@ Quantile = Callable[[Numbers, float, float], Numbers]
 
 CHOICES = ("formulation", "method", "index", "accuracy", "rtol")
 """Options that vary as parameters do; so does `level PATH`."""
+NAMED = {"formulation": FORMULATIONS, "method": METHODS, "index": INDICES}
+"""The words that they take."""
 DISTRIBUTIONS: dict[str, Quantile] = {
     "uniform": lambda u, a, b: a + (b - a) * u,
     "loguniform": lambda u, a, b: a * (b / a) ** u,
@@ -81,6 +84,9 @@ def listed(name: str, texts: Sequence[str], evaluate: Evaluate) -> Axis:
     """A list of expressions."""
     if not all(texts):
         raise UsageError(f"--over {name}: an empty value")
+    for text in texts:
+        if name in NAMED and text not in NAMED[name]:
+            raise UsageError(f"--over {name}: '{text}' is none of {', '.join(NAMED[name])}")
     if name in CHOICES or name.startswith("level "):
         return Axis(name, tuple(texts))
     found = tuple(evaluate(name, text) for text in texts)

@@ -21,6 +21,8 @@ from sysdyn.cli.sweep.axes import MOST, Axis, Numbers
 from sysdyn.values import dataclass
 
 SAMPLES = ("random", "latin", "sobol")
+LAST_SEED = 2**63 - 1
+"""What the file of a sweep can hold."""
 Case = dict[str, float | str]
 """Name -> value in SI units, or a text."""
 
@@ -91,6 +93,8 @@ def study(axes: list[Axis], sample: str | None, runs: int | None, seed: int) -> 
         raise UsageError("--runs without a distribution: NAME~uniform(a, b)")
     if runs is not None and not 1 <= runs <= MOST:
         raise UsageError(f"--runs {runs}: from 1 to {MOST}")
+    if not 0 <= seed <= LAST_SEED:
+        raise UsageError(f"--seed {seed}: a whole number from 0 to {LAST_SEED}")
     found = Study(tuple(axes), sample or "random", runs or 0, seed)
     if found.number > MOST:
         raise UsageError(f"{found.number} runs: at most {MOST}")

@@ -74,11 +74,14 @@ def test_no_limit_is_null_in_json(traces, capsys):
     assert found["result"]["worst"] == {"variable": "x", "time": 0.03, "ratio": None, "status": "nonfinite"}
 
 
-def test_quiet_says_nothing(traces, capsys):
-    assert run(["diff", "-q", "ref.h5", "other.h5"]) == 1
+def test_quiet_says_no_more_than_the_reason(traces, capsys):
     assert run(["diff", "-q", "ref.h5", "ref.h5"]) == 0
     said = capsys.readouterr()
     assert (said.out, said.err) == ("", "")
+    assert run(["diff", "-q", "ref.h5", "other.h5"]) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("sysdyn: differs: y at ")
 
 
 def test_tolerances(traces):

@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from sysdyn.cli.failures import worst
+from sysdyn.cli.failures import classify, worst
 from sysdyn.cli.main import run
 from sysdyn.runtime.trace.claim import claimed
 from texts import BROKEN, ENDLESS, PENDULUM, process, write
@@ -236,3 +236,53 @@ def test_a_netlist_comes_from_standard_input(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("stdin.cir").write_text(netlist)
     assert process("import", "-", input=netlist).stdout == process("import", "stdin.cir").stdout
+
+
+def test_quiet_keeps_the_reason_of_a_difference(model, capsys):
+    assert run(["simulate", "-q", model, "--set", "m=3", "--set", "l=2.3", "-o", "second.h5"]) == 0
+    assert run(["diff", "-q", "trace.h5", "second.h5"]) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "differs" in said.err
+    assert run(["diff", "-q", "trace.h5", "trace.h5"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (["--over", "formulation=lagrangian,nosuch"], 2),
+        (["--over", "method=bdf,nosuch"], 2),
+        (["--over", "index=2,9"], 2),
+        ([*OVER, "--seed", "9" * 30], 2),
+        (["--over", "l~normal(2 m, 0.1 m)", "--runs", "2", "--seed", "-5"], 2),
+        ([*OVER, "--until", "1e400"], 1),
+    ],
+)
+def test_what_a_sweep_cannot_vary_is_said_before_its_runs(model, capsys, options, code):
+    assert run(["sweep", model, "-o", "new.h5", *options]) == code
+    assert capsys.readouterr().err
+    assert not Path("new.h5").exists()
+
+
+@pytest.mark.parametrize("command", [["linearize", "--at"], ["simulate", "--until"], ["simulate", "--max-wall"]])
+def test_a_number_that_no_float_holds_is_refused(model, capsys, command):
+    for text in ("1e400", "1e-400"):
+        assert run([command[0], model, command[1], text]) == 1
+        assert "E114" in capsys.readouterr().err
+
+
+def test_a_stage_is_in_json_too(model, capsys):
+    for stage in ("network", "program"):
+        assert run(["compile", model, "--dump", stage]) == 0
+        text = capsys.readouterr().out
+        assert run(["compile", model, "--dump", stage, "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)["result"]
+        assert found["stage"] == stage
+        assert found["text"].rstrip("\n") == text.rstrip("\n") != ""
+
+
+def test_an_interruption_within_another_error_is_one():
+    wrapped = RuntimeError("Error calling __set_name__")
+    wrapped.__cause__ = KeyboardInterrupt()
+    assert classify(wrapped) == (130, "interrupted")
