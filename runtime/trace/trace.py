@@ -128,7 +128,7 @@ class Trace:
                 if name == "time" or not _is_row(item):
                     continue
                 path_of = _plain(item.attrs.get("derivative", ""))
-                known = source[path_of] if path_of and path_of in source else None
+                known: Any = source[path_of] if path_of and path_of in source else None
                 rate = np.asarray(known[:length]) if _is_row(known) else None
                 quantities[name] = Quantity(
                     name,
