@@ -140,7 +140,7 @@ def test_start_of_small_models_imports_no_scipy():
 
 
 def test_what_is_no_compiled_model(tmp_path, library):
-    with pytest.raises(OSError, match="missing.so"):
+    with pytest.raises(OSError, match=r"missing\.so"):
         load(tmp_path / "missing.so")
     with pytest.raises(ContractError, match="contract"):
         load(object())
