@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.simulate import simulate
