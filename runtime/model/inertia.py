@@ -122,15 +122,20 @@ class Inertia:
         return bool((np.abs(total) <= CANCELS * size).all())
 
 
-def joins(system: System) -> bool:
-    """Whether a coordinate's rows may hold inertia of another one's flow."""
+def joined(system: System) -> NDArray[np.bool_]:
+    """Flows whose coordinate's rows may hold inertia of another one's, or theirs its own [unknowns]."""
     columns, flows = system.pattern.columns_of(), system.are("f")
     in_y, in_rate = system.structural()
-    for group, there in (("dynamics", in_rate), ("momentum", in_y)):
+    momenta, own_flow = with_flows(system)
+    flow = np.where(flows, np.arange(system.unknowns), -1)
+    flow[momenta] = own_flow
+    found = np.zeros(system.unknowns, dtype=bool)
+    for group, there, kind in (("dynamics", in_rate, "f"), ("momentum", in_y, "f"), ("momentum", in_y, "p")):
         own = own_unknown(system, group, "f")[system.pattern.row]
-        if (there & (own >= 0) & flows[columns] & (own != columns)).any():
-            return True
-    return False
+        other = np.where(system.are(kind), flow, -1)[columns]
+        apart = there & (own >= 0) & (other >= 0) & (own != other)
+        found[own[apart]] = found[other[apart]] = True
+    return found
 
 
 def inertia(system: System, jy: Floats, jyd: Floats) -> Floats:

@@ -255,7 +255,7 @@ class Starter:
         They are taken from the inertia at two points: what moves with the state is left out.
         """
         settled = self.settled
-        if not unsettled.size or (self.n > DENSE and not self.equations.joined):
+        if not unsettled.size or (self.n > DENSE and not self.equations.joined.any()):
             return weights(np.zeros((0, unsettled.size)))
         points = [self._inertia(shift) for shift in (0.0, 0.1)]
         number = np.cumsum(settled.are("f")) - 1
@@ -281,14 +281,18 @@ class Starter:
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
 
-        Of a momentum and its flow the one that is written carries the state, else the momentum.
+        Of a momentum and its flow the one that is written carries the state; else the momentum, or the flow where
+        others make the momentum too: what they hold together would depend on the form.
         """
         jyd = self.system.slopes(t, *self.expand(x), rate=True)
         state = self.settled.are(*STATE)
         carries = state & ~self.measured
         carries[: self.system.unknowns] &= self.system.differential(jyd)
         carries |= self.given.written & state
-        carries[np.where(self.given.written[self._flow], self._momentum, self._flow)] = False
+        flow, momentum, written = self._flow, self._momentum, self.given.written
+        by_flow = written[flow] | (self.equations.joined[flow] & ~written[momentum])
+        carries[flow] |= by_flow & carries[momentum]
+        carries[np.where(by_flow, momentum, flow)] = False
         found = np.ones(x.size, dtype=bool)
         found[: self.n] = ~carries
         return found

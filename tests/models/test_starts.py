@@ -131,3 +131,20 @@ def test_coordinates_declared_in_two_loops(tmp_path, formulation):
     rate = 3.0 * np.sqrt(4.0 - 2.0 * np.cos(np.pi / 5.0) - 2.0 * np.cos(2.0 * np.pi / 5.0))
     shape = np.sin(2.0 * np.pi / 5.0) * np.sin(6.0 * np.pi / 5.0)
     np.testing.assert_allclose(trace["z"].values, shape * np.cos(rate * np.array(trace.time)), atol=2e-6)
+
+
+JOINED = """model joined {
+  coord x, y: translation
+  energy T* = 1/2*(1 kg)*((x' + y')^2 + x'^2)
+  energy V = 1/2*(1 N/m)*(x^2 + y^2)
+  psi drive: x' + y' = 1 m/s
+}
+scene go of joined { time 0 s to 0.1 s; accuracy 1e-6; trace x' as u, y' as v }
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR[:2])
+def test_flows_that_share_inertia_start_alike_in_both_families(tmp_path, formulation):
+    """The least of (2 u)^2 + v^2 with u + v = 1: each flow counts with its own inertia, not with the momentum."""
+    trace = trace_of(tmp_path, JOINED, formulation=formulation)
+    np.testing.assert_allclose([trace["u"].values[0], trace["v"].values[0]], [0.2, 0.8], atol=1e-9)
