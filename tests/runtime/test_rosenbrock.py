@@ -104,6 +104,18 @@ def test_tolerance_against_error_and_work():
         assert finished.statistics.steps < steps
 
 
+@pytest.mark.parametrize("part", [1.0, 1e-2])
+def test_a_run_opens_with_the_step_that_the_one_before_found_fit(part):
+    """With another tolerance too: as exact as one that looks for it, in fewer steps."""
+    draft = rosenbrock(models.mass_spring(), 2.0, rtol=1e-4)[2]
+    t, found = np.linspace(0, 2, 81), []
+    for opening in (0.0, draft.opening):
+        _, columns, finished = rosenbrock(models.mass_spring(), 2.0, t, rtol=1e-4 * part, opening=opening)
+        found.append((np.abs(columns["q_x"] - oscillation(t)).max(), finished.statistics))
+    (error, sought), (as_exact, known) = found
+    assert as_exact < 1.2 * error and known.steps < sought.steps and known.rejected_steps == 0
+
+
 def test_a_stiff_diode_as_the_others_have_it():
     t = np.linspace(0, 0.05, 101)
     exact = run(models.diode_circuit(), 0.05, "3", 1, t, rtol=1e-11, method="radau")[1]
