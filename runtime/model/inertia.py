@@ -127,13 +127,13 @@ def joined(system: System) -> NDArray[np.bool_]:
     columns, flows = system.pattern.columns_of(), system.are("f")
     in_y, in_rate = system.structural()
     momenta, own_flow = with_flows(system)
-    flow = np.where(flows, np.arange(system.unknowns), -1)
+    flow = np.where(flows, np.arange(system.unknowns, dtype=np.int32), np.int32(-1))
     flow[momenta] = own_flow
     found = np.zeros(system.unknowns, dtype=bool)
-    for group, there, kind in (("dynamics", in_rate, "f"), ("momentum", in_y, "f"), ("momentum", in_y, "p")):
-        own = own_unknown(system, group, "f")[system.pattern.row]
-        other = np.where(system.are(kind), flow, -1)[columns]
-        apart = there & (own >= 0) & (other >= 0) & (own != other)
+    for group, there, moving in (("dynamics", in_rate, flows), ("momentum", in_y, flow >= 0)):
+        at = np.flatnonzero(there & moving[columns])
+        own, other = own_unknown(system, group, "f")[system.pattern.row[at]], flow[columns[at]]
+        apart = (own >= 0) & (own != other)
         found[own[apart]] = found[other[apart]] = True
     return found
 
