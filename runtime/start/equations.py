@@ -78,7 +78,10 @@ class Equations:
             rows = settled.description.rows[family]
             contents[first : first + rows.size] = group == "initial" and rows.content
         own = contents[self.rows] & (self.columns < self.written)
-        mask[self.columns[own]] = True
+        rows, columns, flows = self.rows[own], self.columns[own], settled.are("f")
+        moving = np.zeros(settled.rows, dtype=bool)
+        moving[rows[flows[columns]]] = True  # what is made of flows measures these alone
+        mask[columns[flows[columns] | ~moving[rows]]] = True
         mask[self.momentum] |= mask[self.flow]
         return mask
 

@@ -281,8 +281,8 @@ class Starter:
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
 
-        Of a momentum and its flow the one that is written carries the state; else the momentum, or the flow where
-        others make the momentum too: what they hold together would depend on the form.
+        Of a momentum and its flow the one that is written carries the state, else the momentum; where other flows make
+        it too, the momentum in any case.
         """
         jyd = self.system.slopes(t, *self.expand(x), rate=True)
         state = self.settled.are(*STATE)
@@ -290,9 +290,8 @@ class Starter:
         carries[: self.system.unknowns] &= self.system.differential(jyd)
         carries |= self.given.written & state
         flow, momentum, written = self._flow, self._momentum, self.given.written
-        by_flow = written[flow] | (self.equations.joined[flow] & ~written[momentum])
-        carries[flow] |= by_flow & carries[momentum]
-        carries[np.where(by_flow, momentum, flow)] = False
+        carries[flow[~written[flow]]] = False
+        carries[momentum[written[flow] & ~self.equations.joined[flow]]] = False
         found = np.ones(x.size, dtype=bool)
         found[: self.n] = ~carries
         return found
@@ -324,7 +323,7 @@ class Starter:
         rows, families = self.system.description.rows, self.system.description.families
         groups = self.system.form.groups if self.balanced else ()
         effort = {rows[k].owner: rows[k].unit for group, k, _ in groups if group == "dynamics"}
-        kinds = {"q": "", "s": "", "f": "p", "slack": "", "unsaid": ""}
+        kinds = {"q": "", "s": "", "f": "p ", "p": "p ", "slack": "", "unsaid": ""}
         named = [kinds.get(f.kind, f.kind) + (effort if f.kind in "fp" else {}).get(f.owner, f.unit) for f in families]
         number: dict[str, int] = {}
         of_family = np.array([*(number.setdefault(s, len(number)) for s in named), 0], dtype=np.int32)
