@@ -55,7 +55,8 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     add_initials(form.assembly, model, form.carriers, equations)
     form.families += missing(equations)
     if equations or form.moves_flows():
-        form.held(shared(model) - carriers)
+        measured = {n.data[0] for i in model.initials if i.store for n in variables(i.target) if n.op == "var"}
+        form.held(shared(model) - carriers - measured)
     owners = (*model.coordinates, *model.unknowns, *model.states, *model.positions)
     shapes = [(f.name, f.shape) for f in owners]
     shapes += [(e.owner, tuple((loop.first, loop.last) for loop in e.target.nest)) for e in equations]
@@ -284,9 +285,9 @@ class _Lowering:
         for c in self.model.coordinates:
             if c.name in names:
                 owner, (nest, at) = HELD + c.name, whole(c)
-                unit = f"p {c.units['e']}"
-                self.families.append(Unknowns(owner, "unsaid", owner, unit, c.place))
-                self.assembly.family(Equations("initial", c.name, owner, "initial", c.units["p"], c.place, content=True))
+                self.families.append(Unknowns(owner, "unsaid", owner, f"p {c.units['e']}", c.place))
+                rows = Equations("initial", c.name, owner, "initial", c.units["p"], c.place, content=True)
+                self.assembly.family(rows)
                 self.assembly.add("initial", owner, at, nest, neg(var(owner, "unsaid", *at)))
         for term in self.model.function(m.coenergy):
             for rate in local_variables(term.expression, m.rate):
