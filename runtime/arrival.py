@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.integrate.alternatives import alternatives
+from sysdyn.runtime.accuracy.alternatives import alternatives
+from sysdyn.runtime.accuracy.options import Options, choose_method
+from sysdyn.runtime.accuracy.way import LONG, Way
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.options import Options, choose_method
 from sysdyn.runtime.integrate.request import LONGEST, Request
-from sysdyn.runtime.integrate.way import LONG, Way
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime.accuracy.alternatives import alternatives
+from sysdyn.runtime.accuracy.control import Achieved, Lighter, control
+from sysdyn.runtime.accuracy.options import Options, choose_index, choose_method, own_tolerances
+from sysdyn.runtime.accuracy.runs import Runs, Samples
+from sysdyn.runtime.accuracy.second_opinion import confirmed
+from sysdyn.runtime.accuracy.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.integrate.accuracy import Achieved, Lighter, control
-from sysdyn.runtime.integrate.alternatives import alternatives
-from sysdyn.runtime.integrate.options import Options, choose_index, choose_method, own_tolerances
-from sysdyn.runtime.integrate.runs import Runs, Samples
-from sysdyn.runtime.integrate.second_opinion import confirmed
 from sysdyn.runtime.integrate.underlying import underlying_form
-from sysdyn.runtime.integrate.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
 from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe

@@ -10,7 +10,7 @@ from sysdyn.cli.run.starting import Started
 from sysdyn.compiler.binding.following import Following, following
 from sysdyn.compiler.binding.following import Group as Formulas
 from sysdyn.compiler.forms import descriptor
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.integrate.underlying import Accelerations, Selection, Underlying, underlying_form
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import NoSuchForm

@@ -21,7 +21,7 @@ from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Place, Report
-from sysdyn.runtime.integrate.options import Progress
+from sysdyn.runtime.accuracy.options import Progress
 from sysdyn.runtime.trace.trace import Quantity, Trace
 from sysdyn.values import dataclass
 

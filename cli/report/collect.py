@@ -21,7 +21,7 @@ from sysdyn.cli.run.targets import Target
 from sysdyn.dsl import load
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.integrate.options import Options, Progress
+from sysdyn.runtime.accuracy.options import Options, Progress
 from sysdyn.runtime.model.failures import TraceError
 
 LONG = 20.0

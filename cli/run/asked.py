@@ -25,7 +25,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network, Scene
 from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
-from sysdyn.runtime.integrate.options import Options, Progress
+from sysdyn.runtime.accuracy.options import Options, Progress
 from sysdyn.runtime.trace.trace import Parameter
 from sysdyn.values import dataclass
 

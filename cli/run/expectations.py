@@ -12,7 +12,7 @@ from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.starting import holds, where_holds
 from sysdyn.dsl.model.network import Expectation, Golden
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.integrate.options import Watch
+from sysdyn.runtime.accuracy.options import Watch
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.simulate import Outcome

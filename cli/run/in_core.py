@@ -21,7 +21,7 @@ from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.columns import Read, following
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.many.asked import ROWS, Claim, NotApplicableError, obstacle, way_of
 from sysdyn.runtime.many.batch import Batch
 from sysdyn.runtime.model.description import stated

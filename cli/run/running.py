@@ -23,7 +23,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.integrate.options import Options, Progress
+from sysdyn.runtime.accuracy.options import Options, Progress
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
 from sysdyn.runtime.simulate import Outcome, simulate
 from sysdyn.runtime.trace.opening import replaceable

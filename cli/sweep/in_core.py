@@ -12,7 +12,7 @@ from sysdyn.cli.run.loaded import Loaded
 from sysdyn.cli.sweep.kept import Block
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
-from sysdyn.runtime.integrate.options import instants
+from sysdyn.runtime.accuracy.options import instants
 from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.many.asked import DONE, END, EXTREMA, TRACES, NotApplicableError
 

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
+from sysdyn.runtime.accuracy.pairs import SHARE, TIMING
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.compare import compare
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.verdict import About, Tolerance
-from sysdyn.runtime.integrate.pairs import SHARE, TIMING
 from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.trace.trace import Trace
 

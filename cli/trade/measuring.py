@@ -28,7 +28,7 @@ from sysdyn.cli.trade.work import counted, of_rows
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.integrate.options import Options, choose_index
+from sysdyn.runtime.accuracy.options import Options, choose_index
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass

@@ -18,7 +18,7 @@ from sysdyn.cli.trade.errors import error_of
 from sysdyn.cli.trade.measuring import Bench, Limits, bench_of
 from sysdyn.cli.trade.traded import Combination, Reference
 from sysdyn.cli.verify.agreement import horizon
-from sysdyn.runtime.integrate.accuracy import LAWS
+from sysdyn.runtime.accuracy.laws import LAWS
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 

@@ -29,7 +29,7 @@ from sysdyn.cli.verify.twins import Twins, free_quantities, twins
 from sysdyn.cli.verify.verified import Refusal, Run, Verified, disagreements, worst
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 

@@ -21,7 +21,7 @@ from sysdyn.compiler.forms.descriptor import AUDIT, DescriptorForm, Equations, U
 from sysdyn.compiler.forms.efforts import Effort, efforts
 from sysdyn.compiler.forms.meters.audit import add_audit
 from sysdyn.compiler.forms.meters.observing import add_initials, add_observations, missing, observed, pins_and_equations
-from sysdyn.compiler.forms.momenta import given, inertial, resolved
+from sysdyn.compiler.forms.momenta import given, inertial, resolved, shared
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.calculus import derivative, differential, gradient, time_derivative
@@ -32,6 +32,8 @@ from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 
+HELD = "#held "
+"""Before the name of a coordinate: what its flow and others hold together."""
 PARALLEL = 1e-9
 """Sine of the angle between two gradients below which they have one direction."""
 
@@ -52,9 +54,13 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     pins, equations = pins_and_equations(model, form.carriers, form.families)
     add_initials(form.assembly, model, form.carriers, equations)
     form.families += missing(equations)
+    if equations or form.moves_flows():
+        measured = {n.data[0] for i in model.initials if i.store for n in variables(i.target) if n.op == "var"}
+        form.held(shared(model) - carriers - measured)
     owners = (*model.coordinates, *model.unknowns, *model.states, *model.positions)
     shapes = [(f.name, f.shape) for f in owners]
     shapes += [(e.owner, tuple((loop.first, loop.last) for loop in e.target.nest)) for e in equations]
+    shapes += [(HELD + c.name, c.shape) for c in model.coordinates]
     shapes += stored
     hulls: dict[str, list[tuple[tuple[Node, ...], Nest, Place]]] = {}
     for row in model.rows:
@@ -261,6 +267,33 @@ class _Lowering:
     def _momentum(self, owner: str, at: tuple[Node, ...], nest: Nest, expression: Node) -> None:
         self.assembly.add("momentum", owner, at, nest, expression)
         self.assembly.add("momentum_rate", owner, at, nest, time_derivative(expression))
+
+    def moves_flows(self) -> bool:
+        """Whether something may move flows from their guesses at the start: constraints, or balances without inertia in
+        sum.
+        """
+        m = self.model.mirror
+        inertias = [(t.expression, local_variables(t.expression, m.rate)) for t in self.model.function(m.coenergy)]
+        one = any(_of_one_combination(energy, rates) for energy, rates in inertias)
+        return one or any(row.kind != "lambda" for row in self.model.rows)
+
+    def held(self, names: frozenset[str]) -> None:
+        """The least change of these flows is that of the momenta which they make together: what they miss of zero, at
+        the start alone, as momenta that are unknowns change there.
+        """
+        m = self.model.mirror
+        for c in self.model.coordinates:
+            if c.name in names:
+                owner, (nest, at) = HELD + c.name, whole(c)
+                self.families.append(Unknowns(owner, "unsaid", owner, f"p {c.units['e']}", c.place))
+                rows = Equations("initial", c.name, owner, "initial", c.units["p"], c.place, content=True)
+                self.assembly.family(rows)
+                self.assembly.add("initial", owner, at, nest, neg(var(owner, "unsaid", *at)))
+        for term in self.model.function(m.coenergy):
+            for rate in local_variables(term.expression, m.rate):
+                if rate.data[0] in names:
+                    slope = derivative(term.expression, rate)
+                    self.assembly.add("initial", HELD + rate.data[0], rate.args, term.loops, slope)
 
     def efforts(self, acting: Iterable[Effort]) -> None:
         """Gradients, works and reactions."""

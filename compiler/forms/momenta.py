@@ -45,6 +45,18 @@ def inertial(model: EnergyModel) -> frozenset[str]:
     return frozenset(found)
 
 
+def shared(model: EnergyModel) -> frozenset[str]:
+    """Coordinates whose momentum dT*/df other flows make too."""
+    found = set()
+    for term in model.function(model.mirror.coenergy):
+        rates = local_variables(term.expression, model.mirror.rate)
+        for a in rates:
+            slope = derivative(term.expression, a)
+            if any(b is not a and not is_const(derivative(slope, b), 0.0) for b in rates):
+                found.add(a.data[0])
+    return frozenset(found)
+
+
 def momentum(model: EnergyModel, node: Node) -> Node:
     """dT*/df of the coordinate of a momentum node, at that node's indices; 0 where no kinetic store moves with it."""
     pieces = []

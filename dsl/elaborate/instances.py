@@ -309,8 +309,10 @@ class Instances(Elements):
             nodes += [c.plus, c.minus] if isinstance(c, syntax.Across) else []
             nodes += [c.node] if isinstance(c, syntax.Single) else []
         left = [name for name in ports if all(getattr(c, "name", None) != name for c in s.connections)]
-        texts = [self.source_text(node.span) for node in nodes]
-        pairs = [f"{name} = {text}" for name, text in zip(left, texts, strict=False)]
+        texts = iter([self.source_text(node.span) for node in nodes])
+        pairs = []
+        for name, text in zip(left, texts, strict=False):
+            pairs.append(f"{name} = {text}" + (f" -> {next(texts, 'ground')}" if name in head.branches else ""))
         message = f"'{s.decl.name}: {component.name}' is connected by name: {', '.join(ports) or 'no connection'}"
         return self.resolver.fail("E402", message, connection.span, help=", ".join(pairs))
 

@@ -1,1 +1,1 @@
-"""One run: methods, steps, and the control of accuracy."""
+"""One run: methods, steps, rows."""

@@ -42,6 +42,8 @@ WINDOW, STRAINED = 24, 0.5
 """Steps, with a quarter of those before, in which Newton may fail in this part of them: beyond, the tolerance says
 little of what a run finds."""
 CHUNK_STEPS = 1 << 20
+OPENED = ("dopri", "rosenbrock")
+"""Methods that are told how long their first step may be."""
 CRAWL, DRAFT_CRAWL = 200_000, 20_000
 """Steps after which a run, a draft must have got CREPT of the span further: else it would take for ever."""
 CREPT = 1e-6
@@ -193,7 +195,9 @@ class Integration:
         elif self.underlying is not None:
             method.patience = request.stiff_steps
         if request.method == "dopri":
-            method.spare, method.opening = request.spare_steps, request.opening
+            method.spare = request.spare_steps
+        if request.method in OPENED:
+            method.opening = request.opening
         if request.method == "energy":
             self._audit = self.system.observer("audit")
             method.audit = None if self._audit is None else c.addressof(self._audit)
@@ -328,7 +332,7 @@ class Integration:
             self.happened(),
             self.driver.run.beyond,
             self.last(),
-            method.opening if self.request.method == "dopri" else 0.0,
+            method.opening if self.request.method in OPENED else 0.0,
         )
 
 

@@ -41,7 +41,7 @@ class Request:
     audit's members too;
     condense: what constant sums define leaves the system (condense/);
     stages: of radau, in the first step and at most, None: chosen;
-    opening: of dopri, first step as an earlier run found it fit (core/steppers/dopri.h), 0: chosen;
+    opening: of dopri, rosenbrock: first step as an earlier run found it fit (core/steppers/dopri.h), 0: chosen;
     unstrained: it is given up where Newton fails in every second step (cause strained);
     apart: part of a step; instants within it that are nearer to the row before are passed over.
     """

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from sysdyn.runtime.integrate.alternatives import alternatives
-from sysdyn.runtime.integrate.options import Options, choose_method
-from sysdyn.runtime.integrate.way import Way
+from sysdyn.runtime.accuracy.alternatives import alternatives
+from sysdyn.runtime.accuracy.options import Options, choose_method
+from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.simulate import counted, form_name, formed

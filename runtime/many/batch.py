@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.integrate import pairs
-from sysdyn.runtime.integrate.accuracy import DRAFT, FEW_STEPS, Achieved, Law
+from sysdyn.runtime.accuracy import pairs
+from sysdyn.runtime.accuracy.control import DRAFT, Achieved
+from sysdyn.runtime.accuracy.laws import FEW_STEPS, Law
+from sysdyn.runtime.accuracy.options import Options
+from sysdyn.runtime.accuracy.runs import APART, ROUGH, Runs
+from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
-from sysdyn.runtime.integrate.runs import APART, ROUGH, Runs
-from sysdyn.runtime.integrate.way import Way
 from sysdyn.runtime.judgement import allowed, judge
 from sysdyn.runtime.many.anchors import anchors
 from sysdyn.runtime.many.asked import DONE, END, ROWS, TRACES, WHY, Claim, NotApplicableError, Results, obstacle

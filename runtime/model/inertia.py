@@ -122,15 +122,20 @@ class Inertia:
         return bool((np.abs(total) <= CANCELS * size).all())
 
 
-def joins(system: System) -> bool:
-    """Whether a coordinate's rows may hold inertia of another one's flow."""
+def joined(system: System) -> NDArray[np.bool_]:
+    """Flows whose coordinate's rows may hold inertia of another one's, or theirs its own [unknowns]."""
     columns, flows = system.pattern.columns_of(), system.are("f")
     in_y, in_rate = system.structural()
-    for group, there in (("dynamics", in_rate), ("momentum", in_y)):
-        own = own_unknown(system, group, "f")[system.pattern.row]
-        if (there & (own >= 0) & flows[columns] & (own != columns)).any():
-            return True
-    return False
+    momenta, own_flow = with_flows(system)
+    flow = np.where(flows, np.arange(system.unknowns, dtype=np.int32), np.int32(-1))
+    flow[momenta] = own_flow
+    found = np.zeros(system.unknowns, dtype=bool)
+    for group, there, moving in (("dynamics", in_rate, flows), ("momentum", in_y, flow >= 0)):
+        at = np.flatnonzero(there & moving[columns])
+        own, other = own_unknown(system, group, "f")[system.pattern.row[at]], flow[columns[at]]
+        apart = (own >= 0) & (own != other)
+        found[own[apart]] = found[other[apart]] = True
+    return found
 
 
 def inertia(system: System, jy: Floats, jyd: Floats) -> Floats:

@@ -38,6 +38,8 @@ FAR = 0.1
 """Part of what the first way misses from which another is taken though it does not meet the rows either."""
 EMPTY = 1e-160
 """Coefficients whose squares underflow say nothing: a row of them is empty (slopes of diodes far from conduction)."""
+NOTHING = 2.0**-52
+"""Of the largest coefficient of a row, equilibrated: less is round-off, no row of its own beside what levels hold."""
 _PROXIMAL = 6
 
 
@@ -109,7 +111,8 @@ def in_order(
         k = int((sigma > RANK * np.abs(a[:, level]).max(initial=0.0)).sum())  # nothing may be left of a level
         found[level] = right[:k].T @ ((left[:, :k].T @ (only @ aim)) / sigma[:k])
         aim = aim - a[:, level] @ found[level]
-    i, j = np.nonzero(a[:, later])
+    size = np.abs(a * column)
+    i, j = np.nonzero((size > NOTHING * size.max(axis=1, keepdims=True, initial=0.0))[:, later])
     found[later] = least_norm((shape[0], int(later.sum())), (i, j, a[:, later][i, j]), aim)
     return found
 

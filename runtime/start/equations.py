@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Ints
-from sysdyn.runtime.model.inertia import joins, with_flows
+from sysdyn.runtime.model.inertia import joined, with_flows
 from sysdyn.runtime.model.redirected import redirected
 from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates_of
 
 Mask = NDArray[np.bool_]
@@ -28,7 +27,7 @@ class Equations:
     guessed: (rows of block initial that are guesses, the unknowns that they miss); unsettled [rows]: they need not
     hold; rows, columns [entries]: of what some block writes in the matrix; alike [unknowns]: number of the kind and
     unit of each; member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them;
-    joined: of a large model whether coordinates hold inertia of each other.
+    joined [unknowns of y]: flows whose coordinates hold inertia of each other.
     """
 
     def __init__(self, system: System, settled: System) -> None:
@@ -42,7 +41,7 @@ class Equations:
         self.guessed = self.rows[misses], self.columns[misses]
         self._kinds(settled)
         self.measured = self._measured(settled)
-        self.joined = self.n > DENSE and joins(settled)
+        self.joined = joined(settled)
         self.rated_rows = settled.of_groups("dynamics_rate").astype(np.int32)
 
     def _entries(self, settled: System) -> None:
@@ -79,7 +78,10 @@ class Equations:
             rows = settled.description.rows[family]
             contents[first : first + rows.size] = group == "initial" and rows.content
         own = contents[self.rows] & (self.columns < self.written)
-        mask[self.columns[own]] = True
+        rows, columns, flows = self.rows[own], self.columns[own], settled.are("f")
+        moving = np.zeros(settled.rows, dtype=bool)
+        moving[rows[flows[columns]]] = True  # what is made of flows measures these alone
+        mask[columns[flows[columns] | ~moving[rows]]] = True
         mask[self.momentum] |= mask[self.flow]
         return mask
 

@@ -255,7 +255,7 @@ class Starter:
         They are taken from the inertia at two points: what moves with the state is left out.
         """
         settled = self.settled
-        if not unsettled.size or (self.n > DENSE and not self.equations.joined):
+        if not unsettled.size or (self.n > DENSE and not self.equations.joined.any()):
             return weights(np.zeros((0, unsettled.size)))
         points = [self._inertia(shift) for shift in (0.0, 0.1)]
         number = np.cumsum(settled.are("f")) - 1
@@ -281,14 +281,17 @@ class Starter:
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
 
-        Of a momentum and its flow the one that is written carries the state, else the momentum.
+        Of a momentum and its flow the one that is written carries the state, else the momentum; where other flows make
+        it too, the momentum in any case.
         """
         jyd = self.system.slopes(t, *self.expand(x), rate=True)
         state = self.settled.are(*STATE)
         carries = state & ~self.measured
         carries[: self.system.unknowns] &= self.system.differential(jyd)
         carries |= self.given.written & state
-        carries[np.where(self.given.written[self._flow], self._momentum, self._flow)] = False
+        flow, momentum, written = self._flow, self._momentum, self.given.written
+        carries[flow[~written[flow]]] = False
+        carries[momentum[written[flow] & ~self.equations.joined[flow]]] = False
         found = np.ones(x.size, dtype=bool)
         found[: self.n] = ~carries
         return found
@@ -320,7 +323,7 @@ class Starter:
         rows, families = self.system.description.rows, self.system.description.families
         groups = self.system.form.groups if self.balanced else ()
         effort = {rows[k].owner: rows[k].unit for group, k, _ in groups if group == "dynamics"}
-        kinds = {"q": "", "s": "", "f": "p", "slack": "", "unsaid": ""}
+        kinds = {"q": "", "s": "", "f": "p ", "p": "p ", "slack": "", "unsaid": ""}
         named = [kinds.get(f.kind, f.kind) + (effort if f.kind in "fp" else {}).get(f.owner, f.unit) for f in families]
         number: dict[str, int] = {}
         of_family = np.array([*(number.setdefault(s, len(number)) for s in named), 0], dtype=np.int32)

@@ -26,7 +26,7 @@ MODELS = Path(__file__).resolve().parents[2] / "models"
 LONGEST_RUN = 20.0
 """Seconds after which a run is given up."""
 TIMING = 1e-9
-"""Of the span: the time tolerance of comparisons (integrate/accuracy.py)."""
+"""Of the span: the time tolerance of comparisons (accuracy/control.py)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -177,7 +177,7 @@ def test_golden_record_and_check_refuse_it(duffing, tmp_path, capsys, monkeypatc
     folder = ["--folder", str(tmp_path / "goldens")]
     assert run(["golden", "record", str(duffing), *folder]) == 0
     monkeypatch.setattr("sysdyn.runtime.judgement.allowed", lambda options: 1e-17)
-    monkeypatch.setattr("sysdyn.runtime.integrate.runs.Runs.open_balances", lambda self: [0.0])
+    monkeypatch.setattr("sysdyn.runtime.accuracy.runs.Runs.open_balances", lambda self: [0.0])
     assert run(["golden", "check", "duffing", *folder]) == 3
     assert run(["golden", "accept", "duffing", "--reason", "none", *folder]) == 3
     assert run(["golden", "record", str(duffing), "--name", "other", *folder]) == 3
@@ -215,7 +215,7 @@ def test_a_value_error_inside_is_a_fault_and_no_wrong_usage(duffing, tmp_path, c
     def broken(*_, **__):
         raise ValueError("operands could not be broadcast together")
 
-    monkeypatch.setattr("sysdyn.runtime.integrate.runs.Runs.run", broken)
+    monkeypatch.setattr("sysdyn.runtime.accuracy.runs.Runs.run", broken)
     assert run(["simulate", str(duffing), "-o", str(tmp_path / "out.h5"), "--quiet"]) == 4
     said = capsys.readouterr().err
     assert "a fault in sysdyn: ValueError: operands" in said

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.runtime.integrate import second_opinion
+from sysdyn.runtime.accuracy import second_opinion
 from sysdyn.runtime.trace.trace import Trace
 
 SEED = Path(__file__).parents[2] / "models" / "seed"

@@ -117,13 +117,15 @@ def test_processes_killed_at_random_lose_nothing(fall):
 def cluster():
     distributed = pytest.importorskip("distributed", reason="needs Dask: pip install 'sysdyn[dask]'")
     import cloudpickle
+    from sysdyn.cli.sweep import on_dask
 
     cloudpickle.register_pickle_by_value(sys.modules[__name__])
     number = 4 if LONG else 2
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         options = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
-        with distributed.LocalCluster(n_workers=number, **options) as found:
+        with distributed.LocalCluster(n_workers=number, **options) as found, pytest.MonkeyPatch.context() as patch:
+            patch.setattr(on_dask, "ALONE", 600.0)  # new workers begin late where much else runs
             yield found
 
 

@@ -359,7 +359,7 @@ def null_vector(a, e, s):
 
 def solve(network, end, path, formulation="lagrangian", accuracy=1e-6, **more):
     """The trace of a network from 0 to `end`, and the outcome."""
-    from sysdyn.runtime.integrate.options import Options
+    from sysdyn.runtime.accuracy.options import Options
     from sysdyn.runtime.model.carrier import load
     from sysdyn.runtime.simulate import simulate
     from sysdyn.runtime.trace.trace import Trace

@@ -176,3 +176,18 @@ def test_of_two_connections_of_one_port_or_input_none_is_taken(connection, said)
 @pytest.mark.parametrize(("arguments", "said"), [("k = 1 N/m", []), ("k = 1 N/m, k = 2 N/m", ["E106"])])
 def test_an_argument_that_is_given_twice_is_refused(arguments, said):
     assert whole(OSCILLATOR.replace("spring()", f"spring({arguments})"))[1] == said
+
+
+@pytest.mark.parametrize(
+    ("ends", "named"),
+    [
+        ("port a, b: electrical; R: dissipator(e = 2 ohm*f) a -> b; S: dissipator(e = 1 ohm*f) b -> a", "a = p, b = q"),
+        ("branch one, two: electrical; energy T* = 1/2*(1 H)*(one.f + two.f)^2", "one = p -> q, two = q -> ground"),
+    ],
+)
+def test_nodes_in_a_row_are_named_in_the_remedy(ends, named):
+    row = "p -> q" if ends.startswith("port") else "p -> q, q -> ground"
+    elaborator, report = begun(f"component k {{ {ends} }}\nmodel m {{ node p, q: electrical; K: k() {row} }}")
+    elaborator.names()
+    elaborator.elements()
+    assert [(d.code, d.help) for d in report] == [("E402", named)]

@@ -8,7 +8,7 @@ from sysdyn.api import simulate
 from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.integrate import runs
+from sysdyn.runtime.accuracy import runs
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 

@@ -131,3 +131,57 @@ def test_coordinates_declared_in_two_loops(tmp_path, formulation):
     rate = 3.0 * np.sqrt(4.0 - 2.0 * np.cos(np.pi / 5.0) - 2.0 * np.cos(2.0 * np.pi / 5.0))
     shape = np.sin(2.0 * np.pi / 5.0) * np.sin(6.0 * np.pi / 5.0)
     np.testing.assert_allclose(trace["z"].values, shape * np.cos(rate * np.array(trace.time)), atol=2e-6)
+
+
+JOINED = """model joined {
+  coord x, y: translation
+  energy T* = 1/2*(1 kg)*((x' + y')^2 + x'^2)
+  energy V = 1/2*(1 N/m)*(x^2 + y^2)
+  psi drive: x' + y' = 1 m/s
+}
+scene go of joined { time 0 s to 0.1 s; accuracy 1e-6; trace x' as one, y' as other }
+"""
+COILS = """from std.electrical import coupled_inductors, current, resistor
+
+model coils {
+  node a, b: electrical
+  I: current(i = 1 A) ground -> a
+  K: coupled_inductors(L1 = 1 H, L2 = 2 H, k = 0.6) one = a -> ground, two = a -> b
+  R: resistor(R = 1 ohm) b -> ground
+}
+scene go of coils { time 0 s to 0.1 s; accuracy 1e-6; trace K.one.f as one, K.two.f as other }
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "inertia", "formulations"),
+    [(JOINED, [[2, 1], [1, 1]], FOUR[:2]), (COILS, [[1, 0.6 * 2**0.5], [0.6 * 2**0.5, 2]], FOUR)],
+)
+def test_flows_that_share_inertia_start_alike_in_all_formulations(tmp_path, text, inertia, formulations):
+    """Momenta M f of least squares with f1 + f2 = 1."""
+    down = np.array(inertia) @ [1.0, -1.0]
+    share = -down @ np.array(inertia) @ [0.0, 1.0] / (down @ down)
+    for formulation in formulations:
+        trace = trace_of(tmp_path, text, formulation=formulation)
+        found = [trace["one"].values[0], trace["other"].values[0]]
+        np.testing.assert_allclose(found, [share, 1.0 - share], atol=1e-9)
+
+
+SAID = """model said {
+  coord x, y, z: translation
+  energy T* = 1/2*(1 kg)*((x' + y')^2 + (y' + z')^2 + x'^2)
+  energy V = 1/2*(1 N/m)*(x^2 + y^2 + z^2)
+  psi drive: x' + y' + z' = 1 m/s
+  init x' = 0.4 m/s
+}
+scene go of said { time 0 s to 0.1 s; accuracy 1e-6; trace x', y', z' }
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR[:2])
+def test_a_flow_that_is_said_counts_in_what_it_holds_with_others(tmp_path, formulation):
+    """x' = 0.4, y' + z' = 0.6 and the least of (2 x' + y')^2 + (x' + 2 y' + z')^2 + (y' + z')^2."""
+    trace = trace_of(tmp_path, SAID, formulation=formulation)
+    y = np.linalg.lstsq(np.array([[1.0], [1.0]]), -np.array([0.8, 0.4 + 0.6]), rcond=None)[0][0]
+    found = [trace[name].values[0] for name in ("x'", "y'", "z'")]
+    np.testing.assert_allclose(found, [0.4, y, 0.6 - y], atol=1e-9)

@@ -26,7 +26,7 @@ from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.program import build
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.model import carrier
 from sysdyn.runtime.trace.trace import Trace
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from sysdyn.runtime.integrate.accuracy import LAWS, STEEP, TAME, Lighter, control, law_of
-from sysdyn.runtime.integrate.pairs import ROUND_OFF, Sampled
+from sysdyn.runtime.accuracy.control import TAME, Lighter, control
+from sysdyn.runtime.accuracy.laws import LAWS, STEEP, law_of
+from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.failures import SolverFailure
 

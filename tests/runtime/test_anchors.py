@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import small_models as models
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.many import anchors as module
 from sysdyn.runtime.many.anchors import anchors

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.many.asked import DONE, END, EXTREMA, ROWS, TRACES, WHY, NotApplicableError, obstacle, way_of
 from sysdyn.runtime.many.batch import Batch
 from sysdyn.runtime.model.carrier import load

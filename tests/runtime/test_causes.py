@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import small_models as models
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.integrate.causes import _null_place
-from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.simulate import simulate

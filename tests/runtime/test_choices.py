@@ -9,10 +9,10 @@ from sysdyn.cli.run.prepare import prepare
 from sysdyn.dsl import load as text
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
-from sysdyn.runtime.integrate.alternatives import NOT_STIFF, alternatives
-from sysdyn.runtime.integrate.options import Options, choose_index, choose_method, own_tolerances
+from sysdyn.runtime.accuracy.alternatives import NOT_STIFF, alternatives
+from sysdyn.runtime.accuracy.options import Options, choose_index, choose_method, own_tolerances
+from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.underlying import obstacle, rateless, underlying_form
-from sysdyn.runtime.integrate.way import Way
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.description import describe
 from sysdyn.runtime.model.failures import NoSuchForm, WrongOption

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from sysdyn.runtime.integrate.common_instants import MANY, MOST, Thinned, beside, common, joined, known
+from sysdyn.runtime.accuracy.common_instants import MANY, MOST, Thinned, beside, common, joined, known
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.integrate.ledgers import Balance
-from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import COMPARED, TRACE
 from sysdyn.runtime.integrate.round_off import LeftOpen
 from sysdyn.runtime.integrate.unknown_roles import Roles, without_rate

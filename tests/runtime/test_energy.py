@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import small_models as models
 from scipy.special import ellipj, ellipk
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure

@@ -151,3 +151,15 @@ def test_values_and_aim_stay_the_callers_unless_they_are_spent():
         assert (aim == kept[1]).all()
         assert (least_norm(shape, (i, j, v), aim, spent=True) == found).all()
         assert matrix @ found == pytest.approx(kept[1], rel=1e-9, abs=1e-9 * np.abs(kept[1]).max())
+
+
+def test_round_off_beside_a_level_is_no_row_of_the_rest():
+    """u1 and u2 are the level; of what is left 1e-18 u3 in their rows says nothing of u3 = 2."""
+    random = np.random.default_rng(3)
+    for _ in range(20):
+        a = np.zeros((3, 3))
+        a[:2, :2], a[:2, 2], a[2, 2] = random.normal(size=(2, 2)), 1e-18 * random.normal(size=2), 1.0
+        aim = np.append(a[:2, :2] @ [0.3, 0.7], 2.0)
+        i, j = np.nonzero(a)
+        level = np.array([True, True, False])
+        np.testing.assert_allclose(in_order((3, 3), (i, j, a[i, j]), aim, [level]), [0.3, 0.7, 2.0], rtol=1e-9)

@@ -4,8 +4,8 @@ import chain_model as chain
 import numpy as np
 import pytest
 import small_models as models
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.core_library import ROW_HEAD

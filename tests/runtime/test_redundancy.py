@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import WrongOption
 from sysdyn.runtime.model.system import System

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import small_models as models
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.arrival import arrival
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.events.start import eventful_start
-from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
 from sysdyn.runtime.linear.rest import Resting, rests
 from sysdyn.runtime.model.carrier import load

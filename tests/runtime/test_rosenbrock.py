@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.simulate import simulate
@@ -102,6 +102,20 @@ def test_tolerance_against_error_and_work():
         _, columns, finished = rosenbrock(models.mass_spring(), 10.0, t, rtol=rtol)
         assert np.abs(columns["q_x"] - oscillation(t)).max() < 3 * rtol
         assert finished.statistics.steps < steps
+
+
+@pytest.mark.parametrize("part", [1.0, 1e-2])
+def test_a_run_opens_with_the_step_that_the_one_before_found_fit(part):
+    """With another tolerance too: as exact as one that looks for it, in fewer steps."""
+    draft = rosenbrock(models.mass_spring(), 2.0, rtol=1e-4)[2]
+    t, found = np.linspace(0, 2, 81), []
+    for opening in (0.0, draft.opening):
+        _, columns, finished = rosenbrock(models.mass_spring(), 2.0, t, rtol=1e-4 * part, opening=opening)
+        found.append((np.abs(columns["q_x"] - oscillation(t)).max(), finished.statistics))
+    (error, sought), (as_exact, known) = found
+    assert as_exact < 1.2 * error
+    assert known.steps < sought.steps
+    assert known.rejected_steps == 0
 
 
 def test_a_stiff_diode_as_the_others_have_it():

@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.integrate.options import Options, choose_index
+from sysdyn.runtime.accuracy.options import Options, choose_index
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import SolverFailure, WrongOption
 from sysdyn.runtime.simulate import simulate

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.integrate import accounts
-from sysdyn.runtime.integrate.accounts import Accounts
-from sysdyn.runtime.integrate.compared import Compared
-from sysdyn.runtime.integrate.options import Options
-from sysdyn.runtime.integrate.pairs import Sampled
-from sysdyn.runtime.integrate.quantities import Quantities
+from sysdyn.runtime.accuracy import accounts
+from sysdyn.runtime.accuracy.accounts import Accounts
+from sysdyn.runtime.accuracy.compared import Compared
+from sysdyn.runtime.accuracy.options import Options
+from sysdyn.runtime.accuracy.pairs import Sampled
+from sysdyn.runtime.accuracy.quantities import Quantities
 from sysdyn.runtime.integrate.request import Finished, Statistics
 from sysdyn.runtime.integrate.sizes import Sizes
 from sysdyn.runtime.model.carrier import load

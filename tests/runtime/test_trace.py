@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.simulate import simulate
@@ -125,7 +125,7 @@ sys.path.insert(0, {here!r})
 import small_models as models
 from sysdyn.runtime.trace import writing
 from sysdyn.runtime.model.carrier import load
-from sysdyn.runtime.integrate.options import Options
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.simulate import simulate
 writing.FLUSH_SECONDS = {flush}
 manifest, binding, module = models.mass_spring()

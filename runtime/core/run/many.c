@@ -11,7 +11,7 @@
 #include "run/many_start.h"
 
 #define MOST 48          /* instants of comparison, at most twice that (many/batch.py) */
-#define RUNS 7           /* of the accuracy control, and what follows: integrate/accuracy.py says why */
+#define RUNS 7           /* of the accuracy control, and what follows: accuracy/control.py says why */
 #define SAFETY 2.5
 #define AIM 2.0
 #define LEFT 0.3
@@ -22,7 +22,7 @@
 #define FIRST_DROP 1e-2
 #define LOOSE 1e-5
 #define TAME 1e-6
-#define BEYOND 100.0     /* an unknown within a step, in magnitudes of steps (integrate/compared.py) */
+#define BEYOND 100.0     /* an unknown within a step, in magnitudes of steps (accuracy/compared.py) */
 #define SAME 1e-12       /* of an instant: a claim's */
 #define TRACE 1
 #define STEP 2
@@ -103,7 +103,7 @@ static void put(const sd_many *many, sd_samples *samples, int32_t at, const doub
     }
 }
 
-/* every stride-th row of the trace, the last one behind them (integrate/common_instants.py) */
+/* every stride-th row of the trace, the last one behind them (accuracy/common_instants.py) */
 static void thin(sd_many *many, sd_samples *own, const double *row)
 {
     int32_t kept = many->stride * own->number; /* the row that is kept next */
@@ -271,7 +271,7 @@ static double opening(const sd_pass *pass)
     return pass->opening ? *pass->opening : 0.0;
 }
 
-/* runs until the last one's estimated error is what was asked: `control` of integrate/accuracy.py */
+/* runs until the last one's estimated error is what was asked: `control` of accuracy/control.py */
 static int control(sd_many *many, int64_t *steps, double *estimate)
 {
     sd_samples *last = &many->sample[0], *own = &many->sample[1], *there = &many->sample[2];

@@ -6,7 +6,7 @@
  * Start: the anchored unknowns as the run's text gives them, everything else from the nominal start by one settling, whose
  * steps converge as Newton's method does near a root; guesses that are others than the nominal ones must lead to it too.
  * Magnitudes: of this start, as any run finds them (sizing.h).
- * Accuracy: a draft and finer runs compared at instants of the one before, as runtime/integrate/accuracy.py has it.
+ * Accuracy: a draft and finer runs compared at instants of the one before, as runtime/accuracy/control.py has it.
  * A run that fails, misses its accuracy or a ledger, breaks a claim, or whose structure is another than the nominal's
  * is handed back without a result: the caller runs it on its own, and says what is the matter.
  */
@@ -101,7 +101,7 @@ typedef struct sd_many {
     const int32_t *unit, *unit_of; /* [columns], [written]; unit_of -1: none */
     int32_t units, known;        /* known 1: instants of comparison are set up, else steps of the run before */
     double late;                 /* time tolerance of comparisons [s] */
-    double power, credit, finest, far, ratio, little, growth, few_steps, many_steps; /* of the method's law (integrate/accuracy.py) */
+    double power, credit, finest, far, ratio, little, growth, few_steps, many_steps; /* of the method's law (accuracy/control.py) */
     double tolerance[2];         /* of the draft, of the run behind one of few steps */
     int64_t max_steps;
     double energy;               /* part of a ledger's turnover that its balance may be */

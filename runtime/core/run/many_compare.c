@@ -26,7 +26,7 @@ static void measures(const sd_many *many, const sd_pass *pass, double *size, dou
 }
 
 /* what a value at a step moves by within the time tolerance: as its rate says, but no faster than BEND times what the
- * steps beside it show (integrate/accuracy.py) */
+ * steps beside it show (accuracy/control.py) */
 static double lateness(const sd_many *many, const sd_samples *own, int32_t k, int32_t q)
 {
     double least = INFINITY;

@@ -1,4 +1,4 @@
-/* What two runs of one model differ by at their instants of comparison, as integrate/accuracy.py has it. */
+/* What two runs of one model differ by at their instants of comparison, as accuracy/control.py has it. */
 #ifndef SYSDYN_MANY_COMPARE_H
 #define SYSDYN_MANY_COMPARE_H
 

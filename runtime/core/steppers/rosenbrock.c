@@ -13,6 +13,7 @@
 #define GROW 6.0           /* of the step at most */
 #define CUT 0.2            /* what a refused one is cut to at least */
 #define OPENS 1e-2         /* of the span: the first step at most */
+#define TELLING 3          /* steps that tell how long the first might have been */
 #define SLOPE 1e-6         /* of the step: over which dF/dt is taken */
 #define TELLS 1e-8         /* of the longest step: over that, or the step, at least, for differences over less are round-off */
 #define RESOLVED 64.0      /* of what t resolves: at least that */
@@ -179,6 +180,8 @@ void sd_rosenbrock_start(sd_rosenbrock *rosenbrock, double t, const double *y, c
     rosenbrock->linear->null_pivot = rosenbrock->linear->idle ? SD_LEAST_PIVOT : 0.0;
     set_weights(rosenbrock);
     double span = rosenbrock->t_end - t, part = pow(rosenbrock->rtol, POWER);
+    if (!(h > 0.0) && rosenbrock->steps == 0 && isfinite(rosenbrock->opening))
+        h = rosenbrock->opening * part;
     if (!(h > 0.0)) { /* local error (h y'/y)^5 within tolerance */
         double state = 0.0, change = rosenbrock->rtol * norm(rosenbrock, yd, 1.0, &state);
         h = OPENS * span * fmin(1.0, 10.0 * part); /* runs that are compared begin apart */
@@ -186,6 +189,8 @@ void sd_rosenbrock_start(sd_rosenbrock *rosenbrock, double t, const double *y, c
             h = fmin(h, 0.1 * part / change);
         h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), SD_SHORT * span), span));
     }
+    if (rosenbrock->steps == 0)
+        rosenbrock->opening = INFINITY;
     rosenbrock->h = fmin(rosenbrock->fixed_h > 0.0 ? rosenbrock->fixed_h : h, rosenbrock->h_max);
     rosenbrock->h_used = 0.0;
     rosenbrock->error_accepted = rosenbrock->h_refused = 0.0;
@@ -326,6 +331,8 @@ static void accept(sd_rosenbrock *rosenbrock, double error)
         ratio = fmax(ratio, predicted);
     }
     double next = h / fmax(1.0 / GROW, fmin(1.0 / CUT, ratio));
+    if (rosenbrock->steps < TELLING)
+        rosenbrock->opening = fmin(rosenbrock->opening, SAFE * h * pow(error * rosenbrock->rtol, -POWER));
     if (rosenbrock->rejected)
         next = fmin(next, h);
     rosenbrock->h_accepted = h;

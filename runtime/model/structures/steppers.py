@@ -235,6 +235,7 @@ class Rosenbrock(c.Structure):
         *[(name, I) for name in ["n", "tested"]],
         *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
         *[(name, P) for name in ["atol", "magnitude", "met", "test", "power"]],
+        ("opening", D),
         *[(name, D) for name in ["t", "h", "h_used", "h_accepted", "error_accepted", "h_refused", "error_refused"]],
         ("rejected", I),
         *[(name, P) for name in ["phi", "yd", "last", "y", "rate", "drift", "begin"]],

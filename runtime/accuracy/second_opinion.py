@@ -10,11 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from sysdyn.runtime.integrate.accuracy import Achieved
-from sysdyn.runtime.integrate.pairs import difference
+from sysdyn.runtime.accuracy.control import Achieved
+from sysdyn.runtime.accuracy.pairs import difference
+from sysdyn.runtime.accuracy.runs import Runs
+from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.request import LONGEST
-from sysdyn.runtime.integrate.runs import Runs
-from sysdyn.runtime.integrate.way import Way
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.integrate.options import Options, instants
+from sysdyn.runtime.accuracy.options import Options, instants
 from sysdyn.runtime.integrate.request import COMPARED
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.numerics.points import distinct

@@ -10,11 +10,11 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.integrate import pairs
-from sysdyn.runtime.integrate.common_instants import Instants, Thinned, beside, common
-from sysdyn.runtime.integrate.options import Options
-from sysdyn.runtime.integrate.pairs import Sampled
-from sysdyn.runtime.integrate.quantities import Quantities
+from sysdyn.runtime.accuracy import pairs
+from sysdyn.runtime.accuracy.common_instants import Instants, Thinned, beside, common
+from sysdyn.runtime.accuracy.options import Options
+from sysdyn.runtime.accuracy.pairs import Sampled
+from sysdyn.runtime.accuracy.quantities import Quantities
 from sysdyn.runtime.integrate.request import COMPARED, TRACE, Finished
 from sysdyn.runtime.integrate.round_off import LeftOpen, left_open
 from sysdyn.runtime.model import core_library as lib

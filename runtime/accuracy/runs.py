@@ -9,18 +9,18 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.accuracy.accounts import Accounts
+from sysdyn.runtime.accuracy.common_instants import Instants
+from sysdyn.runtime.accuracy.compared import Compared
+from sysdyn.runtime.accuracy.control import TAME
+from sysdyn.runtime.accuracy.options import Options
+from sysdyn.runtime.accuracy.pairs import Sampled
+from sysdyn.runtime.accuracy.quantities import Quantities
+from sysdyn.runtime.accuracy.way import FACTORED, HELD, SPARE, STIFF, Way
 from sysdyn.runtime.events.kinks import LIVE
-from sysdyn.runtime.integrate import accuracy
-from sysdyn.runtime.integrate.accounts import Accounts
-from sysdyn.runtime.integrate.common_instants import Instants
-from sysdyn.runtime.integrate.compared import Compared
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.origin import Origin
-from sysdyn.runtime.integrate.pairs import Sampled
-from sysdyn.runtime.integrate.quantities import Quantities
 from sysdyn.runtime.integrate.request import LONGEST, STEP, TRACE, Finished, Request
-from sysdyn.runtime.integrate.way import FACTORED, HELD, SPARE, STIFF, Way
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
@@ -135,7 +135,7 @@ class Runs:
             settled_to=ROUGH * rtol if self.controlled else 0.0,
             draft=draft,
             # of steep laws Newton fails at any tolerance
-            unstrained=draft and rtol > 1.01 * accuracy.TAME and not self.system.form.scales,
+            unstrained=draft and rtol > 1.01 * TAME and not self.system.form.scales,
             audited=bool(self.quantities.meters),
             opening=self.opening,
             apart=APART if draft and self.instants.open else 0.0,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.integrate.options import Options, own_tolerances
+from sysdyn.runtime.accuracy.options import Options, own_tolerances
+from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.underlying import rateless
-from sysdyn.runtime.integrate.way import Way
 from sysdyn.runtime.model.scales import magnitudes
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.start import ConsistentState

@@ -6,8 +6,8 @@ import json
 import time
 from typing import Any
 
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.options import Options
 from sysdyn.runtime.integrate.request import Statistics
 
 FORETOLD = 0.01

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysdyn.runtime.integrate import accuracy
+from sysdyn.runtime.accuracy.laws import Law, law_of
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.system import System
 from sysdyn.values import dataclass
@@ -39,7 +39,7 @@ class Way:
     reduced: bool = False
 
     @property
-    def law(self) -> accuracy.Law:
+    def law(self) -> Law:
         """How its errors follow its tolerance."""
         steep = bool(self.system.form.scales)
-        return accuracy.law_of(self.method, steep=steep, smooth=self.smooth, reduced=self.reduced)
+        return law_of(self.method, steep=steep, smooth=self.smooth, reduced=self.reduced)

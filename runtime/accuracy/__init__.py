@@ -1,0 +1,1 @@
+"""The runs of one simulation, and how accurate they are."""
