@@ -78,10 +78,10 @@ class Equations:
             rows = settled.description.rows[family]
             contents[first : first + rows.size] = group == "initial" and rows.content
         own = contents[self.rows] & (self.columns < self.written)
-        rows, columns, flows = self.rows[own], self.columns[own], settled.are("f")
-        moving = np.zeros(settled.rows, dtype=bool)
-        moving[rows[flows[columns]]] = True  # what is made of flows measures these alone
-        mask[columns[flows[columns] | ~moving[rows]]] = True
+        row, column = self.rows[own], self.columns[own]
+        flow, moving = settled.are("f")[column], np.zeros(settled.rows, dtype=bool)
+        moving[row[flow]] = True  # what is made of flows measures these alone
+        mask[column[flow | ~moving[row]]] = True
         mask[self.momentum] |= mask[self.flow]
         return mask
 
