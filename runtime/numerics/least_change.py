@@ -107,8 +107,11 @@ def in_order(
         later = later & ~level
         left, sigma, _ = decomposed(a[:, later] * column[later])
         only = left[:, count(sigma) :].T  # what rows say of the level whatever comes later
-        left, sigma, right = decomposed(only @ a[:, level])
-        k = int((sigma > RANK * np.abs(a[:, level]).max(initial=0.0)).sum())  # nothing may be left of a level
+        said, largest = only @ a[:, level], np.abs(a[:, level]).max(axis=0, initial=0.0)
+        noise = NOTHING / min(sigma[: count(sigma)], default=1.0)  # of `only`, by the least that counts
+        said[np.abs(said) <= noise * largest] = 0.0
+        left, sigma, right = decomposed(said)
+        k = int((sigma > RANK * largest.max(initial=0.0)).sum())  # nothing may be left of a level
         found[level] = right[:k].T @ ((left[:, :k].T @ (only @ aim)) / sigma[:k])
         aim = aim - a[:, level] @ found[level]
     size = np.abs(a * column)

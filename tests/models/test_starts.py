@@ -69,8 +69,9 @@ def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
     assert set(SOUGHT) == {name for name, _ in STRATEGIES[1:]}
 
 
-HARD = {"scalar": (), "arrays": (52, 174, 233)}
-"""Networks whose starts once differed: a fixed value of one element beside a guess over its range."""
+HARD = {"scalar": (636,), "arrays": (52, 174, 233)}
+"""Networks whose starts once differed: round-off of what is loosely tied passed for a row (scalar), a fixed value of one
+element beside a guess over its range (arrays)."""
 
 
 @pytest.mark.parametrize(("sort", "number"), [("scalar", 1000), ("arrays", 500)])
