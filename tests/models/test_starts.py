@@ -70,8 +70,8 @@ def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
 
 
 HARD = {"scalar": (636,), "arrays": (52, 174, 233)}
-"""Networks whose starts once differed: round-off of what is loosely tied passed for a row (scalar), a fixed value of one
-element beside a guess over its range (arrays)."""
+"""Networks whose starts once differed: round-off of what is loosely tied passed for a row (scalar), a fixed value of
+one element beside a guess over its range (arrays)."""
 
 
 @pytest.mark.parametrize(("sort", "number"), [("scalar", 1000), ("arrays", 500)])
