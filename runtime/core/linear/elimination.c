@@ -11,7 +11,7 @@
 #define GROWTH 1e4         /* of multipliers, where a solution is a correction that the next one corrects */
 #define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
 #define FIRST 3            /* matrices seen before an order is looked for: one-off systems do not pay for it, */
-#define SHARE 4            /* nor do large ones before this part of n */
+#define SHARE 8            /* nor do large ones before this part of n */
 #define MISSES 3           /* matrices that an order did not serve, each of which costs a fortieth of a search, before another is */
 #ifdef SD_COMPLEX
 #define NUMBERS SD_COMPLEX_NUMBERS
