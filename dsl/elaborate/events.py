@@ -316,19 +316,19 @@ def _stick_in_plane(
     what: tuple[Node, Node, Node],
     place: Place,
 ) -> Node:
-    """The speed abs(f) of friction in the plane, continued through zero along the direction n in which it slips:
-    sign((f + BESIDE n) n) abs(f + BESIDE n), whose gradient is the direction of f, and n where f vanishes.
+    """The speed abs(f) of friction in the plane, continued through zero along the direction of a flow n in which it
+    slips: sign((f + n) n) abs(f + n), whose gradient is the direction of f, and that of n where f is less than n.
     """
     (at, loops), (node, bound, sense) = where, what
     unit, flows = si(NONE), node.args
     n = tuple(  # any at first: at rest there is none
-        _sense(frame, f"{name} direction {k}", at, loops, place, begins) for k, begins in ((1, 1.0), (2, 0.0))
+        _sense(frame, f"{name} direction {k}", at, loops, place, begins) for k, begins in ((1, BESIDE), (2, 0.0))
     )
     labels = (name, f"{name} across")
     for label, flow in zip(labels, flows, strict=True):
         frame.said(Constraint("psi", label, at, flow, loops, unit, place))
     multipliers = tuple(ex.var(label, "mu", *at) for label in labels)
-    along = ex.add(*(ex.mul(a, b) for a, b in zip(n, flows, strict=True)))
+    along = ex.div(ex.add(*(ex.mul(a, b) for a, b in zip(n, flows, strict=True))), ex.call("hypot", *n))
     value = ex.sub(along, ex.scale(0.5, node))
     draft = Draft(
         name, at, loops, "planar", place, unit, value, ex.call("hypot", *multipliers), bound=bound, sense=sense,
@@ -336,7 +336,7 @@ def _stick_in_plane(
     )  # fmt: skip
     frame.parts.drafts.append(draft)
     frame.parts.drafts.append(Draft(labels[1], at, loops, "follows", place, unit, flows[1], multipliers[1]))
-    beside = [ex.add(f, ex.scale(BESIDE, d)) for f, d in zip(flows, n, strict=True)]
+    beside = [ex.add(f, d) for f, d in zip(flows, n, strict=True)]
     forward = ex.call("sign", ex.add(*(ex.mul(d, b) for d, b in zip(n, beside, strict=True))))
     return ex.mul(forward, ex.call("hypot", *beside))
 

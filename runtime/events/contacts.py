@@ -8,7 +8,7 @@ Sets that fit are found by pivoting.py; gaps that close are struck before (impac
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ BODIES = 4.0
 UNTOLD = 1e-9
 """Change of a bound by reactions of one that is round-off."""
 
+BESIDE = 1e-20
+"""m/s and the like: a flow in the plane that is no flow yet, and has a direction."""
 BEYOND = 1e-6
 """Of the largest value of a gap: one that is less than nothing by more has jumped, and does not stay where it is."""
 
@@ -135,10 +137,21 @@ class Contacts:
         self.p[self.contacts[k].sense] = sense
 
     def _direct(self, contact: Contact, along: Floats) -> None:
-        """The direction of a slip in the plane."""
+        """The direction of a slip in the plane, as a flow."""
         size = float(np.hypot(*along))
         if size > 0.0:
-            self.p[list(contact.direction)] = along / size
+            self.p[list(contact.direction)] = BESIDE * along / size
+
+    def halting(self, touched: Sequence[int]) -> list[int]:
+        """The contacts of those touched which slip in a plane."""
+        return [k for k in touched if self.contacts[k].kind == "planar" and not self.active[k]]
+
+    def halt(self, k: int, values: Floats) -> None:
+        """A slip that comes to rest: where its flows are round-off, the law is that of those in `values`, shortly
+        before.
+        """
+        contact = self.contacts[k]
+        self.p[list(contact.direction)] = values[list(contact.aim[:2])]
 
     def wrong(self, values: Floats, impulses: Floats) -> int:
         """The first contact whose condition does not hold; -1 where all do."""

@@ -55,9 +55,9 @@ class Contact:
 
     kind: phi, psi (value >= 0, multiplier >= 0 where it holds), guarded (holds while the row `guard` is not zero),
     friction (where it holds, abs(multiplier) <= bound; else the place `sense` of p is the sign of the value).
-    planar is friction in the plane: value is the speed along `direction` (places in p) less half the speed, rate that
-    of the former, aim the rows of both flows, both multipliers and the speed; follows holds where the one before it
-    does.
+    planar is friction in the plane: value is the speed along `direction` (a flow: places in p) less half the speed,
+    rate that of the former, aim the rows of both flows, both multipliers and the speed; follows holds where the one
+    before it does.
     value, rate, acceleration (of phi), multiplier, bound, bound - multiplier (upper),
     bound + multiplier (lower), guard: rows; number: of its switch; restitution: of phi.
     """

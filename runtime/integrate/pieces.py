@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes as c
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,9 @@ UNSEEN = 100.0
 """Times a run's tolerance: of a bounce that rises less, the error test of the bdf hardly sees that it falls."""
 PARTS = 8
 """Steps at least that such a bounce takes (radau and dopri follow a parabola in one), or after one that misled."""
+
+HALT = 1e-5
+"""Of a step, before friction in the plane comes to rest: the direction of a slip is told there, at rest there is none."""
 
 FAINT = 1e3
 """Times what round-off leaves of a quantity: what has never been larger is asked again whether it is any."""
@@ -167,7 +171,7 @@ class Pieces:
             before = self._point(t)
             point = self._fire(t, before, [], which)
             if point is not None:
-                self._accept(t, TRACE, sink)
+                self._accept(t, TRACE, sink, which)
                 self._go_on(t, point, before, misled=end - core.t_from if self.handler.stands(which) else 0.0)
                 return time.process_time() - began
             begin = t
@@ -185,10 +189,13 @@ class Pieces:
         observer.largest[faint] = self._open[faint] / observer.small
         return bool(faint)
 
-    def _accept(self, t: float, kind: int, sink: Sink) -> None:
+    def _accept(self, t: float, kind: int, sink: Sink, which: Sequence[Watched] = ()) -> None:
         """The last step counts up to t; rows of before the event are written with the parameters of before."""
-        after = self.handler.now()
+        after, contacts = self.handler.now(), self.handler.contacts
         self.handler.back(self.handler.before)
+        for k in contacts.halting([w.contact for w in which if w.contact >= 0]):
+            begin = self.run.driver.run.t_from
+            contacts.halt(k, self._values(t - HALT * (t - begin)))
         full = lib.core.sd_run_accept(self.run.driver.core, t, kind)
         while full:
             self.run.driver.drain(sink)

@@ -152,3 +152,7 @@ def test_a_stop_in_the_plane_with_other_parameters(changed, tmp_path):
     assert np.abs(values(trace, "vx", times) - p["vx_0"] * left).max() < 1e-9
     assert np.abs(values(trace, "y", times) - p["vy_0"] * stop / 2.0 * (1.0 - left**2)).max() < 1e-9
     assert happened(trace, [stop]) < INSTANTS
+    before = int(np.searchsorted(trace.time, stop - 1e-6))  # the row at which it stops, where its flow has no direction
+    for name, v in (("ex", p["vx_0"]), ("ey", p["vy_0"])):
+        assert trace[name].values[before] == pytest.approx(p["mu"] * 2.0 * p["g"] * v / speed, rel=1e-8)
+        assert trace[name].values[before + 1] == 0.0
