@@ -99,7 +99,9 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Cancelled:
-    """A traced difference of terms much larger than itself.  known, terms: in the quantity's unit, SI."""
+    """A traced quantity whose rows are much smaller than its terms, or than itself between them.  known, terms: in the
+    quantity's unit, SI.
+    """
 
     quantity: str
     known: float
@@ -110,7 +112,7 @@ def cancelled(
     nominal: Mapping[str, float], seen: Mapping[str, float], asked: float | None, estimate: float | None
 ) -> Iterator[Cancelled]:
     """Quantities whose terms (nominal) cancel so far that the error, relative to the terms, is more than the accuracy
-    asked of the difference (seen) itself; what is nothing but round-off of its terms is zero by symmetry.
+    asked of the rows (seen) themselves; what is nothing but round-off of its terms is zero by symmetry.
 
     asked, estimate: relative; None where the solver's own tolerances are given.
     """

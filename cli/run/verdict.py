@@ -98,13 +98,16 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
 
 
 def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Report) -> None:
-    """N922 for each traced difference that is less well known than its accuracy seems to say."""
+    """N922 for each quantity that is less well known than its accuracy and its rows seem to say: a difference of larger
+    terms, or what was larger between the rows.
+    """
     observed = {o.name: o for o in prepared.network.observations}
     for lost in cancelled:
         said = observed.get(lost.quantity)
         unit, place = (f" {said.unit.text}", said.place) if said else ("", prepared.network.place)
-        text = f"{lost.quantity} is known to {lost.known:.1g}{unit}: a difference of {lost.terms:.1g}{unit}"
-        report.note("N922", text, place, help="a coordinate for the difference itself, or an origin nearby")
+        text = f"{lost.quantity} is known to {lost.known:.1g}{unit}: it or its terms reach {lost.terms:.1g}{unit}"
+        help_ = "of a difference: a coordinate for itself, or an origin nearby; where its rows are small: accuracy on it"
+        report.note("N922", text, place, help=help_)
 
 
 def verdict(target: Target, prepared: Prepared, judgement: Judgement, report: Report) -> None:

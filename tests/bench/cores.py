@@ -64,6 +64,7 @@ def stepped(line: Line, method: str, steps: int) -> str:
             core.sd_threads_use(threads)
             made = line.integration(method, 1e-6)
             made.driver.run.every_step = 0
+            made.driver.run.sizes_at_steps = 0
             found = measured(time.process_time, partial(core.sd_run_advance, made.driver.core, steps, 1e9))
             each = 1e3 / made.method.contents.steps
             before = best.get(threads, (float("inf"), float("inf")))

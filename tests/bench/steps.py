@@ -89,6 +89,7 @@ class Line:
         for _ in range(repeated):
             made = self.integration(method, rtol)
             made.driver.run.every_step = 0
+            made.driver.run.sizes_at_steps = 0
             began = time.process_time()
             lib.core.sd_run_advance(made.driver.core, most, 1e9)
             least = min(least, time.process_time() - began)

@@ -58,7 +58,8 @@ def test_a_run_in_the_core_is_the_run_of_the_command(name, formulation, tmp_path
             assert one.units == two.units
             assert np.abs(one.values - two.values).max() <= 1e-4 * size, quantity
             assert (one.derivative is None) == (two.derivative is None), quantity
-            assert one.nominal == two.nominal or abs(one.nominal - two.nominal) <= 1e-4 * size, quantity
+            # the largest of the ends of steps, too, which stand elsewhere
+            assert one.nominal == two.nominal or abs(one.nominal - two.nominal) <= 1e-3 * size, quantity
 
 
 @pytest.mark.parametrize("name", ["pendulum", "two_tank", "slider_crank"])

@@ -86,3 +86,29 @@ def test_a_difference_of_large_numbers_says_how_well_it_is_known(tmp_path, capsy
             exact = 1.0 + np.cos(trace["time"][()] * np.sqrt(50.0 * (1 / 3 + 1 / 2)))
             error = abs(trace["apart"][()] - exact).max()
         assert (error > 1e-4) == said
+
+
+PULSE = """\
+model pulse {
+  state a: 1 = 1
+  state b: 1 = 0
+  dynamic a' = -a*1 s^-1
+  dynamic b' = (a - b)*1 s^-1
+}
+scene s of pulse {
+  time 0 s to 100 s
+  trace b every 10 s
+}
+"""
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock", "dopri"])
+def test_what_passes_between_the_rows_is_the_size_that_errors_are_relative_to(tmp_path, method):
+    """b = t exp(-t), 1/e at 1 s; 4.5e-4 in the first row behind the start."""
+    path = tmp_path / "pulse.sd"
+    path.write_text(PULSE, encoding="utf-8")
+    main.run(["simulate", str(path), "--method", method, "-o", str(tmp_path / "t.h5")])
+    with h5py.File(tmp_path / "t.h5") as trace:
+        t, b = trace["time"][()], trace["b"]
+        assert b.attrs["nominal"] == pytest.approx(np.exp(-1.0), rel=0.05)
+        assert np.abs(b[()] - t * np.exp(-t)).max() < 1e-4 * b.attrs["nominal"]

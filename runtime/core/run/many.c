@@ -296,6 +296,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
             many->kind[k] = COMPARED | (lean && k == last->number - 1 ? TRACE : 0);
         prepare(many, &many->passes[1], next, longest, many->known ? NULL : last, opened);
         many->passes[1].run->every_step = many->passes[1].run->every_step && !lean;
+        many->passes[1].run->sizes_at_steps = !lean;
         state = integrate(many, &many->passes[1], own, there, &taken);
         *steps += taken;
         int lost_now = state == SD_MANY_ACCURACY;

@@ -116,6 +116,31 @@ static void refine(sd_run *run)
     run->settle->enough = enough;
 }
 
+/* Magnitudes of what is observed [observed] and of its terms, at the point of a row. */
+static void note_sizes(sd_run *run, double t, const double *observed)
+{
+    memset(run->values, 0, (size_t)run->observed * sizeof(double));
+    if (run->observe_scale)
+        run->observe_scale->rows(&run->observe_scale->frame, t, run->point, run->point_d, run->values);
+    for (int32_t i = 0; i < run->observed; i++) {
+        double size = fmax(fabs(observed[i]), fabs(run->values[i]));
+        if (size > run->largest[i])
+            run->largest[i] = size;
+    }
+}
+
+/* The same at the end of a step that has no row. */
+static void note_step(sd_run *run, double t)
+{
+    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+    if (run->settle)
+        settle_row(run, t, 0);
+    memset(run->slope, 0, (size_t)run->observed * sizeof(double));
+    if (run->observe)
+        run->observe->rows(&run->observe->frame, t, run->point, run->point_d, run->slope);
+    note_sizes(run, t, run->slope);
+}
+
 /* one output row at an instant of the last step, written as of `label`; two where it is compared too */
 static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
@@ -174,14 +199,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     if (run->observe_rate && !(compared && alone))
         run->observe_rate->rows(&run->observe_rate->frame, t, run->point, run->point_d,
                                 row + SD_ROW_HEAD + run->observed);
-    memset(run->values, 0, (size_t)run->observed * sizeof(double));
-    if (run->observe_scale)
-        run->observe_scale->rows(&run->observe_scale->frame, t, run->point, run->point_d, run->values);
-    for (int32_t i = 0; i < run->observed; i++) {
-        double size = fmax(fabs(row[SD_ROW_HEAD + i]), fabs(run->values[i]));
-        if (size > run->largest[i])
-            run->largest[i] = size;
-    }
+    note_sizes(run, t, row + SD_ROW_HEAD);
     run->t_row = label;
     run->rows++;
     run->rows_written++;
@@ -226,6 +244,8 @@ int sd_run_drain(sd_run *run)
         run->next += asked;
         if (kind > 0.0)
             emit(run, t, t, kind, 1);
+        else if (run->sizes_at_steps)
+            note_step(run, t);
         run->pending = 0;
     }
     return 0;

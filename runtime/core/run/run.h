@@ -42,6 +42,7 @@ typedef struct sd_run {
     const double *instant;            /* [instants] ascending, within the span */
     const int32_t *instant_kind;      /* [instants] kind of the row */
     int32_t instants, every_step, sample_steps;
+    int32_t sizes_at_steps;           /* largest is over the ends of all steps, not of those with a row alone */
     int32_t bare;                     /* what is observed follows from the state: rows for comparison alone are not settled */
     int32_t unsummed;                 /* nothing observed reads the audit: rows for comparison alone are without it (1), a draft
                                        * without integrals of powers (2); they are no numbers */

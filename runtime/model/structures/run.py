@@ -127,6 +127,7 @@ class Run(c.Structure):
         ("instants", I),
         ("every_step", I),
         ("sample_steps", I),
+        ("sizes_at_steps", I),
         ("bare", I),
         ("unsummed", I),
         ("rough", D),
