@@ -20,8 +20,10 @@ from sysdyn.values import dataclass
 MOST = 24
 """Instants at which runs are compared, at most twice that; of a long run this part of its steps, at most twice MANY."""
 PART, MANY = 16, 500
-GRID = 600
-"""Rows of a trace with an interval that are compared at most: between steps errors differ from row to row."""
+GRID, VALUES = 10_000, 2_000_000
+"""Rows of a trace with an interval that are compared at most, and values in them: behind an event a motion may relax
+within a row (of every fourth alone, 13 times the accuracy asked went unseen).  A draft takes what is a part of its
+step apart."""
 FEW = 48
 GOLDEN = 0.6180339887498949
 """Multiples of it modulo 1 fill an interval evenly and never regularly (Weyl's sequence)."""
@@ -72,12 +74,13 @@ class Thinned:
         return found[place] if np.array_equal(found[place, 0], instants) else found[:0]
 
 
-def known(times: Floats, options: Options) -> Floats | None:
+def known(times: Floats, options: Options, quantities: int) -> Floats | None:
     """Instants of comparison [s] where those of the trace are known before a run; None where they are its steps."""
     if options.every is None:
         return None
     if times.size >= FEW:
-        return distinct(np.append(times[:: -(-times.size // GRID)], times[-1]))
+        most = min(GRID, max(VALUES // max(quantities, 1), FEW))
+        return distinct(np.append(times[:: -(-times.size // most)], times[-1]))
     span = options.t_end - options.t_start
     return distinct(np.append(options.t_start + span * (np.arange(1, MOST + 1) * GOLDEN % 1.0), options.t_end))
 
@@ -141,13 +144,13 @@ class Instants:
     comparison, None while they are not known; open: while those are of the trace, from which a draft takes its own.
     """
 
-    def __init__(self, options: Options, kept: dict[str, Any]) -> None:
-        """kept: by the model; the run before had the same instants, or others."""
+    def __init__(self, options: Options, kept: dict[str, Any], quantities: int) -> None:
+        """kept: by the model; the run before had the same instants, or others; quantities: compared."""
         asked = options.t_start, options.t_end, options.every, options.at, options.sampled_at
         before = kept.get("instants")
         if before is None or before[0] != asked:
             times, kinds = instants(options)
-            compared = known(times, options)
+            compared = known(times, options, quantities)
             both = None if compared is None else _Joined.of(times, kinds, compared)
             before = asked, (times, kinds, compared, both)
             if times.size <= KEPT:

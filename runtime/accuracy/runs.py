@@ -61,7 +61,7 @@ class Runs:
         description = way.system.description
         self.columns: tuple[Column, ...] = way.system.once("columns", lambda: columns_of(description))
         self.names = way.system.once("observed names", lambda: _observed_names(description))
-        self.instants = Instants(options, description.layouts)
+        self.instants = Instants(options, description.layouts, len(self.names))
         self.compared = Compared(options, self.instants, len(self.names))
         self.accounts = Accounts(options)
         self.keeping = keeping(options.output)

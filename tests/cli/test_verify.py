@@ -97,8 +97,9 @@ def both(*formulations):
 
 @pytest.fixture(autouse=True)
 def _without_co_kane(request, monkeypatch):
-    """Every circuit has it, beside co_lagrangian: some tests and SYSDYN_LONG=1 run it."""
-    if not LONG and not request.node.originalname.startswith("test_kane"):
+    """Every circuit has it, beside co_lagrangian: some tests, and scenes with SYSDYN_LONG=1, run it."""
+    name = request.node.originalname
+    if not name.startswith("test_kane") and not (LONG and name == "test_every_scene_agrees"):
         monkeypatch.setattr(verification, "EVERY", TRIED)
 
 
@@ -143,8 +144,6 @@ def scenes():
             yield path.relative_to(MODELS).as_posix(), scene
 
 
-REFUSED = ("benchmark/ring.sd",)
-"""Scenes at which one of the methods stops with a reason: the matrix of bdf becomes singular."""
 UNMET = ("benchmark/tube.sd",)
 """Scenes at which one of the methods says that it has not reached the accuracy: roots at flows through zero, in bdf."""
 
@@ -176,15 +175,11 @@ def test_every_scene_agrees(file, scene, capsys):
         pytest.skip("SYSDYN_LONG=1 verifies it")
     end = [] if LONG or (file, scene) not in SHORT else ["--until", SHORT[file, scene]]
     code, found = run_json(capsys, "verify", str(MODELS / file), "--scene", scene, "--max-wall", "600", *end)
-    if file in REFUSED and not end:
-        assert code == 3
-        assert not found["result"].get("disagreements")
-        assert any("the solver stopped" in d["message"] for d in found["diagnostics"])
-        return
     errors = [d["message"] for d in found["diagnostics"] if d["severity"] == "error"]
     if file in SINGULAR:
         assert code == 3
-        assert any(("radau" in text and "singular" in text) or "coarser run" in text for text in errors), errors
+        assert all("radau: the solver stopped" in text for text in errors), errors
+        assert not found["result"]["disagreements"]
         return
     if file in UNMET and code == 3:
         assert all("not met by its own estimate" in text and "bdf" in text.split(":")[0] for text in errors), errors

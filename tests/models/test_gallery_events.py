@@ -3,6 +3,7 @@
 from math import asin, cos, pi, sin, sqrt
 from pathlib import Path
 
+import numpy as np
 import pytest
 from sysdyn.api import simulate
 
@@ -46,3 +47,16 @@ def test_the_teeth_of_a_gear_with_play_keep_their_distance_and_lose_energy_at_ea
     # alone until the first knock: J1 driver' = T/w (1 - cos w t), so the play of 0.01 rad is crossed where
     # T/(J1 w^2) (w t - sin w t) = 0.01
     assert 1.0 / (0.01 * 36.0) * (6.0 * first - sin(6.0 * first)) == pytest.approx(0.01, rel=0, abs=1e-8)
+
+
+@pytest.mark.parametrize("method", ["bdf", "rosenbrock"])
+def test_what_relaxes_behind_an_event_within_a_row_counts(method, tmp_path):
+    """The valves of the pump open into flows that follow within a millisecond, the interval of the trace."""
+    file, accuracy = GALLERY / "piston_pump.sd", 1e-4
+    run = simulate(file, method=method, accuracy=accuracy, o=tmp_path / "x.h5")
+    exact = simulate(file, method="radau", accuracy=1e-9, o=tmp_path / "exact.h5")
+    rows, one, two = np.intersect1d(run.time, exact.time, return_indices=True)
+    assert rows.size > 1900
+    for name in run.names:
+        apart = np.abs(run[name].values[one] - exact[name].values[two]).max()
+        assert apart < accuracy * exact[name].nominal, name

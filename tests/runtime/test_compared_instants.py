@@ -38,10 +38,12 @@ def test_a_long_stream_is_thinned_evenly_whatever_its_chunks(chunk):
 
 
 def test_instants_are_known_where_the_trace_has_an_interval():
-    assert known(np.arange(10.0), Options(None, 0.0, 9.0)) is None
-    many = known(np.linspace(0.0, 1.0, 1201), Options(None, 0.0, 1.0, every=1 / 1200))
+    assert known(np.arange(10.0), Options(None, 0.0, 9.0), 1) is None
+    asked, options = np.linspace(0.0, 1.0, 1201), Options(None, 0.0, 1.0, every=1 / 1200)
+    assert np.array_equal(known(asked, options, 1), asked)
+    many = known(asked, options, 4000)
     assert many.size == 401  # every third, the last among them
-    few = known(np.array([0.0, 1.0]), Options(None, 2.0, 4.0, every=2.0))
+    few = known(np.array([0.0, 1.0]), Options(None, 2.0, 4.0, every=2.0), 1)
     assert few.size == MOST + 1
     assert few[-1] == 4.0
     assert ((few > 2.0) & (few <= 4.0)).all()
