@@ -30,7 +30,7 @@ from sysdyn.dsl.names.symbols import (
 )
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.parser.parse import parse
-from sysdyn.dsl.text.diagnostics import Place, Related, Report, SourceText
+from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Related, Report, SourceText
 from sysdyn.dsl.tree import syntax
 
 LIBRARY = Path(__file__).parents[1] / "std"
@@ -52,6 +52,12 @@ def prelude() -> syntax.File:
     file, problems = parse(SourceText.read(LIBRARY / "prelude.sd", "std/prelude.sd"))
     assert not problems, problems
     return file
+
+
+@cache
+def _of_library(path: Path) -> tuple[syntax.File, tuple[Diagnostic, ...]]:
+    """A file of the library and what is wrong with it, parsed once a process."""
+    return parse(SourceText.read(path, f"std/{path.name}"))
 
 
 class FileScope:
@@ -172,7 +178,7 @@ class FileScope:
             self.report.error("E103", f"there is no module '{'.'.join(names)}'", place, help=help_)
             return None
         self._modules[path] = None
-        file, problems = parse(SourceText.read(path, f"std/{path.name}" if inside else None))
+        file, problems = _of_library(path) if inside else parse(SourceText.read(path))
         self.report.extend(problems)
         scope = Scope(self.outer)
         before, self.scope = self.scope, scope

@@ -31,8 +31,7 @@ PARTS = 8
 """Steps at least that such a bounce takes (radau and dopri follow a parabola in one), or after one that misled."""
 
 HALT = 1e-5
-"""Of a step, before friction in the plane comes to rest: the direction of a slip is told there, at rest there is none."""
-
+"""Of a step, before friction in the plane comes to rest: there a slip still has a direction."""
 FAINT = 1e3
 """Times what round-off leaves of a quantity: what has never been larger is asked again whether it is any."""
 

@@ -1,0 +1,26 @@
+"""Files of the library are read once, however many values of a command line are told by their names."""
+
+from sysdyn.dsl import load
+from sysdyn.dsl.elaborate import files
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.parser.parse import parse
+from sysdyn.dsl.text.diagnostics import Report, SourceText
+
+TEXT = """from std.electrical import resistor
+const half = 0.5
+model one { node a: electrical; R1: resistor(R = 1 ohm) a -> ground }
+"""
+
+
+def test_a_module_is_parsed_once_for_many_values(monkeypatch):
+    read = []
+    monkeypatch.setattr(files, "parse", lambda source: read.append(source.name) or parse(source))
+    files._of_library.cache_clear()
+    files.prelude()
+    read.clear()
+    report = Report()
+    document = load.document(SourceText("one.sd", TEXT), report)
+    values = [load.constant(document, f"{k}*half*2 s", dim.TIME, "--at", report) for k in range(20)]
+    assert values == [float(k) for k in range(20)]
+    assert read == ["std/electrical.sd"]
+    assert not list(report)
