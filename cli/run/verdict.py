@@ -106,7 +106,7 @@ def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Repo
         said = observed.get(lost.quantity)
         unit, place = (f" {said.unit.text}", said.place) if said else ("", prepared.network.place)
         text = f"{lost.quantity} is known to {lost.known:.1g}{unit}: it or its terms reach {lost.terms:.1g}{unit}"
-        help_ = "a coordinate for a difference, or an origin nearby; where it is small in its rows alone, accuracy on it"
+        help_ = "a coordinate for a difference, or an origin nearby; where its rows alone are small, accuracy on it"
         report.note("N922", text, place, help=help_)
 
 
