@@ -82,9 +82,10 @@ diodes, transistors).
 """
 
 UNSEEN_CORNERS = replace(LAWS["dopri"], credit=0.3)
-"""Of dopri where laws are steep: tables have corners in their second derivative, which a long step passes unseen by its
-error test.  Errors fall by fits and starts (a spring of seven points, SciPy's DOP853 alike: 3.9e-3, 2.3e-3, 8e-5, 2.3e-4
-at 8e-5, 1e-5, 1e-6, 8e-7), and a pair a hundredth apart may be off by its difference.
+"""Of dopri where laws are steep: tables have corners in their second derivative, which a long step passes unseen by
+its error test.  Errors fall by fits and starts (a spring of six points, SciPy's DOP853 alike: 3.9e-3, 2.3e-3, 8e-5,
+2.3e-4 at 8e-5, 1e-5, 1e-6, 8e-7), and a pair a hundredth apart may be off by its difference.  Of 51 runs at 1e-2 to
+1e-4 the worst error is 0.19 of what was asked, where it was 4.2 times that.
 """
 
 OF_THREE_STAGES = Law(1.5, 0.9, 0.6, 1e-17, ratio=0.01, loosest=0.03, little=0.02, short=0.3)

@@ -38,8 +38,8 @@ def crossing(dense: Dense, watches: Sequence[Watch], begin: float, end: float) -
 
 
 def _falls(watch: Watch, low: Floats, high: Floats) -> bool:
-    """Whether a watch changes between two points; what leaves zero upwards, or at rest (a contact that lets go begins to
-    part with its jerk alone), and rises at the end, has not: a first step of order 1 may pull it below.
+    """Whether a watch changes between two points; what leaves zero upwards, or at rest (a contact that lets go begins
+    to part by its jerk alone), and does not fall at the end, has not: a first step of order 1 may pull it below.
     """
     row, side, small, rate, level, still = watch
     rises = rate >= 0 and side * low[row] <= level + small and min(side * low[rate], side * high[rate]) >= -still

@@ -1,4 +1,4 @@
-"""Contacts that let go at rest: reaction, speed and acceleration are zero there, so that the gap opens by its jerk alone."""
+"""Contacts that let go at rest: reaction, speed and acceleration are zero there, the gap opens by its jerk alone."""
 
 import numpy as np
 import pytest
@@ -78,7 +78,8 @@ def slid(t):
     exact = {"rtol": 1e-11, "atol": 1e-13, "dense_output": True, "method": "DOP853"}
     first = solve_ivp(held, (0.0, 1.1), [0.2, 0.0, length / 2 * np.sin(0.2), 0.0], events=pulls, **exact)
     then = solve_ivp(floor, (first.t[-1], 1.1), first.y[:, -1], **exact)
-    return np.where(t <= first.t[-1], first.sol(np.minimum(t, first.t[-1])), then.sol(np.maximum(t, first.t[-1])))[[0, 2]]
+    off = first.t[-1]
+    return np.where(t <= off, first.sol(np.minimum(t, off)), then.sol(np.maximum(t, off)))[[0, 2]]
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])

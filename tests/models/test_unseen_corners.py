@@ -1,4 +1,4 @@
-"""Tables whose second derivative jumps, which the explicit method's error test may pass unseen: what a run says of itself."""
+"""Tables whose second derivative jumps, which the explicit method's error test may pass unseen."""
 
 import numpy as np
 import pytest
