@@ -186,7 +186,8 @@ class Handler:
     def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
         """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
         watched = self.watched()
-        rows = [(w.row, w.side, self._least(w), self.rate(w), self._level(w), self._still(w)) for w in watched]
+        still = [self.observer.zero(self.rate(w)) * (w.row in self.bounces) for w in watched]  # let go, at rest
+        rows = [(w.row, w.side, self._least(w), self.rate(w), self._level(w), still[k]) for k, w in enumerate(watched)]
         found = crossing(dense, rows, begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 
@@ -205,11 +206,6 @@ class Handler:
         """The value at which what is watched begins: that of a bounce, else zero."""
         bounce = self.bounces.get(watched.row)
         return 0.0 if bounce is None else bounce.level
-
-    def _still(self, watched: Watched) -> float:
-        """The rate below which what a contact let go is at rest; else none is."""
-        rate = self.rate(watched)
-        return self.observer.zero(rate) if watched.row in self.bounces and rate >= 0 else 0.0
 
     def flight(self, unseen: float) -> float:
         """Time (s) until the first bounce ends that rises less than `unseen` times the largest value of its gap."""
