@@ -40,7 +40,8 @@ class NotMet:
 
     what: accuracy, energy or invariants; value beyond limit: relative for accuracy (value None: no estimate), in `unit`
     for a ledger; element: the quantity, or whose content changed most in the step that spoiled the balance most; time
-    [s]: of the first instant beyond the limit; row: where the element stands in the text.
+    [s]: of the first instant beyond the limit; row: where the element stands in the text; undefined: the quantity is no
+    number from then on.
     """
 
     what: str
@@ -50,6 +51,7 @@ class NotMet:
     time: float | None
     unit: str = "1"
     row: RowLabel | None = None
+    undefined: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """The object of CONTRACT's `not_met` list."""
@@ -88,13 +90,14 @@ UNJUDGED: dict[str, str | int] = {"met": 0, "judged": ""}
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """The accuracy control's verdict on one quantity.  error: relative (None: there is none); time [s] of the first
-    instant at which two runs differ by more than asked.
+    instant at which two runs differ by more than asked; undefined: it is no number there.
     """
 
     quantity: str
     error: float | None
     asked: float
     time: float | None
+    undefined: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +150,9 @@ def judge(
     if method == "euler":
         return Judgement((), (), conserved)
     judged = ["accuracy"] if accurate else []
-    found = [NotMet("accuracy", e.error, e.asked, e.quantity, e.time) for e in missed] if accurate else []
+    found = [
+        NotMet("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined) for e in missed if accurate
+    ]
     part = allowed(options)
     for kind, what in (("energy", "energy"), ("invariant", "invariants")):
         own = [(k, b) for k, b in enumerate(balances) if b.kind == kind]

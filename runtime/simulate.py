@@ -133,8 +133,8 @@ def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Es
     """The quantity that misses most what was asked, where the accuracy was not reached."""
     if achieved is None or achieved.met:
         return ()
-    name, asked, time = runs.compared.worst(runs.quantities.compared, _targets(runs, options))
-    return (Estimate(name, achieved.error_estimate, asked, time),)
+    name, asked, time, undefined = runs.compared.worst(runs.quantities.compared, _targets(runs, options))
+    return (Estimate(name, achieved.error_estimate, asked, time, undefined),)
 
 
 def _achieved(

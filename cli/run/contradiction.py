@@ -71,7 +71,11 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             )
         case _:
             message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
-            report.error("E903", message, where, help="guesses nearer to a solution: init ... ~ ...")
+            sides = {switch.name for switch in prepared.network.switches}  # no guess mends a short circuit
+            one = next((r.label for r in error.rows if re.sub(r"\[.*", "", r.label) in sides), None)
+            given = f"a resistance in series with {one}, which passes or stops all that the others ask for"
+            help_ = "guesses nearer to a solution: init ... ~ ..."
+            report.error("E903", message, where, help=help_ if one is None else f"{given}; else {help_}")
 
 
 def _listed(prepared: Prepared, error: InconsistentStart) -> str:

@@ -125,10 +125,14 @@ def verdict(target: Target, prepared: Prepared, judgement: Judgement, report: Re
 
 
 def _inaccurate(prepared: Prepared, missed: NotMet, place: Place, report: Report) -> None:
+    where = next((o.place for o in prepared.network.observations if o.name == missed.element), place)
+    if missed.undefined:
+        text = f"{missed.element} is no number from t = {missed.time:.9g} s on: a function is outside its domain"
+        report.error("E920", f"the accuracy asked was not reached: {text}", where, help=_REMEDIES["E933"])
+        return
     estimate = "nothing estimates its error" if missed.value is None else f"estimated error {missed.value:.1e}"
     since = "" if missed.time is None else f", beyond it from t = {missed.time:.9g} s on"
     text = f"the accuracy asked was not reached: {missed.element}, {estimate}, asked {missed.limit:.1e}{since}"
-    where = next((o.place for o in prepared.network.observations if o.name == missed.element), place)
     report.error("E920", text, where, help="a looser accuracy, a shorter span, or what stands at the place")
 
 

@@ -5,6 +5,7 @@ Pure functions from words and sets of terminals to (code, message, help).
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Collection
 
@@ -248,15 +249,15 @@ _SHAPES = {
 """The shape of a statement, by its first word."""
 
 
-def expected(accepted: Collection[str], kind: str, text: str, before: str, word: str = "") -> Complaint:
-    """A token that does not fit, with what would; `before` is the token before it, `word` begins the statement."""
+def expected(accepted: Collection[str], kind: str, text: str, line: str, word: str = "") -> Complaint:
+    """A token that does not fit, with what would; `line` is the line up to it, `word` begins the statement."""
     said = f"expected {_listed(accepted)}, found {quoted(text, kind)}"
     shape = _SHAPES.get(word)
     if text == "," and word in ("param", "state", "let", "input", "output", "const", "discrete"):
         shape = f"one name a statement: {_SHAPES.get(word, word + ' on = false')}"
     if word == "trace" and text == "in":
         shape = "the unit stands before the name: trace x in mm as pos"
-    return "E113", said, _hint(kind, text, before, accepted) or shape
+    return "E113", said, _hint(kind, text, line, accepted) or shape
 
 
 def _listed(accepted: Collection[str]) -> str:
@@ -292,8 +293,9 @@ def _listed(accepted: Collection[str]) -> str:
     return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " or " + parts[-1]
 
 
-def _hint(kind: str, text: str, before: str, accepted: Collection[str]) -> str | None:
+def _hint(kind: str, text: str, line: str, accepted: Collection[str]) -> str | None:
     """The text to write for a slip that is easily named."""
+    before = line[-1:]
     if text == "*" and before == "*":
         return "a power is written a^b"
     if text == "(" and "on" in accepted:
@@ -310,4 +312,10 @@ def _hint(kind: str, text: str, before: str, accepted: Collection[str]) -> str |
         return f"{before} -> {text}"
     if before == "." and kind != "<name>":
         return "a number ends with a digit: 5.0"
+    divided = re.search(r"(\w[\w^/]*)/([a-z]\w*)$", line)
+    if text == "(" and divided is not None:
+        return f"{divided[2]} is read as a unit; to divide by its value: {divided[1]} / {divided[2]}(...)"
+    number = re.search(r"[\d.]+$", line)
+    if text == "1" and kind == "<number>" and number is not None:
+        return f"a unit begins with a name: {number[0]} s^-1 for {number[0]} 1/s"
     return None

@@ -196,8 +196,9 @@ class Recovery:
             self._error(("E113", message, f"{word}_: ..."), Span(start, start + len(word)))
         else:
             accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
-            before = scanner.text[: scanner.start].rstrip()[-1:]
-            self._error(complaints.expected(accepted, kind, text, before, word), self._token())
+            before = scanner.text[: scanner.start].rstrip()
+            line = before[before.rfind("\n") + 1 :]
+            self._error(complaints.expected(accepted, kind, text, line, word), self._token())
 
     def _words_here(self, size: int) -> dict[str, int]:
         """The terminals with which a statement may begin here."""

@@ -103,14 +103,14 @@ class Compared:
         found = self.left_open(finished, quantities.system).quantities[quantities.places]
         return np.append(found, np.zeros(len(quantities.meters)))
 
-    def worst(self, names: tuple[str, ...], target: Floats) -> tuple[str, float, float | None]:
+    def worst(self, names: tuple[str, ...], target: Floats) -> tuple[str, float, float | None, bool]:
         """Of the last two runs: the quantity whose difference is largest beside what is asked of it (target
-        [compared]), that, and the first instant [s] at which it differs by more.
+        [compared]), that, the first instant [s] at which it differs by more, and whether it is no number there.
         """
         asked = {name: float(wanted) for name, wanted in zip(names, target, strict=True)}
         name = min(asked, key=lambda n: asked[n], default="")
         if len(self.samplings) < 2 or self.samplings[0].own[0].shape != self.samplings[1].values.shape:
-            return name, asked.get(name, 0.0), None
+            return name, asked.get(name, 0.0), None, False
         one, two = self.samplings
         assert self._at is not None
         size = (one if one.tolerance < two.tolerance else two).largest
@@ -121,8 +121,9 @@ class Compared:
         ratio[two.between] = 0.0
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)
-        name = names[k]
-        return name, asked[name], float(self._at[beyond[0]]) if beyond.size else None
+        name, at = names[k], int(beyond[0]) if beyond.size else None
+        undefined = at is not None and not np.isfinite([one.own[0][at, k], two.values[at, k]]).any()
+        return name, asked[name], None if at is None else float(self._at[at]), undefined
 
 
 def _values(rows: Floats, finished: Finished, quantities: Quantities) -> Floats:

@@ -186,7 +186,8 @@ class Handler:
     def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
         """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
         watched = self.watched()
-        rows = [(w.row, w.side, self._least(w), self.rate(w), self._level(w)) for w in watched]
+        still = [self.observer.zero(self.rate(w)) * (w.row in self.bounces) for w in watched]  # let go, at rest
+        rows = [(w.row, w.side, self._least(w), self.rate(w), self._level(w), still[k]) for k, w in enumerate(watched)]
         found = crossing(dense, rows, begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 

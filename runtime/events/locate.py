@@ -17,10 +17,10 @@ ITERATIONS = 60
 
 Dense = Callable[[float], Floats]
 """t (s) -> values [observed] there."""
-Watch = tuple[int, int, float, int, float]
-"""(row, side, tolerance, row of its rate or -1, level <= 0): it changes where side*value - level falls below
--tolerance. A bounce begins at the value that the impact before it left, which is zero but for round-off: that is its
-level, else the round-off of many bounces adds up to a fall.
+Watch = tuple[int, int, float, int, float, float]
+"""(row, side, tolerance, row of its rate or -1, level <= 0, tolerance of its rate): it changes where side*value - level
+falls below -tolerance. A bounce begins at the value that the impact before it left, which is zero but for round-off:
+that is its level, else the round-off of many bounces adds up to a fall.
 """
 
 
@@ -38,11 +38,11 @@ def crossing(dense: Dense, watches: Sequence[Watch], begin: float, end: float) -
 
 
 def _falls(watch: Watch, low: Floats, high: Floats) -> bool:
-    """Whether a watch changes between two points; what leaves zero upwards, and still does, has not: the interpolant of
-    a first step of order 1 may pull it below.
+    """Whether a watch changes between two points; what leaves zero upwards, or at rest (a contact that lets go begins
+    to part by its jerk alone), and does not fall at the end, has not: a first step of order 1 may pull it below.
     """
-    row, side, small, rate, level = watch
-    rises = rate >= 0 and side * low[row] <= level and side * low[rate] > 0.0 and side * high[rate] >= 0.0
+    row, side, small, rate, level, still = watch
+    rises = rate >= 0 and side * low[row] <= level + small and min(side * low[rate], side * high[rate]) >= -still
     return bool(side * high[row] - level < -small and not rises)
 
 
@@ -65,7 +65,7 @@ def _instant(dense: Dense, watch: Watch, low: tuple[float, Floats], high: tuple[
     """Where a watch falls through zero; what begins at zero and rises (a bounce lower than the tolerance) falls from
     its crest.
     """
-    row, side, _, rate, level = watch
+    row, side, _, rate, level, _ = watch
     begin, value = low[0], side * float(low[1][row]) - level
     if value <= 0.0 and rate >= 0 and side * float(low[1][rate]) > 0.0 > side * float(high[1][rate]):
         lower, upper = ((at, side * float(values[rate])) for at, values in (low, high))

@@ -82,6 +82,23 @@ def test_an_accuracy_that_is_not_reached_is_exit_3(tmp_path, capsys):
     assert [d["code"] for d in found["diagnostics"] if d["severity"] == "error"] == ["E920"]
 
 
+@pytest.mark.parametrize("law", ["ln(x)", "asin(2*x - 1)", "sqrt(x)"])
+def test_a_traced_value_that_is_no_number_is_told_as_that(tmp_path, capsys, law):
+    """x = 0.5 - t is negative from 0.5 s on."""
+    path = tmp_path / "m.sd"
+    path.write_text(
+        f"model m {{\n  state x: 1 = 0.5\n  dynamic x' = -1/(1 s)\n  let y = {law}\n}}\n"
+        "scene s of m {\n  time 0 s to 1 s\n  trace y every 0.1 s\n}\n"
+    )
+    code, found, _ = simulated(path, tmp_path, capsys)
+    assert code == 3
+    (missed,) = found["result"]["not_met"]
+    (said,) = [d for d in found["diagnostics"] if d["code"] == "E920"]
+    assert "y is no number from t = " in said["message"]
+    since = float(said["message"].partition("t = ")[2].split()[0])
+    assert since == pytest.approx(missed["time"]) == pytest.approx(0.5, abs=0.11)
+
+
 def test_euler_is_not_judged_and_says_so(duffing, tmp_path, capsys):
     text = duffing.read_text().replace("trace x\n", "trace x\n  solver euler(step = 1 ms)\n")
     duffing.write_text(text)

@@ -8,8 +8,10 @@ from model_runs import FOUR, attempt, trace_of
 from random_starts import judged
 from reduced import ROOT
 from start_strategies import strategies
+from sysdyn import api
 from sysdyn.cli.options import EVERY
 from sysdyn.cli.run.starting import SOUGHT, sought
+from sysdyn.dsl.text.diagnostics import ModelError
 from sysdyn.runtime.start.strategies import STRATEGIES
 from sysdyn.runtime.trace.trace import Trace
 
@@ -186,3 +188,28 @@ def test_a_flow_that_is_said_counts_in_what_it_holds_with_others(tmp_path, formu
     y = np.linalg.lstsq(np.array([[1.0], [1.0]]), -np.array([0.8, 0.4 + 0.6]), rcond=None)[0][0]
     found = [trace[name].values[0] for name in ("x'", "y'", "z'")]
     np.testing.assert_allclose(found, [0.4, y, 0.6 - y], atol=1e-9)
+
+
+def test_a_source_across_what_conducts_without_loss_is_told_to_have_a_resistance(tmp_path):
+    text = """\
+from std.electrical import diode
+model shorted {
+  node a: electrical
+  S: effort(e = 5 V) a -> ground
+  D: diode.complementary() a -> ground
+}
+scene s of shorted {
+  time 0 s to 1 s
+  trace S.f
+}
+"""
+    (tmp_path / "model.sd").write_text(text)
+    with pytest.raises(ModelError) as raised:
+        api.simulate(tmp_path / "model.sd", output=tmp_path / "out.h5")
+    (said,) = [d for d in raised.value.diagnostics if d.code == "E903"]
+    assert "a resistance in series with D.one_way" in said.help
+    loaded = text.replace("node a:", "node a, b:").replace("complementary() a", "complementary() b")
+    loaded = loaded.replace("  D:", "  R: dissipator(e = 2 ohm*f) a -> b\n  D:")
+    (tmp_path / "model.sd").write_text(loaded)
+    trace = api.simulate(tmp_path / "model.sd", output=tmp_path / "out.h5")
+    assert trace["S.f"].values == pytest.approx(-2.5, rel=1e-9)

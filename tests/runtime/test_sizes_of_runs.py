@@ -93,15 +93,20 @@ def compared(coarse, fine, **more):
 def test_the_quantity_whose_difference_is_largest_beside_what_is_asked():
     """a is off by 2 of what is asked at 2 s, b by 3 and by 5 from 1 s on."""
     coarse = [[1.0, 1.0], [1.0, 1.0], [1.0, 1.0]]
-    assert compared(coarse, [[1.0, 1.0], [1.0, 1.3], [1.002, 1.5]]) == ("b", 1e-2, 1.0)
-    assert compared(coarse, [[1.0, 1.0], [1.0, 1.0], [1.002, 1.05]]) == ("a", 1e-3, 2.0)
+    assert compared(coarse, [[1.0, 1.0], [1.0, 1.3], [1.002, 1.5]]) == ("b", 1e-2, 1.0, False)
+    assert compared(coarse, [[1.0, 1.0], [1.0, 1.0], [1.002, 1.05]]) == ("a", 1e-3, 2.0, False)
     assert compared(coarse, coarse)[2] is None
+
+
+def test_what_is_no_number_is_told_as_that():
+    none = [[1.0, 1.0], [1.0, np.nan], [1.0, np.nan]]
+    assert compared(none, none) == ("b", 1e-2, 1.0, True)
 
 
 def test_what_moves_by_as_much_within_the_time_tolerance_is_no_difference():
     late = np.array([[0.0, 0.0], [0.0, 0.3], [0.0, 0.5]])
     coarse = [[1.0, 1.0], [1.0, 1.0], [1.0, 1.5]]
-    name, _, instant = compared(coarse, [[1.0, 1.0], [1.0, 1.3], [1.002, 1.5]], late=late)
+    name, _, instant, _ = compared(coarse, [[1.0, 1.0], [1.0, 1.3], [1.002, 1.5]], late=late)
     assert (name, instant) == ("a", 2.0)
 
 
@@ -109,7 +114,7 @@ def test_a_rate_without_bound_excuses_no_value_that_one_run_alone_has():
     """At a pole each run ends with a value of its own, and the rates there say that any would do."""
     late = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1e9]])
     coarse = [[1.0, 1.0], [1.0, 2.0], [1.0, 5.0]]
-    assert compared(coarse, [[1.0, 1.0], [1.0, 2.0], [1.0, 9.0]], late=late) == ("b", 1e-2, 2.0)
+    assert compared(coarse, [[1.0, 1.0], [1.0, 2.0], [1.0, 9.0]], late=late) == ("b", 1e-2, 2.0, False)
 
 
 def test_a_forecast_counts_the_run_behind_a_draft(monkeypatch):
