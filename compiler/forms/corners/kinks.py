@@ -22,7 +22,7 @@ from contextlib import suppress
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.expression import Node, compare, const, neg, rebuild, sub, topological, variables
+from sysdyn.dsl.model.expression import Node, compare, const, linear, neg, rebuild, sub, topological, variables
 from sysdyn.values import dataclass
 
 JUDGED = ("dynamics", "phi_reaction", "psi_reaction", "momentum", "phi", "psi", "gamma", "lambda")
@@ -144,7 +144,7 @@ def done_of(branch: Node, done: dict[Node, Node]) -> Node:
 
 def smoothness(root: Node, u: Node) -> int:
     """JUMPS, KINK or SMOOTH: of an expression where u = 0."""
-    above, below = side(root, u, above=True), side(root, u, above=False)
+    above, below = _unlike(side(root, u, above=True), side(root, u, above=False))
     if above is below:
         return SMOOTH
     moved = next((n for n in topological([u]) if n.op == "var"), None)
@@ -175,6 +175,18 @@ def smoothness(root: Node, u: Node) -> int:
     if known:
         return found
     return KINK if _continuous(root, u) else JUMPS  # what the operation itself does
+
+
+def _unlike(above: Node, below: Node) -> tuple[Node, Node]:
+    """Both without the terms that their sums have in common: these say nothing of a jump, and are no numbers at some of
+    the samples ((V0/(V0 - q))^1.4 beyond V0).
+    """
+    if above.op != "sum" or below.op != "sum":
+        return above, below
+    terms = [dict(zip(side.args, side.data[1], strict=True)) for side in (above, below)]
+    own = [[(c, n) for n, c in mine.items() if other.get(n) != c] for mine, other in (terms, terms[::-1])]
+    constants = (0.0, 0.0) if above.data[0] == below.data[0] else (above.data[0], below.data[0])
+    return linear(constants[0], own[0]), linear(constants[1], own[1])
 
 
 def _ends(sides: tuple[Node, Node], u: Node, slope: Node, moved: Node) -> bool:
