@@ -158,6 +158,11 @@ def test_formulations_inputs_and_what_fails(spring, capsys):
     code, found = swept(capsys, spring, "--over", "k=1,4", "--jobs", "1", "--max-steps", "3", "-o", "steps.h5")
     assert code == 3
     assert len(found["result"]["failed"]) == 2
+    lines = Path(spring).read_text().splitlines()
+    for item in (*found["diagnostics"], *(f["diagnostic"] for f in found["result"]["failed"])):
+        assert item["code"] == "E934"
+        assert item["file"] == spring
+        assert lines[item["line"] - 1][item["column"] - 1 :].strip()
 
 
 @pytest.mark.parametrize(
