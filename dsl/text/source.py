@@ -22,7 +22,7 @@ def real(path: str | Path) -> Path:
 
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
-_OPTION = re.compile("--[a-z]+(-[a-z]+)*")
+_OPTION = re.compile("--[a-z]+(-[a-z]+)*( .*)?", re.DOTALL)
 
 
 class Span(NamedTuple):
@@ -46,7 +46,7 @@ class SourceText:
 
     @property
     def typed(self) -> bool:
-        """Whether it is the value of an option of the command line, whose name it has."""
+        """Whether it is the value of an option of the command line, by whose name it begins."""
         return _OPTION.fullmatch(self.name) is not None
 
     @classmethod

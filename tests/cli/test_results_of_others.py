@@ -265,6 +265,8 @@ def test_quiet_keeps_the_reason_of_a_difference(model, capsys):
         ([*OVER, "--seed", "9" * 30], 2),
         (["--over", "l~normal(2 m, 0.1 m)", "--runs", "2", "--seed", "-5"], 2),
         ([*OVER, "--until", "1e400"], 2),
+        (["--over", "l=1 kg,2 kg"], 2),
+        (["--over", "nosuch=1,2"], 2),
     ],
 )
 def test_what_a_sweep_cannot_vary_is_said_before_its_runs(model, capsys, options, code):

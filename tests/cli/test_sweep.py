@@ -11,6 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from sysdyn import api
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.main import run
 from sysdyn.cli.run.asked import Request
@@ -265,3 +266,14 @@ def test_a_journal_of_another_study_is_not_taken(tmp_path):
 
 def test_names_that_are_texts_stay_texts():
     assert axis("file=a, b", lambda name, text: None) == Axis("file", ("a", "b"))
+
+
+def test_a_text_that_ends_too_soon_says_so(spring, tmp_path, capsys):
+    path = tmp_path / "cut.sd"
+    text = Path(spring).read_text()
+    path.write_text(text[: text.index("init") + 4])
+    code, found = swept(capsys, str(path), "--over", "k=1,4", "--until", "1", "-o", "runs.h5")
+    assert code == 1
+    assert {d["code"] for d in found["diagnostics"]} >= {"E112"}
+    with pytest.raises(api.ModelError, match="E112"):
+        api.load(path)
