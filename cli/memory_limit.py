@@ -37,4 +37,4 @@ def stand_before_numpy() -> None:
         return
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit != resource.RLIM_INFINITY and limit < LEAST and "numpy" not in sys.modules:
-        sys.meta_path.insert(0, TooLittle(limit))  # type: ignore[arg-type]
+        sys.meta_path.insert(0, TooLittle(limit))

@@ -44,7 +44,7 @@ def wrong_numbers(
     for name, node in scene.limits:
         most = value(node)
         if not (math.isfinite(most) and round(most) >= 1):
-            place = _place(target, scene, syntax.Limit, lambda s, name=name: s.name.name == name)  # type: ignore[misc]
+            place = _place(target, scene, syntax.Limit, lambda s, name=name: s.name.name == name)
             yield Diagnostic("E912", f"limit {name} {most:g}: a whole number from 1 on", place, f"limit {name} 10000")
     yield from _solver(target, scene, value, method, index=index)
 
