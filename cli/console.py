@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 import click
-from sysdyn.cli.failures import OF_RUNS, SOLVER, envelope, plain, shown
+from sysdyn.cli.failures import OF_RUNS, SOLVER, USAGE, envelope, plain, shown, worst
 from sysdyn.cli.streams import put
 from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, ModelError, Report, shortened
 
@@ -50,9 +50,12 @@ class Console:
         if not (self.quiet or self.as_json):
             put(shown(message) + "\n", "stderr")
 
-    def complain(self, message: str, code: int) -> None:
-        """A finding that has no place in a text, with the exit code that it leads to; --quiet does not silence it."""
-        self._plain.append(plain(message, code))
+    def complain(self, message: str, code: int, found: dict[str, Any] | None = None) -> None:
+        """A message with the exit code that it leads to; --quiet does not silence it.
+
+        found: of one run among several, what its finding says to --json: code, place and help.
+        """
+        self._plain.append(plain(message, code) if found is None else {**found, "message": message})
         if not (self.as_json or self.format):
             put(shown(f"sysdyn: {message}") + "\n", "stderr")
 
@@ -65,8 +68,9 @@ class Console:
     def finish(self, code: int = 0) -> int:
         """Show the findings; the exit code (1 where there are errors)."""
         found = shortened(self.report.diagnostics)
-        if code == 0 and self.report.failed:
-            code = 1
+        if self.report.failed:
+            typed = any(d.severity == "error" and d.place and d.place.source.typed for d in self.report)
+            code = worst((code or 1, USAGE if typed else 0))
         if self.as_json:
             diagnostics = [*(d.to_json() for d in found), *self._plain]
             if self.command == "check":

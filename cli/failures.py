@@ -87,7 +87,7 @@ def classify(error: BaseException) -> tuple[int, str]:
         name = f"{error.filename}: " if error.filename else ""
         return INPUT_OUTPUT, f"{name}{error.strerror or error}"
     if isinstance(error, MemoryError):
-        return SOLVER, "there is no memory left"
+        return SOLVER, ": ".join(filter(None, ("there is no memory left", str(error))))
     if type(error).__name__ == "TraceError":
         return INPUT_OUTPUT, str(error)
     how = f"{_where(error)}SYSDYN_DEBUG=1 shows the way there; please report it with the model"

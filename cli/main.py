@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 
 import click
 from sysdyn import __version__
+from sysdyn.cli.memory_limit import stand_before_numpy
 from sysdyn.cli.streams import flush, standing_streams
 from sysdyn.dsl.model.collecting import keep
 
@@ -99,6 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     vars(platform.uname()).setdefault("processor", "")
     keep()
+    stand_before_numpy()
     code = run(arguments)
     gc.freeze()
     if arguments is not None:  # called from Python, which goes on

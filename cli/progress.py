@@ -7,12 +7,15 @@ import time
 
 LONG = 600.0
 """Seconds left that are said at once."""
+RUN = "of integration lie ahead: --max-wall, a looser --accuracy or a shorter span would shorten it"
+SEARCH = "of search lie ahead: fewer --tries would shorten it"
 
 
 class ProgressLine:
-    """Writes to standard error: over itself on a terminal, every ten seconds elsewhere."""
+    """Writes to standard error: over itself on a terminal, every ten seconds elsewhere.  ahead: what takes long."""
 
-    def __init__(self, mode: str) -> None:
+    def __init__(self, mode: str, ahead: str = RUN) -> None:
+        self._ahead = ahead
         self._terminal = sys.stderr.isatty()
         self._on = mode == "always" or (mode == "auto" and self._terminal)
         self._began = time.monotonic()
@@ -25,8 +28,7 @@ class ProgressLine:
         if self._warns and left is not None and left > LONG:
             self._warns = False
             self.clear()
-            remedies = "--max-wall, a looser --accuracy or a shorter span"
-            sys.stderr.write(f"about {_duration(left)} of integration lie ahead: {remedies} would shorten it\n")
+            sys.stderr.write(f"about {_duration(left)} {self._ahead}\n")
             sys.stderr.flush()
         now = time.monotonic()
         wait = 0.2 if self._terminal else 10.0 if self._shown else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import field, replace
 from typing import Any
 
@@ -11,6 +12,7 @@ from sysdyn.cli.analysis.linear import linearised, loose_of
 from sysdyn.cli.analysis.states import at, resting
 from sysdyn.cli.run.asked import Request
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.accuracy.options import Progress
 from sysdyn.runtime.linear.rest import Rest
 from sysdyn.runtime.linear.stability import Verdict, energy_at, verdict
 from sysdyn.runtime.linear.tangent import NoLinearisation
@@ -89,12 +91,25 @@ class Equilibrium:
         return said + kind
 
 
-def equilibria(request: Request, tries: int, report: Report) -> tuple[Found, tuple[Equilibrium, ...]] | None:
+def equilibria(
+    request: Request, tries: int, report: Report, progress: Progress | None = None
+) -> tuple[Found, tuple[Equilibrium, ...]] | None:
     """The model and its states of rest; None where the report says why it has none to be asked of."""
+    began = 0.0
+
+    def advance(tried: int) -> None:
+        """So many points of all; the time left by those that were tried."""
+        nonlocal began
+        now = time.monotonic()
+        began = began if tried else now
+        if progress is not None:
+            whole, spent = tried / (tries + 1), now - began
+            progress(whole, spent * (1.0 - whole) / whole if spent > 1.0 else None)
+
     made = compiled(request, report, (), of_nodes)
     if made is None:
         return None
-    found, states = resting(*made, tries)
+    found, states = resting(*made, tries, advance=advance)
     return found, tuple(replace(_judged(found, rest), efforts=_efforts(at(found, rest))) for rest in states)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -40,14 +41,20 @@ def state_of(
     return (found_, None) if found_ is None or request.until is None else arrived(found_, request, report)
 
 
-def resting(target: Target, prepared: Prepared, tries: int, most: int | None = None) -> tuple[Found, tuple[Rest, ...]]:
-    """The model at its first state of rest, and all of them; the guess where there is none."""
+def resting(
+    target: Target,
+    prepared: Prepared,
+    tries: int,
+    most: int | None = None,
+    advance: Callable[[int], None] | None = None,
+) -> tuple[Found, tuple[Rest, ...]]:
+    """The model at its first state of rest, and all of them; the guess where there is none.  advance: see rests."""
     scene = prepared.network.scene
     t0 = prepared.binding.evaluate(scene.start) if scene is not None and scene.start is not None else 0.0
     system = System(prepared.structure, prepared.arrays, prepared.carrier)
     guess = _guess(prepared, system, t0)
     tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
-    states = rests(Resting(system, tangible, t0, guess), tries, most)
+    states = rests(Resting(system, tangible, t0, guess), tries, most, advance)
     state = states[0].state if states else ConsistentState(t0, guess, np.zeros_like(guess), (), np.inf)
     return Found(target, prepared, system, state, prepared.binding), states
 

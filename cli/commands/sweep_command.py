@@ -118,7 +118,7 @@ def _shown(console: Console, found: Swept, plot: str | None) -> int:
     if found.alone and len(found.cases) > SHOWN:
         console.say(f"one by one: {found.alone}")
     for kept in found.failed[:SHOWN]:
-        console.complain(f"run {kept.run} ({_said(found, kept.run)}): {kept.reason}", kept.exit)
+        console.complain(f"run {kept.run} ({_said(found, kept.run)}): {kept.reason}", kept.exit, kept.finding)
     if len(found.failed) > SHOWN:
         console.complain(f"and {len(found.failed) - SHOWN} more: 'reason' in {found.output}", _exit(found))
     return console.finish(_exit(found))

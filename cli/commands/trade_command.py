@@ -66,7 +66,7 @@ def command(
             budget = budget_of(max_wall)
             found = trade(request, console.report, Path(folder), full=full, budget=budget, progress=line, jobs=jobs)
     except NoReference as error:
-        console.complain(f"there is no reference: {error}", SOLVER)
+        console.complain(f"there is no reference: {error}", SOLVER, error.finding)
         return console.finish(SOLVER)
     finally:
         line.clear()
@@ -194,7 +194,7 @@ def _result(found: Traded, use: str, *, timings: bool) -> dict[str, Any]:
     settings = [setting(m, pareto=m in pareto, timings=timings) for m in found.measured]
     for r in found.refusals:
         names = {"formulation": r.formulation, "index": r.index, "method": r.method}
-        said = {"level": r.level or None, "pareto": False, "met": False, "reason": r.reason}
+        said = {"level": r.level or None, "pareto": False, "met": False, "reason": r.reason, "diagnostic": r.finding}
         settings.append({**names, **nothing, **said})
     best = found.chosen
     return {
@@ -236,4 +236,5 @@ def setting(m: Measured, *, pareto: bool, timings: bool) -> dict[str, Any]:
         "pareto": pareto,
         "met": not m.reason,
         "reason": m.reason or None,
+        "diagnostic": m.finding,
     }

@@ -84,8 +84,8 @@ def _judged(found: Verified, console: Console) -> int:
         code = SOLVER
     for text in _warnings(found):
         console.say(text)
-    for text in found.failures:
-        console.complain(text, SOLVER)
+    for run in found.failures:
+        console.complain(f"{run.name}: {run.failure}", SOLVER, run.finding)
         code = SOLVER
     if not found.compared:
         why = "; ".join(f"{name}: {reason}" for name, reason in found.left_out) or "the scene traces nothing"
@@ -191,8 +191,11 @@ def _cells(run: Run) -> list[str]:
 
 
 def _gap_cells(run: Run, gap: Gap | None, found: Verified) -> list[str]:
-    if run is found.runs[0]:
-        return ["-", "the reference", "-"]
+    first = "the reference" if run is found.runs[0] else ""
+    if run.failure:
+        return ["-", ", ".join(filter(None, (first, "stopped early"))), f"{run.outcome.reached:.4g}"]
+    if first:
+        return ["-", first, "-"]
     return ["-", "-", "-"] if gap is None else [f"{gap.ratio:.2g}", gap.variable, f"{gap.time:.4g}"]
 
 
@@ -204,12 +207,18 @@ def _horizon(found: Verified) -> str:
 
 
 def _verdict(found: Verified) -> str:
-    number = len(found.runs)
+    ended = [run for run in found.runs if not run.failure]
+    number = len(ended)
     if any(not d.doubted for d in found.disagreements) or not all(t.agree for t in found.twins):
         return f"{number} runs: they disagree"
     if found.disagreements:
         return f"{number} runs, of which some are not met: the others agree"
-    return f"{number} runs agree on {len(found.compared)} quantities"
+    if len(ended) == len(found.runs):
+        return f"{number} runs agree on {len(found.compared)} quantities"
+    stopped = f"{len(found.runs) - number} of {len(found.runs)} runs stopped early"
+    if number < 2:
+        return f"{stopped}: nothing is known from them"
+    return f"{stopped}: the other {number} agree on {len(found.compared)} quantities"
 
 
 def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
@@ -256,6 +265,7 @@ def _run_object(run: Run, gap: Gap | None, *, keep: bool, timings: bool) -> dict
         "expects": [{"text": text, "ok": ok} for text, ok in run.expects],
         "warnings": list(o.warnings),
         "failure": run.failure,
+        "diagnostic": run.finding,
         "trace": str(o.trace) if keep else None,
     }
 

@@ -13,6 +13,7 @@ from sysdyn import __version__
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.expectations import watch
 from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.scene_numbers import INSTANTS, wrong_numbers
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.binding.columns import Read, value_of
 from sysdyn.compiler.binding.instants import distinct, instants
@@ -24,7 +25,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network, Scene
 from sysdyn.dsl.model.units import si_text
-from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
+from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy.options import Options, Progress
 from sysdyn.runtime.trace.trace import Parameter
 from sysdyn.values import dataclass
@@ -32,8 +33,6 @@ from sysdyn.values import dataclass
 ACCURACY = 1e-4
 FINEST_RTOL = 1e-14
 """What double precision resolves."""
-INSTANTS = 2e7
-"""Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""
 STEPS = 20_000_000
 """Of a run that has no limit of its own: hours of work; a count, so that traces stay equal."""
 LISTED = 1000
@@ -118,7 +117,8 @@ def options_of(
     """The runtime's options; None where the report says why not.  began: `time.monotonic()` of the command; held: in
     memory where the request names no file.
     """
-    scene = prepared.network.scene or Scene("", prepared.network.place)
+    network = prepared.network
+    scene = network.scene or Scene("", network.place)
     value = prepared.binding.evaluate
 
     t0 = value(scene.start) if scene.start is not None else 0.0
@@ -127,6 +127,10 @@ def options_of(
         raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
     until, at, wall = instants_of(request, target.document, report)
     t1 = until if request.until is not None else t1
+    if network.scene is not None:
+        given, sharp = request.until is not None, request.accuracy is not None
+        how, form = request.method, request.index is not None
+        report.extend(wrong_numbers(target, scene, value, until=given, accuracy=sharp, method=how, index=form))
     if t1 is None or report.failed:
         return None
     if not math.isfinite(t0) or not math.isfinite(t1):
@@ -134,8 +138,6 @@ def options_of(
     if not t1 > t0:
         raise UsageError(f"the run ends at {t1:g} s, but it begins at {t0:g} s")
     every = value(scene.every) if scene.every is not None else None
-    if every is not None and not every > 0.0:
-        raise UsageError(f"the interval of the trace is {every:g} s: it must be positive")
     if every is not None and (t1 - t0) / every > INSTANTS:
         raise UsageError(f"every {every:g} s from {t0:g} s to {t1:g} s is more than {INSTANTS:.0e} instants")
     accuracy, on = _accuracy(request, scene, prepared)
@@ -143,8 +145,6 @@ def options_of(
     method = request.method or scene.solver or "auto"
     if method == "euler" and "step" not in solver:
         raise UsageError("method euler needs a step: 'solver euler(step = 1 ms)' in the scene")
-    if not solver.get("longest", 1.0) > 0.0:
-        raise UsageError(f"the longest step is {solver['longest']:g} s: it must be positive")
     steps = request.max_steps or next((round(value(n)) for name, n in scene.limits if name == "steps"), STEPS)
     claims = tuple(value(e.at) for e in prepared.network.expectations if e.at is not None)
     return Options(
@@ -224,9 +224,6 @@ def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float
     if scene.accuracy is None:
         return ACCURACY, ()
     wanted = prepared.binding.evaluate(scene.accuracy)
-    if not FINEST_ACCURACY <= wanted < 1.0:
-        text = f"accuracy {wanted:g}: from {FINEST_ACCURACY:g} to less than 1, what double precision can tell"
-        raise ModelError([Diagnostic("E906", text, scene.place)])
     return (None, tuple((name, wanted) for name in scene.accuracy_on)) if scene.accuracy_on else (wanted, ())
 
 

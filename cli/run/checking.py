@@ -59,22 +59,23 @@ def checked(target: targets.Target, report: Report, refused: bool = False) -> di
     network = load.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
     summary: dict[str, object] = {**names, "ok": network is not None}
     if network is not None and all(p.values for p in network.parameters):
-        summary |= _started(network, inner)
+        summary |= _started(target, network, inner)
     incomplete = refused and not summary["ok"]
     report.extend(targets.unsupported(inner) if incomplete else inner)
     return summary
 
 
-def _started(network: Network, report: Report) -> dict[str, object]:
+def _started(target: targets.Target, network: Network, report: Report) -> dict[str, object]:
     try:
-        return _judged(network, report)
+        return _judged(target, network, report)
     except ModelError as error:  # of numbers that make no model
         report.extend(error.diagnostics)
         return {"ok": False}
 
 
-def _judged(network: Network, report: Report) -> dict[str, object]:
-    from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
+def _judged(target: targets.Target, network: Network, report: Report) -> dict[str, object]:
+    from sysdyn.cli.run.prepare import prepare
+    from sysdyn.cli.run.scene_numbers import wrong_numbers  # lowering and arrays: not needed where the text has errors
     from sysdyn.cli.run.starting import described, start
     from sysdyn.compiler.binding.certificate import certificate
 
@@ -82,6 +83,10 @@ def _judged(network: Network, report: Report) -> dict[str, object]:
     if prepared is None:
         return {"ok": False}
     scene = network.scene
+    if scene is not None:
+        report.extend(wrong_numbers(target, scene, prepared.binding.evaluate))
+        if report.failed:
+            return {"ok": False}
     t0 = prepared.binding.evaluate(scene.start) if scene and scene.start else 0.0
     started = start(prepared, t0, report)
     if started is None:

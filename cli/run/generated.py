@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import importlib.abc
 import importlib.util
-from types import ModuleType
+from functools import lru_cache
+from types import CodeType, ModuleType
+
+KEPT = 8
+"""Texts whose code is kept: scenes of one model are often one text."""
 
 
 class _Text(importlib.abc.InspectLoader):
@@ -16,6 +20,15 @@ class _Text(importlib.abc.InspectLoader):
     def get_source(self, fullname: str) -> str:
         """The generated text."""
         return self._text
+
+    def get_code(self, fullname: str) -> CodeType:
+        """The text's code, compiled once."""
+        return _code(self._text)
+
+
+@lru_cache(maxsize=KEPT)
+def _code(text: str) -> CodeType:
+    return compile(text, "<sysdyn_residual>", "exec", dont_inherit=True)
 
 
 def module_of(text: str) -> ModuleType:

@@ -125,7 +125,7 @@ class Loaded:
         report = Report()
         document = targets.read(request.file, report)
         target = targets.one(document, request.file, request.model, request.scene, report)
-        if target is None:
+        if target is None or report.failed:
             raise ModelError(report.diagnostics)
         self.target: Target = target
         self._compiled: dict[tuple[tuple[str, str], ...], Compiled] = {}

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from sysdyn import __version__
-from sysdyn.cli.failures import UsageError
+from sysdyn.cli.failures import OF_RUNS, UsageError
 from sysdyn.cli.run import lock, targets
 from sysdyn.cli.run.asked import Request, check_tolerances, default_output, options_of, rest, stops
 from sysdyn.cli.run.events import plan, zeno
@@ -22,7 +24,7 @@ from sysdyn.compiler.forms.kane import repeats
 from sysdyn.dsl import load
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.runtime.accuracy.options import Options, Progress
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
 from sysdyn.runtime.simulate import Outcome, simulate
@@ -44,6 +46,13 @@ class Ran:
     claims: tuple[Claim, ...]
     exit: int
     failure: str | None = None
+
+
+def finding(diagnostics: Iterable[Diagnostic]) -> dict[str, Any] | None:
+    """Why one run among several failed, in CONTRACT's shape: the first error, one of the run before one of a claim."""
+    errors = [d for d in diagnostics if d.severity == "error"]
+    first = next((d for d in errors if d.code in OF_RUNS), errors[0] if errors else None)
+    return None if first is None else first.to_json()
 
 
 def run(request: Request, report: Report, progress: Progress | None = None) -> Ran | None:

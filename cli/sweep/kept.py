@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 @dataclass(frozen=True, slots=True)
 class Kept:
     """What is kept of a run.  exit: as `simulate` ends; reason: why it is not 0; end, least, most by traced name; time
-    and traces: thinned, where the scene has an interval.
+    and traces: thinned, where the scene has an interval; finding: the reason with its code and place.
     """
 
     run: int
@@ -33,6 +33,7 @@ class Kept:
     most: dict[str, float] | None = None
     time: list[float] | None = None
     traces: dict[str, list[float]] | None = None
+    finding: dict[str, Any] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """For the journal; numbers to the last bit."""

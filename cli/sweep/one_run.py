@@ -10,7 +10,7 @@ import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.loaded import Loaded
-from sysdyn.cli.run.running import Ran
+from sysdyn.cli.run.running import Ran, finding
 from sysdyn.cli.sweep.axes import CHOICES
 from sysdyn.cli.sweep.in_core import Cases, thinned
 from sysdyn.cli.sweep.kept import Item, Kept
@@ -50,13 +50,13 @@ class Runner:
         try:
             ran = self.loaded(choices).run(settings, report)
         except ModelError as error:
-            return Kept(number, 1, False, _first(error.diagnostics))
+            return Kept(number, 1, False, _first(error.diagnostics), finding=finding(error.diagnostics))
         except UsageError as error:
             return Kept(number, 2, False, str(error))
         except SolverFailure as error:
             return Kept(number, 3, False, str(error))
         if ran is None:
-            return Kept(number, 1, False, _first(report.diagnostics))
+            return Kept(number, 1, False, _first(report.diagnostics), finding=finding(report.diagnostics))
         return _kept(number, ran, report, self.keep)
 
     def chunk(self, tasks: Sequence[Task]) -> tuple[list[Item], list[Task]]:
@@ -146,6 +146,7 @@ def _kept(number: int, ran: Ran, report: Report, keep: str) -> Kept:
         {n: float(v.max()) for n, v in values.items()} if extrema else None,
         time,
         traces,
+        None if ran.exit == 0 else finding(report.diagnostics),
     )
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn import __version__
+from sysdyn.cli.failures import plain
 from sysdyn.cli.run import lock
 from sysdyn.cli.run.asked import Request, instants_of, model_digest
 from sysdyn.cli.sweep import results
@@ -204,7 +205,14 @@ def to_json(found: Swept) -> dict[str, Any]:
         "in_core": len(found.cases) - len(found.done.singles),
         "alone": found.alone,
         "failed": [
-            {"run": k.run, "exit": k.exit, "reason": k.reason, "settings": found.cases[k.run]} for k in found.failed
+            {
+                "run": k.run,
+                "exit": k.exit,
+                "reason": k.reason,
+                "settings": found.cases[k.run],
+                "diagnostic": k.finding or plain(k.reason, k.exit),
+            }
+            for k in found.failed
         ],
         "end": summary(found),
     }

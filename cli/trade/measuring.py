@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
@@ -19,7 +20,7 @@ from sysdyn.cli.options import TRIED
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.asked import ACCURACY, Request, options_of
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import Ran, begin, ready, run_from
+from sysdyn.cli.run.running import Ran, begin, finding, ready, run_from
 from sysdyn.cli.run.starting import Started
 from sysdyn.cli.run.targets import Target
 from sysdyn.cli.trade.errors import error_of
@@ -27,7 +28,7 @@ from sysdyn.cli.trade.traded import INDICES, Combination, Measured, Refusal
 from sysdyn.cli.trade.work import counted, of_rows
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
-from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.runtime.accuracy.options import Options, choose_index
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.trace.trace import Trace
@@ -40,6 +41,8 @@ MOST = 32
 """Combinations of levels that are measured."""
 GRID = 200
 """Intervals of the trace where the scene leaves them to the solver."""
+Said = dict[str, Any]
+"""A finding in CONTRACT's shape."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,9 +138,8 @@ class Bench:
         if prepared is None or options is None or started is None:
             reasons = [d for d in report if d.severity == "error"] or list(report)
             if what.formulation is not None and reasons:
-                self.refusals.append(
-                    Refusal(what.formulation, reasons[0].message, reasons[0].code, level=what.level)
-                )  # fmt: skip
+                said = reasons[0]
+                self.refusals.append(Refusal(what.formulation, said.message, said.to_json(), level=what.level))
             return None
         every = options.every or (options.t_end - options.t_start) / GRID
         options = replace(options, every=every, watch=None, sampled_at=(), sample_steps=False)
@@ -198,11 +200,11 @@ class Bench:
 
     def trace(
         self, combination: Combination, tolerance: float, limits: Limits, *, name: str = "run"
-    ) -> tuple[Ran | None, str]:
-        """One run at the solver's own tolerance: what came of it, and why it may not be used."""
+    ) -> tuple[Ran | None, str, Said | None]:
+        """One run at the solver's own tolerance: what came of it, why it may not be used, and the finding of that."""
         carried, report = self.carry(combination), Report()
         if carried is None:
-            return None, f"{combination.formulation} cannot express {combination.level}"
+            return None, f"{combination.formulation} cannot express {combination.level}", None
         most = [n for n in (carried.options.max_steps, limits.steps) if n is not None]
         options = replace(
             carried.options,
@@ -219,18 +221,19 @@ class Bench:
             started = begin(carried.prepared, options, report) if carried.again else carried.started
             ran = run_from(self.target, carried.prepared, started, options, report) if started else None
         except UsageError as error:
-            return None, error.format_message()
+            return None, error.format_message(), None
         except SolverFailure as failure:
-            return None, str(failure)
+            return None, str(failure), None
         except (ArithmeticError, ValueError, MemoryError) as error:  # one setting's fault ends no other
-            return None, f"{type(error).__name__}: {error}"
-        return (ran, _reason(ran, report)) if ran else (None, _reason(None, report))
+            return None, f"{type(error).__name__}: {error}", None
+        reason = _reason(ran, report)
+        return ran, reason, finding(_of_run(report)) if reason else None
 
     def measure(
         self, combination: Combination, tolerance: float, reference: Trace, until: float, limits: Limits
     ) -> Measured | str:
         """One run, compared with the reference; a sentence where there is no such setting."""
-        ran, reason = self.trace(combination, tolerance, limits)
+        ran, reason, said = self.trace(combination, tolerance, limits)
         if ran is None:
             return reason
         outcome = ran.outcome
@@ -254,6 +257,7 @@ class Bench:
             float(np.max(found["audit.constraints"].values, initial=0.0)),
             reason,
             tuple(numbers.items()),
+            said,
         )
 
     def _work(self, combination: Combination, statistics: dict[str, int]) -> float:
@@ -299,11 +303,16 @@ def _text(levels: tuple[tuple[str, str], ...]) -> str:
     return " ".join(f"{path}={name}" for path, name in levels)
 
 
+def _of_run(report: Report) -> list[Diagnostic]:
+    """Findings without those of what the scene expects: they are no reason against a setting."""
+    return [d for d in report if d.code not in ("E907", "E909")]
+
+
 def _reason(ran: Ran | None, report: Report) -> str:
     """Why a run may not be chosen; "" where it may."""
     if ran is not None and ran.failure:
         return ran.failure
-    errors = [d.message for d in report if d.severity == "error" and d.code not in ("E907", "E909")]
+    errors = [d.message for d in _of_run(report) if d.severity == "error"]
     if ran is not None and ran.outcome.met:
         return ""
     return errors[0] if errors else "not met"

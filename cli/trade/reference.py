@@ -15,7 +15,7 @@ from pathlib import Path
 from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.crew import Beside
 from sysdyn.cli.trade.errors import error_of
-from sysdyn.cli.trade.measuring import Bench, Limits, bench_of
+from sysdyn.cli.trade.measuring import Bench, Limits, Said, bench_of
 from sysdyn.cli.trade.traded import Combination, Reference
 from sysdyn.cli.verify.agreement import horizon
 from sysdyn.runtime.accuracy.laws import LAWS
@@ -41,8 +41,19 @@ class _Run:
     steps: tuple[int, int]
 
 
+_Tried = tuple[_Run | None, list[tuple[str, Said | None]]]
+"""A run; where there is none, why, and the finding of that."""
+
+
 class NoReference(Exception):  # noqa: N818 (a name of the house)
-    """No two runs agree anywhere; the message says how far they are apart, or why there are none."""
+    """No two runs agree anywhere; the message says how far they are apart, or why there are none.
+
+    finding: of the first run that failed.
+    """
+
+    def __init__(self, message: str, finding: Said | None = None) -> None:
+        self.finding = finding
+        super().__init__(message)
 
 
 def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple[Trace, Reference]:
@@ -51,7 +62,7 @@ def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple
     jobs: 1: one run after the other; else the second way runs beside the first, once that has been long.
     """
     runs: list[_Run] = []
-    reasons: list[str] = []
+    reasons: list[tuple[str, Said | None]] = []
     best: tuple[float, _Run, _Run] | None = None
     sure = SURE * bench.accuracy
     ways = list(_ways(bench))
@@ -70,7 +81,9 @@ def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple
             if best is not None and (best[0] <= sure or len(runs) == 3):
                 break
     if best is None:
-        raise NoReference("; ".join(dict.fromkeys(reasons)) or "there is but one way to run this scene")
+        said = "; ".join(dict.fromkeys(text for text, _ in reasons))
+        finding = next((found for _, found in reasons if found), None)
+        raise NoReference(said or "there is but one way to run this scene", finding)
     uncertainty, first, second = best
     until = bench.options.t_end
     if uncertainty > sure:
@@ -94,7 +107,7 @@ def _ways(bench: Bench) -> Iterator[Combination]:
         yield Combination(names[0], "2", "radau", level)
 
 
-def _beside(asked: tuple[Request, Path, Combination, float | None]) -> tuple[_Run | None, list[str]]:
+def _beside(asked: tuple[Request, Path, Combination, float | None]) -> _Tried:
     """A run at the finest tolerance in a process of its own."""
     request, folder, combination, budget = asked
     return _finest(bench_of(request, folder), combination, budget, 1)
@@ -102,19 +115,19 @@ def _beside(asked: tuple[Request, Path, Combination, float | None]) -> tuple[_Ru
 
 def _finest(
     bench: Bench, combination: Combination, budget: float | None, number: int
-) -> tuple[_Run | None, list[str]]:
+) -> _Tried:
     """A run at the finest tolerance that ends in time; None where none does, and why."""
     law, tolerance = LAWS[combination.method], FINEST[combination.method]
     coarsest = max(law.tolerance(ENOUGH * bench.accuracy), tolerance)
     wall = SECONDS if budget is None else max(PART * budget, 1e-3)
     while True:
         began = time.monotonic()
-        ran, reason = bench.trace(combination, tolerance, Limits(STEPS, wall), name=f"reference{number}")
+        ran, reason, said = bench.trace(combination, tolerance, Limits(STEPS, wall), name=f"reference{number}")
         if ran is not None and ran.outcome.final:
             counts = ran.outcome.statistics
             steps = counts["steps"], counts["residual_evaluations"]
             return _Run(f"{combination.name} at {tolerance:.0e}", ran.outcome.traced, steps), []
         if ran is None or tolerance >= coarsest:
-            return None, [f"{combination.name}: {reason}"]
+            return None, [(f"{combination.name}: {reason}", said)]
         late = time.monotonic() - began >= 0.5 * wall
         tolerance = coarsest if late else min(100.0 * tolerance, coarsest)

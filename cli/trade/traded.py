@@ -6,6 +6,8 @@ A setting meets an accuracy where its error and the uncertainty of the reference
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import field
+from typing import Any
 
 from sysdyn.values import dataclass
 
@@ -53,6 +55,8 @@ class Measured:
     constraints: float | None
     reason: str = ""
     statistics: tuple[tuple[str, int], ...] = ()
+    finding: dict[str, Any] | None = field(default=None, compare=False)
+    """The reason with its code and place, where a finding says it."""
 
     @property
     def usable(self) -> bool:
@@ -66,11 +70,11 @@ Runs = dict[tuple[Combination, float], Measured | str]
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A formulation or combination that cannot be run, and why; code: of the finding."""
+    """A formulation or combination that cannot be run, and why; finding: the reason with its code and place."""
 
     formulation: str
     reason: str
-    code: str = ""
+    finding: dict[str, Any] | None = field(default=None, compare=False)
     index: str | None = None
     method: str | None = None
     level: str = ""

@@ -112,4 +112,4 @@ def trade(
 def _never(search: Search) -> list[Refusal]:
     """Combinations that do not exist."""
     refused = [(climb.combination, climb.refused) for climb in search.climbs if climb.refused]
-    return [Refusal(c.formulation, reason, "", c.index, c.method, c.level) for c, reason in refused]
+    return [Refusal(c.formulation, reason, None, c.index, c.method, c.level) for c, reason in refused]

@@ -22,7 +22,7 @@ from sysdyn.cli.run import targets
 from sysdyn.cli.run.asked import ACCURACY, Request, check_tolerances, options_of
 from sysdyn.cli.run.crew import Lost, each
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.running import Ran, integrate, ready
+from sysdyn.cli.run.running import Ran, finding, integrate, ready
 from sysdyn.cli.run.targets import Target
 from sysdyn.cli.verify.agreement import Bounds, Gap, horizon
 from sysdyn.cli.verify.twins import Twins, free_quantities, twins
@@ -210,7 +210,7 @@ class _Verification:
                 report.extend(d for d in inner if d.severity != "error")
             if ran is None:
                 return
-            self.runs.append(_read(ran, options))
+            self.runs.append(_read(ran, options, inner))
             self.done += 1
             if method != first:
                 continue
@@ -223,17 +223,18 @@ class _Verification:
 
     def _other(self, prepared: Prepared, options: Options, reference: Run) -> Run | None:
         """The reference at a tenth of the accuracy; at a coarser tolerance where it has the finest there is already."""
-        finer = _finer(options)
-        ran = self._run(prepared, finer, reference.method, Report(), "-finer")
+        finer, report = _finer(options), Report()
+        ran = self._run(prepared, finer, reference.method, report, "-finer")
         if ran is None:
             return None
-        run = _read(ran, finer)
+        run = _read(ran, finer, report)
         used = float(reference.trace.attributes["rtol"])
         if float(run.trace.attributes["rtol"]) <= 0.5 * used:
             return run
         coarser = replace(finer, rtol=used / FINER)
-        ran = self._run(prepared, coarser, reference.method, Report(), "-coarser")
-        return None if ran is None else _read(ran, coarser)
+        report = Report()
+        ran = self._run(prepared, coarser, reference.method, report, "-coarser")
+        return None if ran is None else _read(ran, coarser, report)
 
     def _run(self, prepared: Prepared, options: Options, method: str, report: Report, suffix: str) -> Ran | None:
         path = self.folder / f"{prepared.formulation}-{method}{suffix}.h5"
@@ -356,8 +357,9 @@ def _bounds(options: Options, trace: Trace) -> dict[str, float]:
     return {name: TIMES * wanted.get(name, rest) for name in trace.names}
 
 
-def _read(ran: Ran, options: Options) -> Run:
+def _read(ran: Ran, options: Options, report: Report) -> Run:
     accuracy = min([options.accuracy or ACCURACY, *(wanted for _, wanted in options.accuracy_on)])
     claims = tuple((claim.text, claim.ok) for claim in ran.claims)
     trace = ran.outcome.traced
-    return Run(ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure)
+    said = finding(report) if ran.failure else None
+    return Run(ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure, said)

@@ -6,6 +6,8 @@ Received: runs with their traces, bounds by name, the horizon; handed back: disa
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import field
+from typing import Any
 
 import numpy as np
 from sysdyn.cli.verify.agreement import Bounds, Gap, gaps
@@ -30,6 +32,8 @@ class Run:
     expects: tuple[tuple[str, bool | None], ...]
     trace: Trace
     failure: str | None
+    finding: dict[str, Any] | None = field(default=None, compare=False)
+    """Where and why it stopped, in CONTRACT's shape."""
 
     @property
     def name(self) -> str:
@@ -106,14 +110,16 @@ class Verified:
     disagreements: tuple[Disagreement, ...]
 
     @property
-    def failures(self) -> tuple[str, ...]:
-        """Runs that the solver could not finish."""
-        return tuple(f"{run.name}: {run.failure}" for run in (*self.runs, self.finer) if run.failure)
+    def failures(self) -> tuple[Run, ...]:
+        """Runs that stopped early: the solver could not finish them, or a limit came first."""
+        return tuple(run for run in (*self.runs, self.finer) if run.failure)
 
 
 def worst(reference: Run, run: Run, bounds: Bounds, until: float) -> Gap | None:
-    """The worst gap of a run to the reference; None of the reference itself and where nothing is compared."""
-    if run is reference:
+    """The worst gap of a run to the reference; None of the reference itself, where nothing is compared, and where one
+    of the two stopped early.
+    """
+    if run is reference or run.failure or reference.failure:
         return None
     return next(iter(gaps(reference.trace, run.trace, bounds, until)), None)
 
@@ -121,8 +127,12 @@ def worst(reference: Run, run: Run, bounds: Bounds, until: float) -> Gap | None:
 def disagreements(runs: Sequence[Run], bounds: Bounds, until: float) -> tuple[Disagreement, ...]:
     """Runs that differ from the first up to `until` [s], then pairs among those that do not.
 
-    A first run that is not met by its own estimate judges no other.
+    A first run that is not met by its own estimate judges no other; one that stopped early neither judges nor is
+    judged.
     """
+    runs = [run for run in runs if not run.failure]
+    if not runs:
+        return ()
     found, agreeing = [], []
     for run in runs[1:]:
         gap = worst(runs[0], run, bounds, until)

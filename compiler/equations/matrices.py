@@ -28,6 +28,8 @@ from sysdyn.values import dataclass
 
 LARGEST = 12
 """Rates and multipliers that are solved for in symbols."""
+LONGEST = 2000
+"""Operations of an entry of the solution: twice those of the longest of the book's systems (parallelogram, 1117)."""
 MOVING = 3
 """Coordinates whose momenta are, where their inertia moves with displacements."""
 
@@ -210,16 +212,26 @@ def _eliminated(sympy: Any, a: Any, b: Any) -> list[Any] | None:
         free.discard(i)
         left.discard(j)
         pivot = rows[i][j]
-        rows[i] = [_divided(sympy, v, pivot) for v in rows[i]]
+        rows[i] = [_readable(_divided(sympy, v, pivot)) for v in rows[i]]
         for k in range(len(rows)):
             factor = rows[k][j]
             if k != i and factor != 0:
                 pairs = zip(rows[k], rows[i], strict=True)
-                rows[k] = [_simple(sympy, v - factor * w) if w != 0 else v for v, w in pairs]
+                rows[k] = [_readable(_simple(sympy, v - factor * w)) if w != 0 else v for v, w in pairs]
     solution: list[Any] = [None] * n
     for i, j in pivots:
         solution[j] = rows[i][n]
     return solution
+
+
+def _readable(value: Any) -> Any:
+    """The same.  NoSuchEquations where it is longer than anyone reads: what follows from it takes minutes."""
+    if value.count_ops() > LONGEST:
+        raise NoSuchEquations(
+            f"the solution for rates and multipliers has entries of more than {LONGEST} operations: --form matrices"
+            " shows the equations that it solves"
+        )
+    return value
 
 
 def _divided(sympy: Any, value: Any, pivot: Any) -> Any:

@@ -11,6 +11,7 @@ from typing import Any
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.affine import not_affine
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Loop
 from sysdyn.dsl.model.units import NONE, Dimension
@@ -355,15 +356,27 @@ class Context:
         if isinstance(index, syntax.Range):
             raise self.fail("E806", "one element is wanted here, not a slice", index.span)
         node = self.whole_number(index, "an index")
-        loops = [n for n in ex.topological([node]) if n.op == "index"]
+        loops = _loops(node)
         if loops:
             rest = node
             for n in loops[:1]:
                 rest = ex.sub(node, n)
-            if len(loops) > 1 or any(n.op == "index" for n in ex.topological([rest])):
-                message = f"index {node} is not affine in one loop variable: the array would have to be unrolled"
-                raise self.fail("E806", message, index.span, help="i + c, or a table over the index")
+            if len(loops) > 1 or _loops(rest):
+                said = " in one loop variable: the array would have to be unrolled"
+                message, help_, _ = not_affine(node, said)
+                raise self.fail("E806", message, index.span, help=help_)
         return node
+
+
+def _loops(node: Node) -> list[Node]:
+    """Loop variables of an index outside parameters: a size of a component in an array may be one for all of them."""
+    found, stack = dict[Node, None](), [node]
+    while stack:
+        top = stack.pop()
+        if top.op == "index":
+            found.setdefault(top)
+        stack += () if top.op == "param" else top.args
+    return [*found]
 
 
 def later(a: Node, b: Node) -> Node:

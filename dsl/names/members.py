@@ -207,7 +207,9 @@ class Members(Quantities):
         if not isinstance(port, PortSymbol):
             raise self.fail("E407", f"'{self._shown(e.base)}' has no port '{e.name}'", e.span)
         if change or space.around:
-            raise self.fail("N608", "energy_through of an array of components is not supported yet", e.span)
+            message = "energy_through of an array of components is not supported yet"
+            help_ = "the energies of its elements inside: sum(i in 1..n: S[i].R.energy)"
+            raise self.fail("N608", message, e.span, help=help_)
         end, place = port.end, self.place(e.span)
         for other_port in (s for s in space.scope.symbols.values() if isinstance(s, PortSymbol) and s is not port):
             if other_port.end.node is end.node is not None and other_port.end.at == end.at:
@@ -245,6 +247,11 @@ class Members(Quantities):
         near = nearest(e.name, (*names, *BRANCH) if branch is not None else names)
         listed = (*branch_words(branch.domain), *names) if isinstance(branch, BranchSymbol) else names
         help_ = f"nearest: '{near}'" if near else f"it has {', '.join(listed[:20])}"
+        ports = [n for n, s in space.scope.symbols.items() if isinstance(s, PortSymbol)]
+        if branch is None and ports and e.name in ("power", "energy", "energy_through"):
+            shown = self._shown(e.base)
+            through = " + ".join(f"energy_through({shown}.{port})" for port in ports[:4])
+            help_ = f"what goes in by its ports: {through}; or of an element inside, {shown}.LABEL.energy"
         raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{e.name}'{level}", e.span, help=help_)
 
     # -- constraints ---------------------------------------------------------------------------------------

@@ -296,6 +296,8 @@ class Names(Context):
             found = f"{len(items)} of them" if isinstance(value, Vector) else "one number"
             message = f"input '{symbol.name}' is an array {known}, found {found}"
         help_ = "[a, b, ...]" if symbol.shape else "an element: x[1]"
+        if symbol.shape and isinstance(value, Vector) and size is None:
+            help_ = f"what varies is listed for a size that is a number: input {symbol.name}[1..{len(items)}]"
         raise self.fail("E805", message, symbol.expression.span, help=help_)
 
     # -- elements of arrays --------------------------------------------------------------------------------

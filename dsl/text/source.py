@@ -22,6 +22,7 @@ def real(path: str | Path) -> Path:
 
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
+_OPTION = re.compile("--[a-z]+(-[a-z]+)*( .*)?", re.DOTALL)
 
 
 class Span(NamedTuple):
@@ -42,6 +43,11 @@ class SourceText:
     def __post_init__(self) -> None:
         starts = (0, *(match.end() for match in _LINE_END.finditer(self.text)))
         object.__setattr__(self, "line_starts", starts)
+
+    @property
+    def typed(self) -> bool:
+        """Whether it is the value of an option of the command line, by whose name it begins."""
+        return _OPTION.fullmatch(self.name) is not None
 
     @classmethod
     def read(cls, path: str | Path, name: str | None = None) -> SourceText:

@@ -11,6 +11,7 @@ Receives a System and what of it is tangible.  Hands on states of rest, each onc
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
@@ -234,8 +235,12 @@ class Resting:
         return bool(np.abs(move).max(initial=0.0) > SAME)
 
 
-def rests(resting: Resting, tries: int, most: int | None = None) -> tuple[Rest, ...]:
-    """States of rest from the first guess and from random points, in the order found; most: how many are wanted."""
+def rests(
+    resting: Resting, tries: int, most: int | None = None, advance: Callable[[int], None] | None = None
+) -> tuple[Rest, ...]:
+    """States of rest from the first guess and from random points, in the order found; most: how many are wanted;
+    advance: told how many points were tried.
+    """
     kept: list[Rest] = []
     guess = resting.first
     random = np.random.default_rng(7)
@@ -245,6 +250,8 @@ def rests(resting: Resting, tries: int, most: int | None = None) -> tuple[Rest, 
     for k in range(tries + 1):
         if most is not None and len(kept) >= most:
             break
+        if advance is not None:
+            advance(k)
         shaken = 10.0 ** random.uniform(NEAREST, FARTHEST) * scale * random.standard_normal(guess.size)
         point = guess if k == 0 else mirrored.pop() if mirrored else guess + shaken
         found = resting.found(point)

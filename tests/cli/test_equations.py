@@ -9,6 +9,7 @@ import pytest
 from sysdyn.cli.analysis.asked import compiled
 from sysdyn.cli.main import run
 from sysdyn.cli.run.asked import Request
+from sysdyn.compiler.equations import matrices
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import BLOCKS, classes, equations
 from sysdyn.compiler.equations.elements import elements
@@ -429,6 +430,31 @@ def test_equations_that_there_are_none_of(text, form, tmp_path, capsys):
     code, found = run_json(capsys, "equations", write(tmp_path, text), "--form", form)
     assert code == 1
     assert [d["code"] for d in found["diagnostics"]] == ["E607"]
+
+
+BODY = """\
+model body {
+  param J1 = 1 kg.m^2
+  param J2 = 2 kg.m^2
+  param J3 = 3 kg.m^2
+  coord e0: rotation = 1
+  coord e1, e2, e3: rotation = 0
+  let w1 = 2*(-e1*e0' + e0*e1' + e3*e2' - e2*e3')
+  let w2 = 2*(-e2*e0' - e3*e1' + e0*e2' + e1*e3')
+  let w3 = 2*(-e3*e0' + e2*e1' - e1*e2' + e0*e3')
+  energy T* = 1/2*J1*w1^2 + 1/2*J2*w2^2 + 1/2*J3*w3^2
+  phi unit: e0^2 + e1^2 + e2^2 + e3^2 = 1
+}
+"""
+
+
+def test_a_solution_that_nobody_reads_is_refused(tmp_path, capsys, monkeypatch):
+    """Minutes and megabytes otherwise; here sooner than by default, for the sake of the test's own time."""
+    monkeypatch.setattr(matrices, "LONGEST", 250)
+    code, found = run_json(capsys, "equations", write(tmp_path, BODY), "--form", "underlying")
+    assert code == 1
+    assert "more than 250 operations" in found["diagnostics"][-1]["message"]
+    assert "--form matrices" in found["diagnostics"][-1]["message"]
 
 
 def test_a_circuit_has_no_underlying_equation(capsys):

@@ -1,9 +1,15 @@
 """`sysdyn equilibrium`: states of rest against closed forms and scipy's roots, their stability."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from sysdyn.cli.analysis import resting
 from sysdyn.cli.main import run
+from sysdyn.cli.progress import SEARCH, ProgressLine
+from sysdyn.cli.run.asked import Request
+from sysdyn.dsl.text.diagnostics import Report
 from texts import ROOT, run_json, write
 
 SEED = ROOT / "models" / "seed"
@@ -212,3 +218,20 @@ def test_the_table(tmp_path, capsys):
     assert "3 found" in err
     assert out.count("asymptotically stable by the eigenvalues (Lyapunov's indirect method)") == 2
     assert "x = -2" in out
+
+
+def test_a_long_search_says_how_far_it_is(tmp_path, monkeypatch):
+    told = []
+    path = write(tmp_path, DUFFING)
+    clock = iter(np.arange(0.0, 1e4, 2.0))
+    monkeypatch.setattr(resting, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
+    found = resting.equilibria(Request(str(path)), 9, Report(), lambda done, left: told.append((done, left)))
+    assert found is not None
+    assert [done for done, _ in told] == [k / 10 for k in range(10)]
+    for k, (_, left) in list(enumerate(told))[1:]:  # one look a point: 2 s each, and as many as are left
+        assert left == pytest.approx(2.0 * (10 - k))
+
+
+def test_a_search_that_takes_long_names_its_own_option(capsys):
+    ProgressLine("auto", SEARCH)(0.01, 7200.0)
+    assert capsys.readouterr().err == "about 2.0 h of search lie ahead: fewer --tries would shorten it\n"

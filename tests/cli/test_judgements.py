@@ -163,7 +163,17 @@ def test_runs_that_the_solver_left_are_failures():
     stopped = replace(run("radau", [1, 1, 1]), failure="the solver stopped")
     made = Verified(**{**dict.fromkeys(Verified.__dataclass_fields__), "runs": (run("bdf", [1, 1, 1]), stopped),
                        "finer": stopped})  # fmt: skip
-    assert made.failures == ("lagrangian radau: the solver stopped",) * 2
+    assert made.failures == (stopped,) * 2
+
+
+def test_a_run_that_stopped_early_neither_differs_nor_agrees():
+    stopped = replace(run("radau", [1, 2, 1]), failure="the limit of wall time is reached")
+    whole = run("bdf", [1, 1, 1])
+    assert disagreements((whole, stopped), BOUNDS, 1.0) == disagreements((stopped, whole), BOUNDS, 1.0) == ()
+    assert worst(whole, stopped, BOUNDS, 1.0) is worst(stopped, whole, BOUNDS, 1.0) is None
+    other = run("dopri", [1, 3, 1])
+    ((found),) = disagreements((stopped, whole, other), BOUNDS, 1.0)  # the two that ended are compared
+    assert (found.one, found.other) == (whole, other)
 
 
 # --- energies of statements -------------------------------------------------------------------------------------------

@@ -506,7 +506,7 @@ def test_an_input_that_follows_a_formula_is_refused(tmp_path, capsys):
 
 def test_an_output_that_does_not_exist(tmp_path, capsys):
     code, found = run_json(capsys, "linearize", str(write(tmp_path, RLC)), "--outputs", "c.z", "--backend", "numpy")
-    assert code == 1
+    assert code == 2
     assert found["diagnostics"][0]["severity"] == "error"
 
 

@@ -157,12 +157,20 @@ def test_the_exit_that_counts_first():
 
 
 @pytest.mark.parametrize(
-    ("options", "code"),
-    [(["--until", "1 m"], 1), (["--max-wall", "0"], 2), (["--max-wall", "1 V"], 1), (["--until", "-1"], 2)],
+    "options",
+    [["--until", "1 m"], ["--max-wall", "0"], ["--max-wall", "1 V"], ["--until", "-1"], ["--set", "nosuch=1"]],
 )
-def test_wrong_usage_of_a_sweep_is_no_failure_of_its_runs(model, options, code):
-    assert run(["sweep", "-q", model, *OVER, "-o", "new.h5", *options]) == code
-    assert run(["simulate", "-q", model, "-o", "new.h5", *options]) == code
+def test_wrong_usage_of_a_sweep_is_no_failure_of_its_runs(model, options):
+    assert run(["sweep", "-q", model, *OVER, "-o", "new.h5", *options]) == 2
+    assert run(["simulate", "-q", model, "-o", "new.h5", *options]) == 2
+
+
+@pytest.mark.parametrize("command", ["verify", "trade", "reduce", "report", "equations", "compile", "equilibrium"])
+@pytest.mark.parametrize("options", [["--set", "nosuch=1"], ["--set", "l=2 kg"], ["--level", "a=b"]])
+def test_a_value_that_was_typed_wrong_is_wrong_usage(model, capsys, command, options):
+    assert run([command, model, *options, "--json"]) == 2
+    (found,) = [d for d in json.loads(capsys.readouterr().out)["diagnostics"] if d["severity"] == "error"]
+    assert found["file"] == options[0]
 
 
 @pytest.mark.parametrize("command", ["trade", "reduce"])
@@ -256,7 +264,9 @@ def test_quiet_keeps_the_reason_of_a_difference(model, capsys):
         (["--over", "index=2,9"], 2),
         ([*OVER, "--seed", "9" * 30], 2),
         (["--over", "l~normal(2 m, 0.1 m)", "--runs", "2", "--seed", "-5"], 2),
-        ([*OVER, "--until", "1e400"], 1),
+        ([*OVER, "--until", "1e400"], 2),
+        (["--over", "l=1 kg,2 kg"], 2),
+        (["--over", "nosuch=1,2"], 2),
     ],
 )
 def test_what_a_sweep_cannot_vary_is_said_before_its_runs(model, capsys, options, code):
@@ -268,7 +278,7 @@ def test_what_a_sweep_cannot_vary_is_said_before_its_runs(model, capsys, options
 @pytest.mark.parametrize("command", [["linearize", "--at"], ["simulate", "--until"], ["simulate", "--max-wall"]])
 def test_a_number_that_no_float_holds_is_refused(model, capsys, command):
     for text in ("1e400", "1e-400"):
-        assert run([command[0], model, command[1], text]) == 1
+        assert run([command[0], model, command[1], text]) == 2
         assert "E114" in capsys.readouterr().err
 
 

@@ -275,3 +275,15 @@ def test_an_interruption_keeps_what_was_computed(tmp_path):
     trace = readable("out.h5", rows)
     assert trace.time.size > 100
     assert list(Path().glob(".out.h5*")) == []
+
+
+def test_a_process_that_may_not_load_numpy_says_so(tmp_path):
+    path = write(tmp_path, PENDULUM)
+    for command, code in ((["simulate", path], 3), (["fmt", "--check", path], 0), (["explain", "E101"], 0)):
+        words = [sys.executable, "-m", "sysdyn.cli", *command]
+        limited = ["sh", "-c", 'ulimit -v 140000 && exec "$@"', "sh", *words]
+        ended = subprocess.run(limited, check=False, capture_output=True, text=True)
+        assert ended.returncode == code, ended.stderr
+        said = "there is no memory left: numpy needs 166 MB, 137 MB are allowed (ulimit -v)"
+        assert (said in ended.stderr) == bool(code)
+        assert "OpenBLAS" not in ended.stderr

@@ -11,6 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from sysdyn import api
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.main import run
 from sysdyn.cli.run.asked import Request
@@ -158,6 +159,11 @@ def test_formulations_inputs_and_what_fails(spring, capsys):
     code, found = swept(capsys, spring, "--over", "k=1,4", "--jobs", "1", "--max-steps", "3", "-o", "steps.h5")
     assert code == 3
     assert len(found["result"]["failed"]) == 2
+    lines = Path(spring).read_text().splitlines()
+    for item in (*found["diagnostics"], *(f["diagnostic"] for f in found["result"]["failed"])):
+        assert item["code"] == "E934"
+        assert item["file"] == spring
+        assert lines[item["line"] - 1][item["column"] - 1 :].strip()
 
 
 @pytest.mark.parametrize(
@@ -260,3 +266,14 @@ def test_a_journal_of_another_study_is_not_taken(tmp_path):
 
 def test_names_that_are_texts_stay_texts():
     assert axis("file=a, b", lambda name, text: None) == Axis("file", ("a", "b"))
+
+
+def test_a_text_that_ends_too_soon_says_so(spring, tmp_path, capsys):
+    path = tmp_path / "cut.sd"
+    text = Path(spring).read_text()
+    path.write_text(text[: text.index("init") + 4])
+    code, found = swept(capsys, str(path), "--over", "k=1,4", "--until", "1", "-o", "runs.h5")
+    assert code == 1
+    assert {d["code"] for d in found["diagnostics"]} >= {"E112"}
+    with pytest.raises(api.ModelError, match="E112"):
+        api.load(path)

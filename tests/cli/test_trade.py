@@ -320,5 +320,13 @@ def test_nothing_is_chosen_when_the_budget_is_spent_first(tmp_path, capsys):
     assert re.search("there is no reference|the budget was spent first", capsys.readouterr().err)
 
 
+def test_a_trade_without_a_run_names_the_statement(tmp_path, capsys):
+    code, found = run_json(capsys, "trade", write(tmp_path, PENDULUM), "--max-steps", "3")
+    assert code == 3
+    (said,) = found["diagnostics"]
+    assert (said["code"], said["line"]) == ("E934", PENDULUM[: PENDULUM.index("scene swing")].count("\n") + 1)
+    assert said["message"].startswith("there is no reference: lagrangian index 0 dopri: the solver stopped")
+
+
 def test_tolerances_stand_at_half_decades():
     assert [tolerance(k) for k in (2, 3, 4, 24)] == [0.1, 0.0316, 0.01, 1e-12]

@@ -277,8 +277,16 @@ def test_an_expectation_that_fails_is_listed_and_never_decides(tmp_path, capsys)
 def test_a_solver_that_stops_is_exit_3_with_time_and_run(tmp_path, capsys):
     code, found = run_json(capsys, "verify", write(tmp_path, STUCK), "--max-wall", "20")
     assert code == 3
-    failures = [d["message"] for d in found["diagnostics"] if d["code"] == "solver"]
-    assert any(text.startswith("lagrangian bdf: the solver stopped at t = ") for text in failures)
+    failures = [d for d in found["diagnostics"] if "the solver stopped at t = " in d["message"]]
+    assert any(d["message"].startswith("lagrangian bdf: ") for d in failures)
+    lines = Path(found["diagnostics"][0]["file"]).read_text().splitlines()
+    for d in failures:  # each names its statement
+        assert re.fullmatch("E93[0-4]", d["code"])
+        assert lines[d["line"] - 1][d["column"] - 1 :].strip()
+    stopped = [r for r in found["result"]["runs"] if r["failure"]]
+    assert {r["diagnostic"]["code"] for r in stopped} <= {d["code"] for d in failures}
+    assert all(r["diagnostic"]["line"] for r in stopped)
+    assert all((r["diagnostic"] is None) == (r["failure"] is None) for r in found["result"]["runs"])
     # what the runs had is compared all the same
     assert 0.9 < found["result"]["horizon"] <= 1.0
     assert found["result"]["disagreements"] == []

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Iterator, Sequence
 
+from sysdyn.dsl.model.affine import not_affine
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node, add, const, index, param, sub, substitute
 from sysdyn.dsl.model.expression_text import to_text
@@ -226,8 +227,9 @@ class Sizes:
             rest = sub(node, counters[0][1])
             if not _indices(rest):
                 return Affine(counters[0][1].data, self.bound(rest, place))
-        text = f"index {to_text(node)} is not affine: i + c with whole c is meant"
-        raise ModelError([Diagnostic("E806", text, place)])
+        text, help_, size = not_affine(node, ": i + c with whole c is meant")
+        place = self._parameters[size].place if size in self._parameters else place
+        raise ModelError([Diagnostic("E806", text, place, help_)])
 
     def index(self, node: Node, loops: Collection[str], place: Place | None) -> Affine | Picked:
         """An index as i + c, or from a table of the compiler's own (parameters whose names begin with #)."""

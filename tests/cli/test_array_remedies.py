@@ -1,0 +1,102 @@
+"""What the language does not offer of arrays and of components with several ports is refused with what to write."""
+
+import numpy as np
+import pytest
+from sysdyn import api
+
+CHAINS = """\
+from std.electrical import capacitor, resistor, voltage
+component chain {
+  param N = 2
+  port a, b: electrical
+  node v[0..N]: electrical
+  inner: resistor(R = 1 ohm) a -> v[0]
+  outer: resistor(R = 1 ohm) v[N] -> b
+  for i in 1..N {
+    R[i]: resistor(R = 1 kohm) v[i-1] -> v[i]
+    C[i]: capacitor(C = 1 uF) v[i] -> ground
+  }
+}
+model several {
+  param n = 3
+  node p: electrical
+  V: voltage(v = 5 V*sin(2*pi*10 Hz*t)) p -> ground
+  one: chain() a = p, b = ground
+  for k in 1..n { S[k]: chain(N = SIZE) a = p, b = ground }
+}
+scene go of several {
+  time 0 s to 0.1 s
+  trace S[1].v[1].e as x, READ as y every 1 ms
+}
+"""
+PUSHED = """\
+model pushed {
+  param n = 3
+  input u[1..SIZE]: N = 0 N
+  coord x[1..3]: translation = 0 m
+  for i in 1..3 {
+    energy T* = 1/2*(1 kg)*x[i]'^2
+    work u[i] on x[i]
+  }
+}
+scene go of pushed {
+  time 0 s to 1 s
+  set SETTING
+  trace x[2] every 10 ms
+}
+"""
+
+
+def chains(size="2", read="one.inner.power"):
+    return api.check(CHAINS.replace("SIZE", size).replace("READ", read))
+
+
+def pushed(size, setting):
+    return api.check(PUSHED.replace("SIZE", size).replace("SETTING", setting))
+
+
+def errors(found):
+    return [d for d in found if d.severity == "error"]
+
+
+@pytest.mark.parametrize("read", ["one.power", "one.energy", "one.energy_through"])
+def test_a_component_with_ports_names_their_energies(read):
+    error = errors(chains(read=read))[0]
+    assert error.code == "E102"
+    assert "energy_through(one.a) + energy_through(one.b)" in error.help
+    assert not errors(chains(read="energy_through(one.a) + energy_through(one.b)"))
+
+
+def test_the_energies_inside_an_array_of_components_can_be_read():
+    (found,) = [d for d in chains(read="energy_through(S[2].a)") if d.code == "N608"]
+    assert "sum(i in 1..n: S[i].R.energy)" in found.help
+    assert not [d for d in chains(read="sum(i in 1..n: S[i].inner.energy)") if d.code in ("N608", "E102")]
+
+
+@pytest.mark.parametrize("size", ["k", "k + 1", "if k == 1 then 1 else 3"])
+def test_sizes_that_differ_in_an_array_are_named_where_they_are_given(size):
+    (error,) = errors(chains(size))
+    assert error.code == "E806"
+    assert error.place.source.line(error.place.start[0]).strip() == "param N = 2"
+    assert "S.N[k] is a size" in error.message
+    assert "a label of its own for each" in error.help
+    assert not errors(chains("n"))
+
+
+def test_the_last_node_of_each_component_in_an_array_is_found_by_its_size(tmp_path):
+    """`v[N]` of components of one size: three of 2*(1 ohm) + 3*(1 kohm) side by side, leaks of 1 Gohm in place of C."""
+    path = tmp_path / "chains.sd"
+    text = CHAINS.replace("  one: chain() a = p, b = ground\n", "").replace("SIZE", "n").replace("READ", "-V.f/(5 A)")
+    text = text.replace("capacitor(C = 1 uF)", "resistor(R = 1 Gohm)").replace("5 V*sin(2*pi*10 Hz*t)", "5 V")
+    path.write_text(text)
+    conductance = api.simulate(str(path), output=str(tmp_path / "c.h5"), backend="numpy")["y"].values
+    np.testing.assert_allclose(conductance, 3.0 / 3002.0, rtol=1e-5)  # three chains of three
+
+
+def test_elements_of_an_input_that_vary_are_listed_where_its_size_is_a_number():
+    assert not errors(pushed("3", "u = [1 N, t*1 N/s, 0 N]"))
+    (error,) = errors(pushed("3", "u[2] = t*1 N/s"))
+    assert (error.code, error.help) == ("E807", "the whole: set u = [a, b, ...]")
+    (error,) = errors(pushed("n", "u = [1 N, t*1 N/s, 0 N]"))
+    assert error.code == "E805"
+    assert error.help.endswith("input u[1..3]")

@@ -1,0 +1,66 @@
+"""Numbers of a scene that no run can be asked for are said by `check` and by `simulate` alike, at its words."""
+
+import pytest
+from sysdyn.cli.main import run
+from texts import run_json, write
+
+TEXT = """\
+model spring {
+  param k = 4 N/m
+  coord x: translation = 1 m
+  energy T* = 1/2*(1 kg)*x'^2
+  energy V = 1/2*k*x^2
+  init x' = 0 m/s
+}
+scene go of spring {
+  time 0 s to 2 s
+  trace x
+}
+"""
+TIME, TRACE = "  time 0 s to 2 s\n", "  trace x\n"
+WRONG = [
+    (TRACE, "  trace x every 1e-300 s\n", "E912", "more than 2e+07 instants", "1e-300 s"),
+    (TRACE, "  trace x every k*1e-300 s.m/N\n", "E912", "more than 2e+07 instants", "k*1e-300 s.m/N"),
+    (TRACE, "  trace x every -k*1 s.m/N\n", "E912", "-4 s", "-k*1 s.m/N"),
+    (TIME, "  time 0 s to -k*1 s.m/N\n", "E912", "from 0 s to -4 s", "time"),
+    (TIME, "  time 0 s to 1 s/(k*1 m/N - 4)\n", "E912", "from 0 s to inf s", "time"),
+    (TRACE, "  trace x\n  accuracy k*1 m/N\n", "E906", "accuracy 4", "accuracy"),
+    (TRACE, "  trace x\n  limit steps 0\n", "E912", "limit steps 0", "limit"),
+    (TRACE, "  trace x\n  limit events -1\n", "E912", "limit events -1", "limit"),
+    (TRACE, "  trace x\n  limit steps inf\n", "E912", "limit steps inf", "limit"),
+    (TRACE, "  trace x\n  solver euler\n", "E607", "needs a step", "solver"),
+    (TRACE, "  trace x\n  solver euler(step = 0 s)\n", "E912", "step = 0 s", "solver"),
+    (TRACE, "  trace x\n  solver bdf(longest = -1 s)\n", "E912", "longest = -1 s", "solver"),
+    (TRACE, "  trace x\n  solver bdf(index = 7)\n", "E607", "index = 7", "solver"),
+]
+
+
+@pytest.mark.parametrize("command", ["check", "simulate"])
+@pytest.mark.parametrize(("old", "new", "code", "said", "at"), WRONG)
+def test_it_is_an_error_of_the_text(tmp_path, capsys, command, old, new, code, said, at):
+    text = TEXT.replace(old, new)
+    exit_code, found = run_json(capsys, command, write(tmp_path, text))
+    assert exit_code == 1
+    (error,) = [d for d in found["diagnostics"] if d["severity"] == "error"]
+    assert error["code"] == code
+    assert said in error["message"]
+    assert error["help"]
+    assert text.splitlines()[error["line"] - 1][error["column"] - 1 :].startswith(at)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "options"),
+    [
+        (TRACE, "  trace x every 1 us\n  time 0 s to 1000 s\n", ["--until", "1 ms"]),
+        (TIME, "  time 0 s to -k*1 s.m/N\n", ["--until", "1 ms"]),
+        (TIME, "  time 0 s to -k*1 s.m/N\n", ["--set", "k=-1"]),
+        (TRACE, "  trace x\n  accuracy k*1 m/N\n", ["--accuracy", "1e-3"]),
+        (TRACE, "  trace x\n  limit steps 2.5e3\n", []),
+        (TRACE, "  trace x\n  solver euler\n", ["--method", "bdf"]),
+        (TRACE, "  trace x\n  solver bdf(index = 7)\n", ["--index", "0"]),
+    ],
+)
+def test_the_command_line_wins(tmp_path, old, new, options):
+    text = TEXT.replace(old, new)
+    text = text.replace(TIME, "") if text.count("  time ") > 1 else text
+    assert run(["simulate", "-q", write(tmp_path, text), *options]) == 0
