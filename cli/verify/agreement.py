@@ -1,7 +1,8 @@
 """Traces of one scene compared at the instants that both hold.
 
 A quantity of two traces differs where |a - b| > bound * nominal, nominal the smaller of what both store: a run that
-explodes shall not widen what is allowed.  Rounding of the largest quantity of the same unit is no difference.
+explodes shall not widen what is allowed.  Rounding of the largest quantity of the same unit is no difference, and
+between an event of one and the same event of the other nothing is compared: the sides of a jump differ.
 Received: traces, bounds by name; handed back: the worst place of each quantity, and the instant up to which two agree.
 """
 
@@ -11,6 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.accuracy.common_instants import beside
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.trace.trace import Quantity, Trace
@@ -64,9 +66,11 @@ def horizon(one: Trace, other: Trace, bounds: Bounds) -> tuple[float, Gap | None
 
 
 def _common(one: Trace, other: Trace) -> tuple[Floats, Places, Places]:
-    """Instants of both traces, and their places in each."""
+    """Instants of both traces, and their places in each; none between an event of one and the same of the other."""
     times, here, there = np.intersect1d(one.time, other.time, return_indices=True)
-    return times, here.astype(np.intp), there.astype(np.intp)
+    jumps = [np.unique([event.time for event in trace.events]) for trace in (one, other)]
+    use = ~beside(times, *jumps, float(np.ptp(times)) if times.size else 0.0)
+    return times[use], here[use].astype(np.intp), there[use].astype(np.intp)
 
 
 def _compared(one: Trace, other: Trace, bounds: Bounds) -> tuple[Floats, dict[str, Floats]]:
