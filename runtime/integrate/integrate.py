@@ -226,10 +226,10 @@ class Integration:
         y, yd = self.method.point()
         return y, yd, self.sizes.at(y)[0]
 
-    def confirmed(self, y: Floats) -> Floats:
-        """Magnitudes as the run confirmed them [unknowns as written]; y: of the last point."""
+    def confirmed(self, met: Floats, magnitude: Floats) -> Floats:
+        """Magnitudes as the run confirmed them [unknowns as written], by those it met and went by."""
         span = self.request.t_end - self.start.t
-        return confirmed(self.system, span, *self.sizes.at(y))[: self.system.form.written]
+        return confirmed(self.system, span, met, magnitude)[: self.system.form.written]
 
     def _drift(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
@@ -321,8 +321,9 @@ class Integration:
                 self.system.trim(LARGE)
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)
-        last = self.last()
-        magnitude = self.confirmed(last[0])
+        y, yd = self.method.point()
+        met, magnitude = self.sizes.at(y, last=True)
+        magnitude = self.confirmed(met, magnitude)
         self._spare()
         return Finished(
             method.t,
@@ -334,7 +335,7 @@ class Integration:
             self.driver.ledgers,
             self.happened(),
             self.driver.run.beyond,
-            last,
+            (y, yd, met),
             method.opening if self.request.method in OPENED else 0.0,
         )
 
