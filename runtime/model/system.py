@@ -85,6 +85,7 @@ class System(Facts):
         self._own: dict[Hashable, Any] = {}
         self._layout: Layout | None = None
         self._slots: list[Ints] = []
+        self.trim()
         self._assemble()
 
     def trim(self, least: int = HUGE) -> None:
@@ -92,7 +93,7 @@ class System(Facts):
         more unknowns than these.
         """
         if self.unknowns > least:
-            lib.core.sd_trim()
+            lib.core.sd_trim(self.unknowns > HUGE)
 
     @property
     def plain(self) -> bool:
