@@ -129,12 +129,14 @@ class Condensed:
     def _products(self) -> Ints:
         """Which entries of the whole matrix add to this one with what factor; the column of each such product."""
         system, found, terms = self.whole, self.sums, self._composition
-        columns = system.pattern.columns_of()
-        at, place = numbers_of(system.unknowns, self.kept)[columns], numbers_of(system.unknowns, found.place)[columns]
         kept = np.zeros(system.rows, dtype=bool)
         kept[self.kept_rows] = True
-        entry = places_of(kept[system.pattern.row] & ((at >= 0) | (place >= 0)))
-        at, place = at[entry], place[entry]
+        entry = places_of(kept[system.pattern.row])
+        columns = system.pattern.columns_of()[entry]
+        at, place = numbers_of(system.unknowns, self.kept)[columns], numbers_of(system.unknowns, found.place)[columns]
+        read = (at >= 0) | (place >= 0)
+        entry, at, place = entry[read], at[read], place[read]
+        del columns, read
         # an entry of a kept unknown is a product, one of an eliminated unknown as many as that has terms
         gone = place >= 0
         count = np.ones(entry.size, dtype=np.int32)
@@ -221,7 +223,7 @@ class Condensed:
         made = elsewhere.core
         made.kinematics = kept_parts[0].size
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
-        made.k_scale = self._hold(np.ones(kept_parts[0].size))
+        made.k_scale = self._hold(whole.kinematic_scale)  # ones all
         made.k_span, made.k_spans = self._hold(spans), 0 if self._own.size else len(spans)
         for k, planned in enumerate(form.calls):  # without loops that add to rows that are not kept alone
             whole.spare_loops(elsewhere.calls[k], planned.block, kept, planned.to)
@@ -406,6 +408,7 @@ class _Condenser:
             whole.forget_once("may leave")
             held = [found, numbers]
             del found, numbers, allowed
+            whole.trim()
             return self._made(held)
         if self._forms is None:
             self._forms = self._made([found, numbers])
@@ -429,6 +432,9 @@ class _Condenser:
             return None
         places = places_of(rows), places_of(kept)
         del rows, kept
+        if whole.unknowns > LARGE:
+            whole.spare()
+            whole.trim()
         room = Room(whole, self.settled)
         stepped, settled = (
             Condensed(system, numbers, terms, straights, rows, room)

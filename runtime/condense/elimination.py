@@ -106,7 +106,10 @@ def definable(system: System, jy: Floats, constant: Floats) -> Mask:
     by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
     here, gone, carried = system.once("may leave", lambda: _candidates(system))
     i, j = rows[here], columns[here]
-    weight = size[here] * by_row[i] * by_column[j]
+    weight = size[here]
+    weight *= by_row[i]
+    weight *= by_column[j]
+    del size, by_row, by_column, columns  # of a large one the room counts
     largest = np.zeros(system.rows)
     np.maximum.at(largest, i, weight)
     reads = weight > 0.0

@@ -226,10 +226,10 @@ class Integration:
         y, yd = self.method.point()
         return y, yd, self.sizes.at(y)[0]
 
-    def confirmed(self) -> Floats:
-        """Magnitudes as the run confirmed them [unknowns as written]."""
-        sizes = self.sizes.at(self.method.point()[0])
-        return confirmed(self.system, self.request.t_end - self.start.t, *sizes)[: self.system.form.written]
+    def confirmed(self, met: Floats, magnitude: Floats) -> Floats:
+        """Magnitudes as the run confirmed them [unknowns as written], by those it met and went by."""
+        span = self.request.t_end - self.start.t
+        return confirmed(self.system, span, met, magnitude)[: self.system.form.written]
 
     def _drift(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
@@ -321,17 +321,21 @@ class Integration:
                 self.system.trim(LARGE)
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)
+        y, yd = self.method.point()
+        met, magnitude = self.sizes.at(y, last=True)
+        magnitude = self.confirmed(met, magnitude)
+        self._spare()
         return Finished(
             method.t,
             self.statistics(),
-            self.confirmed(),
+            magnitude,
             self.driver.largest(),
             self.cpu,
             self.settler.core.contents.failures,
             self.driver.ledgers,
             self.happened(),
             self.driver.run.beyond,
-            self.last(),
+            (y, yd, met),
             method.opening if self.request.method in OPENED else 0.0,
         )
 

@@ -66,9 +66,8 @@ class Origin:
         if self._sized is None or self._sized[0] != t_end:
             order = net_order_of(self.system)
             far = self.jy, self.jyd, self.yd, order.address
-            y = self.start.without_noise(self.y)
-            spent = self.system.unknowns > LARGE
-            self._sized = t_end, magnitudes(self.system, self.t, t_end, y, self.yd, far, spent=spent)
+            clean, spent = self.start.without_noise, self.system.unknowns > LARGE
+            self._sized = t_end, magnitudes(self.system, self.t, t_end, clean(self.y), self.yd, far, spent=spent)
             if spent:
                 self._matrix = None
         return self._sized[1]

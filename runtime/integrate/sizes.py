@@ -75,14 +75,16 @@ class Sizes:
         if self._own is not None:
             self._own[1][:] = self.magnitude[self._own[0]]
 
-    def at(self, y: Floats) -> tuple[Floats, Floats]:
-        """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point y."""
+    def at(self, y: Floats, *, last: bool = False) -> tuple[Floats, Floats]:
+        """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point y.
+        last: in the arrays of the run, which is over.
+        """
         if self._own is None:
             return self.met, self.magnitude
         kept, magnitude, met = self._own
-        largest = np.maximum(self.met, np.abs(y))
+        largest = np.maximum(self.met, np.abs(y), out=self.met if last else None)
         largest[kept] = met
-        sizes = np.maximum(self.magnitude, largest)
+        sizes = np.maximum(self.magnitude, largest, out=self.magnitude if last else None)
         sizes[kept] = magnitude
         return largest, sizes
 

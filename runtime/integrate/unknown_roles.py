@@ -83,12 +83,13 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     smooth = unique(system, jyd)
     state = system.are("q", "p", "s") | (flows & _inertial(system, jyd))
     stepped = state | (flows & differential)  # of index 1 and 0 also those whose rates derived constraints hold
-    test = np.where(stepped, 0, -1)
+    test = np.where(stepped, np.int32(0), np.int32(-1))
     power = np.zeros(system.unknowns, dtype=np.int32)
     multiplier = system.are("kappa", "mu", "nu")
     if index >= 2:
         steep = np.zeros(system.unknowns, dtype=bool)
-        steep[system.pattern.columns_of()[system.steep_rows(t)[system.pattern.row]]] = True
+        if system.form.scales:
+            steep[system.pattern.columns_of()[system.steep_rows(t)[system.pattern.row]]] = True
         power[multiplier | ((implicit | (flows & ~differential)) & ~steep)] = 1
         # flows that stores know by differences alone: what they have in common is a rate of what balances hold
         shared = flows & state & ~smooth
@@ -103,7 +104,7 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
         test[:] = 0
     idle = multiplier | implicit | (flows & ~differential)
     common = _common(system, jyd, flows & stepped & ~smooth if index < 2 else np.zeros_like(flows))
-    return Roles(test.astype(np.int32), power, state, differential, smooth, idle, common)
+    return Roles(test, power, state, differential, smooth, idle, common)
 
 
 def _inertial(system: System, jyd: Floats) -> NDArray[np.bool_]:

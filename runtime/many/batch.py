@@ -371,7 +371,7 @@ class Batch:
         finished = Finished(
             self.options.t_end,
             runs.accounts.statistics,
-            made.confirmed(),
+            made.confirmed(*made.sizes.at(made.method.point()[0])),
             made.driver.largest(),
             core.spent,
             made.settler.core.contents.failures,

@@ -210,7 +210,7 @@ def _load() -> Any:
         "sd_pairs": (_L, [_I, _I, _I, _P, _P, _P, _P, _P]),
         "sd_column_order": (c.c_int, [_I, _I, _P, _P, _P, _P]),
         "sd_both_ends": (c.c_int, [_I, _P, _P, _P]),
-        "sd_trim": (None, []),
+        "sd_trim": (None, [c.c_int]),
         "sd_threads": (c.c_int, []),
         "sd_threads_use": (None, [c.c_int]),
         "sd_determined": (c.c_int, [_I, _I, *[_P] * 5, _D, _L, _P, _P, _P]),

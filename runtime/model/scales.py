@@ -209,11 +209,16 @@ def magnitudes(
     else needs these entries, which are overwritten: of a large system the room counts.
     """
     span = max(t_end - t0, 0.0) or 1.0
-    a, b = (system._buffer(np.where(np.isfinite(item), item, 0.0)) for item in (y, yd))
+    a = system._buffer(np.where(np.isfinite(y), y, 0.0))
+    del y  # of a large system the room counts
+    b = system._buffer(np.where(np.isfinite(yd), yd, 0.0))
     found, tau = np.zeros(system.unknowns), np.zeros(1)
     motion = (None, None, None, None) if far is None else (*map(lib.pointer, far[:3]), far[3])
     answers = lib.pointer(found), lib.pointer(tau)
-    core = c.byref(sizing(system).core), c.byref(system.core)
+    tables = sizing(system)
+    if spent:
+        system.spare()
+    core = c.byref(tables.core), c.byref(system.core)
     if lib.core.sd_magnitudes(*core, t0, span, lib.pointer(a), lib.pointer(b), *motion, spent, *answers):
         raise MemoryError
     system.failure.check()
@@ -225,8 +230,10 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
     kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
     round-off altogether.
     """
-    found = np.zeros(system.unknowns)
+    found, kind, like, nominal = np.zeros(system.unknowns), _kinds(system), alike(system), system.nominal
+    rows = lib.Balance(unknowns=like.size, kinds=1 + int(like.max(initial=0)), kind=lib.pointer(like))  # none is read
+    tables = lib.Sizing(balance=c.addressof(rows), nominal=lib.pointer(nominal), kind=lib.pointer(kind))
     arrays = lib.pointer(met), lib.pointer(magnitude), lib.pointer(found)
-    if lib.core.sd_confirmed(c.byref(sizing(system).core), c.byref(system.core), span, *arrays):
+    if lib.core.sd_confirmed(c.byref(tables), c.byref(system.bare), span, *arrays):
         raise MemoryError
     return found

@@ -85,6 +85,7 @@ class System(Facts):
         self._own: dict[Hashable, Any] = {}
         self._layout: Layout | None = None
         self._slots: list[Ints] = []
+        self.trim()
         self._assemble()
 
     def trim(self, least: int = HUGE) -> None:
@@ -92,7 +93,7 @@ class System(Facts):
         more unknowns than these.
         """
         if self.unknowns > least:
-            lib.core.sd_trim()
+            lib.core.sd_trim(self.unknowns > HUGE)
 
     @property
     def plain(self) -> bool:
@@ -142,7 +143,7 @@ class System(Facts):
         for k, scale in enumerate(form.scales):
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
-        self.kinematic_scale = np.ones(form.k_row.size)
+        self.kinematic_scale = self._ones() if form.name != "2" else self._ones().copy()
         self.work = self._work(layout.entries)
         self._keep += [calls]
         self._reads_rate, self._may_hold = layout.reads_rate, layout.may_hold
@@ -192,9 +193,19 @@ class System(Facts):
         return self._core
 
     @property
+    def bare(self) -> lib.System:
+        """The same where nothing asks for its matrix."""
+        return self._core
+
+    @property
     def pattern(self) -> Pattern:
         """Of the Jacobian."""
         return (self._layout or self._bring_back()).pattern
+
+    def _ones(self) -> Floats:
+        """Factors of rows q' - f where no metric gives them others: the same for all forms."""
+        number = self.form.k_row.size
+        return self.description.layouts.setdefault(("ones", number), np.ones(number))  # type: ignore[no-any-return]
 
     def _work(self, entries: int) -> Floats:
         """Room for the entries of any part, one after the other: all systems of a description have the same."""

@@ -154,6 +154,10 @@ class _Linear:
         """What u counts each free unknown in; made when asked."""
         return self.problem.scale[self.problem.free] / self.problem.weight[self.problem.free]
 
+    def moved(self, x: Floats) -> Floats:
+        """How far each free unknown is from the guess, in its unit; made when asked."""
+        return (x - self.problem.guess)[self.problem.free] / self.unit
+
     def _taken(self, *, spent: bool = False) -> tuple[Any, Any, Floats]:
         """Rows, columns and values of the entries in use; factors would fill from zeros too.  spent: at last."""
         take = self._values != 0.0
@@ -198,7 +202,7 @@ class _Linear:
         # what costs nothing stays where it is as far as it may
         stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else 0.0
         aim = add_product(i, j, v, u - stays, np.negative(r, out=r))
-        del r
+        del r, u  # of a large one the room counts
         if ordered:
             return stays + in_order(self.shape, (i, j, v), aim, levels)
         idle = None if self.problem.idle is None else self.problem.idle[self.problem.free]
@@ -261,17 +265,16 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             break
         if problem.work.done:
             break
-        u = (x - problem.guess)[problem.free] / linear.unit
         norm, rows = float(np.linalg.norm(scaled)), [scaled[problem.use]]
         del scaled
         try:
-            target = linear.nearest(u, rows.pop(), beside=size < _BESIDE and stale > 1)
+            target = linear.nearest(linear.moved(x), rows.pop(), beside=size < _BESIDE and stale > 1)
         except NotFiniteError:
             break
         problem.spare()
         if not np.isfinite(target).all():
             break
-        step, tried = 1.0, x
+        step, tried, u = 1.0, x, linear.moved(x)
         for _ in range(_HALVINGS):
             tried = x.copy()
             tried[problem.free] += step * (target - u) * linear.unit
@@ -293,7 +296,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
 def stepped(problem: Problem, x: Floats) -> Floats:
     """The point one whole step from x.  NotFiniteError."""
     linear, free = _Linear(problem, x), problem.free
-    u = (x - problem.guess)[free] / linear.unit
+    u = linear.moved(x)
     r = (problem.residual(x) * linear.row_scale)[problem.use]
     found = x.copy()
     found[free] = problem.guess[free] + linear.nearest(u, r, beside=False) * linear.unit

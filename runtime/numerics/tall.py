@@ -95,7 +95,8 @@ def determined(
     columns = _columns(shape, entries, fewer=idle is not None)
     if columns is None:
         return None
-    aim = np.append(aim, np.zeros(columns.pattern.rows - shape[0]))
+    if columns.pattern.rows > shape[0]:
+        aim = np.append(aim, np.zeros(columns.pattern.rows - shape[0]))
     for way in (_substituted, _factored if idle is None else _beside(idle[columns.used])):
         found = np.zeros(columns.pattern.unknowns)
         failed = way(columns, aim, found)

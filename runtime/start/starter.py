@@ -378,6 +378,10 @@ def problem_of(
         said = state & starter.written
         levels = said & ~placed, said & placed, unsaid & ~starter.idle, unsaid & starter.idle
         scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
+    weight = starter.weights(t, x, scale)
+    if x.size > LARGE:  # what the search reads it has; the room counts
+        starter.system.spare()
+        starter.system.put_away(whole=True)
     return Problem(
         residual=lambda z: starter.residual(t, z),
         jacobian=lambda z: starter.jacobian(t, z),
@@ -388,7 +392,7 @@ def problem_of(
         free=free,
         guess=guess,
         scale=scale,
-        weight=starter.weights(t, x, scale),
+        weight=weight,
         levels=levels,
         idle=np.arange(x.size) >= starter.n,
         work=starter.work,

@@ -123,16 +123,22 @@ def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...]
 
 
 def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
-    """Index from the growth of (dF/dy + cj dF/dyd)^-1 b over cj (large models)."""
+    """Index from the growth of (dF/dy + cj dF/dyd)^-1 b over cj (large models); jy, jyd are spent."""
     pattern, order = system.pattern, net_order_of(system)
     columns = pattern.columns_of()
     row, column = sparse_factors(pattern.row, columns, np.abs(jy) + np.abs(jyd), (pattern.rows, pattern.unknowns))
-    scale = row[pattern.row] * column[columns]
+    scale = row[pattern.row]
+    scale *= column[columns]
     del columns, row, column
+    for values in (jy, jyd):
+        values *= scale
+    del scale, values
     linear = order.linear(pattern)
+    if system.unknowns > LARGE:  # the room counts; the factors hold to the pattern at hand
+        system.put_away(whole=True)
     try:
         for rate in RATES:
-            index = _growth(linear, (jy, jyd, scale), rate)
+            index = _growth(linear, (jy, jyd), rate)
             if index is not None:
                 return index
     finally:
@@ -140,19 +146,18 @@ def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     return None
 
 
-def _growth(linear: Any, matrix: tuple[Floats, Floats, Floats], rate: float) -> int | None:
-    """The index by the growth from cj = rate to ten times that; None where it does not tell.  matrix: dF/dy, dF/dyd,
-    what both are multiplied by [entries].
+def _growth(linear: Any, matrix: tuple[Floats, Floats], rate: float) -> int | None:
+    """The index by the growth from cj = rate to ten times that; None where it does not tell.  matrix: dF/dy, dF/dyd
+    [entries], equilibrated.
 
     The larger cj comes first: there sums of rows lose most, and the pivots that it finds serve the other one.
     """
     sizes, least = [], 1.0
-    jy, jyd, scale = matrix
+    jy, jyd = matrix
     values = lib.reader(linear.contents.scaled, jy.size)  # of a large one the room counts
     for cj in (10.0 * rate, rate):
         np.multiply(jyd, cj, out=values)
         values += jy
-        values *= scale
         size, pivot = _inverse(linear, values)
         if not (np.isfinite(size) and size > 0.0):
             return None

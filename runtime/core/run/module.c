@@ -6,10 +6,15 @@
 #include <malloc.h>
 #endif
 
-/* Hands memory that was let go back to the machine: between the stages of a large run little of it would fit. */
-void sd_trim(void)
+#define OWN_PAGES (1 << 22) /* bytes */
+
+/* Hands memory that was let go back to the machine: between the stages of a large run little of it would fit.  huge: from
+ * now on arrays have pages of their own, which go back as they do; between others they would leave gaps. */
+void sd_trim(int huge)
 {
 #ifdef __GLIBC__
+    if (huge)
+        mallopt(M_MMAP_THRESHOLD, OWN_PAGES);
     malloc_trim(0);
 #endif
 }

@@ -314,24 +314,28 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     int failed = quick < 0.0 || *tau < 0.0;
     if (rate && !failed)
         failed |= sd_relaxed(system, order, s->rungs, s->rung, jy, jyd, rate, *tau, moves);
-    /* of a large system the room counts: what factors do not need follows them */
+    /* of a large system the room counts: what factors do not need follows them, and what matrices held serves again */
     size_t borne = system->scales > 0 ? 2 * n + rows + entries + SD_LANES : 0, own = spent ? 0 : 2 * entries + 2;
-    double *memory = calloc(4 * n + (size_t)system->kinematics + rows + own + kinds + borne + 1, sizeof *memory);
+    size_t within = entries >= 2 * n ? 0 : 2 * n;
+    double *memory = calloc(n + (size_t)system->kinematics + rows + own + borne + within + 1, sizeof *memory);
     int32_t *carries = calloc(n + 1, sizeof *carries);
-    if (!memory || !carries) {
+    double *divisor = memory, *least = divisor + n, *row = least + system->kinematics;
+    double *own_jy = spent ? jy : row + rows, *own_jyd = spent ? jyd : own_jy + entries + 1, *size = own_jy;
+    double *kept = within ? row + rows + own + borne : own_jyd, *balanced = kept + n;
+    int none = !memory || !carries;
+    if (!none) {
+        sd_jacobian(system, t0, y, yd, NULL, own_jy, own_jyd);
+        carriers(s, own_jyd, carries);
+        none = sd_compliance(s, own_jy, own_jyd, divisor);
+    }
+    if (none) {
         free(first);
         free(memory);
         free(carries);
         return -1;
     }
-    double *divisor = memory, *room = divisor + n; /* [3 n + kinds], of the compliance; behind that of these: */
-    double *kept = room, *balanced = kept + n, *least = balanced + n, *row = room + 3 * n + kinds + system->kinematics;
-    double *own_jy = spent ? jy : row + rows, *own_jyd = spent ? jyd : own_jy + entries + 1, *size = own_jy;
-    sd_jacobian(system, t0, y, yd, NULL, own_jy, own_jyd);
-    carriers(s, own_jyd, carries);
     for (size_t k = 0; k < n; k++)
         moves[k] = !carries[k] ? 0.0 : rate ? moves[k] : *tau * fabs(yd[k]);
-    compliance(s, own_jy, own_jyd, divisor, room);
     known_sizes(s, system, y, divisor, moves, found, most);
     flows(system, span, found, least);
     for (size_t e = 0; e < entries; e++) {
