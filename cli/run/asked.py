@@ -163,6 +163,7 @@ def options_of(
         index=request.index or (f"{solver['index']:g}" if "index" in solver else "auto"),
         euler_step=solver.get("step"),
         longest=solver.get("longest"),
+        order=int(solver["order"]) if "order" in solver and method == scene.solver else None,
         redundancy=_redundancy(request, prepared.network),
         max_steps=steps,
         max_wall=wall,

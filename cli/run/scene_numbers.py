@@ -20,6 +20,8 @@ from sysdyn.dsl.tree import syntax
 INSTANTS = 2e7
 """Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""
 _INDICES = (0.0, 1.0, 2.0, 3.0)
+_ORDERS = {"bdf": (1.0, 2.0, 3.0, 4.0, 5.0), "radau": (5.0, 9.0, 13.0)}
+"""Of the methods whose order can be asked for."""
 
 Value = Callable[[Node], float]
 
@@ -79,6 +81,10 @@ def _solver(target: Target, scene: Scene, value: Value, method: str | None, *, i
             yield Diagnostic("E912", text, place, f"{name} = 1 ms")
     if not index and said.get("index", 0.0) not in _INDICES:
         yield Diagnostic("E607", f"index = {said['index']:g} of the solver", place, "index = 0, 1, 2, 3")
+    orders = _ORDERS.get(scene.solver or "", ())
+    if method in (None, scene.solver) and "order" in said and said["order"] not in orders:
+        text = f"order = {said['order']:g} of the solver {scene.solver}"
+        yield Diagnostic("E607", text, place, "bdf(order = 1 .. 5): at most; radau(order = 5), 9 or 13: that one")
     if method is None and scene.solver == "euler" and "step" not in said:
         yield Diagnostic("E607", "method euler needs a step", place, "solver euler(step = 1 ms)")
 

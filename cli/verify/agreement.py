@@ -68,8 +68,8 @@ def horizon(one: Trace, other: Trace, bounds: Bounds) -> tuple[float, Gap | None
 def _common(one: Trace, other: Trace) -> tuple[Floats, Places, Places]:
     """Instants of both traces, and their places in each; none between an event of one and the same of the other."""
     times, here, there = np.intersect1d(one.time, other.time, return_indices=True)
-    jumps = [np.unique([event.time for event in trace.events]) for trace in (one, other)]
-    use = ~beside(times, *jumps, float(np.ptp(times)) if times.size else 0.0)
+    first, second = (np.unique([event.time for event in trace.events]) for trace in (one, other))
+    use = ~beside(times, first, second, float(np.ptp(times)) if times.size else 0.0)
     return times[use], here[use].astype(np.intp), there[use].astype(np.intp)
 
 

@@ -35,10 +35,11 @@ class Options:
     each traced quantity, accuracy_on: (name, accuracy) of single ones (the others are then free if `accuracy` is
     None); rtol, atol: the solver's own, switch the control off; accuracy_check: a second run by another method must
     agree; first: tolerance with which the control of the accuracy begins; euler_step: of method "euler"; longest:
-    step [s]; stops: ascending instants at which the text jumps or has kinks: a step ends and the integration restarts
-    there; redundancy: what becomes of redundant constraints: drop (the last written of each dependent group is left
-    out), minimum_norm (the least multipliers), error (the caller has seen to it); sample_steps: the watcher sees
-    accepted steps too; watch: what of a run the samples are to hold.
+    step [s]; order: of bdf at most, of radau (5, 9, 13) at every step; stops: ascending instants at which the text
+    jumps or has kinks: a step ends and the integration restarts there; redundancy: what becomes of redundant
+    constraints: drop (the last written of each dependent group is left out), minimum_norm (the least multipliers),
+    error (the caller has seen to it); sample_steps: the watcher sees accepted steps too; watch: what of a run the
+    samples are to hold.
     """
 
     output: str | Path | None
@@ -57,6 +58,7 @@ class Options:
     index: str = "auto"
     euler_step: float | None = None
     longest: float | None = None
+    order: int | None = None
     stops: Floats | None = None
     redundancy: str = "error"
     events: Plan | None = None

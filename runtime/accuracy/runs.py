@@ -129,7 +129,7 @@ class Runs:
             index=self.index,
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
-            stages=(3, lib.STAGES) if self.way.smooth else None,
+            stages=self._stages,
             stiff_steps=HELD if options.method == "auto" else STIFF,
             spare_steps=SPARE if draft and options.method == "auto" and self.system.unknowns <= FACTORED else 0.0,
             settled_to=ROUGH * rtol if self.controlled else 0.0,
@@ -142,9 +142,16 @@ class Runs:
             events=options.events or None,
             begin=self.begin,
             least_norm=options.redundancy == "minimum_norm" and bool(self.system.left_out),
-            max_order=1 if self.method == "euler" else lib.MAX_ORDER,
+            max_order=1 if self.method == "euler" else options.order or lib.MAX_ORDER,
             fixed_step=options.euler_step if self.method == "euler" else None,
         )
+
+    @property
+    def _stages(self) -> tuple[int, int] | None:
+        """Of radau, in the first step and at most; None: chosen.  The order of s stages is 2 s - 1."""
+        if self.method == "radau" and self.options.order is not None:
+            return (self.options.order + 1) // 2, (self.options.order + 1) // 2
+        return (3, lib.STAGES) if self.way.smooth else None
 
     @property
     def most_steps(self) -> int | None:

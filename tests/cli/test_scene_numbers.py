@@ -1,7 +1,9 @@
 """Numbers of a scene that no run can be asked for are said by `check` and by `simulate` alike, at its words."""
 
+import numpy as np
 import pytest
 from sysdyn.cli.main import run
+from sysdyn.runtime.trace.trace import Trace
 from texts import run_json, write
 
 TEXT = """\
@@ -32,6 +34,9 @@ WRONG = [
     (TRACE, "  trace x\n  solver euler(step = 0 s)\n", "E912", "step = 0 s", "solver"),
     (TRACE, "  trace x\n  solver bdf(longest = -1 s)\n", "E912", "longest = -1 s", "solver"),
     (TRACE, "  trace x\n  solver bdf(index = 7)\n", "E607", "index = 7", "solver"),
+    (TRACE, "  trace x\n  solver bdf(order = 6)\n", "E607", "order = 6", "solver"),
+    (TRACE, "  trace x\n  solver radau(order = 7)\n", "E607", "order = 7", "solver"),
+    (TRACE, "  trace x\n  solver dopri(order = 5)\n", "E607", "order = 5", "solver"),
 ]
 
 
@@ -58,9 +63,23 @@ def test_it_is_an_error_of_the_text(tmp_path, capsys, command, old, new, code, s
         (TRACE, "  trace x\n  limit steps 2.5e3\n", []),
         (TRACE, "  trace x\n  solver euler\n", ["--method", "bdf"]),
         (TRACE, "  trace x\n  solver bdf(index = 7)\n", ["--index", "0"]),
+        (TRACE, "  trace x\n  solver bdf(order = 6)\n", ["--method", "radau"]),
     ],
 )
 def test_the_command_line_wins(tmp_path, old, new, options):
     text = TEXT.replace(old, new)
     text = text.replace(TIME, "") if text.count("  time ") > 1 else text
     assert run(["simulate", "-q", write(tmp_path, text), *options]) == 0
+
+
+@pytest.mark.parametrize(
+    ("solver", "order", "span"), [("bdf(order = 1)", 1, 2), ("bdf(order = 2)", 2, 2), ("radau(order = 5)", 5, 100)]
+)
+def test_the_order_asked_for_is_that_of_the_steps(tmp_path, solver, order, span):
+    """Steps grow with the power 1/(order + 1) of the tolerance, where the longest step does not hold them."""
+    text = TEXT.replace(TIME, f"  time 0 s to {span} s\n").replace(TRACE, f"  trace x\n  solver {solver}\n")
+    file, steps = write(tmp_path, text), []
+    for rtol in ("1e-4", "1e-7"):
+        assert run(["simulate", "-q", file, "--rtol", rtol, "-o", str(tmp_path / "t.h5")]) == 0
+        steps.append(Trace.open(tmp_path / "t.h5").statistics["steps"])
+    assert np.log(1e3) / np.log(steps[1] / steps[0]) - 1.0 == pytest.approx(order, abs=0.5)
