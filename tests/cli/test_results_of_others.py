@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -33,14 +34,22 @@ scene long of driven {
 """
 
 
-@pytest.fixture
-def model(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    path = write(tmp_path, PENDULUM)
-    assert run(["simulate", "-q", path, "-o", "trace.h5"]) == 0
-    assert run(["sweep", "-q", path, "--over", "l=2,3", "-o", "runs.h5"]) == 0
-    Path("notes.txt").write_text("a year of measurements\n")
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with a model, its trace and its sweep, made once."""
+    folder = tmp_path_factory.mktemp("made")
+    path = Path(write(folder, PENDULUM))
+    assert run(["simulate", "-q", str(path), "-o", str(folder / "trace.h5")]) == 0
+    assert run(["sweep", "-q", str(path), "--over", "l=2,3", "-o", str(folder / "runs.h5")]) == 0
+    (folder / "notes.txt").write_text("a year of measurements\n")
     return path
+
+
+@pytest.fixture
+def model(made, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(made.parent, tmp_path, dirs_exist_ok=True)
+    return str(tmp_path / made.name)
 
 
 OVER = ["--over", "l=2,3"]
