@@ -223,7 +223,7 @@ class Condensed:
         made = elsewhere.core
         made.kinematics = kept_parts[0].size
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
-        made.k_scale = self._hold(whole.kinematic_scale)  # ones all
+        made.k_scale = self._hold(whole.ones())
         made.k_span, made.k_spans = self._hold(spans), 0 if self._own.size else len(spans)
         for k, planned in enumerate(form.calls):  # without loops that add to rows that are not kept alone
             whole.spare_loops(elsewhere.calls[k], planned.block, kept, planned.to)

@@ -143,7 +143,7 @@ class System(Facts):
         for k, scale in enumerate(form.scales):
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
-        self.kinematic_scale = self._ones() if form.name != "2" else self._ones().copy()
+        self.kinematic_scale = self.ones() if form.name != "2" else self.ones().copy()
         self.work = self._work(layout.entries)
         self._keep += [calls]
         self._reads_rate, self._may_hold = layout.reads_rate, layout.may_hold
@@ -202,7 +202,7 @@ class System(Facts):
         """Of the Jacobian."""
         return (self._layout or self._bring_back()).pattern
 
-    def _ones(self) -> Floats:
+    def ones(self) -> Floats:
         """Factors of rows q' - f where no metric gives them others: the same for all forms."""
         number = self.form.k_row.size
         return self.description.layouts.setdefault(("ones", number), np.ones(number))  # type: ignore[no-any-return]
