@@ -59,7 +59,8 @@ def horizon(one: Trace, other: Trace, bounds: Bounds) -> tuple[float, Gap | None
     for ratio in ratios.values():
         apart |= ratio > 1.0
     if not apart.any():
-        return (float(times[-1]) if times.size else -np.inf), None
+        both = np.intersect1d(one.time, other.time)  # with an event at the end too
+        return (float(both[-1]) if times.size else -np.inf), None
     first = int(np.argmax(apart))
     there = [gap for gap in gaps(one, other, bounds, float(times[first])) if gap.ratio > 1.0]
     return (float(times[first - 1]) if first else -np.inf), there[0]
