@@ -112,3 +112,15 @@ def test_what_passes_between_the_rows_is_the_size_that_errors_are_relative_to(tm
         t, b = trace["time"][()], trace["b"]
         assert b.attrs["nominal"] == pytest.approx(np.exp(-1.0), rel=0.05)
         assert np.abs(b[()] - t * np.exp(-t)).max() < 1e-4 * b.attrs["nominal"]
+
+
+def test_multipliers_between_the_rows_are_the_least_too(tmp_path):
+    """Two rows that say the same share the force of the rod; unshared, the first held it all: twice the nominal."""
+    text = (SEED / "redundant_pendulum.sd").read_text(encoding="utf-8")
+    traced = "trace rod.multiplier as a, again.multiplier as b every 0.4 s"
+    path = tmp_path / "two.sd"
+    path.write_text(text.replace("trace q1, q2, th, om every 10 ms", traced), encoding="utf-8")
+    main.run(["simulate", str(path), "-o", str(tmp_path / "t.h5")])
+    with h5py.File(tmp_path / "t.h5") as trace:
+        for name in ("a", "b"):
+            assert trace[name].attrs["nominal"] == pytest.approx(np.abs(trace[name][()]).max(), rel=1e-3)

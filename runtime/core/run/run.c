@@ -92,13 +92,15 @@ static void emit_compared(sd_run *run, double *row)
 /* The point of a row moved there; where only runs are compared by it, roughly, or not where states alone are seen. */
 static void settle_row(sd_run *run, double t, int32_t kind)
 {
-    if (kind == SD_COMPARED && run->bare)
-        return;
-    double enough = run->settle->enough;
-    if (kind == SD_COMPARED)
-        run->settle->enough = fmax(enough, run->rough);
-    sd_run_settle(run, t);
-    run->settle->enough = enough;
+    if (run->settle && !(kind == SD_COMPARED && run->bare)) {
+        double enough = run->settle->enough;
+        if (kind == SD_COMPARED)
+            run->settle->enough = fmax(enough, run->rough);
+        sd_run_settle(run, t);
+        run->settle->enough = enough;
+    }
+    if (run->least_norm)
+        sd_least_norm_apply(run->least_norm, t, run->point, run->point_d);
 }
 
 /* derivatives at the ends of the last steps as exact as the rows within the last one want them */
@@ -133,8 +135,7 @@ static void note_sizes(sd_run *run, double t, const double *observed)
 static void note_step(sd_run *run, double t)
 {
     run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
-    if (run->settle)
-        settle_row(run, t, 0);
+    settle_row(run, t, 0);
     memset(run->slope, 0, (size_t)run->observed * sizeof(double));
     if (run->observe)
         run->observe->rows(&run->observe->frame, t, run->point, run->point_d, run->slope);
@@ -166,10 +167,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         memset(run->slope, 0, (size_t)run->observed * sizeof(double));
         run->observe_rate->rows(&run->observe_rate->frame, t, run->point, run->point_d, run->slope);
     }
-    if (run->settle)
-        settle_row(run, t, (int32_t)kind);
-    if (run->least_norm)
-        sd_least_norm_apply(run->least_norm, t, run->point, run->point_d);
+    settle_row(run, t, (int32_t)kind);
     if (run->magnitude && !at_step)
         note_beyond(run);
     dissipated = at_step ? run->dissipated : run->step_dissipated + dissipated;
