@@ -16,6 +16,8 @@ from sysdyn.cli.streams import flush, silence
 USAGE, SOLVER, FAULT, INPUT_OUTPUT, INTERRUPTED = 2, 3, 4, 5, 130
 OF_RUNS = ("E920", "E921", "E930", "E931", "E932", "E933", "E934")
 """Findings of a run that stopped or is not met."""
+OF_CLAIMS = ("E907", "E909")
+"""Findings of what a scene expects of its run."""
 _PRECEDENCE = (INTERRUPTED, FAULT, INPUT_OUTPUT, USAGE, SOLVER, 1, 0)
 """Of exits that hold together, the one that counts first."""
 

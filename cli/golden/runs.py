@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.failures import OF_RUNS
+from sysdyn.cli.failures import OF_CLAIMS, OF_RUNS
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.asked import Request, options_of
 from sysdyn.cli.run.running import Ran, integrate, ready
@@ -28,8 +28,6 @@ PARTS = 16
 """Parts of each cell of the kept trace at whose ends a run has rows too: dense where the curves are not smooth."""
 APART = 1e-12
 """Of the span: instants nearer than this are one, computed in two ways."""
-CLAIMS = ("E907", "E909")
-"""Expectations are judged by `simulate`, at the scene's own accuracy."""
 
 
 def between(time: Floats) -> Floats:
@@ -69,7 +67,7 @@ def run(request: Request, also: Floats | None = None) -> Run:
     with tempfile.TemporaryDirectory(prefix="sysdyn-golden-") as folder:
         path = Path(folder) / "trace.h5"
         ran = _ran(replace(request, output=str(path)), report, also)
-        later = (*CLAIMS, *OF_RUNS)
+        later = (*OF_CLAIMS, *OF_RUNS)  # claims are judged by `simulate`, at the scene's own accuracy
         errors = [d for d in report.diagnostics if d.severity == "error" and (ran is None or d.code not in later)]
         if ran is None or errors:
             first = next(iter(errors), None)

@@ -117,8 +117,7 @@ def options_of(
     """The runtime's options; None where the report says why not.  began: `time.monotonic()` of the command; held: in
     memory where the request names no file.
     """
-    network = prepared.network
-    scene = network.scene or Scene("", network.place)
+    scene = prepared.network.scene or Scene("", prepared.network.place)
     value = prepared.binding.evaluate
 
     t0 = value(scene.start) if scene.start is not None else 0.0
@@ -127,10 +126,8 @@ def options_of(
         raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
     until, at, wall = instants_of(request, target.document, report)
     t1 = until if request.until is not None else t1
-    if network.scene is not None:
-        given, sharp = request.until is not None, request.accuracy is not None
-        how, form = request.method, request.index is not None
-        report.extend(wrong_numbers(target, scene, value, until=given, accuracy=sharp, method=how, index=form))
+    if prepared.network.scene is not None:
+        report.extend(wrong_numbers(target, scene, value, request))
     if t1 is None or report.failed:
         return None
     if not math.isfinite(t0) or not math.isfinite(t1):

@@ -74,8 +74,9 @@ def _started(target: targets.Target, network: Network, report: Report) -> dict[s
 
 
 def _judged(target: targets.Target, network: Network, report: Report) -> dict[str, object]:
-    from sysdyn.cli.run.prepare import prepare
-    from sysdyn.cli.run.scene_numbers import wrong_numbers  # lowering and arrays: not needed where the text has errors
+    from sysdyn.cli.run.asked import Request
+    from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
+    from sysdyn.cli.run.scene_numbers import wrong_numbers
     from sysdyn.cli.run.starting import described, start
     from sysdyn.compiler.binding.certificate import certificate
 
@@ -84,7 +85,8 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
         return {"ok": False}
     scene = network.scene
     if scene is not None:
-        report.extend(wrong_numbers(target, scene, prepared.binding.evaluate))
+        bare = Request(target.document.file.source.name)
+        report.extend(wrong_numbers(target, scene, prepared.binding.evaluate, bare))
         if report.failed:
             return {"ok": False}
     t0 = prepared.binding.evaluate(scene.start) if scene and scene.start else 0.0

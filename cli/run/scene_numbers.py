@@ -2,13 +2,14 @@
 
 Those that are plain constants are told with the text (dsl/elaborate/scenes.py); these are known where parameters have
 values.  What the command line says in a scene's place is not judged here.
-Received: a target, the scene, values; handed back: findings, each at its statement.
+Received: a target, the scene, values, a request; handed back: findings, each at its statement.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.elaborate.scenes import FINEST_ACCURACY
@@ -16,6 +17,9 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Scene
 from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Span
 from sysdyn.dsl.tree import syntax
+
+if TYPE_CHECKING:
+    from sysdyn.cli.run.asked import Request
 
 INSTANTS = 2e7
 """Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""
@@ -26,19 +30,10 @@ _ORDERS = {"bdf": (1.0, 2.0, 3.0, 4.0, 5.0), "radau": (5.0, 9.0, 13.0)}
 Value = Callable[[Node], float]
 
 
-def wrong_numbers(
-    target: Target,
-    scene: Scene,
-    value: Value,
-    *,
-    until: bool = False,
-    accuracy: bool = False,
-    method: str | None = None,
-    index: bool = False,
-) -> Iterator[Diagnostic]:
-    """What is wrong; until, accuracy, index: the command line gives it; method: as it gives it."""
-    yield from _span(target, scene, value, until=until)
-    if scene.accuracy is not None and not accuracy:
+def wrong_numbers(target: Target, scene: Scene, value: Value, request: Request) -> Iterator[Diagnostic]:
+    """What is wrong of what the request leaves to the scene."""
+    yield from _span(target, scene, value, until=request.until is not None)
+    if scene.accuracy is not None and request.accuracy is None:
         wanted = value(scene.accuracy)
         if not FINEST_ACCURACY <= wanted < 1.0:
             text = f"accuracy {wanted:g}: from {FINEST_ACCURACY:g} to less than 1, what double precision can tell"
@@ -48,7 +43,7 @@ def wrong_numbers(
         if not (math.isfinite(most) and round(most) >= 1):
             place = _place(target, scene, syntax.Limit, lambda s, name=name: s.name.name == name)
             yield Diagnostic("E912", f"limit {name} {most:g}: a whole number from 1 on", place, f"limit {name} 10000")
-    yield from _solver(target, scene, value, method, index=index)
+    yield from _solver(target, scene, value, request)
 
 
 def _span(target: Target, scene: Scene, value: Value, *, until: bool) -> Iterator[Diagnostic]:
@@ -71,7 +66,7 @@ def _span(target: Target, scene: Scene, value: Value, *, until: bool) -> Iterato
         yield Diagnostic("E912", text, place, f"every {(t1 - t0) / 1000.0:.3g} s, or none: each step is traced then")
 
 
-def _solver(target: Target, scene: Scene, value: Value, method: str | None, *, index: bool) -> Iterator[Diagnostic]:
+def _solver(target: Target, scene: Scene, value: Value, request: Request) -> Iterator[Diagnostic]:
     """The options of the solver, and the step that one of them needs."""
     said = {name: value(node) for name, node in scene.solver_options}
     place = _place(target, scene, syntax.Solver)
@@ -79,13 +74,13 @@ def _solver(target: Target, scene: Scene, value: Value, method: str | None, *, i
         if not said.get(name, 1.0) > 0.0:
             text = f"{name} = {said[name]:g} s of the solver: it is positive"
             yield Diagnostic("E912", text, place, f"{name} = 1 ms")
-    if not index and said.get("index", 0.0) not in _INDICES:
+    if request.index is None and said.get("index", 0.0) not in _INDICES:
         yield Diagnostic("E607", f"index = {said['index']:g} of the solver", place, "index = 0, 1, 2, 3")
     orders = _ORDERS.get(scene.solver or "", ())
-    if method in (None, scene.solver) and "order" in said and said["order"] not in orders:
+    if request.method in (None, scene.solver) and "order" in said and said["order"] not in orders:
         text = f"order = {said['order']:g} of the solver {scene.solver}"
         yield Diagnostic("E607", text, place, "bdf(order = 1 .. 5): at most; radau(order = 5), 9 or 13: that one")
-    if method is None and scene.solver == "euler" and "step" not in said:
+    if request.method is None and scene.solver == "euler" and "step" not in said:
         yield Diagnostic("E607", "method euler needs a step", place, "solver euler(step = 1 ms)")
 
 

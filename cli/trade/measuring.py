@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.failures import UsageError
+from sysdyn.cli.failures import OF_CLAIMS, UsageError
 from sysdyn.cli.options import TRIED
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.asked import ACCURACY, Request, options_of
@@ -305,7 +305,7 @@ def _text(levels: tuple[tuple[str, str], ...]) -> str:
 
 def _of_run(report: Report) -> list[Diagnostic]:
     """Findings without those of what the scene expects: they are no reason against a setting."""
-    return [d for d in report if d.code not in ("E907", "E909")]
+    return [d for d in report if d.code not in OF_CLAIMS]
 
 
 def _reason(ran: Ran | None, report: Report) -> str:

@@ -38,11 +38,10 @@ class Gap:
 
 def gaps(one: Trace, other: Trace, bounds: Bounds, until: float) -> tuple[Gap, ...]:
     """The worst place of each quantity up to `until` [s], worst first; () where there is no common instant."""
-    times, ratios = _compared(one, other, bounds)
+    (times, here, there), ratios = _compared(one, other, bounds)
     inside = times <= until
     if not inside.any():
         return ()
-    _, here, there = _common(one, other)
     found = []
     for name, ratio in ratios.items():
         k = int(np.argmax(ratio[inside]))
@@ -54,7 +53,7 @@ def gaps(one: Trace, other: Trace, bounds: Bounds, until: float) -> tuple[Gap, .
 
 def horizon(one: Trace, other: Trace, bounds: Bounds) -> tuple[float, Gap | None]:
     """The last common instant [s] before any quantity differs, and what differs after it; -inf where there is none."""
-    times, ratios = _compared(one, other, bounds)
+    (times, *_), ratios = _compared(one, other, bounds)
     apart = np.zeros(times.size, dtype=bool)
     for ratio in ratios.values():
         apart |= ratio > 1.0
@@ -74,8 +73,12 @@ def _common(one: Trace, other: Trace) -> tuple[Floats, Places, Places]:
     return times[use], here[use].astype(np.intp), there[use].astype(np.intp)
 
 
-def _compared(one: Trace, other: Trace, bounds: Bounds) -> tuple[Floats, dict[str, Floats]]:
-    """Common instants, and there the ratio of difference to bound of each quantity; not a number counts as infinite."""
+def _compared(
+    one: Trace, other: Trace, bounds: Bounds
+) -> tuple[tuple[Floats, Places, Places], dict[str, Floats]]:
+    """Common instants and their places, and there the ratio of difference to bound of each quantity; not a number
+    counts as infinite.
+    """
     times, here, there = _common(one, other)
     ratios = {}
     largest = [_largest(one), _largest(other)]
@@ -86,7 +89,7 @@ def _compared(one: Trace, other: Trace, bounds: Bounds) -> tuple[Floats, dict[st
         apart = np.abs(one[name].values[here] - other[name].values[there])
         ratio = apart / size if size > 0.0 else np.where(apart == 0.0, 0.0, np.inf)
         ratios[name] = np.where(np.isnan(ratio), np.inf, ratio)
-    return times, ratios
+    return (times, here, there), ratios
 
 
 def _largest(trace: Trace) -> dict[str, float]:

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from sysdyn.cli.failures import OF_RUNS, UsageError
+from sysdyn.cli.failures import OF_CLAIMS, OF_RUNS, UsageError
 from sysdyn.cli.options import EVERY
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.asked import ACCURACY, Request, check_tolerances, options_of
@@ -42,7 +42,7 @@ GRID = 200
 """Intervals of the common instants where the scene leaves them to the solver."""
 REFUSALS = ("E601", "E602", "E603", "E604", "E605", "E606", "E607", "E608")
 """Codes by which a formulation says that it cannot express a model."""
-JUDGED = ("E907", "E909", *OF_RUNS)
+JUDGED = (*OF_CLAIMS, *OF_RUNS)
 """What runs say of themselves: it is in their part of the table."""
 
 
