@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 def command(
     console: Console, progress: str, no_timings: bool, full: bool, jobs: int | None, output: str | None, **options: Any
 ) -> int:
-    """Run a scene of FILE in every formulation that can express it, by bdf and by radau, and compare the traces.
+    """Run a scene of FILE in every formulation that can express it, by two methods, and compare the traces.
+
+    The methods are bdf and radau; where the scene or --method names another, that one and bdf.
 
     Two runs agree where every traced quantity differs by less than 10 x accuracy x its nominal magnitude, up to the
     horizon: the instant at which the reference differs by that much from its own run at a tenth of the accuracy.

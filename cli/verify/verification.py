@@ -34,6 +34,8 @@ from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
 METHODS = ("bdf", "radau")
+"""Where neither the scene nor the request names a method; else that one, and the first of these that is another; again
+these in a formulation that has no such method."""
 TIMES = 10.0
 """Of the accuracy asked: what two runs may differ by (CONTRACT)."""
 FINER = 0.1
@@ -58,8 +60,8 @@ def verify(
     jobs: formulations side by side, each in a process of its own; None: where it pays.
     """
     check_tolerances(request)
-    if request.method not in (None, "auto", *METHODS):
-        raise UsageError(f"--method {request.method}: verify compares {' and '.join(METHODS)}")
+    if request.method == "euler":
+        raise UsageError("--method euler: verify compares bdf and radau, or a method named and bdf; euler has no accuracy")
     document = targets.read(request.file, report)
     request = replace(request, text=document.file.source.text if request.file == "-" else None)
     target = targets.one(document, request.file, request.model, request.scene, report)
@@ -200,10 +202,13 @@ class _Verification:
             self.report.extend(d for d in report if d.severity != "error")
 
     def _methods(self, prepared: Prepared, options: Options, report: Report, *, reference: bool) -> None:
-        first = _method(options)
-        for method in (first, *(m for m in METHODS if m != first)):
+        first, second = _methods(options)
+        for method in (first, second):
             inner = Report()
             ran = self._run(prepared, options, method, inner, "")
+            if ran is None and not reference and method not in METHODS and any(d.code == "E607" for d in inner):
+                self._methods(prepared, replace(options, method="auto"), report, reference=False)
+                return  # this formulation has no such method
             name = f"{prepared.formulation} {method}"
             self._collect(inner, name)
             if reference and method == first:
@@ -334,9 +339,11 @@ def _gridded(options: Options) -> Options:
     return replace(options, every=(options.t_end - options.t_start) / GRID)
 
 
-def _method(options: Options) -> str:
-    """The method of the reference: the one asked for, or the first where neither is."""
-    return options.method if options.method in METHODS else METHODS[0]
+def _methods(options: Options) -> tuple[str, str]:
+    """The method of the reference, and the other one."""
+    if options.method in ("auto", "euler"):
+        return METHODS
+    return options.method, next(m for m in METHODS if m != options.method)
 
 
 def _finer(options: Options) -> Options:

@@ -5,7 +5,7 @@ The models of models/benchmark, each at its end: the cheapest run whose achieved
 it the cheapest single run with --rtol by any method.  Peers: IDA and CVODE on the residual and the Jacobian that
 `sysdyn compile` writes of the same model (peers/peer.c), over index forms, tolerances by half decades, algebraic
 unknowns in and out of the error test, two constants of Newton's test, two policies of refactoring, dense and KLU, BDF
-and Adams.  Error: largest of the traced quantities at the end, over their largest value in the span, against our radau
+and Adams.  Error: largest of the traced quantities at the end, over their larger value at both ends, against our radau
 near round-off (`reference`: how far that is from our bdf, and from published values where there are any).
 Without SUNDIALS (Debian: libsundials-dev, libsuitesparse-dev) it says so and measures ours alone.
 """
@@ -161,7 +161,7 @@ def race(family: str, peers: Peers, seconds: float) -> Family | None:
         if exact is None:
             return None
         names = list(exact.values)
-        size = np.array([exact.nominal[name] for name in names])
+        size = np.array([np.abs(exact.values[name]).max() or exact.nominal[name] for name in names])
         wanted = np.array([exact.values[name][-1] for name in names])
 
         def error(values: dict[str, float]) -> float:
