@@ -61,7 +61,7 @@ def verify(
     """
     check_tolerances(request)
     if request.method == "euler":
-        raise UsageError("--method euler: verify compares bdf and radau, or a method named and bdf; euler has no accuracy")
+        raise UsageError("--method euler: verify compares bdf and radau, or another and bdf; euler has no accuracy")
     document = targets.read(request.file, report)
     request = replace(request, text=document.file.source.text if request.file == "-" else None)
     target = targets.one(document, request.file, request.model, request.scene, report)

@@ -152,7 +152,7 @@ in the complementary formulations, whose laws have no slope there."""
 WARNED = ("gallery/piston_pump.sd",)
 """Models whose index kane cannot tell at the start, where both valves are closed and nothing flows."""
 SINGULAR = ("benchmark/fourbar.sd",)
-"""Scenes that pass positions in which constraints lose rank: radau stops there and says so, bdf and dopri pass and agree."""
+"""Scenes that pass positions in which constraints lose rank: radau stops there and says so, bdf and dopri agree."""
 
 
 SHORT = {
