@@ -181,3 +181,25 @@ def test_options_that_do_not_exist(tmp_path):
     with pytest.raises(WrongOption, match="method rk4"):
         outcome(models.pendulum(), tmp_path / "o.h5", 1.0, method="rk4")
     assert choose_index is not None
+
+
+def test_steps_without_a_row_cost_no_more_than_what_is_new_in_them(tmp_path):
+    """A row moves its point onto the constraints, by residuals of their second derivatives; a step without one only
+    where some quantity is larger than before, so that the nominals are those of all steps.
+    """
+    asked, nominal = [], []
+    for every in (None, 4.0):
+        manifest, binding, module = models.pendulum()
+        rows, calls = module.phi_acceleration_rows, []
+
+        def counted(*arguments, rows=rows, calls=calls):
+            calls.append(1)
+            return rows(*arguments)
+
+        module.phi_acceleration_rows = counted
+        path = tmp_path / "t.h5"
+        trace = outcome((manifest, binding, module), path, 4.0, rtol=1e-6, method="bdf", every=every).traced
+        asked.append(len(calls))
+        nominal.append([trace[name].nominal for name in trace.names])
+    assert asked[1] < 0.4 * asked[0]
+    assert np.allclose(nominal[1], nominal[0], rtol=2e-3)

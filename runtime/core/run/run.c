@@ -10,6 +10,7 @@
 #include "run/quadratures.h"
 
 #define POLL 4  /* steps between two looks at the clock */
+#define GROWN 1.001 /* times the largest so far: a size by which the point of a step is looked at closely */
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
                    int32_t audited)
@@ -118,28 +119,47 @@ static void refine(sd_run *run)
     run->settle->enough = enough;
 }
 
-/* Magnitudes of what is observed [observed] and of its terms, at the point of a row. */
-static void note_sizes(sd_run *run, double t, const double *observed)
+/* values [observed] := magnitudes of what is observed and of its terms, at the point of a row */
+static void find_sizes(sd_run *run, double t, const double *observed)
 {
     memset(run->values, 0, (size_t)run->observed * sizeof(double));
     if (run->observe_scale)
         run->observe_scale->rows(&run->observe_scale->frame, t, run->point, run->point_d, run->values);
-    for (int32_t i = 0; i < run->observed; i++) {
-        double size = fmax(fabs(observed[i]), fabs(run->values[i]));
-        if (size > run->largest[i])
-            run->largest[i] = size;
-    }
+    for (int32_t i = 0; i < run->observed; i++)
+        run->values[i] = fmax(fabs(observed[i]), fabs(run->values[i]));
 }
 
-/* The same at the end of a step that has no row. */
-static void note_step(sd_run *run, double t)
+/* the same of a point without a row */
+static void find_own_sizes(sd_run *run, double t)
 {
-    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
-    settle_row(run, t, 0);
     memset(run->slope, 0, (size_t)run->observed * sizeof(double));
     if (run->observe)
         run->observe->rows(&run->observe->frame, t, run->point, run->point_d, run->slope);
-    note_sizes(run, t, run->slope);
+    find_sizes(run, t, run->slope);
+}
+
+static void note_sizes(sd_run *run)
+{
+    for (int32_t i = 0; i < run->observed; i++)
+        if (run->values[i] > run->largest[i])
+            run->largest[i] = run->values[i];
+}
+
+/* Sizes at the end of a step that has no row: it is moved onto the equations only where more than the state is seen, and one
+ * of them grows by more than they would change it. */
+static void note_step(sd_run *run, double t)
+{
+    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+    int grown = run->least_norm != NULL;
+    if (!grown)
+        find_own_sizes(run, t);
+    for (int32_t i = 0; i < run->observed && !grown && !run->bare; i++)
+        grown = run->values[i] > GROWN * run->largest[i];
+    if (grown) {
+        settle_row(run, t, 0);
+        find_own_sizes(run, t);
+    }
+    note_sizes(run);
 }
 
 /* one output row at an instant of the last step, written as of `label`; two where it is compared too */
@@ -197,7 +217,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     if (run->observe_rate && !(compared && alone))
         run->observe_rate->rows(&run->observe_rate->frame, t, run->point, run->point_d,
                                 row + SD_ROW_HEAD + run->observed);
-    note_sizes(run, t, row + SD_ROW_HEAD);
+    find_sizes(run, t, row + SD_ROW_HEAD);
+    note_sizes(run);
     run->t_row = label;
     run->rows++;
     run->rows_written++;
