@@ -10,7 +10,7 @@
 #include "run/quadratures.h"
 
 #define POLL 4  /* steps between two looks at the clock */
-#define GROWN 1.001 /* times the largest so far: a size by which the point of a step is looked at closely */
+#define GROWN 1.1 /* times the largest so far: beyond it the size of a step is not believed as the method left it */
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
                    int32_t audited)
@@ -145,8 +145,8 @@ static void note_sizes(sd_run *run)
             run->largest[i] = run->values[i];
 }
 
-/* Sizes at the end of a step that has no row: it is moved onto the equations only where more than the state is seen, and one
- * of them grows by more than they would change it. */
+/* Sizes at the end of a step that has no row, which is moved onto the equations only where more than the state is seen and one
+ * of them grows at once: what no error test sees may be anything in a first step. */
 static void note_step(sd_run *run, double t)
 {
     run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
