@@ -139,12 +139,13 @@ def main() -> None:
         try:
             made = rows(name, accuracies, given.formulation, given.seconds)
         except NoSuchForm as none:
-            print(f"{none}: values beside a jump are of instants, not of errors", flush=True)
+            print(f"{name}: {none}", flush=True)
             continue
         for row in made:
             found.append(row)
             print(row, flush=True)
-    print(summary(found))
+    if found:
+        print(summary(found))
 
 
 if __name__ == "__main__":
