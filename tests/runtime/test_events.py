@@ -83,3 +83,56 @@ def test_a_resistance_jumps_in_every_index_form(tmp_path, formulation, how):
     assert [e.time for e in trace.events] == pytest.approx([jump], rel=1e-6)
     end = 100.0 / 13.0 + (2.0 - 100.0 / 13.0) * np.exp(-(5e-3 - jump) / after)
     assert trace["u"][-1] == pytest.approx(end, rel=1e-6)
+
+
+TRIP = """
+model supply {
+  discrete trips = 0
+  discrete at: s = 0 s
+  node a, b: electrical
+  V: effort(e = if t < 1 s then 1 V else 5 V) a
+  R: dissipator(e = 1 ohm*f) a -> b
+  C: potential(q = 1 F*e) b
+  when R.f >= 2 A { trips := trips + 1; at := t }
+  init C.e = 0 V
+}
+scene s of supply {
+  time 0 s to 2 s
+  trace C.e as u, trips, at every 0.3 s
+}
+"""
+ROPE = """
+model rope {
+  discrete held = true
+  coord x: translation = 0 m
+  energy T* = 1/2*(2 kg)*x'^2
+  psi rope: x' = 0 m/s while held
+  when held and abs(rope.multiplier) >= 3 N { held := false }
+  work (if t < 1 s then 1 N else 5 N) on x
+  init x' = 0 m/s
+}
+scene s of rope {
+  time 0 s to 3 s
+  trace x
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian"])
+@pytest.mark.parametrize("method", ["radau", "bdf"])
+def test_a_current_that_jumps_past_a_limit_with_its_source_trips(tmp_path, formulation, method):
+    """The current follows from the source by the circuit's equations: no relation reads the text that jumps."""
+    trace = run(TRIP, tmp_path, formulation=formulation, method=method, accuracy=1e-6)
+    assert [e.time for e in trace.events] == pytest.approx([1.0], abs=1e-12)
+    assert trace["trips"][-1] == 1.0
+    assert trace["at"][-1] == pytest.approx(1.0, abs=1e-12)
+    here = np.flatnonzero(np.abs(trace.time - 1.0) < 1e-12)
+    assert trace["trips"][here[-1]] == 1.0  # the instant is in the trace, between those of `every`
+    u = 5.0 - (4.0 + np.exp(-1.0)) * np.exp(-1.0)
+    assert trace["u"][-1] == pytest.approx(u, rel=1e-6)
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+def test_a_rope_breaks_where_its_force_jumps_past_what_it_bears(tmp_path, formulation):
+    trace = run(ROPE, tmp_path, formulation=formulation, accuracy=1e-8)
+    assert trace["x"][-1] == pytest.approx(0.5 * (5.0 / 2.0) * 2.0**2, rel=1e-8)
