@@ -37,7 +37,7 @@ def test_a_content_without_a_corner_is_no_friction(content):
     assert [d.code for d in check(sudden) if d.severity == "note"] == ["N608"]
 
 
-@pytest.mark.parametrize("target, remedy", [("x", "x' := ..., its rate"), ("K.q", None), ("K.e", None)])
+@pytest.mark.parametrize(("target", "remedy"), [("x", "x' := ..., its rate"), ("K.q", None), ("K.e", None)])
 def test_a_rate_is_the_remedy_where_there_is_one(target, remedy):
     """What a store holds has no rate that an event may assign: the store's flow is no unknown of its own."""
     element = "  K: potential(e = 3 N/m*q) on x\n  when x <= 0 m {{ {0} := 0 {1} }}\n  init x'"

@@ -284,7 +284,7 @@ def test_errors_without_end_are_cut():
 
 
 @pytest.mark.parametrize(
-    "line, help_",
+    ("line", "help_"),
     [
         ("R1 = resistor(R = 1 ohm) a -> b   # load", "R1: resistor(R = 1 ohm) a -> b"),
         ("resistor R1(R = 1 ohm) a -> b", "R1: resistor(R = 1 ohm) a -> b"),
