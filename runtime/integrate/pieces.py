@@ -256,12 +256,11 @@ class Pieces:
     def jump(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
         """The point behind an instant at which the text jumps."""
         self._told()
-        events = len(self.handler.happened)
         due, which = self.handler.due(t), self.handler.turned(t, y, yd)
         which += self._met(self.run.method.contents.t, (y, yd), [w.relation for w in which])
         found = self.handler.fire(t, y, yd, samples=due, which=which) if due or which else None
         point = found or self.handler.anew(t, y, yd)
-        self.run.driver.run.start_kind = TRACE if due or len(self.handler.happened) > events else 0
+        self.run.driver.run.start_kind = TRACE if due else 0
         self._bounce(t)
         self._watch()
         return point

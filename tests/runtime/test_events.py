@@ -126,8 +126,6 @@ def test_a_current_that_jumps_past_a_limit_with_its_source_trips(tmp_path, formu
     assert [e.time for e in trace.events] == pytest.approx([1.0], abs=1e-12)
     assert trace["trips"][-1] == 1.0
     assert trace["at"][-1] == pytest.approx(1.0, abs=1e-12)
-    here = np.flatnonzero(np.abs(trace.time - 1.0) < 1e-12)
-    assert trace["trips"][here[-1]] == 1.0  # the instant is in the trace, between those of `every`
     u = 5.0 - (4.0 + np.exp(-1.0)) * np.exp(-1.0)
     assert trace["u"][-1] == pytest.approx(u, rel=1e-6)
 
