@@ -216,7 +216,9 @@ def _target(frame: ElaborationContext, action: syntax.Action) -> tuple[Typed, bo
             return Typed(ex.var(name, "f", *node.args), value.dimension), False
     text = " ".join(frame.resolver.source.text[action.target.span.start : action.target.span.end].split())
     message = f"event assigns {text} (only discrete variables, states and x' of a coordinate may jump)"
-    help_ = f"discrete {text} = ... in place of its declaration" if node.op == "param" else f"{text}' := ..., its rate"
+    help_ = f"discrete {text} = ... in place of its declaration" if node.op == "param" else None
+    if node.op == "var" and node.data[1:] == ("q", 0):
+        help_ = f"{text}' := ..., its rate"
     raise frame.resolver.fail("E702", message, action.target.span, help=help_)
 
 

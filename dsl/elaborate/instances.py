@@ -428,7 +428,9 @@ class Instances(Elements):
             raise self.resolver.fail("E407", f"'{component.name}' has no branch '{name}'", connection.span)
         if name in bound:
             message = f"'{s.decl.name}: {component.name}' needs 1 connection, has {len(s.connections)}"
-            raise self.resolver.fail("E402", message, connection.span)
+            nodes = [self._text(c.node) for c in s.connections if isinstance(c, syntax.Single)]
+            help_ = " -> ".join(nodes) if len(s.connections) == len(nodes) == 2 else None
+            raise self.resolver.fail("E402", message, connection.span, help=help_)
         word = head.branches[name].domain
         wanted = space.scope.find(word.name)
         if not isinstance(wanted, DomainSymbol):

@@ -36,7 +36,7 @@ def choose_level(
     if chosen not in levels:
         message = f"no level '{chosen}'; '{component.name}' has {', '.join(levels) or 'none'}"
         near = nearest(chosen, levels)
-        remedy = f"nearest: '{near}'" if near else None
+        remedy = f"nearest: '{near}'" if near else None if levels else "leave the level out"
         frame.report.error("E802", message, place or frame.place(s.component.span), help=remedy)
         raise Failed
     if len(levels) > 1:

@@ -265,8 +265,8 @@ def call(name: str, *args: Node) -> Node:
     if name == "smoothstep":
         x = call("min", call("max", args[0], const(0.0)), const(1.0))
         return mul(x, x, linear(3.0, ((-2.0, x),)))
-    if name in ("min", "max") and len(args) > 2:
-        return call(name, call(name, *args[:-1]), args[-1])
+    if name in ("min", "max") and len(args) != 2:
+        return call(name, call(name, *args[:-1]), args[-1]) if len(args) > 2 else args[0]
     if name == "signal":
         return signal(args[0])
     if all(a.op == "const" for a in args):

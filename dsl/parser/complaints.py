@@ -128,6 +128,11 @@ _GROUPS = (
     (frozenset({"linear", "pchip", "cubic", "hold"}), "'linear', 'pchip', 'cubic' or 'hold'"),
 )
 
+_ASSIGNED = re.compile(r"=\s*([\w.]+\(.*->[^#]*)")
+"""An element behind a sign of equality."""
+_DECLARED = re.compile(r"(\w+)\s*\((.*?)\)\s*([\w\[\]]+\s*->\s*[\w\[\]]+)?\s*;?\s*(?:#.*)?$")
+"""A label behind its component: name, parameters, nodes."""
+
 Complaint = tuple[str, str, str | None]
 """Code, message, help."""
 
@@ -159,6 +164,8 @@ def first_token(text: str, kind: str, body: str) -> Complaint:
         return "E112", f"'{text}' closes nothing that is open", None
     if kind == "<newline>":
         return "E113", "';' ends nothing here", None
+    if text == "{":
+        return "E109", "a statement cannot begin with '{'", "the '{' at the end of the line above"
     return "E109", f"a statement cannot begin with {quoted(text, kind)}", _CONTINUE
 
 
@@ -193,6 +200,8 @@ def unknown(word: str, after: str, body: str) -> Complaint:
         return "E113", "an action assigns: name := expression", None
     if body == "bundle_member":
         return "E113", "a bundle lists nodes: x, y: translation", None
+    if body == "statement" and (element := _element(word, after.partition("\n")[0])) is not None:
+        return "E113", f"no statement begins with '{word}'; an element has a label", element
     if after.startswith("=") and not after.startswith("=="):
         wanted = "set" if body == "scene_statement" else "const" if body == "item" else "let"
         return (
@@ -212,6 +221,15 @@ def unknown(word: str, after: str, body: str) -> Complaint:
         label = f"{word[0].upper()}1: {word}(...) a -> b"
         return "E113", f"no statement begins with '{word}'; an element has a label", label
     return "E113", f"no statement begins with '{word}'", said or (near[0] if near else None)
+
+
+def _element(word: str, after: str) -> str | None:
+    """The element that is meant by `R1 = resistor(...) a -> b` and by `resistor R1(...)`."""
+    assigned = _ASSIGNED.match(after)
+    if assigned is not None:
+        return f"{word}: {assigned[1].strip()}"
+    declared = _DECLARED.match(after)
+    return None if declared is None else f"{declared[1]}: {word}({declared[2]}) {declared[3] or 'a -> b'}"
 
 
 _SHAPES = {
@@ -236,12 +254,17 @@ _SHAPES = {
     "init": "init x = 1 m",
     "law": "law e = R*f",
     "when": "when x >= 1 m { y := 0 }",
+    "every": "every 5 ms { y := x }",
+    "discrete": "discrete on = false",
+    "for": "for i in 1..n { ... }",
     "time": "time 0 s to 5 s",
     "set": "set k = 3 N/m",
     "trace": "trace x in mm as pos, y every 1 ms",
     "expect": "expect always: a <= b",
     "accuracy": "accuracy 1e-6 on x",
     "scene": "scene name of model { ... }",
+    "model": "model name { ... }",
+    "component": "component name { ... }",
     "from": "from std.electrical import resistor, capacitor",
     "fn": "fn f(x: m) -> N = ...",
     "table": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
@@ -308,6 +331,12 @@ def _hint(kind: str, text: str, line: str, accepted: Collection[str]) -> str | N
         return "bare numbers here: their units stand in the head of the table"
     if text in ("<", ">", "<=", ">=", "==", "!=") and "and" in accepted:
         return "comparisons do not chain: a < b and b < c"
+    if text == "-" and "->" in accepted:
+        return "a -> b: the arrow is one sign"
+    if text == "if":
+        return "the condition of a choice comes first: if c then a else b"
+    if text != "<" and accepted and set(accepted) & {"then", "else"}:
+        return "if c then a else b"
     if kind == "<name>" and "->" in accepted and before.isidentifier():
         return f"{before} -> {text}"
     if before == "." and kind != "<name>":

@@ -293,10 +293,10 @@ class Handler:
         return point
 
     def anew(self, t: float, y: Floats, yd: Floats) -> Point:
-        """The point behind an instant at which nothing but the text jumps."""
+        """The point behind an instant at which the text jumps, and behind the conditions that become true by it."""
         stood = self.kinks.state()
         self.kinks.anew()
-        point = self.settled(t, y, yd, self._words())
+        point = self._followed(t, self.settled(t, y, yd, self._words()))
         self.happened += self.kinks.happened(t, stood)
         return point
 

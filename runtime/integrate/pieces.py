@@ -168,12 +168,28 @@ class Pieces:
             if self._by_round_off(which):
                 continue
             before = self._point(t)
+            which += self._met(t, before, [w.relation for w in which])
             point = self._fire(t, before, [], which)
             if point is not None:
                 self._accept(t, TRACE, sink, which)
                 self._go_on(t, point, before, misled=end - core.t_from if self.handler.stands(which) else 0.0)
                 return time.process_time() - began
             begin = t
+
+    def _met(self, t: float, point: Point, known: Sequence[int] = ()) -> list[Watched]:
+        """The relations beside the known ones that cross zero at t (s) too, but for round-off: one instant for all."""
+        handler = self.handler
+        sided = [k for k, side in enumerate(handler.side.tolist()) if side and k not in known]
+        values = handler.observer(t, *point) if sided else np.zeros(0)
+        near = [w for w in handler.watched() if w.relation in sided]
+        near = [w for w in near if abs(values[w.row]) <= handler.observer.zero(w.row)]
+        begin = self.run.driver.run.t_from if self.modes is None else self.modes.core.begin
+        step = (t - begin) / PARTS
+        if not near or step <= handler.nothing:
+            return []
+        low, here = self._values(t - step), self._values(t)
+        falls = [(w, w.side * float(low[w.row] - here[w.row]) / step) for w in near]
+        return [w for w, rate in falls if rate > 0.0 and w.side * float(here[w.row]) <= rate * handler.nothing]
 
     def _by_round_off(self, which: list[Watched]) -> bool:
         """Whether a relation has crossed zero within what round-off leaves of it, which is then its zero."""
@@ -230,7 +246,7 @@ class Pieces:
             y, yd = run.method.point()
             y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
             self.handler.before = self.handler.now()
-            point = self._fire(method.t, (y, yd), due, [])
+            point = self._fire(method.t, (y, yd), due, self._met(method.t, (y, yd)))
             run.driver.drain(sink)
             self.aim(end)
             if point is not None:
@@ -241,6 +257,7 @@ class Pieces:
         """The point behind an instant at which the text jumps."""
         self._told()
         due, which = self.handler.due(t), self.handler.turned(t, y, yd)
+        which += self._met(self.run.method.contents.t, (y, yd), [w.relation for w in which])
         found = self.handler.fire(t, y, yd, samples=due, which=which) if due or which else None
         point = found or self.handler.anew(t, y, yd)
         self.run.driver.run.start_kind = TRACE if due else 0

@@ -35,3 +35,12 @@ def test_a_content_without_a_corner_is_no_friction(content):
     assert not any(d.code in ("N608", "W301") for d in check(text))
     sudden = text.replace(content, "1 N*x'*(if x' > 0 m/s then 2 else 1)")
     assert [d.code for d in check(sudden) if d.severity == "note"] == ["N608"]
+
+
+@pytest.mark.parametrize(("target", "remedy"), [("x", "x' := ..., its rate"), ("K.q", None), ("K.e", None)])
+def test_a_rate_is_the_remedy_where_there_is_one(target, remedy):
+    """What a store holds has no rate that an event may assign: the store's flow is no unknown of its own."""
+    element = "  K: potential(e = 3 N/m*q) on x\n  when x <= 0 m {{ {0} := 0 {1} }}\n  init x'"
+    text = MODEL.format("").replace("  init x'", element.format(target, "N" if target == "K.e" else "m"))
+    (found,) = [d for d in check(text) if d.code == "E702"]
+    assert (found.help == remedy) if remedy else ("'" + " := ..." not in found.help)

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.dimensions import halved, result, wants_plain
 from sysdyn.dsl.model.functions import FUNCTIONS, is_whole, real_power
 
@@ -78,3 +79,10 @@ def test_dimensions_of_values():
     assert (result("abs", area), result("sign", area), result("celsius", ())) == (area, (), (("K", 1),))
     assert result("sqrt", None) is None
     assert [wants_plain(name) for name in ("exp", "abs", "atan2")] == [True, False, False]
+
+
+@pytest.mark.parametrize("name", ["min", "max"])
+def test_the_least_of_one_number_is_itself(name):
+    x = ex.var("x", "s")
+    assert ex.call(name, x) is x
+    assert ex.call(name, ex.const(2.0)) is ex.const(2.0)

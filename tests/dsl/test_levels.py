@@ -59,3 +59,11 @@ def test_elsewhere_it_is_an_error_that_names_the_level(found):
 
 def test_what_no_level_has_is_an_error(found):
     assert [code for code, _ in found("", "  trace M.Lb.f\n")[1]] == ["E102"]
+
+
+def test_a_part_without_levels_has_none_to_choose(tmp_path):
+    report = Report()
+    text = (TEXT % ("", "")).replace("scene run of drive {", "scene run of drive {\n  level V = hot")
+    document = load.document(SourceText(str(tmp_path / "drive.sd"), text), report)
+    load.network(document, document.models["drive"], document.scenes["run"], report)
+    assert [(d.code, d.help) for d in report if d.code == "E802"] == [("E802", "leave the level out")]

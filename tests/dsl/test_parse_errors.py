@@ -281,3 +281,28 @@ def test_errors_without_end_are_cut():
     found = parse(SourceText("t", "? ?\n" * 100_000))[1]
     assert len(found) == 101
     assert "rest of the file is not read" in found[-1].message
+
+
+@pytest.mark.parametrize(
+    ("line", "help_"),
+    [
+        ("R1 = resistor(R = 1 ohm) a -> b   # load", "R1: resistor(R = 1 ohm) a -> b"),
+        ("resistor R1(R = 1 ohm) a -> b", "R1: resistor(R = 1 ohm) a -> b"),
+        ("Resistor R1(R=1);", "R1: Resistor(R=1) a -> b"),
+        ("R1: resistor(R = 1 ohm) a - > b", "a -> b: the arrow is one sign"),
+        ("let u = if t > 1 s then 5 V", "if c then a else b"),
+        ("let u = 5 V if t > 1 s else 0 V", "the condition of a choice comes first: if c then a else b"),
+        ("for i = 1:3 { }", "for i in 1..n { ... }"),
+        ("every 1 ms every 2 ms { }", "every 5 ms { y := x }"),
+    ],
+)
+def test_what_other_languages_write_is_shown_as_it_is_written_here(line, help_):
+    assert in_model(line).help == help_
+
+
+def test_a_brace_belongs_on_the_line_above():
+    found = parse(SourceText("t.sd", "model m\n{\n  param k = 3\n}\n"))[1]
+    assert [(d.code, d.help) for d in found] == [
+        ("E113", "model name { ... }"),
+        ("E109", "the '{' at the end of the line above"),
+    ]

@@ -83,3 +83,92 @@ def test_a_resistance_jumps_in_every_index_form(tmp_path, formulation, how):
     assert [e.time for e in trace.events] == pytest.approx([jump], rel=1e-6)
     end = 100.0 / 13.0 + (2.0 - 100.0 / 13.0) * np.exp(-(5e-3 - jump) / after)
     assert trace["u"][-1] == pytest.approx(end, rel=1e-6)
+
+
+TRIP = """
+model supply {
+  discrete trips = 0
+  discrete at: s = 0 s
+  node a, b: electrical
+  V: effort(e = if t < 1 s then 1 V else 5 V) a
+  R: dissipator(e = 1 ohm*f) a -> b
+  C: potential(q = 1 F*e) b
+  when R.f >= 2 A { trips := trips + 1; at := t }
+  init C.e = 0 V
+}
+scene s of supply {
+  time 0 s to 2 s
+  trace C.e as u, trips, at every 0.3 s
+}
+"""
+ROPE = """
+model rope {
+  discrete held = true
+  coord x: translation = 0 m
+  energy T* = 1/2*(2 kg)*x'^2
+  psi rope: x' = 0 m/s while held
+  when held and abs(rope.multiplier) >= 3 N { held := false }
+  work (if t < 1 s then 1 N else 5 N) on x
+  init x' = 0 m/s
+}
+scene s of rope {
+  time 0 s to 3 s
+  trace x
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian"])
+@pytest.mark.parametrize("method", ["radau", "bdf"])
+def test_a_current_that_jumps_past_a_limit_with_its_source_trips(tmp_path, formulation, method):
+    """The current follows from the source by the circuit's equations: no relation reads the text that jumps."""
+    trace = run(TRIP, tmp_path, formulation=formulation, method=method, accuracy=1e-6)
+    assert [e.time for e in trace.events] == pytest.approx([1.0], abs=1e-12)
+    assert trace["trips"][-1] == 1.0
+    assert trace["at"][-1] == pytest.approx(1.0, abs=1e-12)
+    u = 5.0 - (4.0 + np.exp(-1.0)) * np.exp(-1.0)
+    assert trace["u"][-1] == pytest.approx(u, rel=1e-6)
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+def test_a_rope_breaks_where_its_force_jumps_past_what_it_bears(tmp_path, formulation):
+    trace = run(ROPE, tmp_path, formulation=formulation, accuracy=1e-8)
+    assert trace["x"][-1] == pytest.approx(0.5 * (5.0 / 2.0) * 2.0**2, rel=1e-8)
+
+
+TWO_POINT = """
+model two_point {
+  state x: V = 0 V
+  discrete high = true
+  discrete held: V = 0 V
+  when x <= 0.5 V { high := true }
+  when x >= 0.9 V { high := false }
+  every 0.26 s { held := x }
+  dynamic x' = (if x <= 0.5 V or high and x < 0.9 V then 1 V/s else -1 V/s)
+}
+scene s of two_point {
+  time 0 s to 5 s
+  trace x, held every 0.05 s
+}
+"""
+
+
+@pytest.mark.parametrize("method", ["radau", "bdf"])
+def test_a_threshold_that_is_met_at_a_sample_is_passed(tmp_path, method):
+    """At 1.3 s a sample is due and the lower threshold is met: the law does not rest upon it, for its memory turns."""
+    trace = run(TWO_POINT, tmp_path, method=method, accuracy=1e-6)
+    past = np.mod(trace.time - 0.9, 0.8)
+    expected = np.where(trace.time < 0.9, trace.time, np.where(past < 0.4, 0.9 - past, 0.1 + past))
+    assert np.abs(trace["x"] - expected).max() < 1e-6
+    assert trace["held"][-1] == pytest.approx(0.86, abs=1e-6)  # of 4.94 s
+
+
+@pytest.mark.parametrize("beside", ["every 0.1 s { s := s + 1 }", "work (if t < 0.5 s then 0 N else 1e-12 N) on h"])
+def test_an_impact_at_the_instant_of_a_sample_or_a_jump_is_counted(tmp_path, beside):
+    """The first impact is at 0.5 s, the next at 1.3 s."""
+    text = BALL.replace("= 1 m\n", "= 1/2*(9.81 m/s^2)*(0.5 s)^2\n").replace("2.5 s", "1.45 s")
+    counts = "  discrete n = 0\n  discrete s = 0\n  when h <= 0 m { n := n + 1 }\n"
+    text = text.replace("  init", f"{counts}  {beside}\n  init")
+    trace = run(text.replace("trace h,", "trace n, h,"), tmp_path)
+    assert trace["n"][-1] == 2.0
+    assert trace["h"][-1] == pytest.approx(0.64 * 0.5 * G * 0.15 - 0.5 * G * 0.15**2, rel=1e-6)
