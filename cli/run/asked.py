@@ -157,7 +157,7 @@ def options_of(
         rtol=request.rtol,
         atol=request.atol,
         method=method,
-        index=request.index or (f"{solver['index']:g}" if "index" in solver else "auto"),
+        index=request.index or scene.index(value) or "auto",
         euler_step=solver.get("step"),
         longest=solver.get("longest"),
         order=int(solver["order"]) if "order" in solver and method == scene.solver else None,

@@ -75,13 +75,21 @@ def _solver(target: Target, scene: Scene, value: Value, request: Request) -> Ite
             text = f"{name} = {said[name]:g} s of the solver: it is positive"
             yield Diagnostic("E912", text, place, f"{name} = 1 ms")
     if request.index is None and said.get("index", 0.0) not in _INDICES:
-        yield Diagnostic("E607", f"index = {said['index']:g} of the solver", place, "index = 0, 1, 2, 3")
+        yield Diagnostic("E607", f"index = {said['index']:g} of the solver", place, "index = 0, 1, 2, 2v, 3")
     orders = _ORDERS.get(scene.solver or "", ())
     if request.method in (None, scene.solver) and "order" in said and said["order"] not in orders:
         text = f"order = {said['order']:g} of the solver {scene.solver}"
         yield Diagnostic("E607", text, place, "bdf(order = 1 .. 5): at most; radau(order = 5), 9 or 13: that one")
-    if request.method is None and scene.solver == "euler" and "step" not in said:
-        yield Diagnostic("E607", "method euler needs a step", place, "solver euler(step = 1 ms)")
+    method = request.method or scene.solver or "auto"
+    if method == "euler":
+        if request.method is None and "step" not in said:
+            yield Diagnostic("E607", "method euler needs a step", place, "solver euler(step = 1 ms)")
+        if said.get("step", 0.0) > said.get("longest", math.inf):
+            text = f"step = {said['step']:g} s of the solver is longer than longest = {said['longest']:g} s"
+            yield Diagnostic("E607", text, place, "euler takes steps of one length: step alone")
+    elif "step" in said and request.method is None:
+        text = f"step = {said['step']:g} s of the solver {method}, which chooses its steps"
+        yield Diagnostic("E607", text, place, f"{method}(longest = ..) bounds them; euler(step = ..) has one length")
 
 
 def _place(

@@ -32,6 +32,11 @@ WRONG = [
     (TRACE, "  trace x\n  limit steps inf\n", "E912", "limit steps inf", "limit"),
     (TRACE, "  trace x\n  solver euler\n", "E607", "needs a step", "solver"),
     (TRACE, "  trace x\n  solver euler(step = 0 s)\n", "E912", "step = 0 s", "solver"),
+    (TRACE, "  trace x\n  solver bdf(step = 1 ms)\n", "E607", "bdf, which chooses its steps", "solver"),
+    (TRACE, "  trace x\n  solver auto(step = 1 ms)\n", "E607", "auto, which chooses its steps", "solver"),
+    (TRACE, "  trace x\n  solver euler(step = 1 ms, longest = 0.1 ms)\n", "E607", "longer than longest", "solver"),
+    (TRACE, "  trace x\n  solver bdf(index = 3v)\n", "E607", "index = 3v", "3v"),
+    (TRACE, "  trace x\n  solver bdf(order = 2v)\n", "E607", "order = 2v", "2v"),
     (TRACE, "  trace x\n  solver bdf(longest = -1 s)\n", "E912", "longest = -1 s", "solver"),
     (TRACE, "  trace x\n  solver bdf(index = 7)\n", "E607", "index = 7", "solver"),
     (TRACE, "  trace x\n  solver bdf(order = 6)\n", "E607", "order = 6", "solver"),
@@ -64,6 +69,8 @@ def test_it_is_an_error_of_the_text(tmp_path, capsys, command, old, new, code, s
         (TRACE, "  trace x\n  solver euler\n", ["--method", "bdf"]),
         (TRACE, "  trace x\n  solver bdf(index = 7)\n", ["--index", "0"]),
         (TRACE, "  trace x\n  solver bdf(order = 6)\n", ["--method", "radau"]),
+        (TRACE, "  trace x\n  solver bdf(step = 1 ms)\n", ["--method", "euler"]),
+        (TRACE, "  trace x\n  solver euler(step = 1 ms)\n", ["--method", "radau"]),
     ],
 )
 def test_the_command_line_wins(tmp_path, old, new, options):
@@ -83,3 +90,33 @@ def test_the_order_asked_for_is_that_of_the_steps(tmp_path, solver, order, span)
         assert run(["simulate", "-q", file, "--rtol", rtol, "-o", str(tmp_path / "t.h5")]) == 0
         steps.append(Trace.open(tmp_path / "t.h5").statistics["steps"])
     assert np.log(1e3) / np.log(steps[1] / steps[0]) - 1.0 == pytest.approx(order, abs=0.5)
+
+
+PENDULUM = """\
+model pendulum {
+  coord x: translation = 0.6 m
+  coord y: translation ~ -0.8 m
+  energy T* = 1/2*(1 kg)*(x'^2 + y'^2)
+  phi rod: x^2 + y^2 = 1 m^2
+  work -(1 kg)*g0 on y
+  init x' = 0 m/s
+}
+scene go of pendulum {
+  time 0 s to 1 s
+  trace x
+  solver bdf(index = 2v)
+}
+"""
+
+
+def test_the_index_of_velocity_constraints_alone_is_that_of_the_command_line(tmp_path):
+    """The same run, bit for bit, and another one than that of the stabilised form."""
+    asked, plain = write(tmp_path, PENDULUM), tmp_path / "plain.sd"
+    plain.write_text(PENDULUM.replace("(index = 2v)", ""))
+    found = {}
+    for name, file, more in [("text", asked, []), ("line", plain, ["--index", "2v"]), ("form 2", plain, [])]:
+        out = str(tmp_path / f"{name}.h5")
+        assert run(["simulate", "-q", str(file), *more, "--no-timings", "--rtol", "1e-5", "-o", out]) == 0
+        found[name] = Trace.open(out)["x"]
+    assert np.array_equal(found["text"], found["line"])
+    assert not np.array_equal(found["text"], found["form 2"])
