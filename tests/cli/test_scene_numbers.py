@@ -26,6 +26,8 @@ WRONG = [
     (TRACE, "  trace x every -k*1 s.m/N\n", "E912", "-4 s", "-k*1 s.m/N"),
     (TIME, "  time 0 s to -k*1 s.m/N\n", "E912", "from 0 s to -4 s", "time"),
     (TIME, "  time 0 s to 1 s/(k*1 m/N - 4)\n", "E912", "from 0 s to inf s", "time"),
+    (TIME, "  time 0 s to 1e-295 s\n", "E912", "1e-75 s to 1e+75 s", "time"),
+    (TIME, "  time 0 s to k*1e299 s.m/N\n", "E912", "1e-75 s to 1e+75 s", "time"),
     (TRACE, "  trace x\n  accuracy k*1 m/N\n", "E906", "accuracy 4", "accuracy"),
     (TRACE, "  trace x\n  limit steps 0\n", "E912", "limit steps 0", "limit"),
     (TRACE, "  trace x\n  limit events -1\n", "E912", "limit events -1", "limit"),
@@ -77,6 +79,27 @@ def test_the_command_line_wins(tmp_path, old, new, options):
     text = TEXT.replace(old, new)
     text = text.replace(TIME, "") if text.count("  time ") > 1 else text
     assert run(["simulate", "-q", write(tmp_path, text), *options]) == 0
+
+
+@pytest.mark.parametrize("until", ["5e-324", "1e-310", "1e-295", "1e-76", "1e76", "1e300"])
+def test_a_span_beyond_double_precision_is_refused_at_once(tmp_path, capsys, until):
+    assert run(["simulate", write(tmp_path, TEXT), "--until", until]) == 2
+    assert "1e-75 s to 1e+75 s" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("method", ["auto", "bdf", "radau", "rosenbrock", "dopri", "energy"])
+@pytest.mark.parametrize("until", ["1e-74", "1e-40"])
+def test_the_shortest_spans_are_run(tmp_path, until, method):
+    """x stays, and x' = -4 t: nothing overflows on the way (a warning is an error here)."""
+    out = str(tmp_path / "t.h5")
+    assert run(["simulate", "-q", write(tmp_path, TEXT), "--until", until, "--method", method, "-o", out]) == 0
+    assert Trace.open(out)["x"].values[-1] == 1.0
+
+
+@pytest.mark.parametrize("x", ["1e160", "1e300"])
+def test_energies_beyond_double_precision_are_said_by_the_ledger(tmp_path, capsys, x):
+    assert run(["simulate", write(tmp_path, TEXT.replace("= 1 m\n", f"= {x} m\n")), "-o", str(tmp_path / "t.h5")]) == 3
+    assert "E921" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
