@@ -233,7 +233,7 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
                 return achieved
             tame = achieved.lost
             why, stands = short, runs.way
-            missed = replace(achieved, error_estimate=None, below_round_off=False, met=False)
+            missed = replace(achieved, error_estimate=None, met=False)
         runs.take(replace(others[0], reason=why, smooth=smooth and steep))
         others = others[1:]
 

@@ -60,6 +60,7 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
         "equations": [line.to_json() for line in sheet.equations],
         "counted": list(sheet.counted),
         "multipliers": [{"symbol": s, "constraint": owner, "line": line} for s, owner, line in sheet.legend if owner],
+        "senses": [{"symbol": s, "of": what, "line": line} for s, what, line in sheet.senses],
     }
     console.data(text)
     return console.finish(0)

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from sysdyn.cli.equations.letters import GREEK, SHORT, is_letter, named
+from sysdyn.cli.equations.letters import GREEK, SHORT, is_letter, named, slips
 from sysdyn.dsl.model.expression import Node, topological
-from sysdyn.dsl.model.network import Loop
+from sysdyn.dsl.model.network import Loop, Switch
 
 LARGEST = 500
 """Nodes of one expression that is written out."""
@@ -73,13 +73,20 @@ def number(value: float) -> str:
 
 
 class Typesetter:
-    """Writes expressions of one model.  coordinates: families whose q and f are a name and its rate; complementary:
-    these are momenta and efforts.
+    """Writes expressions of one model.  coordinates: families whose q and f are a name and its rate; switches:
+    those of the model, whose senses and directions are parameters; complementary: coordinates are momenta and efforts.
     """
 
-    def __init__(self, coordinates: Iterable[str] = (), *, complementary: bool = False) -> None:
+    def __init__(
+        self, coordinates: Iterable[str] = (), switches: Iterable[Switch] = (), *, complementary: bool = False
+    ) -> None:
         self._coordinates = frozenset(coordinates)
         self._complementary = complementary
+        self._slips = {
+            name: (_GREEK.get(base, base), switch.label, [f"<mn>{k}</mn>"] if kind == "direction" else [])
+            for base, kind, switch, names in slips(switches)
+            for k, name in enumerate(names, 1)
+        }
 
     def expression(self, root: Node) -> str:
         """The expression as pieces of MathML."""
@@ -121,6 +128,9 @@ class Typesetter:
             case "const":
                 return number(node.data), ATOM if node.data >= 0 else SUM
             case "param":
+                if node.data in self._slips:
+                    letter, label, part = self._slips[node.data]
+                    return _of(letter, label, [*part, *texts]), ATOM
                 return name(node.data.lstrip("#"), texts), ATOM
             case "index":
                 return counter(node.data), ATOM

@@ -54,13 +54,16 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """Everything printed; legend: what multipliers belong to; more: equations that were left out."""
+    """Everything printed; legend: what multipliers belong to; senses: what the senses and directions of dry friction
+    belong to; more: equations that were left out.
+    """
 
     functions: tuple[Line, ...]
     equations: tuple[Line, ...]
     legend: tuple[tuple[str, str, int], ...]
     more: int = 0
     counted: tuple[str, ...] = ()
+    senses: tuple[tuple[str, str, int], ...] = ()
 
     def to_text(self) -> str:
         """For a terminal."""
@@ -68,7 +71,8 @@ class Sheet:
         if self.equations:
             parts.append(_block(self.equations) + (f"\n... {self.more} more" if self.more else ""))
         if self.legend:
-            said = (f"{s} of {owner}, line {line}" if owner else s for s, owner, line in self.legend)
+            said = [f"{s} of {owner}, line {line}" if owner else s for s, owner, line in self.legend]
+            said += [f"{s}, {what}, line {line}" for s, what, line in self.senses]
             parts.append("\n".join(said))
         if self.counted:
             parts.append("\n".join(self.counted))
@@ -120,8 +124,9 @@ class Sheets:
 
     def __init__(self, compiled: CompiledModel, named: Sequence[str]) -> None:
         self.compiled = compiled
-        self.letters = Letters(compiled.form, named)
-        order = Order([p.name for p in compiled.network.parameters])
+        parameters = [p.name for p in compiled.network.parameters]
+        self.letters = Letters(compiled.form, named, parameters, compiled.network.switches)
+        order = Order(parameters)
         self.writers: tuple[Writer, Writer] = (Text(self.letters, order), Latex(self.letters, order))
         self.complementary = compiled.form.formulation.startswith("co_")
 
@@ -131,7 +136,8 @@ class Sheets:
         legend = tuple(self.legend()) if content.equations else ((self._flows(), "", 0),)
         legend = () if any(e.kind == "element" for e in content.equations) else legend
         functions = tuple(self.named(f) for f in content.functions)
-        return Sheet(functions, tuple(lines), legend, content.more, content.counted)
+        said = ((self.writers[0].symbol(letter, ()), what, line) for letter, what, line in self.letters.slipping())
+        return Sheet(functions, tuple(lines), legend, content.more, content.counted, tuple(said))
 
     def _matrix(self, matrix: Matrix) -> Line:
         text, latex = ([[self._entry(w, e) for e in row] for row in matrix.rows] for w in self.writers)

@@ -74,7 +74,8 @@ def matrix(found: Matrix, types: Typesetter) -> str:
 def page(title: str, content: Content, compiled: CompiledModel) -> str:
     """A page of its own."""
     complementary = compiled.form.formulation.startswith("co_")
-    types = Typesetter((c.name for c in compiled.energies.coordinates), complementary=complementary)
+    names, switches = (c.name for c in compiled.energies.coordinates), compiled.network.switches
+    types = Typesetter(names, switches, complementary=complementary)
     parts = (
         functions(content.functions, types, complementary=complementary),
         (f"<span></span><div>{matrix(m, types)}</div>" for m in content.matrices),

@@ -240,7 +240,7 @@ class Text(Writer):
 
     def symbol(self, letter: Letter, index: Sequence[str]) -> str:
         """f1', x_0, κ1[i]."""
-        base = {"kappa": "κ", "mu": "μ"}.get(letter.base, letter.base) if letter.below[:1] else letter.base
+        base = _GREEK.get(letter.base, letter.base) if letter.below else letter.base
         below = list(letter.below)
         if below and below[0].isdigit():
             base += below.pop(0)
@@ -337,6 +337,10 @@ class Latex(Writer):
         r"""\delta x."""
         text, strength = self.piece(on)
         return f"\\delta {text}" if strength == ATOM else f"\\delta {self.held(text)}"
+
+
+_GREEK = {"kappa": "κ", "mu": "μ", "sigma": "σ"}
+"""In text, of letters with an index."""
 
 
 def _below(part: str) -> str:

@@ -51,8 +51,7 @@ class Formed:
 def choose(prepared: Prepared, started: Started, index: str | None) -> Formed:
     """The form of --index, else the scene's, else the one `simulate` takes.  Raises NoSuchForm."""
     scene = prepared.network.scene
-    said = dict(scene.solver_options).get("index") if scene else None
-    wanted = index or (f"{prepared.binding.evaluate(said):g}" if said is not None else "auto")
+    wanted = index or (scene.index(prepared.binding.evaluate) if scene else None) or "auto"
     policy = (scene.redundancy if scene else None) or "error"
     t0 = started.state.t
     options = Options(output="", t_start=t0, t_end=t0 + 1.0, index=wanted, redundancy=policy)

@@ -44,13 +44,14 @@ class Study:
     def typesetter(self) -> Typesetter:
         """Of the lowered model's expressions."""
         names = (c.name for c in self.prepared.compiled.energies.coordinates)
-        return Typesetter(names, complementary=self.complementary)
+        return Typesetter(names, self.network.switches, complementary=self.complementary)
 
     @property
     def typesetter_of_text(self) -> Typesetter:
         """Of expressions as the text has them."""
         coordinates = self.network.coordinates
-        return Typesetter((c.name for c in coordinates), complementary=any(c.complementary for c in coordinates))
+        complementary = any(c.complementary for c in coordinates)
+        return Typesetter((c.name for c in coordinates), self.network.switches, complementary=complementary)
 
     def link(self, place: Place | None, label: str) -> str:
         """Label (HTML) as a link to the line of a place; label alone where the page does not show the text."""

@@ -16,6 +16,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import field
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Protocol
@@ -71,17 +72,27 @@ class Crew:
     def __init__(self, supply: Supply, jobs: int, serve: Serve, setup: tuple[Any, ...]) -> None:
         self._supply, self._jobs, self._serve, self._setup = supply, jobs, serve, setup
         self._workers: list[_Worker] = []
+        self._ended = False
+        self._beginning = threading.Lock()
+        """Held while a worker begins: `end`, of another thread, waits until it is one of the workers."""
 
     def _fill(self) -> None:
         """As many workers as there are jobs for."""
         while len(self._workers) < self._jobs and (job := self._supply.next()) is not None:
-            mine, other = _CONTEXT.Pipe()
-            process = _CONTEXT.Process(target=_alone, args=(self._serve, other, *self._setup), daemon=True)
-            process.start()
-            other.close()
-            worker = _Worker(process, mine, job)
-            self._workers.append(worker)
+            with _undisturbed(), self._beginning:
+                if self._ended:
+                    return
+                worker = self._begun(job)
             self._give(worker, job)
+
+    def _begun(self, job: Any) -> _Worker:
+        mine, other = _CONTEXT.Pipe()
+        process = _CONTEXT.Process(target=_alone, args=(self._serve, other, *self._setup), daemon=True)
+        process.start()
+        other.close()
+        worker = _Worker(process, mine, job)
+        self._workers.append(worker)
+        return worker
 
     @staticmethod
     def _give(worker: _Worker, job: Any) -> None:
@@ -122,12 +133,35 @@ class Crew:
         yield from found
 
     def end(self) -> None:
-        """No worker goes on."""
+        """No worker goes on, and none begins."""
+        with self._beginning:
+            self._ended = True
         for worker in self._workers:
             worker.pipe.close()
             worker.process.terminate()
         for worker in self._workers:
             worker.process.join(5.0)
+
+
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """An interruption waits, and a process that is begun here never hears of one: it is ended by the one who steers.
+
+    Half begun it would find its pipe closed, and an interruption before it has said what to do with one would end it
+    with a page of where it was.  A blocked signal stays so in a new process; other threads of this one may still take
+    it, so what the first thread does about it waits too.
+    """
+    heard: list[object] = []
+    with contextlib.ExitStack() as after:
+        if threading.current_thread() is threading.main_thread():
+            after.callback(lambda: signal.raise_signal(signal.SIGINT) if heard else None)
+            after.callback(signal.signal, signal.SIGINT, signal.getsignal(signal.SIGINT))
+            signal.signal(signal.SIGINT, lambda *said: heard.append(said))
+        if hasattr(signal, "pthread_sigmask"):
+            resource_tracker.ensure_running()  # which lets interruptions through again behind what it begins itself
+            mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            after.callback(signal.pthread_sigmask, signal.SIG_SETMASK, mask)
+        yield
 
 
 def _alone(serve: Serve, *setup: Any) -> None:

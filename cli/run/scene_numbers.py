@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 INSTANTS = 2e7
 """Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""
+SPANS = (1e-75, 1e75)
+"""s: shortest and longest span of a run; beyond them second rates of magnitudes near 1 and their squares are no
+doubles."""
 _INDICES = (0.0, 1.0, 2.0, 3.0)
 _ORDERS = {"bdf": (1.0, 2.0, 3.0, 4.0, 5.0), "radau": (5.0, 9.0, 13.0)}
 """Of the methods whose order can be asked for."""
@@ -55,6 +58,9 @@ def _span(target: Target, scene: Scene, value: Value, *, until: bool) -> Iterato
     if not (until or right):
         text = f"the time is from {t0:g} s to {t1:g} s: a run goes forward and ends"
         yield Diagnostic("E912", text, _place(target, scene, syntax.Time), "time 0 s to 10 s")
+    elif not (until or computed(t1 - t0)):
+        yield Diagnostic("E912", beyond(t0, t1), _place(target, scene, syntax.Time), "time 0 s to 10 s")
+        return
     every = None if scene.every is None else value(scene.every)
     if every is None or not (right or until):
         return
@@ -66,6 +72,17 @@ def _span(target: Target, scene: Scene, value: Value, *, until: bool) -> Iterato
         yield Diagnostic("E912", text, place, f"every {(t1 - t0) / 1000.0:.3g} s, or none: each step is traced then")
 
 
+def computed(span: float) -> bool:
+    """Whether a run can have this span [s]."""
+    return SPANS[0] <= span <= SPANS[1]
+
+
+def beyond(t0: float, t1: float) -> str:
+    """What is said of a span that no run can have; t0, t1 [s]."""
+    least, most = SPANS
+    return f"from {t0:g} s to {t1:g} s are {t1 - t0:g} s: {least:g} s to {most:g} s are what double precision allows"
+
+
 def _solver(target: Target, scene: Scene, value: Value, request: Request) -> Iterator[Diagnostic]:
     """The options of the solver, and the step that one of them needs."""
     said = {name: value(node) for name, node in scene.solver_options}
@@ -75,13 +92,21 @@ def _solver(target: Target, scene: Scene, value: Value, request: Request) -> Ite
             text = f"{name} = {said[name]:g} s of the solver: it is positive"
             yield Diagnostic("E912", text, place, f"{name} = 1 ms")
     if request.index is None and said.get("index", 0.0) not in _INDICES:
-        yield Diagnostic("E607", f"index = {said['index']:g} of the solver", place, "index = 0, 1, 2, 3")
+        yield Diagnostic("E607", f"index = {said['index']:g} of the solver", place, "index = 0, 1, 2, 2v, 3")
     orders = _ORDERS.get(scene.solver or "", ())
     if request.method in (None, scene.solver) and "order" in said and said["order"] not in orders:
         text = f"order = {said['order']:g} of the solver {scene.solver}"
         yield Diagnostic("E607", text, place, "bdf(order = 1 .. 5): at most; radau(order = 5), 9 or 13: that one")
-    if request.method is None and scene.solver == "euler" and "step" not in said:
-        yield Diagnostic("E607", "method euler needs a step", place, "solver euler(step = 1 ms)")
+    method = request.method or scene.solver or "auto"
+    if method == "euler":
+        if request.method is None and "step" not in said:
+            yield Diagnostic("E607", "method euler needs a step", place, "solver euler(step = 1 ms)")
+        if said.get("step", 0.0) > said.get("longest", math.inf):
+            text = f"step = {said['step']:g} s of the solver is longer than longest = {said['longest']:g} s"
+            yield Diagnostic("E607", text, place, "euler takes steps of one length: step alone")
+    elif "step" in said and request.method is None:
+        text = f"step = {said['step']:g} s of the solver {method}, which chooses its steps"
+        yield Diagnostic("E607", text, place, f"{method}(longest = ..) bounds them; euler(step = ..) has one length")
 
 
 def _place(

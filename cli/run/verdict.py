@@ -53,6 +53,13 @@ _REMEDIES_OF_EVENTS = {
 }
 
 
+_BY_SLOPES = (
+    "; rosenbrock takes laws by their slopes where a step begins: they may vanish or jump there (a flow that turns"
+    " through a root or a square)"
+)
+"""Of a step of rosenbrock whose error no shorter one lessens."""
+
+
 _TWICE = "constraints that hold at one time may say the same twice: leave one out, or put a resistance between them"
 
 
@@ -80,14 +87,17 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
         text += f", in {_named(error.row)}"
     if error.unknown is not None:
         text += f", {'of' if error.cause in _OF_EVENTS else 'unknown'} {error.unknown}"
+    partial = error.partial
+    linear = error.cause == "error_test" and isinstance(partial, Outcome) and partial.method == "rosenbrock"
+    text += _BY_SLOPES if linear else ""
     why = None
     if last is not None and code == "E930":
         why = last.grown(started.state.y) or last.vanishing(started.state.y)
         text += f"; {why}" if why else ""
-    partial = error.partial
     if isinstance(partial, Outcome) and partial.reached > error.time:
         text += "; the trace is that of a coarser run to the end, its error is not known"
     usual = _REMEDIES_OF_EVENTS.get(error.cause, _REMEDIES[code])
+    usual = "--method radau or bdf, or auto" if linear else usual
     if error.cause == "singular" and len(started.system.description.switches.places):
         usual = _TWICE
     remedy = _BOUNDED if why else _RANK if lost else usual

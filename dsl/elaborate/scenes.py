@@ -173,7 +173,12 @@ class SceneReader:
                 )
             if arg.name in dict(options):
                 raise self.resolver.fail("E106", f"'{arg.name}' of the solver is given twice", arg.span)
-            if arg.name in ("keep_implicit", "keep_flow"):
+            if isinstance(arg.value, syntax.Name) and arg.value.name[0].isdigit():
+                if (arg.name, arg.value.name) != ("index", "2v"):
+                    message = f"{arg.name} = {arg.value.name} of the solver"
+                    raise self.resolver.fail("E607", message, arg.value.span, help="index = 0, 1, 2, 2v, 3")
+                node, self._found["velocities"] = ex.const(2.0), True
+            elif arg.name in ("keep_implicit", "keep_flow"):
                 node = self._yes(arg.value, arg.name)
             else:
                 node = self._constant(arg.value, dim.TIME if arg.name in ("step", "longest") else NONE, arg.name)

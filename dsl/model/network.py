@@ -7,7 +7,7 @@ A *family* is a name with a shape: `coord x[1..n]` is one family, its shape the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field
 
 from sysdyn.dsl.model.expression import Node, is_const
@@ -377,8 +377,14 @@ class Scene:
     formulation_place: Place | None = None
     solver: str | None = None
     solver_options: tuple[tuple[str, Node], ...] = ()
+    velocities: bool = False  # the index form 2 is that of velocity constraints alone, 2v
     redundancy: str | None = None
     limits: tuple[tuple[str, Node], ...] = ()
+
+    def index(self, value: Callable[[Node], float]) -> str | None:
+        """The index form that the solver is asked for, as the command line names it; None: it is not said."""
+        node = dict(self.solver_options).get("index")
+        return None if node is None else "2v" if self.velocities else f"{value(node):g}"
 
     def keeps(self, option: str) -> bool:
         """Whether the solver's option, keep_flow or keep_implicit, is said to be true."""

@@ -162,7 +162,7 @@ class Automaton:
             return kind
         start, end = scanner.start, scanner.end
         text = scanner.text[start:end]
-        if kind in ("<name>", "<function>"):
+        if kind in ("<name>", "<function>", "<index>"):
             return Word(text, Span(start, end))
         if kind == "<quantity>" and scanner.unit is not None:
             unit = Span(*scanner.unit)

@@ -44,8 +44,13 @@ def formulation(v: Values, span: Span, notes: Notes) -> s.Formulation:
 
 
 def solver(v: Values, span: Span, notes: Notes) -> s.Solver:
-    """`solver NAME [args]`."""
+    """`solver NAME [options]`."""
     return s.Solver(v[0], v[1], span, notes.doc(span))
+
+
+def index_form(v: Values, span: Span, notes: Notes) -> s.Arg:
+    """`NAME = INDEX`."""
+    return s.Arg(v[0].name, s.Name(v[1].name, v[1].span), span)
 
 
 def redundancy(v: Values, span: Span, notes: Notes) -> s.Redundancy:

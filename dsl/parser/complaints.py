@@ -119,6 +119,7 @@ _OPERATORS = frozenset({"+", "-", "*", "/", "^", "==", "!=", "<", ">", "<=", ">=
 _CLASSES = {
     "<number>": "a number",
     "<text>": 'a text in quotes "..."',
+    "<index>": "2v",
     "<function>": "one of T* T V* V (energies), D G (contents)",
     "<newline>": "the end of the statement",
     "<end>": "the end of the file",

@@ -25,6 +25,7 @@ _REGULAR = {
     "NUMBER": "<number>",
     "QUANTITY": "<quantity>",
     "STRING": "<text>",
+    "INDEX": "<index>",
     "STATE_FUNCTION": "<function>",
     "_NL": "<newline>",
     "$END": "<end>",

@@ -39,6 +39,7 @@ _UNIT = re.compile(
     rf"({_FACTOR}(?:[./]{_FACTOR})*)"
 )
 _GLUED = re.compile(rf"{_FACTOR}(?:[./]{_FACTOR})*")
+_INDEX = re.compile(r"[0-9]v")
 _FUNCTION = re.compile(r"(?:T\*|V\*|T|V|D|G)(?![\w*])")
 _BLANK = re.compile(r"[ \t]*+")
 _WORDS = (
@@ -176,6 +177,9 @@ class Scanner:
         text = self.text
         glued = _GLUED.match(text, end)
         if glued is not None:
+            if "<index>" in row and _INDEX.fullmatch(text, self.start, glued.end()):
+                self.end = glued.end()
+                return "<index>"
             self.glued = True
             self.unit = glued.span()
             self.end = glued.end()

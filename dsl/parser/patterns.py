@@ -137,7 +137,7 @@ class Patterns:
             elif kind == "<text>":
                 add(Text(text[a + 1 : b - 1], span))
             else:
-                add(Word(text[a:b], span) if kind == "<function>" else kind)
+                add(Word(text[a:b], span) if kind in ("<function>", "<index>") else kind)
         for build, parts, a, b in recipe.rules:
             values = list(map(take, parts))
             add(values if build is None else build(values, new(Span, (at + a, at + b)), notes))

@@ -153,6 +153,7 @@ file
 restitution
 while
 <newline> restitution while }
+<index>
 """
 """Sets of terminals, one a line."""
 
@@ -640,12 +641,12 @@ ROWS = """\
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 -256:65
 225:85 227:53 289:19 556:15
--257:65 399:16
-558:131
--258:132 559:133 560:99
--259:134 562:64
--260:65 563:29
-564:135
+-257:65 558:16
+559:131
+-258:132 560:133 561:99
+-259:134 563:64
+-260:65 564:29
+565:135
 264:96 265:13 266:50
 264:96 265:13 266:50
 -261:117
@@ -653,13 +654,13 @@ ROWS = """\
 496:49 497:50
 -263:117
 -264:117
-568:50
+569:50
 -265:117
 -266:65
--267:65 569:64
+-267:65 570:64
 400:13 401:103
 188:13
-572:61
+573:61
 -268:136
 -81:123 236:16 459:15
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
@@ -674,13 +675,13 @@ ROWS = """\
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 -276:65
 -277:65
--278:22 578:1
+-278:22 579:1
 -279:22 188:13
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
--280:22 582:1
+-280:22 583:1
 -281:22
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
--282:65 584:121
+-282:65 585:121
 -283:65
 -284:65
 -285:65
@@ -695,12 +696,12 @@ ROWS = """\
 -290:104
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
-591:61
+592:61
 -291:82
 137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 504:13
 -292:122
 -293:122
-593:62
+594:62
 -294:119
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
@@ -708,20 +709,21 @@ ROWS = """\
 264:96 265:13 266:50
 -296:22 106:30 109:33 123:47 377:107 378:108 379:37 380:109 381:110 382:111 383:112 384:113 385:114
 -297:65
--298:22 598:1
+-298:22 599:1
 -299:22 106:30 109:33 123:47 377:107 378:108 379:37 380:109 381:110 382:111 383:112 384:113 385:114
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
-601:13
+602:13
 -300:65
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 -301:65
+137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 607:61 608:13
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
-604:13
+610:13
 264:96 265:13 266:50
--302:134 606:64
+-302:134 612:64
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
-610:53 611:138 612:139
+616:53 617:138 618:139
 -303:117
 -304:117
 -305:117
@@ -731,21 +733,21 @@ ROWS = """\
 -308:124 225:85 227:53 289:19
 -309:136
 -310:124
--78:140 225:85 226:19 227:53 614:94
+-78:140 225:85 226:19 227:53 620:94
 -311:119
 -312:65
 -313:65
 -314:22 188:13
 -315:65
 -316:65
--317:22 616:1
+-317:22 622:1
 -318:22 188:13
 -319:65
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 -320:65
 -321:65
 -322:65
--323:65 621:141 622:142
+-323:65 627:141 628:142
 -324:65
 -325:65
 -326:82
@@ -756,68 +758,82 @@ ROWS = """\
 -330:122
 -331:65
 -332:22 106:30 109:33 123:47 377:107 378:108 379:37 380:109 381:110 382:111 383:112 384:113 385:114
--333:65 625:64
+-333:65 631:64
 -334:65
 -335:65
 -336:65
--337:65
--338:132
--339:132 626:133
+632:61
+-337:122
+-338:61 634:64
+-339:65
+-81:123 236:16 635:15
+-340:65
+-341:132
+-342:132 636:133
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
--340:132
--341:65
--342:12
-629:16
-610:53 631:139
-632:52
--343:124
-188:13
+-343:132
 -344:65
--345:22 188:13
--346:65
--347:65 621:141 622:142
--348:143
+-345:12
+639:16
+616:53 641:139
+642:52
+-346:124
+188:13
+-347:65
+-348:22 188:13
 -349:65
+-350:65 627:141 628:142
+-351:143
+-352:65
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
-637:61
--350:65 638:64
+647:61
+-353:65 648:64
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
-640:13
--351:132
-642:64 643:92
-496:49 646:50
--352:12
-647:52
--353:12
--354:124 225:85 227:53 289:19
--355:143
--356:143
--357:143
--358:82
+-354:65
+-355:61 650:64
+137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 608:13
+137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 653:144
+654:13
+-356:132
+656:64 657:92
+496:49 660:50
+-357:12
+661:52
+-358:12
+-359:124 225:85 227:53 289:19
+-360:143
+-361:143
+-362:143
+-363:82
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
--359:124
--360:132
-649:64 650:92
-629:16 652:92
--361:12
-654:64
--362:122
--363:122
--364:12
--365:124
-629:16 656:92
--366:12
--367:119
--368:12
-657:61 658:64
-496:49 646:50
--369:119
--370:12
--371:119
-496:49 646:50
--372:122
--373:122
+-364:124
+137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 608:13
+-365:122
+-366:122
+-367:122
+-368:132
+664:64 665:92
+639:16 667:92
+-369:12
+669:64
+-370:122
+-371:122
+-372:12
+-373:124
+-374:122
+639:16 671:92
+-375:12
+-376:119
+-377:12
+672:61 673:64
+496:49 660:50
+-378:119
+-379:12
+-380:119
+496:49 660:50
+-381:122
+-382:122
 """
 """For each state action:set, where the action is a state to shift to, or -1 - rule to reduce."""
 
@@ -830,7 +846,7 @@ _body{item}:1 bundle:2 component:3 const:4 domain:5 function:6 import_:7 item:8 
 
 
 
-___body{item}_star_18:26
+___body{item}_star_19:26
 
 
 
@@ -850,7 +866,7 @@ dotted:35
 
 
 bundle:2 component:3 const:4 domain:5 function:6 import_:7 item:42 model:9 scene:10 table:12 unit_alias:13 unit_base:14
-___body{item}_star_18:43
+___body{item}_star_19:43
 
 
 block:46
@@ -884,7 +900,7 @@ and_:125 arith:126 atom:127 call:128 compare:129 expr:164 not_:131 or_:132 power
 
 bundle:2 component:3 const:4 domain:5 function:6 import_:7 item:59 model:9 scene:10 table:12 unit_alias:13 unit_base:14
 
-___body{bundle_member}_star_20:166
+___body{bundle_member}_star_21:166
 
 __words_star_1:169
 bundle_member:171 words:63
@@ -916,7 +932,7 @@ bundle_member:171 words:63
 
 
 
-___body{statement}_star_22:175
+___body{statement}_star_23:175
 
 
 _indices:177
@@ -947,18 +963,18 @@ and_:125 arith:126 atom:127 call:128 compare:129 expr:209 not_:131 or_:132 power
 decl:210
 and_:125 arith:126 atom:127 call:128 compare:129 expr:211 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 arith:212 atom:127 call:128 power:133 ref:134 term:135 unary:136
-__or__star_13:213
+__or__star_14:213
 comparison:215
 
 
 
 
-__and__star_14:223
+__and__star_15:223
 
 
 
-__arith_star_15:228
-__term_star_16:231
+__arith_star_16:228
+__term_star_17:231
 and_:125 arith:126 atom:127 call:128 compare:129 expr:234 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 atom:127 call:128 power:133 ref:134 unary:235
 
@@ -971,7 +987,7 @@ and_:125 arith:126 atom:127 call:128 compare:129 expr:239 not_:131 or_:132 power
 arith:126 atom:127 call:128 compare:129 not_:240 power:133 ref:134 term:135 unary:136
 
 
-___body{role}_star_19:242
+___body{role}_star_20:242
 role:244
 
 
@@ -993,7 +1009,7 @@ bundle_member:260 words:63
 domain_name:261 unit:262 unit_factor:263
 
 
-___body{bundle_member}_star_20:269
+___body{bundle_member}_star_21:269
 
 
 dotted:271
@@ -1001,7 +1017,7 @@ dotted:271
 branch:67 constraint:68 content:69 coord:70 decl:71 discrete:72 dynamic:73 energy:74 every:75 expect:76 for_:77 golden:78 implicit:79 init:80 input:81 instance:82 law:83 let:84 level:85 lossless:86 node:87 output:88 param:89 port:90 quasi:91 require:92 state:93 statement:273 when:95 work:96
 
 arith:274 atom:127 call:128 index:275 indices:276 power:133 range:277 ref:134 term:135 unary:136
-___body{statement}_star_22:278
+___body{statement}_star_23:278
 
 __decls_star_8:280
 
@@ -1059,14 +1075,14 @@ atom:127 call:128 power:133 ref:134 unary:337
 
 
 _args:339 and_:125 arg:340 arith:126 atom:127 call:128 compare:129 expr:341 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-__atom_star_17:344
+__atom_star_18:344
 
 
 
 
 
 role:349
-___body{role}_star_19:350
+___body{role}_star_20:350
 
 
 
@@ -1085,7 +1101,7 @@ bundle_member:387 words:63
 
 
 
-__unit_star_12:388
+__unit_star_13:388
 
 
 
@@ -1192,7 +1208,7 @@ unit:469 unit_factor:263
 
 
 
-___body{scene_statement}_star_21:473
+___body{scene_statement}_star_22:473
 
 
 
@@ -1243,7 +1259,7 @@ and_:125 arith:126 atom:127 call:128 compare:129 expr:513 not_:131 or_:132 power
 and_:125 arith:126 atom:127 call:128 compare:129 expr:515 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
-___body{action}_star_23:517
+___body{action}_star_24:517
 
 action:520 ref:422
 
@@ -1297,7 +1313,7 @@ and_:125 arith:126 atom:127 call:128 compare:129 expr:547 not_:131 or_:132 power
 
 
 accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:550 set_:371 solver:372 time:373 trace:374 when:375
-___body{scene_statement}_star_21:551
+___body{scene_statement}_star_22:551
 
 
 
@@ -1305,93 +1321,94 @@ ___body{scene_statement}_star_21:551
 arith:555 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
 
-args:557
+options:557
 
 
-__trace_items_star_10:561
+__trace_items_star_10:562
 
 
-unit_factor:565
 unit_factor:566
+unit_factor:567
 
 
-_exponent:567 negative_number:495
-
-
-
-
-
-
-connection:570 ref:398
-ref:571
-
-
-
-and_:125 arith:126 atom:127 call:128 compare:129 expr:573 not_:131 or_:132 power:133 ref:574 term:135 unary:136
-
-
-arith:274 atom:127 call:128 index:575 power:133 range:277 ref:134 term:135 unary:136
-
-
-
-initial:576
-
-and_:125 arith:126 atom:127 call:128 compare:129 expr:577 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-
-
-
-action:579 ref:422
-and_:125 arith:126 atom:127 call:128 compare:129 expr:580 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-___body{action}_star_23:581
-
-arith:583 atom:127 call:128 power:133 ref:134 term:135 unary:136
+_exponent:568 negative_number:495
 
 
 
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:585 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
-block:586
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:587 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-arith:588 atom:127 call:128 power:133 ref:134 term:135 unary:136
+connection:571 ref:398
+ref:572
 
 
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:589 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:574 not_:131 or_:132 power:133 ref:575 term:135 unary:136
+
+
+arith:274 atom:127 call:128 index:576 power:133 range:277 ref:134 term:135 unary:136
+
+
+
+initial:577
+
+and_:125 arith:126 atom:127 call:128 compare:129 expr:578 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+
+
+
+action:580 ref:422
+and_:125 arith:126 atom:127 call:128 compare:129 expr:581 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+___body{action}_star_24:582
+
+arith:584 atom:127 call:128 power:133 ref:134 term:135 unary:136
+
+
+
+
+and_:125 arith:126 atom:127 call:128 compare:129 expr:586 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+
+block:587
+
+and_:125 arith:126 atom:127 call:128 compare:129 expr:588 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+arith:589 atom:127 call:128 power:133 ref:134 term:135 unary:136
+
+
+
 and_:125 arith:126 atom:127 call:128 compare:129 expr:590 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:591 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
-and_:125 arg:592 arith:126 atom:127 call:128 compare:129 expr:341 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arg:593 arith:126 atom:127 call:128 compare:129 expr:341 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
 
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:594 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 and_:125 arith:126 atom:127 call:128 compare:129 expr:595 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:596 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
-unit:596 unit_factor:263
-accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:597 set_:371 solver:372 time:373 trace:374 when:375
+unit:597 unit_factor:263
+accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:598 set_:371 solver:372 time:373 trace:374 when:375
 
 
 accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:550 set_:371 solver:372 time:373 trace:374 when:375
-arith:599 ariths:600 atom:127 call:128 power:133 ref:134 term:135 unary:136
+arith:600 ariths:601 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:602 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:603 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
-arith:603 atom:127 call:128 power:133 ref:134 term:135 unary:136
+_options:604 and_:125 arith:126 atom:127 call:128 compare:129 expr:605 not_:131 option:606 or_:132 power:133 ref:134 term:135 unary:136
+arith:609 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
-unit:605 unit_factor:263
+unit:611 unit_factor:263
 
-arith:485 atom:127 call:128 power:133 ref:134 term:135 trace_item:607 unary:136
-arith:608 atom:127 call:128 power:133 ref:134 term:135 unary:136
-rows:609
+arith:485 atom:127 call:128 power:133 ref:134 term:135 trace_item:613 unary:136
+arith:614 atom:127 call:128 power:133 ref:134 term:135 unary:136
+rows:615
 
 
 
 
-connection:613 ref:398
+connection:619 ref:398
 
 
 
@@ -1400,87 +1417,101 @@ connection:613 ref:398
 
 
 
-action:615 ref:422
+action:621 ref:422
 
 
 
-action:579 ref:422
+action:580 ref:422
 
-arith:617 atom:127 call:128 power:133 ref:134 term:135 unary:136
+arith:623 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
 
 
-__guards_star_5:618 guard:619 guards:620
+__guards_star_5:624 guard:625 guards:626
 
 
 
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:623 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:629 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
 
 
-accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:597 set_:371 solver:372 time:373 trace:374 when:375
-__ariths_star_11:624
+accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:598 set_:371 solver:372 time:373 trace:374 when:375
+__ariths_star_11:630
 
 
 
 
 
+___options_star_12:633
 
-arith:485 atom:127 call:128 power:133 ref:134 term:135 trace_item:627 unary:136
 
 
 
-row:628
-rows:630
 
+arith:485 atom:127 call:128 power:133 ref:134 term:135 trace_item:637 unary:136
 
-ref:633
 
-action:615 ref:422
 
-guard:634
+row:638
+rows:640
 
 
-arith:635 atom:127 call:128 power:133 ref:134 term:135 unary:136
-and_:125 arith:126 atom:127 call:128 compare:129 expr:636 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+ref:643
 
+action:621 ref:422
 
-arith:639 atom:127 call:128 power:133 ref:134 term:135 unary:136
+guard:644
 
 
-__rows_star_3:641
-_signed:644 negative_number:645
+arith:645 atom:127 call:128 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:646 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
+arith:649 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
 
+and_:125 arith:126 atom:127 call:128 compare:129 expr:605 not_:131 option:651 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:652 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
+__rows_star_3:655
+_signed:658 negative_number:659
 
 
-arith:648 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
 
 
-row:651
 
-__row_plus_4:653
 
 
+arith:662 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
+and_:125 arith:126 atom:127 call:128 compare:129 expr:605 not_:131 option:663 or_:132 power:133 ref:134 term:135 unary:136
 
-row:655
 
 
 
 
-_signed:659 negative_number:645
+row:666
 
+__row_plus_4:668
 
 
-_signed:660 negative_number:645
+
+
+
+row:670
+
+
+
+
+_signed:674 negative_number:659
+
+
+
+_signed:675 negative_number:659
 
 
 """
@@ -1508,7 +1539,7 @@ _body{item} 2 [] 1
 _body{item} 2 []
 dotted 1 dotted 0
 _body{item} 3 [] 0 1*
-___body{item}_star_18 2 [] 1
+___body{item}_star_19 2 [] 1
 _body{item} 3 [] 1 2*
 _body{item} 3 [] 1
 _body{bundle_member} 0 []
@@ -1518,7 +1549,7 @@ _body{role} 0 []
 dotted 2 dotted 0 1*
 model 3 model 1 2
 unit_base 3 unit_base 1
-___body{item}_star_18 3 [] 0* 2
+___body{item}_star_19 3 [] 0* 2
 _body{item} 4 [] 1 2*
 _body{bundle_member} 1 [] 0
 words 1 words 0
@@ -1619,7 +1650,7 @@ parameters 2 parameters 0 1*
 __dotted_star_0 3 [] 0* 2
 _body{scene_statement} 0 []
 _body{bundle_member} 3 [] 0 1*
-___body{bundle_member}_star_20 2 [] 1
+___body{bundle_member}_star_21 2 [] 1
 bundle_member 3 bundle_member 0 2
 domain_name 1 domain_name 0
 unit 1 unit 0
@@ -1630,7 +1661,7 @@ _body{bundle_member} 3 [] 1 2*
 _body{bundle_member} 3 [] 1
 instance 3 instance 0 2 - -
 _body{statement} 3 [] 0 1*
-___body{statement}_star_22 2 [] 1
+___body{statement}_star_23 2 [] 1
 index 1 = 0
 indices 1 indices 0
 index 1 = 0
@@ -1644,22 +1675,22 @@ moment 2 moment 0
 init 3 init 1 2
 level 3 level 1 - - 2
 when 3 when 1 2
-__or__star_13 2 [] 1
+__or__star_14 2 [] 1
 compare 3 compare 0 1 2
 power 3 power 0 2
-__and__star_14 2 [] 1
+__and__star_15 2 [] 1
 ref 3 member 0 2
-__arith_star_15 2 [] 0 1
-__arith_star_15 2 [] 0 1
-__term_star_16 2 [] 0 1
-__term_star_16 2 [] 0 1
+__arith_star_16 2 [] 0 1
+__arith_star_16 2 [] 0 1
+__term_star_17 2 [] 0 1
+__term_star_17 2 [] 0 1
 atom 3 group 1
 _args 1 [] 0
 arg 1 arg 0
 call 3 call 0
 atom 3 array 1
 _body{role} 3 [] 0 1*
-___body{role}_star_19 2 [] 1
+___body{role}_star_20 2 [] 1
 _body{role} 3 [] 1 2*
 _body{role} 3 [] 1
 role 3 domain_node 2
@@ -1681,7 +1712,7 @@ scene_statement 1 = 0
 scene_statement 1 = 0
 scene_statement 1 = 0
 _body{scene_statement} 1 []
-___body{bundle_member}_star_20 3 [] 0* 2
+___body{bundle_member}_star_21 3 [] 0* 2
 unit 2 unit 0 1*
 unit_factor 2 unit_variable 1
 __words_star_1 3 [] 0* 2
@@ -1690,7 +1721,7 @@ instance 4 instance 0 2 3 -
 connections 1 connections 0
 instance 4 instance 0 2 - 3
 connection 1 single 0
-___body{statement}_star_22 3 [] 0* 2
+___body{statement}_star_23 3 [] 0* 2
 indices 2 indices 0 1*
 _indices 3 [] 1
 _body{statement} 4 [] 1 2*
@@ -1720,18 +1751,18 @@ port 4 port 1 3
 state 4 state 1 3 -
 state 4 state 1 - 3
 work 4 work 1 3
-__or__star_13 3 [] 0* 2
-__and__star_14 3 [] 0* 2
+__or__star_14 3 [] 0* 2
+__and__star_15 3 [] 0* 2
 ref 4 item_of 0 2
-__arith_star_15 3 [] 0* 1 2
-__arith_star_15 3 [] 0* 1 2
-__term_star_16 3 [] 0* 1 2
-__term_star_16 3 [] 0* 1 2
+__arith_star_16 3 [] 0* 1 2
+__arith_star_16 3 [] 0* 1 2
+__term_star_17 3 [] 0* 1 2
+__term_star_17 3 [] 0* 1 2
 call 4 call 0 2*
 _args 2 [] 0 1*
 atom 4 array 1 2*
-__atom_star_17 2 [] 1
-___body{role}_star_19 3 [] 0* 2
+__atom_star_18 2 [] 1
+___body{role}_star_20 3 [] 0* 2
 _body{role} 4 [] 1 2*
 role 4 role 0 1 3
 __parameters_star_2 3 [] 0* 2
@@ -1747,8 +1778,8 @@ solver 2 solver 1 -
 trace_item 1 trace_item 0 - -
 trace_items 1 trace_items 0
 trace 2 trace 1 -
-__unit_star_12 2 [] 0 1
-__unit_star_12 2 [] 0 1
+__unit_star_13 2 [] 0 1
+__unit_star_13 2 [] 0 1
 unit_factor 3 unit_factor 0 2*
 _exponent 1 [] 0
 _exponent 1 [] 0
@@ -1780,17 +1811,17 @@ relation 1 relation 0
 atom 5 method 0 2
 ___args_star_7 2 [] 1
 arg 3 named_arg 0 2
-__atom_star_17 3 [] 0* 2
+__atom_star_18 3 [] 0* 2
 function 8 function 1 - 5 7
 _body{scene_statement} 3 [] 0 1*
-___body{scene_statement}_star_21 2 [] 1
+___body{scene_statement}_star_22 2 [] 1
 _body{scene_statement} 3 [] 1 2*
 _body{scene_statement} 3 [] 1
 limit 3 limit 1 2
 solver 3 solver 1 2
 trace_items 2 trace_items 0 1*
-__unit_star_12 3 [] 0* 1 2
-__unit_star_12 3 [] 0* 1 2
+__unit_star_13 3 [] 0* 1 2
+__unit_star_13 3 [] 0* 1 2
 unit_factor 4 unit_variable 1 3*
 negative_number 2 negative_number 1
 __connections_star_6 2 [] 1
@@ -1801,7 +1832,7 @@ __indices_star_9 3 [] 0* 2
 coord 6 coord 0 1 3 4 5
 discrete 6 discrete 1 3 5
 _body{action} 3 [] 0 1*
-___body{action}_star_23 2 [] 1
+___body{action}_star_24 2 [] 1
 action 3 action 0 2
 _body{action} 3 [] 1 2*
 _body{action} 3 [] 1
@@ -1817,12 +1848,15 @@ ___args_star_7 3 [] 0* 2
 expr 6 conditional 1 3 5
 function 9 function 1 3 6 8
 parameter 6 parameter 0 2 5
-___body{scene_statement}_star_21 3 [] 0* 2
+___body{scene_statement}_star_22 3 [] 0* 2
 _body{scene_statement} 4 [] 1 2*
 ariths 1 ariths 0
 accuracy 4 accuracy 1 3
 scene_level 4 scene_level 1 3
 set_ 4 set_ 1 3
+option 1 arg 0
+_options 1 [] 0
+options 2 args
 time 4 time 1 3
 trace_item 3 trace_item 0 - 2
 trace_item 3 trace_item 0 2 -
@@ -1830,13 +1864,15 @@ __trace_items_star_10 2 [] 1
 trace 4 trace 1 3
 table 9 table 1 3 6 7 - 8
 __connections_star_6 3 [] 0* 2
-___body{action}_star_23 3 [] 0* 2
+___body{action}_star_24 3 [] 0* 2
 _body{action} 4 [] 1 2*
 expect 7 expect 1 2 3 4 6
 guards 1 guards 0*
 __guards_star_5 1 [] 0
 constraint 7 constraint 0 1 3 4 5 6
 ariths 2 ariths 0 1*
+options 3 args 1*
+_options 2 [] 0 1*
 __trace_items_star_10 3 [] 0* 2
 table 10 table 1 3 6 7 8 9
 table 10 table_file 1 3 6 7 - 9
@@ -1846,12 +1882,16 @@ guard 2 guard_restitution 1
 guard 2 guard_while 1
 call 8 reduction 0 2 4 6
 __ariths_star_11 2 [] 1
+___options_star_12 2 [] 1
+option 3 named_arg 0 2
+option 3 index_form 0 2
 trace_item 5 trace_item 0 2 4
 rows 3 rows 1
 _signed 1 [] 0
 _signed 1 [] 0
 table 11 table_file 1 3 6 7 8 10
 __ariths_star_11 3 [] 0* 2
+___options_star_12 3 [] 0* 2
 rows 4 rows 1 2*
 __rows_star_3 2 [] 1
 rows 4 rows 1

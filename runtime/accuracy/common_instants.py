@@ -36,7 +36,9 @@ APART = 0.1
 
 
 class Thinned:
-    """Every k-th row of a stream, k doubled whenever there are too many, and the last one."""
+    """Every k-th row of a stream, k doubled whenever there are too many, and the last one; of two rows at one instant,
+    before and behind a jump, the former.
+    """
 
     def __init__(self) -> None:
         self._kept: list[Floats] = []
@@ -45,6 +47,8 @@ class Thinned:
 
     def take(self, rows: Floats) -> None:
         """Rows [k, width] in ascending time."""
+        before = -np.inf if self._last is None else self._last[0, 0]
+        rows = rows[np.diff(rows[:, 0], prepend=before) > 0.0]
         if not len(rows):
             return
         first = -self._seen % self._stride
@@ -101,14 +105,15 @@ def common(stored: Floats, options: Options) -> Floats:
 
 def beside(instants: Floats, one: Floats, two: Floats, span: float) -> NDArray[np.bool_]:
     """Which instants lie between those at which two runs have the same event (one, two [s] ascending): a value on one
-    side of a jump is no error of one on the other.  What the jumps do is compared behind them.
+    side of a jump is no error of one on the other.  What the jumps do is compared behind them.  Where both have it at
+    the same instant, as sampled actions are, both values there are those before it.
     """
     number = min(one.size, two.size)
     if not number:
         return np.zeros(instants.size, dtype=bool)
     low, high = np.minimum(one[:number], two[:number]), np.maximum(one[:number], two[:number])
     gap = np.diff(two, prepend=-np.inf, append=np.inf)
-    near = high - low <= APART * np.minimum(gap[:-1], gap[1:])[:number]
+    near = (low < high) & (high - low <= APART * np.minimum(gap[:-1], gap[1:])[:number])
     low, high = low[near] - NEAR * span, high[near] + NEAR * span
     place = np.searchsorted(low, instants, side="right")
     return np.asarray(instants <= np.append(-np.inf, high)[place])

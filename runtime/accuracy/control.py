@@ -78,16 +78,19 @@ LIGHTLY = 1e-5
 @dataclass(frozen=True, slots=True)
 class Achieved:
     """error_estimate: largest relative error estimated of the last run (None: nothing estimates it, and it is not
-    met); below_round_off: the estimate is less than double precision resolves; met: it is within what was asked; lost:
-    the last two runs had nothing in common.
+    met); met: it is within what was asked; lost: the last two runs had nothing in common.
     """
 
     error_estimate: float | None
-    below_round_off: bool
     met: bool
     runs: int
     tolerance: float
     lost: bool = False
+
+    @property
+    def below_round_off(self) -> bool:
+        """The estimate is less than double precision resolves."""
+        return self.error_estimate is not None and self.error_estimate < ROUND_OFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,8 +121,8 @@ def _shrink(law: Law, power: float, step: float, longer: float) -> float:
 def _achieved(estimate: float, met: bool, runs: int, tolerance: float, *, lost: bool = False) -> Achieved:
     """A finite estimate, or none at all."""
     if not np.isfinite(estimate):
-        return Achieved(None, False, False, runs, tolerance, lost)
-    return Achieved(estimate, estimate < ROUND_OFF, met, runs, tolerance, lost)
+        return Achieved(None, False, runs, tolerance, lost)
+    return Achieved(estimate, met, runs, tolerance, lost)
 
 
 def _shifted(run: Run, last: Sampled, target: Floats, number: int) -> Achieved:
@@ -128,7 +131,7 @@ def _shifted(run: Run, last: Sampled, target: Floats, number: int) -> Achieved:
         # at most half the mean step: so the instants of the steps are others
         now = run(last.tolerance, 0.5 * min(LONGEST, 1.0 / max(last.steps, 1)))
     except SolverFailure:
-        return Achieved(None, False, False, number + 1, last.tolerance)
+        return Achieved(None, False, number + 1, last.tolerance)
     apart, over = difference(last, now, target)
     return _achieved(apart, over <= 1.0, number + 1, last.tolerance)
 

@@ -383,7 +383,7 @@ class Batch:
         runs.done = finished, [], writer
         estimate = float(found.estimate[0])
         judgement = judge(self.options, runs.method, finished.balances, True, ())
-        close(runs, Achieved(estimate, estimate < pairs.ROUND_OFF, True, 0, 0.0), judgement)
+        close(runs, Achieved(estimate, True, 0, 0.0), judgement)
         return runs.held
 
 

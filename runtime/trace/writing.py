@@ -70,7 +70,8 @@ class Met:
         """
         if self._energies is None:
             self._energies = np.array([0.0, rows[0, 1], 0.0, 0.0])
-        most = max(np.abs(rows - self._energies).max(), UNCHANGED * np.abs(rows[:, :2]).max())
+        with np.errstate(invalid="ignore", over="ignore"):  # energies beyond double precision: the ledger says so
+            most = max(np.abs(rows - self._energies).max(), UNCHANGED * np.abs(rows[:, :2]).max())
         if np.isfinite(most):
             self.turned_over = max(self.turned_over, float(most))
 

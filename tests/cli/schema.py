@@ -110,7 +110,7 @@ REST = {
     "residual": NUMBER,
     "free": list,
 }
-LINES = ("functions", "equations", "counted", "multipliers")
+LINES = ("functions", "equations", "counted", "multipliers", "senses")
 EQUATIONS = {"formulation": str, "form": str} | dict.fromkeys(LINES, list)
 EQUATION = {
     "kind": str,

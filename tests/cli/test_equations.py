@@ -517,3 +517,42 @@ def test_efforts_by_class_add_up_to_the_balance(name, formulation):
             parts = sums.get(owner, [ex.const(0.0)])
             size = sum(abs(known.of(t)) for t in parts) + 1e-300
             assert sum(known.of(t) for t in parts) == pytest.approx(-known.of(row), abs=1e-11 * size), owner
+
+
+SLIPS = """\
+from std.mechanical import coulomb
+model puck {
+  param sigma_1 = 0.5 N
+  coord x: translation = 0 m
+  coord y: translation = 0 m
+  coord z: translation = 0 m
+  energy T* = 1/2*(1 kg)*(x'^2 + y'^2 + z'^2)
+  content D = sigma_1*hypot(x', y')
+  F: coulomb(Fc = 1 N) z -> ground
+}
+"""
+
+
+def test_senses_and_directions_of_friction_are_letters(tmp_path, capsys):
+    """sigma and n, numbered behind those of the text, and what they are of; no name of the compiler is printed."""
+    code, found = run_json(capsys, "equations", write(tmp_path, SLIPS))
+    assert code == 0
+    result = found["result"]
+    assert [(s["symbol"], s["of"], s["line"]) for s in result["senses"]][1:] == [
+        ("σ3", "sense of content of line 8 (1)", 8),
+        ("n1", "direction of content of line 8 (1)", 8),
+    ]
+    lines = [line["text"] + line["latex"] for line in (*result["functions"], *result["equations"])]
+    assert not any("content" in text or "direction" in text or "sticking" in text for text in lines)
+    balance = next(line["text"] for line in result["equations"] if line["text"].startswith("f_x'"))
+    assert "σ1 σ3 (n1_1 + f_x)" in balance
+    assert run(["equations", write(tmp_path, SLIPS), "--quiet"]) == 0
+    assert "σ3, sense of content of line 8 (1), line 8\n" in capsys.readouterr().out
+
+
+def test_a_page_sets_senses_and_directions_as_letters(tmp_path, capsys):
+    assert run(["equations", write(tmp_path, SLIPS), "--html", "--quiet"]) == 0
+    page = capsys.readouterr().out
+    assert "<msub><mi>n</mi><mrow><mi>content of line 8 (1)</mi><mo>,</mo><mn>2</mn></mrow></msub>" in page
+    assert "<msub><mi>σ</mi><mi>F sticking</mi></msub>" in page
+    assert "direction" not in page

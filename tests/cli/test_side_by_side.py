@@ -1,11 +1,14 @@
 """Work side by side: what comes of it, its order and its faults are those of one process."""
 
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from contextlib import closing
+from multiprocessing import resource_tracker, util
 from pathlib import Path
 
 import pytest
@@ -151,3 +154,50 @@ def test_an_interrupt_ends_every_process_and_keeps_what_was_computed(tmp_path):
     while goes_on(process.pid):  # for ever, where one does
         time.sleep(0.05)
     assert len(kept[0].read_text().split("\n")) > 1
+
+
+def _hears_of_interruptions(_):
+    return signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_a_worker_hears_of_no_interruption_from_its_first_instruction():
+    """One of the whole group, by Ctrl-C, ended those that were beginning with a page of where they were."""
+    assert dict(crew.as_ready(_hears_of_interruptions, [0, 1], 2)) == {0: False, 1: False}
+
+
+def test_an_interruption_waits_until_a_worker_has_begun(monkeypatch, capfd):
+    """Between the process and what it is handed, the worker found its pipe closed: EOFError, on the terminal."""
+    begin = util.spawnv_passfds
+
+    def interrupted(*said):
+        number = begin(*said)
+        signal.raise_signal(signal.SIGINT)
+        return number
+
+    resource_tracker.ensure_running()
+    monkeypatch.setattr(util, "spawnv_passfds", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        list(crew.as_ready(_hears_of_interruptions, [0], 1))
+    time.sleep(0.5)
+    assert multiprocessing.active_children() == []
+    assert capfd.readouterr().err == ""
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_worker_that_is_beginning_beside_is_ended_too(monkeypatch):
+    begin, began = util.spawnv_passfds, threading.Event()
+
+    def slowly(*said):
+        began.set()
+        time.sleep(0.3)
+        return begin(*said)
+
+    resource_tracker.ensure_running()
+    monkeypatch.setattr(util, "spawnv_passfds", slowly)
+    monkeypatch.setattr(crew, "PAYS", 0.0)
+    beside = crew.Beside(_hears_of_interruptions, 0, 2)
+    assert began.wait(5.0)
+    beside.close()
+    assert multiprocessing.active_children() == []
+    time.sleep(0.5)
+    assert multiprocessing.active_children() == []

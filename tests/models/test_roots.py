@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
+from scipy.integrate import solve_ivp
+from sysdyn.cli.main import run as main
 
 METHODS = ("auto", "bdf", "radau", "rosenbrock", "dopri")
 DRAIN = """model drain {
@@ -92,3 +94,42 @@ def test_two_vessels_in_every_formulation(tmp_path, formulation):
     trace = trace_of(tmp_path, VESSELS, formulation=formulation)
     apart = np.maximum(np.sqrt(1e5) - 10.0 * np.array(trace.time), 0.0) ** 2
     assert np.abs(trace["A.e"].values - (5e4 + 0.5 * apart)).max() < 2e-5 * 1e5
+
+
+TURNS = """model vessels {
+  node a, b: hydraulic
+  A: potential(e = 1 Pa/m^3*q) a -> ground
+  B: potential(e = 1 Pa/m^3*q) b -> ground
+  V: dissipator(e = 2 Pa.s^2/m^6*f*abs(f)) a -> b
+  Q: flow(f = 1 m^3/s*sin(2 rad/s*t)) ground -> a
+  init A.e = 1 Pa
+  init B.e = 0 Pa
+}
+scene run of vessels { time 0 s to 20 s; trace A.e, B.e every 0.1 s }
+"""
+
+
+@pytest.mark.parametrize("method", ["auto", "bdf", "radau", "dopri"])
+def test_a_flow_that_turns_through_a_square(tmp_path, method):
+    """Against the law turned over, f = sqrt(d/k), by SciPy; where the flow turns the pressure has no slope."""
+    trace = trace_of(tmp_path, TURNS, method=method)
+
+    def rate(t, p):
+        f = np.sign(p[0] - p[1]) * np.sqrt(abs(p[0] - p[1]) / 2.0)
+        return [np.sin(2.0 * t) - f, f]
+
+    time = np.array(trace.time)
+    exact = solve_ivp(rate, (0.0, 20.0), [1.0, 0.0], "DOP853", t_eval=time, rtol=1e-11, atol=1e-12, max_step=0.01).y
+    assert np.abs(trace["A.e"].values - exact[0]).max() < 1e-4
+    assert np.abs(trace["B.e"].values - exact[1]).max() < 1e-4
+
+
+def test_rosenbrock_is_refused_there_with_the_reason(tmp_path, capsys):
+    """At the first turn, of 1.92 s, and at once."""
+    file = tmp_path / "turns.sd"
+    file.write_text(TURNS)
+    assert main(["simulate", str(file), "--method", "rosenbrock", "-o", str(tmp_path / "t.h5")]) == 3
+    said = capsys.readouterr().err
+    assert "E930" in said
+    assert "slopes where a step begins" in said
+    assert "help: --method radau or bdf" in said

@@ -56,11 +56,21 @@ def test_beside_a_jump_of_the_text_nothing_is_compared():
 
 
 def test_between_one_event_of_two_runs_nothing_is_compared():
-    """The first events are 0.02 apart and 4 from the next: one event.  The second are as far apart as the third is."""
+    """The first events are 0.02 apart and 4 from the next: one event.  The second are as far apart as the third is, and
+    the third are at the same instant, where both values are those before it.
+    """
     one, two = np.array([1.00, 5.0, 6.0]), np.array([1.02, 5.6, 6.0])
     instants = np.array([0.99, 1.01, 1.03, 5.3, 6.0, 7.0])
-    assert beside(instants, one, two, 1.0).tolist() == [False, True, False, False, True, False]
+    assert beside(instants, one, two, 1.0).tolist() == [False, True, False, False, False, False]
     assert not beside(instants, one, np.zeros(0), 1.0).any()
+
+
+def test_of_two_rows_at_one_instant_the_former_is_kept():
+    thinned = Thinned()
+    thinned.take(np.array([[0.0, 1.0], [1.0, 2.0]]))
+    thinned.take(np.array([[1.0, 3.0], [2.0, 4.0], [2.0, 5.0]]))
+    instants = np.array([0.0, 1.0, 2.0])
+    assert thinned.rows(instants)[:, 1].tolist() == [1.0, 2.0, 4.0]
 
 
 def test_instants_of_both_kinds_are_one():
