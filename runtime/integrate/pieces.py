@@ -158,8 +158,13 @@ class Pieces:
         if stepper.refine:
             _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
         begin, end = core.t_from if self.modes is None else self.modes.core.begin, method.t
+        begin = max(begin, min(core.t_clear, end))
         while True:
-            found = self.handler.crossed(self._values, begin, end)
+            seen = core.t_seen if begin < core.t_seen < end else end
+            found = self.handler.crossed(self._values, begin, seen)
+            if found is None and seen < end:
+                begin = seen
+                continue
             if found is None:
                 self._accept(end, 0, sink)
                 self._watch()

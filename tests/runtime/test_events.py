@@ -172,3 +172,28 @@ def test_an_impact_at_the_instant_of_a_sample_or_a_jump_is_counted(tmp_path, bes
     trace = run(text.replace("trace h,", "trace n, h,"), tmp_path)
     assert trace["n"][-1] == 2.0
     assert trace["h"][-1] == pytest.approx(0.64 * 0.5 * G * 0.15 - 0.5 * G * 0.15**2, rel=1e-6)
+
+
+SLOT = """
+model slot {
+  coord th: rotation = 0 rad
+  discrete n = 0
+  state x: V = 0 V
+  energy T* = 1/2*(1 kg.m^2)*th'^2
+  dynamic x' = (if cos(th) > 0.99995 then 1 V/s else 0 V/s)
+  when cos(th) > 0.99995 { n := n + 1 }
+  init th' = 60 rpm
+}
+scene s of slot {
+  time 0 s to 20.5 s
+  trace x, n every 0.5 s
+}
+"""
+
+
+@pytest.mark.parametrize("method", ["auto", "radau", "bdf"])
+def test_a_narrow_slot_is_seen_in_every_turn_of_a_long_step(tmp_path, method):
+    """The angle grows evenly, so steps are many turns long; the slot is open for 3.2 ms of each second."""
+    trace = run(SLOT, tmp_path, method=method)
+    assert trace["n"][-1] == 20.0
+    assert trace["x"][-1] == pytest.approx(41.0 * np.arccos(0.99995) / (2.0 * np.pi), rel=1e-4)

@@ -8,6 +8,7 @@
 #include <time.h>
 
 #include "run/quadratures.h"
+#include "run/watched.h"
 
 #define POLL 4  /* steps between two looks at the clock */
 #define GROWN 1.1 /* times the largest so far: beyond it the size of a step is not believed as the method left it */
@@ -48,6 +49,7 @@ void sd_run_free(sd_run *run)
     if (!run)
         return;
     free(run->memory);
+    free(run->looked);
     free(run);
 }
 
@@ -335,22 +337,6 @@ void sd_run_observe(sd_run *run, double t, double *values)
     run->observe->rows(&run->observe->frame, t, run->point, run->point_d, values);
 }
 
-/* whether something watched changes within the last step */
-static int changes(sd_run *run, double from)
-{
-    const sd_stepper *stepper = run->stepper;
-    for (int part = 1; part <= SD_PARTS && run->watches; part++) {
-        double t = part == SD_PARTS ? *stepper->t : from + (*stepper->t - from) * part / SD_PARTS;
-        stepper->dense(stepper->self, t, run->point, run->point_d);
-        memset(run->values, 0, (size_t)run->observed * sizeof(double));
-        run->observe->rows(&run->observe->frame, t, run->point, run->point_d, run->values);
-        for (int32_t i = 0; i < run->watches; i++)
-            if (run->watch[i].side * run->values[run->watch[i].row] < -run->watch[i].tolerance)
-                return 1;
-    }
-    return 0;
-}
-
 /* quadratures over the step just accepted, powers and balances at its end */
 static void measure(sd_run *run, double from, double t)
 {
@@ -409,7 +395,7 @@ static int advance(sd_run *run)
     if (run->stepper->step(run->stepper->self))
         return SD_FAILED;
     run->t_from = from;
-    if (changes(run, from)) {
+    if (sd_run_changes(run, from)) {
         if (!run->modes)
             return SD_EVENT;
         run->modes->begin = from;

@@ -157,6 +157,9 @@ class Run(c.Structure):
         ("beyond", D),
         ("projected", P),
         ("modes", P),
+        ("t_clear", D),
+        ("t_seen", D),
+        ("looked", P),
     ]
 
 

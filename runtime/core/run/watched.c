@@ -1,0 +1,130 @@
+/* Whether a step passes over a change of what is watched: see watched.h. */
+#include "run/watched.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define NARROWER 20   /* times the part of a step within which something changes is parted again */
+#define SHIFT 0.13    /* of a part, by which every other one is longer */
+#define FAINT 1e-9    /* of the largest value of what is watched: what it is off by unseen */
+
+/* values [observed] of the dense output as it is, at t */
+static void look(sd_run *run, double t, double *values)
+{
+    const sd_stepper *stepper = run->stepper;
+    stepper->dense(stepper->self, t, run->point, run->point_d);
+    memset(values, 0, (size_t)run->observed * sizeof(double));
+    run->observe->rows(&run->observe->frame, t, run->point, run->point_d, values);
+}
+
+/* The least value between x[0] and x[2] of the parabola through three points; of the points, where it has none there. */
+static double bottom(const double *x, const double *value)
+{
+    double rise = (value[1] - value[0]) / (x[1] - x[0]), bend = (value[2] - value[1]) / (x[2] - x[1]) - rise;
+    bend /= x[2] - x[0];
+    double at = 0.5 * (x[0] + x[1] - rise / bend);
+    if (!(bend > 0.0 && at > x[0] && at < x[2]))
+        return fmin(value[0], value[2]);
+    return value[0] + (at - x[0]) * (rise + bend * (at - x[1]));
+}
+
+/* The parabola through three points at x[3]. */
+static double beyond(const double *x, const double *value)
+{
+    double rise = (value[1] - value[0]) / (x[1] - x[0]), bend = (value[2] - value[1]) / (x[2] - x[1]) - rise;
+    bend /= x[2] - x[0];
+    return value[0] + (x[3] - x[0]) * (rise + bend * (x[3] - x[1]));
+}
+
+/* Whether a watch may fall through zero and come back between the ends of SD_PARTS parts, which lie at 0, 1 + SHIFT, 2,
+ * 3 + SHIFT, 4 (no period is a part of all): the value in the middle is off the cubic through the others by more than
+ * a quarter of the least of them, or a parabola through neighbours falls, by so much more at most.  first: what begins at
+ * zero leaves it. */
+static int unfollowed(const sd_run *run, const sd_watch *watch, int first)
+{
+    static const double part[SD_PARTS + 1] = {0.0, 1.0 + SHIFT, 2.0, 3.0 + SHIFT, 4.0};
+    double off = 0.0, least = INFINITY, most = 0.0, found[SD_PARTS + 1];
+    for (int k = 0; k <= SD_PARTS; k++) {
+        double value = watch->side * run->looked[(size_t)k * (size_t)run->observed + (size_t)watch->row], weight = 1.0;
+        for (int j = 0; j <= SD_PARTS; j++)
+            if (j != k && j != 2 && k != 2)
+                weight *= (2.0 - part[j]) / (part[k] - part[j]);
+        off += k == 2 ? value : -weight * value;
+        most = fmax(most, fabs(value));
+        found[k] = value;
+    }
+    double unseen = fmax(watch->tolerance, FAINT * most), low = INFINITY, wrong = fabs(off);
+    first = first && found[0] <= unseen;
+    for (int k = first; k <= SD_PARTS; k++)
+        least = fmin(least, found[k]);
+    for (int k = 0; k + 2 <= SD_PARTS; k++) {
+        if (k >= first)
+            low = fmin(low, bottom(part + k, found + k));
+        if (k + 3 <= SD_PARTS)
+            wrong = fmax(wrong, fabs(beyond(part + k, found + k) - found[k + 3]));
+    }
+    return fabs(off) > fmax(0.25 * least, unseen) || low - wrong < -unseen;
+}
+
+static int fallen(const sd_run *run, const double *values)
+{
+    for (int32_t i = 0; i < run->watches; i++)
+        if (run->watch[i].side * values[run->watch[i].row] < -run->watch[i].tolerance)
+            return 1;
+    return 0;
+}
+
+/* Looks at `parts` parts of begin..end, up to the first at whose end something watched has changed, which is then
+ * t_clear..t_seen; whether what is watched is not followed by so many. */
+static int scan(sd_run *run, double begin, double end, int parts, int *fell)
+{
+    size_t row = (size_t)run->observed;
+    int more = 0;
+    look(run, begin, run->looked);
+    run->t_seen = begin;
+    *fell = 0;
+    for (int part = 1; part <= parts && !*fell; part++) {
+        int k = (part - 1) % SD_PARTS + 1;
+        double *values = run->looked + (size_t)k * row;
+        double t = part == parts ? end : begin + (end - begin) * (part + (part % 2 ? SHIFT : 0.0)) / parts;
+        look(run, t, values);
+        run->t_clear = run->t_seen;
+        run->t_seen = t;
+        *fell = fallen(run, values);
+        for (int32_t i = 0; i < run->watches && k == SD_PARTS && !more && !*fell; i++)
+            more = unfollowed(run, &run->watch[i], part == SD_PARTS);
+        if (k == SD_PARTS)
+            memcpy(run->looked, values, row * sizeof(double));
+    }
+    return more;
+}
+
+int sd_run_changes(sd_run *run, double from)
+{
+    double to = *run->stepper->t, end = to;
+    int parts = SD_PARTS, fell = 0;
+    run->t_clear = from;
+    run->t_seen = to;
+    if (!run->watches)
+        return 0;
+    if (!run->looked && !(run->looked = malloc((SD_PARTS + 1) * (size_t)run->observed * sizeof(double))))
+        return 1; /* it is sought without */
+    int more = scan(run, from, to, parts, &fell);
+    const int parted = more;
+    for (; more && parts < SD_FINEST; more = scan(run, from, end, parts, &fell)) {
+        end = fell ? run->t_seen : end;
+        parts *= SD_PARTS;
+    }
+    for (int k = 0; parted && fell && k < NARROWER; k++) { /* of several changes between two looks the first */
+        double clear = run->t_clear, seen = run->t_seen;
+        scan(run, clear, seen, SD_PARTS, &fell);
+        if (!fell)
+            run->t_clear = clear, run->t_seen = seen;
+        if (run->t_seen == seen)
+            break;
+    }
+    run->t_clear = parted ? fmax(from, 2.0 * run->t_clear - run->t_seen) : from;
+    run->t_seen = parted ? run->t_seen : to;
+    return fell;
+}
