@@ -20,7 +20,7 @@ def claimed(path: Path) -> Iterator[None]:
 
     A lock dies with its process, so a killed run leaves none; where locks do not work nothing is refused.
     """
-    lock = path.with_name(f".{path.name}.lock")
+    lock = _lock_of(path)
     try:
         handle = _locked(lock)
     except BlockingIOError as error:
@@ -33,6 +33,25 @@ def claimed(path: Path) -> Iterator[None]:
         with contextlib.suppress(OSError):
             lock.unlink()
         os.close(handle)
+
+
+def being_written(path: Path) -> bool:
+    """Whether a living run holds the trace at `path` (resolved)."""
+    try:
+        handle = os.open(_lock_of(path), os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return error.errno not in _NO_LOCKS
+    finally:
+        os.close(handle)
+    return False
+
+
+def _lock_of(path: Path) -> Path:
+    return path.with_name(f".{path.name}.lock")
 
 
 def _locked(lock: Path) -> int:

@@ -13,6 +13,8 @@ import stat
 from pathlib import Path
 from typing import Any
 
+from sysdyn.runtime.trace.claim import being_written
+
 
 def opened(path: str | Path, **options: Any) -> Any:
     """The h5py file, open for reading.  OSError where it is no regular file, or names others."""
@@ -51,7 +53,8 @@ def of_sweep(file: Any) -> bool:
 
 def replaceable(path: str | Path, *, sweep: bool = False) -> bool:
     """Nothing is lost where a new trace (sweep: a new sweep) takes this path: there is nothing yet, an empty file, or
-    one of sysdyn of the same kind.
+    one of sysdyn of the same kind; or one that a living run writes, which cannot be read at every instant (its claim
+    says so: claim.py).
     """
     import h5py
 
@@ -64,7 +67,7 @@ def replaceable(path: str | Path, *, sweep: bool = False) -> bool:
     except FileNotFoundError:
         return True
     except (OSError, RuntimeError, ValueError, KeyError, TypeError):
-        return False
+        return being_written(Path(path).resolve())
 
 
 def _is_ours(file: Any) -> bool:

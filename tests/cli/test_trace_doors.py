@@ -13,6 +13,8 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
+from sysdyn.runtime.trace.claim import claimed
+from sysdyn.runtime.trace.opening import replaceable
 from sysdyn.runtime.trace.trace import Trace
 from texts import ENDLESS, PENDULUM, write
 
@@ -175,6 +177,16 @@ def test_a_second_run_of_one_trace_is_refused_while_the_first_lives(tmp_path, mo
     child.send_signal(signal.SIGINT)
     child.communicate(timeout=60)
     assert run(["simulate", "-q", path, "-o", "out.h5", "--until", "0.1"]) == 0
+
+
+def test_a_trace_that_cannot_be_read_while_it_is_written_is_held_by_its_run(tmp_path):
+    """At an instant between two writes a file is no HDF5 yet: without its run it is nobody's trace."""
+    torn = tmp_path / "out.h5"
+    torn.write_bytes(b"\x89HDF\r\n\x1a\n, torn")
+    assert not replaceable(torn)
+    with claimed(torn):
+        assert replaceable(torn)
+    assert not replaceable(torn)
 
 
 READER = """
