@@ -13,7 +13,7 @@ from sysdyn import __version__
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.expectations import watch
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.scene_numbers import INSTANTS, beyond, computed, wrong_numbers
+from sysdyn.cli.run.scene_numbers import INSTANTS, beyond, wrong_numbers
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.binding.columns import Read, value_of
 from sysdyn.compiler.binding.instants import distinct, instants
@@ -134,8 +134,8 @@ def options_of(
         raise UsageError(f"the run is from {t0:g} s to {t1:g} s: finite instants are needed")
     if not t1 > t0:
         raise UsageError(f"the run ends at {t1:g} s, but it begins at {t0:g} s")
-    if not computed(t1 - t0):
-        raise UsageError(beyond(t0, t1))
+    if text := beyond(t0, t1):
+        raise UsageError(text)
     every = value(scene.every) if scene.every is not None else None
     if every is not None and (t1 - t0) / every > INSTANTS:
         raise UsageError(f"every {every:g} s from {t0:g} s to {t1:g} s is more than {INSTANTS:.0e} instants")

@@ -58,8 +58,8 @@ def _span(target: Target, scene: Scene, value: Value, *, until: bool) -> Iterato
     if not (until or right):
         text = f"the time is from {t0:g} s to {t1:g} s: a run goes forward and ends"
         yield Diagnostic("E912", text, _place(target, scene, syntax.Time), "time 0 s to 10 s")
-    elif not (until or computed(t1 - t0)):
-        yield Diagnostic("E912", beyond(t0, t1), _place(target, scene, syntax.Time), "time 0 s to 10 s")
+    elif not until and (text := beyond(t0, t1)):
+        yield Diagnostic("E912", text, _place(target, scene, syntax.Time), "time 0 s to 10 s")
         return
     every = None if scene.every is None else value(scene.every)
     if every is None or not (right or until):
@@ -72,14 +72,11 @@ def _span(target: Target, scene: Scene, value: Value, *, until: bool) -> Iterato
         yield Diagnostic("E912", text, place, f"every {(t1 - t0) / 1000.0:.3g} s, or none: each step is traced then")
 
 
-def computed(span: float) -> bool:
-    """Whether a run can have this span [s]."""
-    return SPANS[0] <= span <= SPANS[1]
-
-
 def beyond(t0: float, t1: float) -> str:
-    """What is said of a span that no run can have; t0, t1 [s]."""
+    """What is said of a span that no run can have, "" of others; t0, t1 [s]."""
     least, most = SPANS
+    if least <= t1 - t0 <= most:
+        return ""
     return f"from {t0:g} s to {t1:g} s are {t1 - t0:g} s: {least:g} s to {most:g} s are what double precision allows"
 
 

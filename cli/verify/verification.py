@@ -202,7 +202,7 @@ class _Verification:
             self.report.extend(d for d in report if d.severity != "error")
 
     def _methods(self, prepared: Prepared, options: Options, report: Report, *, reference: bool) -> None:
-        first, second = _methods(options)
+        first, second = _pair(options)
         for method in (first, second):
             inner = Report()
             ran = self._run(prepared, options, method, inner, "")
@@ -339,7 +339,7 @@ def _gridded(options: Options) -> Options:
     return replace(options, every=(options.t_end - options.t_start) / GRID)
 
 
-def _methods(options: Options) -> tuple[str, str]:
+def _pair(options: Options) -> tuple[str, str]:
     """The method of the reference, and the other one."""
     if options.method in ("auto", "euler"):
         return METHODS

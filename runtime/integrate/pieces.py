@@ -157,8 +157,8 @@ class Pieces:
         self.handler.before = self.handler.now()
         if stepper.refine:
             _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
-        begin, end = core.t_from if self.modes is None else self.modes.core.begin, method.t
-        begin = max(begin, min(core.t_clear, end))
+        end = method.t
+        begin = max(self._from, min(core.t_clear, end))
         while True:
             seen = core.t_seen if begin < core.t_seen < end else end
             found = self.handler.crossed(self._values, begin, seen)
@@ -173,7 +173,7 @@ class Pieces:
             if self._by_round_off(which):
                 continue
             before = self._point(t)
-            which += self._met(t, before, [w.relation for w in which])
+            which += self._met(t, before, which)
             point = self._fire(t, before, [], which)
             if point is not None:
                 self._accept(t, TRACE, sink, which)
@@ -181,15 +181,19 @@ class Pieces:
                 return time.process_time() - began
             begin = t
 
-    def _met(self, t: float, point: Point, known: Sequence[int] = ()) -> list[Watched]:
+    @property
+    def _from(self) -> float:
+        """The instant (s) from which the last step is searched."""
+        return float(self.run.driver.run.t_from if self.modes is None else self.modes.core.begin)
+
+    def _met(self, t: float, point: Point, known: Sequence[Watched] = ()) -> list[Watched]:
         """The relations beside the known ones that cross zero at t (s) too, but for round-off: one instant for all."""
-        handler = self.handler
-        sided = [k for k, side in enumerate(handler.side.tolist()) if side and k not in known]
+        handler, relations = self.handler, {w.relation for w in known}
+        sided = [k for k, side in enumerate(handler.side.tolist()) if side and k not in relations]
         values = handler.observer(t, *point) if sided else np.zeros(0)
         near = [w for w in handler.watched() if w.relation in sided]
         near = [w for w in near if abs(values[w.row]) <= handler.observer.zero(w.row)]
-        begin = self.run.driver.run.t_from if self.modes is None else self.modes.core.begin
-        step = (t - begin) / PARTS
+        step = (t - self._from) / PARTS
         if not near or step <= handler.nothing:
             return []
         low, here = self._values(t - step), self._values(t)
@@ -262,7 +266,7 @@ class Pieces:
         """The point behind an instant at which the text jumps."""
         self._told()
         due, which = self.handler.due(t), self.handler.turned(t, y, yd)
-        which += self._met(self.run.method.contents.t, (y, yd), [w.relation for w in which])
+        which += self._met(self.run.method.contents.t, (y, yd), which)
         found = self.handler.fire(t, y, yd, samples=due, which=which) if due or which else None
         point = found or self.handler.anew(t, y, yd)
         self.run.driver.run.start_kind = TRACE if due else 0

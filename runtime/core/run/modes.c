@@ -84,19 +84,20 @@ static int32_t crossing(sd_run *run, double end, double *t)
     int32_t watches = sd_mode_now(m)->watches, hits = 0, same = 0;
     double begin = fmax(m->begin, fmin(run->t_clear, end)), low = begin, high = low;
     sd_run_observe(run, low, m->low);
-    double seen = begin < run->t_seen && run->t_seen < end ? run->t_seen : end;
-    for (int part = 1; part <= SD_PARTS && !hits; part++) {
-        if (high > low) {
-            memcpy(m->low, m->high, (size_t)m->observed * sizeof(double));
-            low = high;
+    double stop = begin < run->t_seen && run->t_seen < end ? run->t_seen : end; /* where it has been seen, then all */
+    for (int more = 1; more && !hits; begin = stop, stop = end) {
+        more = stop < end;
+        for (int part = 1; part <= SD_PARTS && !hits; part++) {
+            if (high > low) {
+                memcpy(m->low, m->high, (size_t)m->observed * sizeof(double));
+                low = high;
+            }
+            high = part == SD_PARTS ? stop : begin + (stop - begin) * part / SD_PARTS;
+            sd_run_observe(run, high, m->high);
+            for (int32_t k = 0; k < watches; k++)
+                if (falls(m, k, m->low, m->high))
+                    m->which[hits++] = k;
         }
-        high = part == SD_PARTS ? seen : begin + (seen - begin) * part / SD_PARTS;
-        sd_run_observe(run, high, m->high);
-        for (int32_t k = 0; k < watches; k++)
-            if (falls(m, k, m->low, m->high))
-                m->which[hits++] = k;
-        if (part == SD_PARTS && seen < end)
-            part = 0, begin = seen, seen = end;
     }
     if (!hits)
         return 0;

@@ -121,6 +121,13 @@ static void refine(sd_run *run)
     run->settle->enough = enough;
 }
 
+void sd_run_quantities(sd_run *run, double t, double *values)
+{
+    memset(values, 0, (size_t)run->observed * sizeof *values);
+    if (run->observe)
+        run->observe->rows(&run->observe->frame, t, run->point, run->point_d, values);
+}
+
 /* values [observed] := magnitudes of what is observed and of its terms, at the point of a row */
 static void find_sizes(sd_run *run, double t, const double *observed)
 {
@@ -134,9 +141,7 @@ static void find_sizes(sd_run *run, double t, const double *observed)
 /* the same of a point without a row */
 static void find_own_sizes(sd_run *run, double t)
 {
-    memset(run->slope, 0, (size_t)run->observed * sizeof(double));
-    if (run->observe)
-        run->observe->rows(&run->observe->frame, t, run->point, run->point_d, run->slope);
+    sd_run_quantities(run, t, run->slope);
     find_sizes(run, t, run->slope);
 }
 
@@ -333,8 +338,7 @@ void sd_run_observe(sd_run *run, double t, double *values)
     run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
     if (run->settle)
         sd_run_settle(run, t);
-    memset(values, 0, (size_t)run->observed * sizeof *values);
-    run->observe->rows(&run->observe->frame, t, run->point, run->point_d, values);
+    sd_run_quantities(run, t, values);
 }
 
 /* quadratures over the step just accepted, powers and balances at its end */

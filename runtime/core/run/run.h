@@ -81,6 +81,8 @@ typedef struct sd_run {
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
                    int32_t audited);
 void sd_run_free(sd_run *run);
+/* values [observed] := what is observed at run->point, point_d */
+void sd_run_quantities(sd_run *run, double t, double *values);
 /* goes on from y, yd [n] at t with the row of the instant `label`; before [written], before_d: the point at the end of the
  * last step */
 void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd, const double *before,

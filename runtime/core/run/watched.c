@@ -7,23 +7,31 @@
 
 #define NARROWER 20   /* times the part of a step within which something changes is parted again */
 #define SHIFT 0.13    /* of a part, by which every other one is longer */
+#define SECOND (1.0 + SHIFT)
+#define FOURTH (3.0 + SHIFT)
+/* of the cubic through four points: what the value at k counts at 2 beside those at a, b and c */
+#define IN_THE_MIDDLE(k, a, b, c) ((2.0 - (a)) / ((k) - (a)) * ((2.0 - (b)) / ((k) - (b))) * ((2.0 - (c)) / ((k) - (c))))
 #define FAINT 1e-9    /* of the largest value of what is watched: what it is off by unseen */
 
 /* values [observed] of the dense output as it is, at t */
 static void look(sd_run *run, double t, double *values)
 {
-    const sd_stepper *stepper = run->stepper;
-    stepper->dense(stepper->self, t, run->point, run->point_d);
-    memset(values, 0, (size_t)run->observed * sizeof(double));
-    run->observe->rows(&run->observe->frame, t, run->point, run->point_d, values);
+    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+    sd_run_quantities(run, t, values);
+}
+
+/* The parabola through three points: its rise from the first to the second, and half of its second derivative. */
+static double parabola(const double *x, const double *value, double *bend)
+{
+    double rise = (value[1] - value[0]) / (x[1] - x[0]);
+    *bend = ((value[2] - value[1]) / (x[2] - x[1]) - rise) / (x[2] - x[0]);
+    return rise;
 }
 
 /* The least value between x[0] and x[2] of the parabola through three points; of the points, where it has none there. */
 static double bottom(const double *x, const double *value)
 {
-    double rise = (value[1] - value[0]) / (x[1] - x[0]), bend = (value[2] - value[1]) / (x[2] - x[1]) - rise;
-    bend /= x[2] - x[0];
-    double at = 0.5 * (x[0] + x[1] - rise / bend);
+    double bend, rise = parabola(x, value, &bend), at = 0.5 * (x[0] + x[1] - rise / bend);
     if (!(bend > 0.0 && at > x[0] && at < x[2]))
         return fmin(value[0], value[2]);
     return value[0] + (at - x[0]) * (rise + bend * (at - x[1]));
@@ -32,27 +40,25 @@ static double bottom(const double *x, const double *value)
 /* The parabola through three points at x[3]. */
 static double beyond(const double *x, const double *value)
 {
-    double rise = (value[1] - value[0]) / (x[1] - x[0]), bend = (value[2] - value[1]) / (x[2] - x[1]) - rise;
-    bend /= x[2] - x[0];
+    double bend, rise = parabola(x, value, &bend);
     return value[0] + (x[3] - x[0]) * (rise + bend * (x[3] - x[1]));
 }
 
-/* Whether a watch may fall through zero and come back between the ends of SD_PARTS parts, which lie at 0, 1 + SHIFT, 2,
- * 3 + SHIFT, 4 (no period is a part of all): the value in the middle is off the cubic through the others by more than
+/* Whether a watch may fall through zero and come back between the ends of SD_PARTS parts, which lie at 0, SECOND, 2,
+ * FOURTH, 4 (no period is a part of all): the value in the middle is off the cubic through the others by more than
  * a quarter of the least of them, or a parabola through neighbours falls, by so much more at most.  first: what begins at
  * zero leaves it. */
 static int unfollowed(const sd_run *run, const sd_watch *watch, int first)
 {
-    static const double part[SD_PARTS + 1] = {0.0, 1.0 + SHIFT, 2.0, 3.0 + SHIFT, 4.0};
+    static const double part[SD_PARTS + 1] = {0.0, SECOND, 2.0, FOURTH, 4.0};
+    static const double against[SD_PARTS + 1] = {
+        -IN_THE_MIDDLE(0.0, SECOND, FOURTH, 4.0), -IN_THE_MIDDLE(SECOND, 0.0, FOURTH, 4.0), 1.0,
+        -IN_THE_MIDDLE(FOURTH, 0.0, SECOND, 4.0), -IN_THE_MIDDLE(4.0, 0.0, SECOND, FOURTH)};
     double off = 0.0, least = INFINITY, most = 0.0, found[SD_PARTS + 1];
     for (int k = 0; k <= SD_PARTS; k++) {
-        double value = watch->side * run->looked[(size_t)k * (size_t)run->observed + (size_t)watch->row], weight = 1.0;
-        for (int j = 0; j <= SD_PARTS; j++)
-            if (j != k && j != 2 && k != 2)
-                weight *= (2.0 - part[j]) / (part[k] - part[j]);
-        off += k == 2 ? value : -weight * value;
-        most = fmax(most, fabs(value));
-        found[k] = value;
+        found[k] = watch->side * run->looked[(size_t)k * (size_t)run->observed + (size_t)watch->row];
+        off += against[k] * found[k];
+        most = fmax(most, fabs(found[k]));
     }
     double unseen = fmax(watch->tolerance, FAINT * most), low = INFINITY, wrong = fabs(off);
     first = first && found[0] <= unseen;
