@@ -31,7 +31,8 @@ from sysdyn.compiler.forms.kane import kane
 from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.legendre import transformed
 from sysdyn.compiler.forms.meters.untraced import with_coordinates_observed
-from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates
+from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates, without_ignorable
+from sysdyn.compiler.forms.series_stores import with_efforts_of_stores
 from sysdyn.compiler.forms.steepness import scaled
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
@@ -175,13 +176,15 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         network, inverted, steps = primal(family, reflected=reflected)
         verify_network(network, coordinates=True)
     with _timed("energies", timings):
-        model = in_relative_coordinates(energies.energies(network))
+        model, cut = energies.energies(network), tuple[Diagnostic, ...]()
+        if traced and not network.traced:
+            model, cut = with_coordinates_observed(model, network)
+        model = in_relative_coordinates(model)
+        if traced:
+            model = with_efforts_of_stores(without_ignorable(model))
         energies.verify_energies(model)
         as_written = network.scene is not None and network.scene.keeps("keep_flow")
         model, notes = integrate(model) if integrating and not as_written else (model, ())
-        if traced and not network.traced:
-            model, cut = with_coordinates_observed(model, network)
-            notes = (*notes, *cut)
         found = check_energies(model, network)
         if any(d.severity == "error" for d in found):
             raise ModelError(found)
@@ -201,7 +204,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         verify_program(program)
     with _timed("emit", timings):
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
-    said = (*inverted, *notes, *found)
+    said = (*inverted, *notes, *cut, *found)
     return CompiledModel(family, network, model, own, form, program, backend, text, said, steps, tuple(timings))
 
 

@@ -85,6 +85,11 @@ def whole(family: Family) -> tuple[Nest, tuple[Node, ...]]:
     return nest, tuple(counter(k) for k in range(len(nest)))
 
 
+def _rate(name: str) -> str:
+    """As the flow of a displacement is shown."""
+    return f"({name})'" if " " in name else f"{name}'"
+
+
 def _drift(model: EnergyModel) -> tuple[str, ...]:
     """`drift` where something reads it."""
     read = (n for quantity in model.quantities for n in variables(quantity.expression))
@@ -173,9 +178,9 @@ class _Lowering:
         held = {n.data[0] for piece in pieces for n in local_variables(piece, m.mirror.coordinate)}
         seen = observed(m, self.carriers) | held
         found = [
-            Unknowns(c.name, "q", c.name, c.units["q"], c.place) for c in m.coordinates if c.tangible or c.name in seen
+            Unknowns(c.shown, "q", c.name, c.units["q"], c.place) for c in m.coordinates if c.tangible or c.name in seen
         ]
-        found += [Unknowns(f"{c.name}'", "f", c.name, c.units["f"], c.place) for c in m.coordinates]
+        found += [Unknowns(_rate(c.shown), "f", c.name, c.units["f"], c.place) for c in m.coordinates]
         found += [
             Unknowns(f"{c.name}.p", "p", c.name, c.units["p"], c.place)
             for c in m.coordinates

@@ -1,8 +1,12 @@
-"""Coordinates that inertia joins to each other alone, counted from one of them.
+"""Coordinates that are counted from one of them, q_k = u_k + q_r, for one of two reasons.
 
-T* holds their flows in differences only, so the sum of their balances of efforts is algebraic.  Where it reads no flow
-either (current sources and inductors cut capacitors off), its rate is a hidden constraint, which shows once the sum is
-a row: with q_k = u_k + q_r, Lagrange's equation of q_r is that sum, and T* lacks q_r.
+Inertia joins them to each other alone: T* holds their flows in differences only, so the sum of their balances of
+efforts is algebraic.  Where it reads no flow either (current sources and inductors cut capacitors off), its rate is a
+hidden constraint, which shows once the sum is a row: Lagrange's equation of q_r is that sum, and T* lacks q_r.
+
+Potential energy joins coordinates without inertia to q_r, and nothing reads their displacements but in differences: q_r
+is ignorable, and grows no more beside the differences that matter (the nodes of pipes between tanks are impulses in the
+complementary family, 5e9 Pa s for differences of 1e3).
 
 Families take part as wholes: x[i, j] = u[i, j] + r, or + r[i + c] where what is joined stands side by side along i.
 
@@ -11,12 +15,12 @@ Received: an EnergyModel whose rows are as written.  Returned: the same model in
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from sysdyn.compiler.model.energies import EnergyModel, Family, tangible
+from sysdyn.compiler.model.energies import EnergyModel, Family, moved, reading, tangible
 from sysdyn.compiler.model.terms import Nest, has_reduction, local_variables, vanishes
-from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.calculus import differential
 from sysdyn.dsl.model.expression import (
     Node,
     add,
@@ -30,6 +34,7 @@ from sysdyn.dsl.model.expression import (
     var,
     variables,
 )
+from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.values import dataclass
 
@@ -51,20 +56,36 @@ _Anchors = Mapping[str, _Anchor]
 
 
 def in_relative_coordinates(model: EnergyModel) -> EnergyModel:
-    """The model with every group of floating coordinates counted from one of them."""
+    """The model with every group that inertia alone joins counted from one of it: its rows have no hidden rate then."""
+    m = model.mirror
+    return _counted(model, m.coenergy, m.rate, _floats)
+
+
+def without_ignorable(model: EnergyModel) -> EnergyModel:
+    """The model with what potential energy joins to an ignorable coordinate counted from that: for runs, where nobody
+    reads the rows.
+    """
+    m = model.mirror
+    return _counted(model, m.potential, m.coordinate, _is_ignorable)
+
+
+def _counted(
+    model: EnergyModel, function: str, kind: str, admits: Callable[[EnergyModel, _Anchors], bool]
+) -> EnergyModel:
+    """The model with the groups that a state function joins, by its variables of a kind, counted from one of each."""
     change: dict[str, _Anchor] = {}
-    for group in _groups(model):
-        anchors = _anchors(model, group)
-        if anchors and _floats(model, anchors):
-            change |= {name: a for name, a in anchors.items() if name != a.name}
+    for group in _groups(model, function, kind):
+        found = (_anchors(model, function, kind, group, anchor) for anchor in _candidates(model, group, kind))
+        anchors = next((a for a in found if a and admits(model, a)), {})
+        change |= {name: a for name, a in anchors.items() if name != a.name}
     return _changed(model, change) if change else model
 
 
-def _groups(model: EnergyModel) -> Iterator[list[Family]]:
-    """Families of coordinates that terms of T* join, in the order of the model."""
+def _groups(model: EnergyModel, function: str, kind: str) -> Iterator[list[Family]]:
+    """Families of coordinates that terms of a state function join, in the order of the model."""
     joined, groups = Joined[str](), dict[str, list[Family]]()
-    for term in model.function(model.mirror.coenergy):
-        names = [n.data[0] for n in local_variables(term.expression, model.mirror.rate)]
+    for term in model.function(function):
+        names = [n.data[0] for n in local_variables(term.expression, kind)]
         for name in names:
             joined.join(names[0], name)
     for c in model.coordinates:
@@ -72,13 +93,22 @@ def _groups(model: EnergyModel) -> Iterator[list[Family]]:
     return (group for group in groups.values() if len(group) > 1)
 
 
-def _anchors(model: EnergyModel, group: list[Family]) -> _Anchors:
-    """How the families of a group are counted from the last with fewest indices; empty where they cannot be."""
-    m = model.mirror
-    last = min(reversed(group), key=lambda c: len(c.shape))
-    found = {last.name: _Anchor(last.name, tuple((k, const(0.0)) for k in range(len(last.shape))))}
+def _candidates(model: EnergyModel, group: list[Family], kind: str) -> list[Family]:
+    """What a group may be counted from: the last with fewest indices; of a group without inertia what has some, or
+    any of most indices before others.
+    """
+    if kind == model.mirror.rate:
+        return [min(reversed(group), key=lambda c: len(c.shape))]
+    inertial = moved(model)
+    heavy = [c for c in group if c.name in inertial]
+    return heavy if len(heavy) == 1 else [] if heavy else sorted(group, key=lambda c: -len(c.shape))
+
+
+def _anchors(model: EnergyModel, function: str, kind: str, group: list[Family], anchor: Family) -> _Anchors:
+    """How the families of a group are counted from one of them; empty where they cannot be."""
+    found = {anchor.name: _Anchor(anchor.name, tuple((k, const(0.0)) for k in range(len(anchor.shape))))}
     shapes = {c.name: c for c in group}
-    joined = [local_variables(t.expression, m.rate) for t in model.function(m.coenergy)]
+    joined = [local_variables(t.expression, kind) for t in model.function(function)]
     while len(found) < len(group):
         before = len(found)
         for nodes in joined:
@@ -87,9 +117,9 @@ def _anchors(model: EnergyModel, group: list[Family]) -> _Anchors:
                 if n.data[0] in shapes and n.data[0] not in found:
                     assert known is not None
                     places = _places(found[known.data[0]].at(known.args), n.args)
-                    if places is None or not _inside(shapes[n.data[0]], last, places):
+                    if places is None or not _inside(shapes[n.data[0]], anchor, places):
                         return {}
-                    found[n.data[0]] = _Anchor(last.name, places)
+                    found[n.data[0]] = _Anchor(anchor.name, places)
         if len(found) == before:
             return {}
     return found
@@ -126,38 +156,63 @@ def _floats(model: EnergyModel, group: _Anchors) -> bool:
     Elements of the anchor that inertia does not reach do not count.
     """
     m = model.mirror
-    inertia = model.function(m.coenergy)
-    reached = [
-        _reach(group[n.data[0]].at(n.args), term.loops)
-        for term in inertia
-        for n in local_variables(term.expression, m.rate)
-        if n.data[0] in group
-    ]
-
-    def along(root: Node, loops: Nest, kind: str) -> bool:
-        """Whether the expression changes where all that have one anchor move alike."""
-        slopes: dict[tuple[Node, ...], list[Node]] = {}
-        for n in local_variables(root, kind):
-            if n.data[0] in group:
-                slopes.setdefault(group[n.data[0]].at(n.args), []).append(derivative(root, n))
-        if slopes and has_reduction(root):
-            return True
-        return any(
-            not vanishes(*found) and any(_meet(_reach(at, loops), box) for box in reached)
-            for at, found in slopes.items()
-        )
-
+    along = _Along(model, m.coenergy, m.rate, group)
     rows = [row for row in model.rows if row.kind != "lambda"]
-    terms = [*inertia, *model.function(m.content), *(t for row in rows for t in row.terms)]
-    if any(along(t.expression, t.loops, m.rate) for t in terms):
+    terms = [*model.function(m.coenergy), *model.function(m.content), *(t for row in rows for t in row.terms)]
+    if any(along.changes(t.expression, t.loops, m.rate) for t in terms):
         return False
-    if any(along(t.expression, t.loops, m.coordinate) for row in model.of_kind("phi") for t in row.terms):
+    if any(along.changes(t.expression, t.loops, m.coordinate) for row in model.of_kind("phi") for t in row.terms):
         return False
     for work in model.works:
         read = {n.data[1:] for n in variables(work.effort) if n.op == "var"}
-        if not read <= {(m.coordinate, 0), ("s", 0)} and along(work.on, work.loops, m.coordinate):
+        if not read <= {(m.coordinate, 0), ("s", 0)} and along.changes(work.on, work.loops, m.coordinate):
             return False
-    return all(n.data[1] in (m.coordinate, m.rate) for n in _unknowns(model) if n.data[0] in group)
+    return _without_conjugates(model, set(group))
+
+
+def _is_ignorable(model: EnergyModel, group: _Anchors) -> bool:
+    """Whether nothing that makes a coordinate tangible, and no `init`, reads displacements but in differences.
+
+    Elements of the anchor that no potential energy reaches do not count.
+    """
+    m = model.mirror
+    along = _Along(model, m.potential, m.coordinate, group)
+    said = ((i.target, i.nest) for i in model.initials)
+    read = ((expression, loops) for expression, loops, _ in reading(model))
+    if any(along.changes(expression, loops, m.coordinate) for expression, loops in (*read, *said)):
+        return False
+    return _without_conjugates(model, {name for name, anchor in group.items() if name != anchor.name})
+
+
+def _without_conjugates(model: EnergyModel, names: set[str]) -> bool:
+    m = model.mirror
+    return all(n.data[1] in (m.coordinate, m.rate) for n in _unknowns(model) if n.data[0] in names)
+
+
+class _Along:
+    """The motion of all that have one anchor, alike; function, kind: what joins them, and by which of its variables."""
+
+    def __init__(self, model: EnergyModel, function: str, kind: str, group: _Anchors) -> None:
+        self.group = group
+        self.reached = [
+            _reach(group[n.data[0]].at(n.args), term.loops)
+            for term in model.function(function)
+            for n in local_variables(term.expression, kind)
+            if n.data[0] in group
+        ]
+
+    def changes(self, root: Node, loops: Nest, kind: str) -> bool:
+        """Whether the expression changes along it, by its variables of that kind."""
+        together: dict[tuple[Node, ...], dict[Node, Node]] = {}
+        for n in local_variables(root, kind):
+            if n.data[0] in self.group:
+                together.setdefault(self.group[n.data[0]].at(n.args), {})[n] = const(1.0)
+        if together and has_reduction(root):
+            return True
+        return any(
+            not vanishes(differential(root, alike)) and any(_meet(_reach(at, loops), box) for box in self.reached)
+            for at, alike in together.items()
+        )
 
 
 def _reach(at: tuple[Node, ...], loops: Nest) -> tuple[tuple[Node, Node], ...]:
@@ -192,4 +247,13 @@ def _changed(model: EnergyModel, change: _Anchors) -> EnergyModel:
 
     found = model.rewritten(new)
     touched = tangible(found)
-    return replace(found, coordinates=tuple(replace(c, tangible=c.name in touched) for c in found.coordinates))
+    less = {name: _less(anchor) for name, anchor in change.items()}
+    coordinates = (replace(c, tangible=c.name in touched, less=less.get(c.name, c.less)) for c in found.coordinates)
+    return replace(found, coordinates=tuple(coordinates))
+
+
+def _less(anchor: _Anchor) -> str:
+    """The anchor as it is shown: its one element, or the family."""
+    if any(k is not None for k, _ in anchor.places):
+        return anchor.name
+    return to_text(var(anchor.name, "q", *(c for _, c in anchor.places)))

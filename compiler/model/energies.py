@@ -57,6 +57,7 @@ class Family:
     """A coordinate, an implicit unknown or a state with its shape and units by kind of unknown.
 
     balance: of a coordinate, the unit of effort times displacement (J but in pseudo domains).
+    less: of a coordinate that is counted from another, that one, as its name is shown with.
     """
 
     name: str
@@ -64,6 +65,12 @@ class Family:
     units: Mapping[str, str]
     place: Place
     tangible: bool = False
+    less: str = ""
+
+    @property
+    def shown(self) -> str:
+        """What its unknowns are, e.g. pipe.m - v[1]."""
+        return f"{self.name} - {self.less}" if self.less else self.name
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,28 +275,36 @@ def _quantities(network: Network) -> Iterator[Quantity]:
                 yield Quantity(f"expect {k} {side}", expression, False, e.unit.text, e.place)
 
 
-def _occurring(model: EnergyModel) -> Iterator[tuple[Node, Place]]:
-    """Every expression whose undifferentiated displacements make a coordinate tangible."""
+def reading(model: EnergyModel) -> Iterator[tuple[Node, Nest, Place]]:
+    """Every expression whose undifferentiated displacements make a coordinate tangible, under its loops."""
     m = model.mirror
     for function in (m.potential, m.coenergy, m.energy, m.content):
         for term in model.function(function):
-            yield term.expression, term.place
+            yield term.expression, term.loops, term.place
     for row in model.rows:
         for term in row.terms:
-            yield term.expression, term.place
+            yield term.expression, term.loops, term.place
     for work in model.works:
-        yield work.effort, work.place
+        yield work.effort, work.loops, work.place
         for node in local_variables(work.on, m.coordinate):
-            yield derivative(work.on, node), work.place
+            yield derivative(work.on, node), work.loops, work.place
 
 
 def tangible(model: EnergyModel) -> dict[str, Place]:
     """Coordinates whose displacement occurs undifferentiated, with the first place where it does."""
     found: dict[str, Place] = {}
-    for expression, place in _occurring(model):
+    for expression, _, place in reading(model):
         for node in local_variables(expression, model.mirror.coordinate):
             found.setdefault(node.data[0], place)
     return found
+
+
+def moved(model: EnergyModel) -> frozenset[str]:
+    """Coordinates that some kinetic store moves with."""
+    m = model.mirror
+    pairs = ((m.coenergy, m.rate), (m.energy, m.conjugate))
+    terms = ((t, kind) for name, kind in pairs for t in model.function(name))
+    return frozenset(n.data[0] for t, kind in terms for n in local_variables(t.expression, kind))
 
 
 def show(model: EnergyModel) -> str:

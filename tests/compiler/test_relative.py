@@ -1,14 +1,15 @@
-"""Coordinates counted from one of them, and conjugates with the book's sign, by hand."""
+"""Coordinates counted from one of them, efforts that stores tell, and conjugates with the book's sign, by hand."""
 
 import pytest
-from catalogue import PLACE
+from catalogue import ONE, PLACE
 from chains import blank, coordinate
 from sysdyn.compiler.forms.conjugates import signed
-from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates
+from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates, without_ignorable
+from sysdyn.compiler.forms.series_stores import with_efforts_of_stores
 from sysdyn.compiler.model.energies import energies
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Energy
+from sysdyn.dsl.model.network import Constraint, Energy, Unknown, Work
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -69,6 +70,58 @@ def test_a_mass_of_its_own_is_no_reason():
     heavy = x.add(TIED, quadratic((1.0, f("c"), None)))
     made = model(kinetic=heavy, potential=quadratic((1.0, q("a"), None)))
     assert in_relative_coordinates(made) is made
+
+
+def parts(potential, **more):
+    """Of a, b, c: only c has a mass."""
+    return model(kinetic=quadratic((2.0, f("c"), None)), potential=potential, **more)
+
+
+def are_tangible(made):
+    return [c.name for c in made.coordinates if c.tangible]
+
+
+def springs():
+    return quadratic((2.0, q("a"), q("c")), (3.0, q("b"), q("c")))
+
+
+def test_what_springs_read_in_differences_is_counted_from_what_has_the_mass():
+    """a = u_a + c, b = u_b + c: V = u_a^2 + 3/2 u_b^2, a damper at a feels u_a' + c', and nothing reads c."""
+    found = without_ignorable(parts(springs(), content=quadratic((4.0, f("a"), None))))
+    assert value(found, "V", qa=2.0, qb=3.0) == 4.0 + 1.5 * 9.0
+    assert value(found, "D", fa=2.0, fc=5.0) == 2.0 * 49.0
+    assert value(found, "T*", fc=5.0) == 25.0
+    assert are_tangible(found) == ["a", "b"]
+
+
+@pytest.mark.parametrize("of", ["a", "c"])
+def test_what_reads_a_place_by_itself_holds_all_where_they_are(of):
+    made = parts(x.add(springs(), x.power(q(of), x.const(4.0))))
+    assert without_ignorable(made) is made
+
+
+def test_two_masses_on_a_spring_stay_as_they_are():
+    masses = quadratic((2.0, f("a"), None), (1.0, f("c"), None))
+    made = model(kinetic=masses, potential=quadratic((1.0, q("a"), q("c"))))
+    assert without_ignorable(made) is made
+
+
+def test_a_law_reads_the_store_in_series_with_what_it_is_of():
+    """2 a + y = 0, so a' - y^3 is a' + (2 a)^3; with a mass at a it is not."""
+    y, law = x.var("y", "e"), x.sub(f("a"), x.power(x.var("y", "e"), x.const(3.0)))
+    more = {
+        "unknowns": (Unknown("y", (), ONE, PLACE),),
+        "works": (Work(x.neg(y), q("a"), (), PLACE, "dissipated"),),
+        "constraints": (Constraint("gamma", "law", (), law, (), ONE, PLACE),),
+    }
+    spring = Energy("V", quadratic((2.0, q("a"), None)), (), PLACE)
+    mass = Energy("T*", quadratic((2.0, f("a"), None)), (), PLACE)
+    known = {"fa": 100.0, "qa": 3.0, "ey": 5.0}
+    for stores, told in (((spring,), True), ((spring, mass), False)):
+        made = energies(blank(coordinates=(coordinate("a"),), energies=stores, **more))
+        (row,) = with_efforts_of_stores(made).rows
+        found = sum(evaluate([t.expression for t in row.terms], lambda leaf: known[leaf.data[1] + leaf.data[0]]))
+        assert found == (100.0 + 216.0 if told else 100.0 - 125.0)
 
 
 def test_the_book_s_sign_of_a_conjugate():

@@ -309,3 +309,25 @@ def test_a_long_chain_of_inerters_begins_where_its_springs_balance(tmp_path, for
     assert abs(trace["x[1]"].values[0] - 1.0) < 1e-12
     assert abs(trace["s"].values[0]) < 1e-12
     assert abs(trace["r"].values[0]) < 1e-11
+
+
+@pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
+def test_where_nothing_is_traced_every_node_is_told_whole(tmp_path, formulation):
+    """sin(t) through 3 H and two capacitors side by side: node impulses are 3 sin(t) and (t - sin(t))/7 more.
+
+    Rows count one node from the other; what is told is the node.
+    """
+    text = """
+    model cut {
+      node a, b: electrical
+      source: flow(f = 1 A*sin(t/1 s)) ground -> a
+      c1: potential(e = q/(2 F)) a -> b
+      c2: potential(e = q/(5 F)) a -> b
+      l1: kinetic(p = 3 H*f) b -> ground
+    }
+    scene go of cut { time 0 s to 2 s; accuracy 1e-6 }
+    """
+    trace = trace_of(tmp_path, text, formulation=formulation)
+    t = trace.time
+    assert trace["b"].values == pytest.approx(3.0 * np.sin(t), abs=1e-5)
+    assert trace["a"].values == pytest.approx(3.0 * np.sin(t) + (t - np.sin(t)) / 7.0, abs=1e-5)

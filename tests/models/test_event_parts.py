@@ -65,6 +65,22 @@ def row_of(masses, restitution=0.5):
     return f"model row {{\n{coords}  energy T* = {kinetic}\n{gaps}{still}}}\n{trace}\n"
 
 
+def test_a_run_begins_as_the_text_says_whatever_the_run_before_left():
+    """Magnitudes and rates at the start are those of the numbers that hold there."""
+    spring = "model m { param k = 3 N/m; param m = 2 kg; coord x: translation = 1 m; energy T* = 1/2*m*x'^2"
+    made = Model(spring + """; energy V = 1/2*k*x^2; phi stop: x >= 0.5 m restitution 1; init x' = 0 m/s }
+        scene s of m { time 0 s to 3 s; trace x }""")
+    begin = made.run.request.begin
+    assert begin is not None
+    first = made.run.sizes.magnitude.copy(), made.run.start_rate.copy()
+    made.system.description.p[:] += 50.0
+    made.system.description.switches.set(~begin[1])
+    again = Integration(made.system, made.run.start, made.run.request)
+    assert np.array_equal(again.sizes.magnitude, first[0])
+    assert np.array_equal(again.start_rate, first[1])
+    assert np.array_equal(made.system.description.switches.active, begin[1])
+
+
 def newton(masses, speeds, restitution):
     """Speeds behind impulses l >= 0 of the gaps of a row: w = J v - aim >= 0, l w = 0, by trying every set."""
     n = len(masses) - 1
