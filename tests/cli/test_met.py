@@ -290,3 +290,31 @@ scene s of two {
         assert np.abs(trace["audit/energy"][:]).max() < 0.1 * 5e5
     assert code == 3
     assert [m["element"] for m in found["result"]["not_met"]] == ["y"]
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane"])
+@pytest.mark.parametrize(
+    ("elements", "end"),
+    [
+        # c T' = -k (T - 290 K), its heat k (T - 290 K) given as a flow of entropy
+        (
+            "node h: thermal\n  C: potential(e = 300 K*exp(q/(100 J/K))) h\n  init C.e = 350 K\n"
+            "  loss: flow(f = 2 W/K*(h.e - 290 K)/h.e) h -> ground",
+            290.0 + 60.0 * np.exp(-1.0),
+        ),
+        # C u u' = -P
+        (
+            "node h: electrical\n  C: potential(q = 1 mF*e) h\n  init C.e = 350 V\n"
+            "  load: flow(f = (1 W)/h.e) h -> ground",
+            np.sqrt(350.0**2 - 2.0 * 50.0 / 1e-3),
+        ),
+    ],
+)
+def test_a_power_that_is_constant_is_no_constant_of_the_ledger(tmp_path, capsys, elements, end, formulation):
+    path = tmp_path / "m.sd"
+    scene = "scene s of m {\n  time 0 s to 50 s\n  trace C.e as e\n}\n"
+    path.write_text(f"model m {{\n  {elements}\n}}\n{scene}")
+    code, found, _ = simulated(path, tmp_path, capsys, "--formulation", formulation, "--accuracy", "1e-6")
+    assert code == 0, found["result"]["not_met"]
+    with h5py.File(tmp_path / "out.h5") as trace:
+        assert trace["e"][-1] == pytest.approx(end, rel=1e-5)
