@@ -44,7 +44,7 @@ from sysdyn.dsl.tree import syntax
 
 STATICS = ("coordinates", "m1", "m2", "dof", "configuration_dof", "redundant", "order", "manifold", "index")
 VALUES = ("t", "pi", "inf")
-"""Words of the language that are worth something, which a label of an element, worth nothing by itself, does not hide."""
+"""Words of the language that are values, which the label of an element, no value by itself, does not hide."""
 ELEMENTS = (BranchSymbol, TwoPortSymbol, InstanceSymbol)
 
 

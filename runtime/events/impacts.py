@@ -67,8 +67,8 @@ class _Blow(NamedTuple):
 
 
 class Impacts:
-    """The impacts of a run.  rest: see plan.Plan; fastest [contacts]: speed at which each gap closed at most; closed: the
-    gaps that did at last.
+    """The impacts of a run.  rest: see plan.Plan; fastest [contacts]: speed at which each gap closed at most; closed:
+    the gaps that did at last.
     """
 
     def __init__(self, contacts: Contacts, rest: float) -> None:

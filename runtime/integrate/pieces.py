@@ -265,7 +265,7 @@ class Pieces:
         return bool(due) and method.t < end
 
     def jump(self, segment: Segment, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
-        """The point behind the instant at which the text jumps and a segment begins; what happens there has its rows."""
+        """The point behind the instant at which the text jumps, where a segment begins; what happens has its rows."""
         self._told()
         handler, t = self.handler, segment.begin
         handler.before, events = handler.now(), len(handler.happened)
