@@ -23,6 +23,7 @@ from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, c
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
+from sysdyn.runtime.model.slopes import WITH_A_SLOPE, no_slope, without_slope
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
@@ -258,6 +259,10 @@ def formed(
     form, index, warnings = choose_index(options.index, facts, options.method)
     system = written if form == "3" else written.another(form)
     missing = underlying_form(system, start)[1] if form == "0" else ()
+    flat = without_slope(written, start.t, *start.for_form(written)) if missing else ()
+    if flat:
+        remedy = f"{WITH_A_SLOPE}, or index 2 or 3 with bdf or radau"
+        raise NoSuchForm(f"{no_slope(flat)}, and there is no underlying equation: {remedy}")
     if missing:
         still = list(dict.fromkeys(name.rstrip("'") for name in missing if name.endswith("'")))[:3]
         remedy = f"inertia on {', '.join(still)}, constraints that hold it, or " if still else ""

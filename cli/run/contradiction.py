@@ -17,6 +17,7 @@ from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.text.diagnostics import ModelError, Place, Related, Report
 from sysdyn.runtime.events.start import eventful_start
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.model.slopes import WITH_A_SLOPE, no_slope
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import NotFiniteError
 
@@ -43,6 +44,8 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             report.error("E519", f"gamma '{names}' has no solution at the start: {left}", where, related=related)
         case "implicit":
             report.error("E505", f"the gammas do not determine {', '.join(error.names)} at the start", where)
+        case "slope":
+            report.error("E903", f"no start: {no_slope(error.rows)}", where, help=WITH_A_SLOPE)
         case "nonfinite" if not names:
             message = "the equations are no numbers at the start: products or quotients beyond 1e308?"
             sizes = "look at the sizes of parameters and initial values"

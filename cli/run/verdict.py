@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+import numpy as np
 from sysdyn.cli.run.culprit import Culprit, culprit
 from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared, place_at
@@ -17,7 +18,9 @@ from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.judgement import Cancelled, Judgement, NotMet
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
+from sysdyn.runtime.model.slopes import WITH_A_SLOPE, no_slope, without_slope
 from sysdyn.runtime.simulate import Outcome
+from sysdyn.runtime.structure.structure import DENSE
 
 _CAUSES = {
     "newton": ("E930", "Newton's iteration does not converge"),
@@ -81,15 +84,19 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     lost = last.dependent(started.state.y) if last is not None and code == "E930" else []
     if lost:
         code, cause = "E931", f"{', '.join(c.name for c in lost)} lose their rank: they depend on each other there"
+    flat = _flat(started, error) if found is None and not lost and code in ("E930", "E931", "E933") else ()
+    if flat:
+        code, cause = "E931", no_slope(flat)
     where = lost[-1].place if lost else _place(target, prepared, error, found, last)
+    where = author_place(target, prepared, flat[0]) if flat else where
     text = f"the solver stopped at t = {error.time:.9g} s (step {error.step:.2g} s): {cause}"
-    if error.row is not None and found is None:
+    if error.row is not None and found is None and not flat:
         text += f", in {_named(error.row)}"
     if error.unknown is not None:
         text += f", {'of' if error.cause in _OF_EVENTS else 'unknown'} {error.unknown}"
     partial = error.partial
     linear = error.cause == "error_test" and isinstance(partial, Outcome) and partial.method == "rosenbrock"
-    text += _BY_SLOPES if linear else ""
+    text += _BY_SLOPES if linear and not flat else ""
     why = None
     if last is not None and code == "E930":
         why = last.grown(started.state.y) or last.vanishing(started.state.y)
@@ -97,7 +104,8 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     if isinstance(partial, Outcome) and partial.reached > error.time:
         text += "; the trace is that of a coarser run to the end, its error is not known"
     usual = _REMEDIES_OF_EVENTS.get(error.cause, _REMEDIES[code])
-    usual = "--method radau or bdf, or auto" if linear else usual
+    usual = "--method radau or bdf, or auto" if linear or flat else usual
+    usual += f"; {WITH_A_SLOPE}" if flat else ""
     if error.cause == "singular" and len(started.system.description.switches.places):
         usual = _TWICE
     remedy = _BOUNDED if why else _RANK if lost else usual
@@ -105,6 +113,16 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     help_ = "; ".join(filter(None, (remedy, known)))
     report.error(code, text, where, help=help_)
     return text
+
+
+def _flat(started: Started, error: SolverFailure) -> tuple[RowLabel, ...]:
+    """Rows of laws that have no slope at the last good point; none where events are the cause."""
+    system = started.system
+    if error.state is None or error.cause in (*_OF_EVENTS, "inertia", "memory") or system.unknowns > DENSE:
+        return ()
+    t, y, yd = error.state
+    rest = np.zeros(system.unknowns - y.size)
+    return without_slope(system, t, np.append(y, rest), np.append(np.where(np.isfinite(yd), yd, 0.0), rest))
 
 
 def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Report) -> None:

@@ -4,7 +4,8 @@
 
 (book, afterword; Kane, Levinson: Dynamics, 1985, 4.6).  Psi needs no multipliers: its reactions do no work along the
 columns of B.  B is found by elimination without division, so that it is regular wherever a pivot is; one that is a
-number comes first.  A reaction that something reads is kept with Psi_f Psi_f^T mu = Psi_f (Upsilon - ...) as its row.
+number comes first.  A flow constraint whose reaction something reads (that of an inequality its condition does) keeps
+its multiplier, with all that share flows with it: there is nothing left out, and the balances are Lagrange's own.
 """
 
 from __future__ import annotations
@@ -30,26 +31,23 @@ Entries = dict[str, Node]
 
 @dataclass(frozen=True, slots=True)
 class Projection:
-    """free: B by coordinate that keeps its balance, column by column; bound: coordinates that lose it; rows: Psi_f by
-    label.
-    """
+    """free: B by coordinate that keeps its balance, column by column; bound: coordinates that lose it."""
 
     free: Mapping[str, Entries]
     bound: frozenset[str]
-    rows: Mapping[str, Entries]
 
     def along(self, speeds: Speeds) -> Projection:
         """The same with partial velocities in the place of the columns of their coordinates."""
         free = {name: column for name, column in self.free.items() if name not in speeds.rest}
         bound = self.bound - set(speeds.rest)
-        return Projection({**free, **{u: dict(c) for u, c in speeds.columns.items()}}, bound, self.rows)
+        return Projection({**free, **{u: dict(c) for u, c in speeds.columns.items()}}, bound)
 
 
 def kane(model: EnergyModel) -> DescriptorForm:
     """Unknowns q f kappa e s, and mu where a reaction is read.  ModelError E607 where Psi cannot be eliminated."""
-    found = projection(model)
-    form = lagrangian(model)
-    read = _joined(found, _reactions_read(form))
+    rows, form = constraints(model), lagrangian(model)
+    read = _joined(rows, _reactions_read(form))
+    found = projection(model, {label: entries for label, entries in rows.items() if label not in read})
     speeds = speeds_of(model, read)
     if speeds.speeds:
         form = lagrangian(_seen(model, speeds))
@@ -65,20 +63,25 @@ def _seen(model: EnergyModel, speeds: Speeds) -> EnergyModel:
 
 
 def repeats(form: DescriptorForm) -> bool:
-    """Whether a form of Kane is Lagrange's row for row: no flow constraint is left out, no speed is unknown."""
+    """Whether a form of Kane is Lagrange's whatever is read: there is no flow constraint, no speed is unknown."""
     if not form.formulation.endswith("kane"):
         return False
     return not any(row.block == "psi" for row in form.rows) and not any(form.is_speed(f) for f in form.families)
 
 
-def projection(model: EnergyModel) -> Projection:
-    """B of all flow constraints."""
+def constraints(model: EnergyModel) -> dict[str, Entries]:
+    """Psi_f by label."""
     rows: dict[str, Entries] = {}
     families = {c.name: c for c in model.coordinates}
     for row in model.of_kind("psi"):
         if row.name in rows:
             raise _impossible(row, f"psi {row.name} is declared in several pieces")
         rows[row.name] = _entries(row, families)
+    return rows
+
+
+def projection(model: EnergyModel, rows: Mapping[str, Entries]) -> Projection:
+    """B of these flow constraints."""
     reduced = {name: dict(entries) for name, entries in rows.items()}
     pivots: dict[str, str] = {}
     for _ in rows:
@@ -87,7 +90,7 @@ def projection(model: EnergyModel) -> Projection:
         _eliminate(reduced, name, column)
     bound = frozenset(pivots.values())
     free = {c.name: _column(c.name, reduced, pivots) for c in model.coordinates if c.name not in bound}
-    return Projection(free, bound, rows)
+    return Projection(free, bound)
 
 
 def _impossible(row: Row, why: str) -> ModelError:
@@ -123,7 +126,7 @@ def _pivot(reduced: Mapping[str, Entries], pivots: Mapping[str, str], model: Ene
         for column, value in entries.items()
     ]
     if not choices:
-        row = next(r for r in model.of_kind("psi") if r.name not in pivots)
+        row = next(r for r in model.of_kind("psi") if r.name in reduced and r.name not in pivots)
         raise _impossible(row, f"psi {row.name} follows from the others")
     return min(choices)[-2:]
 
@@ -170,11 +173,11 @@ def _reactions_read(form: DescriptorForm) -> frozenset[str]:
     return frozenset(read | {f.owner for f in pinned if f.kind == "mu"})
 
 
-def _joined(found: Projection, read: frozenset[str]) -> frozenset[str]:
+def _joined(rows: Mapping[str, Entries], read: frozenset[str]) -> frozenset[str]:
     """These labels, and all whose rows share flows with them."""
-    columns = {c for label in read for c in found.rows[label]}
-    more = frozenset(label for label, entries in found.rows.items() if columns & set(entries))
-    return read if more <= read else _joined(found, read | more)
+    columns = {c for label in read for c in rows[label]}
+    more = frozenset(label for label, entries in rows.items() if columns & set(entries))
+    return read if more <= read else _joined(rows, read | more)
 
 
 class _Projected:
@@ -209,13 +212,7 @@ class _Projected:
             for row in self.lagrange.rows:
                 if row.block == "dynamics":
                     self.assembly.family(replace(row, block="phi_normal", kind="phi_normal"))
-        multipliers = {f.owner: f for f in self.lagrange.families if f.kind == "mu"}
-        for label in sorted(self.read):
-            family = multipliers[label]
-            self.assembly.family(Equations("dynamics", family.name, label, "dynamics", family.unit, family.place))
         self._copy()
-        for label in sorted(self.read):
-            self._reaction(label)
         for name in self.speeds.rest:
             zero = kinematics(self.speeds, name)
             self.assembly.add("dynamics", name, (), (), zero)
@@ -249,15 +246,19 @@ class _Projected:
     def _left_out(self, row: Equations) -> bool:
         return row.block == "psi" and row.owner in self.speeds.left_out
 
+    def _is_read(self, reaction: Node) -> bool:
+        """Whether a summand of reactions is of a constraint that keeps its multiplier."""
+        return any(n.data[0] in self.read for n in local_variables(reaction, "mu"))
+
     def _copy(self) -> None:
         for block in self.lagrange.blocks:
-            if block.name in ("psi_reaction", "dynamics_rate"):
+            if block.name == "dynamics_rate":
                 continue
             for kernel in block.kernels:
                 for summand in kernel.rows:
                     row = self.lagrange.rows[summand.row]
                     value = substitute(summand.expression, self.change) if self.change else summand.expression
-                    if self._left_out(row):
+                    if self._left_out(row) or (block.name == "psi_reaction" and not self._is_read(value)):
                         continue
                     if HOME.get(block.name, block.name) != "dynamics":
                         self.assembly.add(block.name, row.owner, summand.at, kernel.nest, value)
@@ -267,7 +268,7 @@ class _Projected:
                     self._balance(block.name, row.owner, summand.at, kernel.nest, value)
 
     def _balance(self, block: str, owner: str, at: tuple[Node, ...], nest: Nest, value: Node) -> None:
-        """A summand of the balance of one coordinate, in the mixed balances and the rows of reactions."""
+        """A summand of the balance of one coordinate, in the mixed balances."""
         for name, column in self.found.free.items():
             if owner in column:
                 mixed = mul(_here(column[owner], at), value)
@@ -277,21 +278,6 @@ class _Projected:
                 if name in self.rated and all(n.data[1] == "f" for n in rates):
                     acting = substitute(mixed, dict.fromkeys(rates, const(0.0)))
                     self.assembly.add("dynamics_rate", name, at, nest, total_rate(acting))
-        for label in self.read:
-            if owner in self.found.rows[label]:
-                self.assembly.add(block, label, at, nest, mul(_here(self.found.rows[label][owner], at), value))
-
-    def _reaction(self, label: str) -> None:
-        """Psi_f Psi_f^T mu, in the row of the label."""
-        own = self.found.rows[label]
-        for other, entries in self.found.rows.items():
-            common = [mul(own[c], entries[c]) for c in own if c in entries]
-            if not common:
-                continue
-            _, nests = next(item for item in self.lagrange.hulls if item[0] == label)
-            at, nest, _ = nests[0]
-            value = mul(add(*common), var(other, "mu", *at))
-            self.assembly.add("dynamics", label, at, nest, value)
 
 
 def _here(value: Node, at: tuple[Node, ...]) -> Node:

@@ -43,6 +43,9 @@ from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
 
 STATICS = ("coordinates", "m1", "m2", "dof", "configuration_dof", "redundant", "order", "manifold", "index")
+VALUES = ("t", "pi", "inf")
+"""Words of the language that are values, which the label of an element, no value by itself, does not hide."""
+ELEMENTS = (BranchSymbol, TwoPortSymbol, InstanceSymbol)
 
 
 def _scaled(text: str, scale: Fraction) -> float:
@@ -116,7 +119,9 @@ class Names(Context):
         if e.name in self._bound:
             return self._bound[e.name]
         symbol = self.scope.find(e.name)
-        return self._predefined(e.name, e.span) if symbol is None else self.value(symbol, e.span)
+        if symbol is None or (e.name in VALUES and isinstance(symbol, ELEMENTS)):
+            return self._predefined(e.name, e.span)
+        return self.value(symbol, e.span)
 
     def _predefined(self, name: str, span: syntax.Span) -> Value:
         """What a word of the language itself stands for: t, pi, inf."""

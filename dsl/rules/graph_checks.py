@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
@@ -14,11 +14,14 @@ from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, NodeFamily, Terminal
 from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.model.values import Values, as_constants
+from sysdyn.dsl.rules.untouched import Box, shown, untouched
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
 
 NEAR = 3
 """Names that a finding shows beside a node's."""
+EMPTY = (-math.inf, math.inf)
+"""Bounds of an index of a loop that has no element, in order (Values.bounds)."""
 _End = tuple[str, str | None, tuple[Node, ...]]
 """Domain, node and indices; None for the ground."""
 
@@ -46,11 +49,15 @@ def _ends(branches: Iterable[Branch]) -> Iterable[tuple[Branch, Terminal]]:
 
 
 def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report: Report) -> None:
-    """E409: a node that fewer than two elements touch (common flow: none) and nothing reads."""
+    """E409: a node that fewer than two elements touch (common flow, or one of a family: none) and nothing reads."""
     touched: dict[str, float] = {}
+    boxes: dict[str, list[Box]] = {}
     for branch, terminal in _ends(model.parts.branches):
         assert terminal.node is not None
         touched[terminal.node] = touched.get(terminal.node, 0.0) + _count(branch, known)
+        if terminal.at:
+            found = tuple(known.bounds(at, branch.loops) for at in terminal.at)
+            boxes.setdefault(terminal.node, []).append(tuple((min(b), max(b)) for b in found))
     mentioned = read | _mentioned(model)
     alike: dict[str, list[str]] = {}
     for node in model.parts.nodes:
@@ -59,8 +66,22 @@ def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report
         size = math.prod(known.number(b) - known.number(a) + 1 for a, b in node.shape)
         wanted = (2.0 if node.domain.common == "effort" else 1.0) * (size if not node.shape else 1.0)
         count = touched.get(node.name, 0.0)
-        if count < wanted and node.name not in mentioned and size > 0 and not math.isnan(count):
-            _lonely(node, count, alike[_beginning(node)][: NEAR + 1], report)
+        if node.name in mentioned or not size > 0 or math.isnan(count):
+            continue
+        near = alike[_beginning(node)][: NEAR + 1]
+        if count < wanted:
+            _lonely(node, count, near, report)
+        elif node.shape and (left := _left(node, boxes.get(node.name, []), known)) is not None:
+            message = f"node '{node.name}[{shown(left)}]' touches no element"
+            report.error("E409", message, node.place, help="connect it to an element, or declare fewer nodes")
+
+
+def _left(node: NodeFamily, boxes: Sequence[Box], known: Values) -> Box | None:
+    """The first elements of a family that nothing touches."""
+    whole = tuple((known.number(first), known.number(last)) for first, last in node.shape)
+    if not all(math.isfinite(a + b) for box in (whole, *boxes) for a, b in box if (a, b) != EMPTY):
+        return None
+    return untouched(whole, [box for box in boxes if EMPTY not in box])
 
 
 def _beginning(node: NodeFamily) -> str:

@@ -8,7 +8,7 @@ which begin every run as they were bound.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import Any
 
 import numpy as np
@@ -322,7 +322,7 @@ class Handler:
         self._renew(t, *found)
         if anew:
             self._bounce(t, *found)
-        self._note(t, said, touched)
+        self._note(t, said, {*touched, *self.succession.impacts.closed})
         return found
 
     def _bounce(self, t: float, y: Floats, yd: Floats) -> None:
@@ -334,14 +334,14 @@ class Handler:
             if c.kind == "phi" and not self.contacts.active[k] and abs(values[c.value]) <= self.observer.zero(c.value)
         }
 
-    def _note(self, t: float, said: list[str], touched: Sequence[int]) -> None:
+    def _note(self, t: float, said: list[str], struck: Set[int]) -> None:
         for k, contact in enumerate(self.plan.contacts):
             now = self.contacts.word(k)
             if contact.kind == "follows":
                 continue
             if now != said[k]:
                 self.happened.append(Happened(t, contact.name, contact.name, said[k], now))
-            elif k in touched and contact.kind == "phi":
+            elif k in struck and contact.kind == "phi":
                 self.happened.append(Happened(t, f"impact {contact.name}", contact.name, said[k], now))
 
     # -- conditions and assignments ------------------------------------------------------------------------------

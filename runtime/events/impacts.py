@@ -67,10 +67,13 @@ class _Blow(NamedTuple):
 
 
 class Impacts:
-    """The impacts of a run.  rest: see plan.Plan; fastest [contacts]: speed at which each gap closed at most."""
+    """The impacts of a run.  rest: see plan.Plan; fastest [contacts]: speed at which each gap closed at most; closed:
+    the gaps that did at last.
+    """
 
     def __init__(self, contacts: Contacts, rest: float) -> None:
         self.contacts, self.rest = contacts, rest
+        self.closed: list[int] = []
         self.fastest = np.zeros(len(contacts.contacts))
 
     def after(self, t: float, y: Floats, yd: Floats, strike: Strike, system: System, *, blow: bool) -> Floats:
@@ -82,7 +85,7 @@ class Impacts:
         values, terms = contacts.observer(t, y, yd), contacts.observer.terms.copy()
         near = [k for k in range(len(contacts.contacts)) if k not in contacts.frozen and self._near(k, values)]
         speed = {k: float(values[self._flow(k)]) for k in near if contacts.contacts[k].kind == "phi"}
-        closing = [k for k in speed if speed[k] < -zero(self._flow(k))]
+        closing = self.closed = [k for k in speed if speed[k] < -zero(self._flow(k))]
         if not (closing or (blow and near)):
             return y
         aim = dict.fromkeys(near, 0.0)

@@ -22,7 +22,7 @@ def cross(run: Integration, segment: Segment) -> None:
     run.sizes.share(y)
     y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
     if run.pieces is not None:
-        found: tuple[Floats, Floats] | None = run.pieces.jump(segment.begin, y, yd)
+        found: tuple[Floats, Floats] | None = run.pieces.jump(segment, y, yd)
     else:
         found = _across(run, segment.begin, y, yd)
     if found is None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes as c
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,7 @@ from sysdyn.runtime.integrate.driver import Sink
 from sysdyn.runtime.integrate.modes import Modes, serves
 from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.integrate.round_off import left_open
+from sysdyn.runtime.integrate.segments import Segment
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
@@ -262,14 +264,28 @@ class Pieces:
                 self._go_on(method.t, point, (y, yd))
         return bool(due) and method.t < end
 
-    def jump(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
-        """The point behind an instant at which the text jumps."""
+    def jump(self, segment: Segment, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
+        """The point behind the instant at which the text jumps, where a segment begins; what happens has its rows."""
         self._told()
-        due, which = self.handler.due(t), self.handler.turned(t, y, yd)
+        handler, t = self.handler, segment.begin
+        handler.before, events = handler.now(), len(handler.happened)
+        due, which = handler.due(t), handler.turned(t, y, yd)
         which += self._met(self.run.method.contents.t, (y, yd), which)
-        found = self.handler.fire(t, y, yd, samples=due, which=which) if due or which else None
-        point = found or self.handler.anew(t, y, yd)
-        self.run.driver.run.start_kind = TRACE if due else 0
+        found = handler.fire(t, y, yd, samples=due, which=which) if due or which else None
+        point = found or handler.anew(t, y, yd)
+        handler.happened[events:] = [replace(h, time=segment.label) for h in handler.happened[events:]]
+        if len(handler.happened) > events:
+            self._row_before()
+        self.run.driver.run.start_kind = TRACE if due or len(handler.happened) > events else 0
         self._bounce(t)
         self._watch()
         return point
+
+    def _row_before(self) -> None:
+        """The row of the end of the last step, with the parameters of before, where it has none in the trace."""
+        core, after = self.run.driver.run, self.handler.now()
+        if core.every_step or core.end_kind & TRACE:
+            return
+        self.handler.back(self.handler.before)
+        lib.core.sd_run_row(self.run.driver.core, TRACE)
+        self.handler.back(after)

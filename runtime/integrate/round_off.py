@@ -47,6 +47,9 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     last [unknowns]: its last y and yd, the largest |y| met.  Zero where the Jacobian says nothing.
     """
     y, yd, met = *last[:2], group_maximum(system, last[2])
+    k_q, k_f = system.form.k_q, system.form.k_f
+    # faster than that it was in shorter steps, which are over
+    met[k_f] = np.minimum(met[k_f], np.maximum(2.0 * met[k_q] / step, np.abs(y[k_f])))
     rows, columns = system.pattern.row, system.pattern.columns_of()
     jy, jyd = system.jacobian(t, y, yd)
     with np.errstate(all="ignore"):
@@ -59,8 +62,14 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     if not (np.isfinite(of_step).all() and np.isfinite(size).all()):
         return found
     size = _eliminated(system, (rows, columns, of_step), size)
+    # in magnitudes: what an elimination leaves of the largest unknown is no change of one that is small by its unit
+    of_row, of_column = np.where(size > 0.0, size, 1.0), np.where(met > 0.0, met, 1.0)
+    with np.errstate(all="ignore"):
+        scaled = rows, columns, of_step * of_column[columns] / of_row[rows]
+    if not np.isfinite(scaled[2]).all():
+        return found
     for error in normal(PROBES, system.rows):
-        change = least_norm((system.rows, system.unknowns), (rows, columns, of_step), EPS * size * error)
+        change = of_column * least_norm((system.rows, system.unknowns), scaled, EPS * np.where(size > 0.0, error, 0.0))
         moved = t, y + change, yd + change / step
         for largest, now, was in zip(found, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
             np.fmax(largest, MARGIN * np.abs(now - was), out=largest)

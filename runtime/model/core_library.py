@@ -197,6 +197,7 @@ def _load() -> Any:
         "sd_run_advance": (c.c_int, [_P, _L, _D]),
         "sd_run_accept": (c.c_int, [_P, _D, _I]),
         "sd_run_drain": (c.c_int, [_P]),
+        "sd_run_row": (None, [_P, _I]),
         "sd_linear_pivoted": (_P, [_P]),
         "sd_linear_replayed": (None, [_P]),
         "sd_code_allow": (None, [_I]),

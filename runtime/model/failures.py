@@ -76,7 +76,8 @@ class InconsistentStart(Exception):  # noqa: N818
 
     kind: "fixed" fixed initial values contradict each other or the rows; "gamma" an effort constraint has no
     solution; "implicit" the effort constraints do not determine an implicit unknown; "nonfinite" the residual is
-    not a number; "stuck" the iteration did not converge.
+    not a number; "slope" a law is flat, or infinitely steep, where the equations hold, and no rate follows; "stuck" the
+    iteration did not converge.
     rows: labels in the way; residual: smallest residual reached, in the first row's unit ("stuck": as a part of the
     row's terms); candidates: labels of the fixed values to free, best first; names: the unknowns concerned.
     """

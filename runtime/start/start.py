@@ -13,6 +13,7 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats, Places
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.patterns import read_only
+from sysdyn.runtime.model.slopes import without_slope
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.gauss_newton import (
     OutOfTimeError,
@@ -26,7 +27,7 @@ from sysdyn.runtime.numerics.gauss_newton import (
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
-from sysdyn.runtime.start.strategies import CLOSED, EXACT, OWN, applicable, first, rescaled
+from sysdyn.runtime.start.strategies import CLOSED, EXACT, HIDDEN, OWN, applicable, first, rescaled
 from sysdyn.values import dataclass
 
 BACK = 1e-10
@@ -147,6 +148,9 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
 
 def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution) -> InconsistentStart:
     """Why there is no consistent state: rows in the way, and the fixed values that would have to move."""
+    flat = _flat(starter, t, guess, free) if guess.size <= DENSE else ()
+    if flat:
+        return InconsistentStart("slope", float(best.residual), flat)
     if not np.isfinite(best.residual):
         bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
@@ -176,6 +180,18 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         if contradict and rows and rows[0].kind.startswith(("phi", "psi", "initial")):
             kind = "fixed"
     return InconsistentStart(kind, float((scaled if kind == "stuck" else raw)[order[0]]), rows, candidates)
+
+
+def _flat(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[RowLabel, ...]:
+    """Rows of laws without a slope where the rows as written hold, near the guess; none where these hold nowhere."""
+    starter.work = Work(EXPLAINED, starter.work.until)
+    rows = starter.every & ~starter.groups(*(group for group in HIDDEN if group != "phi_rate"))  # no rate is in these
+    near = _onto(starter, t, guess, guess, rows=rows, free=free)
+    missed = np.abs(starter.residual(t, near)) * starter.row_scale(t, near, starter.scale(t, near))
+    if not (missed[rows] < EXACT).all():
+        return ()
+    y, yd = starter.expand(near)
+    return without_slope(starter.system, t, y, yd)
 
 
 def consistent_start(

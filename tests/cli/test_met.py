@@ -290,3 +290,60 @@ scene s of two {
         assert np.abs(trace["audit/energy"][:]).max() < 0.1 * 5e5
     assert code == 3
     assert [m["element"] for m in found["result"]["not_met"]] == ["y"]
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane"])
+@pytest.mark.parametrize(
+    ("elements", "end"),
+    [
+        # c T' = -k (T - 290 K), its heat k (T - 290 K) given as a flow of entropy
+        (
+            "node h: thermal\n  C: potential(e = 300 K*exp(q/(100 J/K))) h\n  init C.e = 350 K\n"
+            "  loss: flow(f = 2 W/K*(h.e - 290 K)/h.e) h -> ground",
+            290.0 + 60.0 * np.exp(-1.0),
+        ),
+        # C u u' = -P
+        (
+            "node h: electrical\n  C: potential(q = 1 mF*e) h\n  init C.e = 350 V\n"
+            "  load: flow(f = (1 W)/h.e) h -> ground",
+            np.sqrt(350.0**2 - 2.0 * 50.0 / 1e-3),
+        ),
+    ],
+)
+def test_a_power_that_is_constant_is_no_constant_of_the_ledger(tmp_path, capsys, elements, end, formulation):
+    path = tmp_path / "m.sd"
+    scene = "scene s of m {\n  time 0 s to 50 s\n  trace C.e as e\n}\n"
+    path.write_text(f"model m {{\n  {elements}\n}}\n{scene}")
+    code, found, _ = simulated(path, tmp_path, capsys, "--formulation", formulation, "--accuracy", "1e-6")
+    assert code == 0, found["result"]["not_met"]
+    with h5py.File(tmp_path / "out.h5") as trace:
+        assert trace["e"][-1] == pytest.approx(end, rel=1e-5)
+
+
+LIGHT = """
+model light {
+  coord x: translation = 1 m
+  energy T* = 1/2*(1e-60 kg)*x'^2
+  energy V = 1/2*(4 N/m)*x^2
+  init x' = 0 m/s
+}
+scene s of light {
+  time 0 s to 1 s
+  trace x, x', audit.energy
+}
+"""
+
+
+@pytest.mark.parametrize("method", ["auto", "radau", "rosenbrock"])
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_a_motion_too_fast_for_the_resolution_of_time_is_not_met(tmp_path, capsys, formulation, method):
+    """Of 1e-60 kg on 4 N/m a second is 3e29 periods: steps damp what they do not follow, 2 J, which round-off does not
+    excuse.
+    """
+    path = tmp_path / "light.sd"
+    path.write_text(LIGHT)
+    options = ("--formulation", formulation, "--method", method, "--accuracy", "1e-2")
+    code, found, _ = simulated(path, tmp_path, capsys, *options)
+    assert code == 3
+    if found["result"]["final"]:
+        assert "energy" in {m["what"] for m in found["result"]["not_met"]}

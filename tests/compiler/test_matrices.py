@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from catalogue import ONE, PLACE
 from chains import blank, coordinate
-from sysdyn.compiler.forms.kane import projection
+from sysdyn.compiler.forms.kane import constraints, projection
 from sysdyn.compiler.forms.minors import determinant, inverse
 from sysdyn.compiler.forms.speeds import speeds_of
 from sysdyn.compiler.model.energies import Quantity, energies
@@ -134,7 +134,7 @@ def knife_edge(**quasi):
 
 def test_a_knife_edge_leaves_the_motion_along_itself():
     """Psi = sin a x' - cos a y': B holds (cos a, sin a) up to a factor, and the turn."""
-    found = projection(knife_edge())
+    found = projection(knife_edge(), constraints(knife_edge()))
     columns = [{k: value(v, a=0.3) for k, v in column.items()} for column in found.free.values()]
     turn = [c for c in columns if "a" in c]
     along = [c for c in columns if "a" not in c]
@@ -165,9 +165,9 @@ def test_columns_span_what_the_rows_leave(seed):
     dependent = np.linalg.matrix_rank(full) < len(psi)
     if dependent:
         with pytest.raises(ModelError):
-            projection(made)
+            projection(made, constraints(made))
         return
-    found = projection(made)
+    found = projection(made, constraints(made))
     columns = np.zeros((len(names), len(found.free)))
     for k, column in enumerate(found.free.values()):
         for name, node in column.items():

@@ -59,6 +59,26 @@ def test_a_family_is_touched_as_a_whole():
 
 
 @pytest.mark.parametrize(
+    ("declared", "elements", "left"),
+    [
+        ("a[1..5]: electrical", "for i in 1..2 { R[i]: R a[i] -> a[i + 1] }", "a[4..5]"),
+        ("a[0..5]: electrical", "for i in 1..2 { R[i]: R a[2*1 + 1] -> a[i + 3] }", "a[0..2]"),
+        ("a[1..5]: translation", "R: R a[1]\nS: R a[3]\nT: R a[4] -> a[5]", "a[2]"),
+        ("a[1..3]: translation", "for i in 1..0 { R[i]: R a[i] }\nS: R a[3]", "a[1..2]"),
+        ("a[1..3, 1..4]: translation", "for i in 1..3 { for j in 2..4 { R[i, j]: R a[i, j] } }", "a[1..3, 1]"),
+        ("a[1..2, 1..2]: translation", "R: R a[1, 1]\nS: R a[2, 2]\nT: R a[2, 1]", "a[1, 2]"),
+        ("a[1..3]: electrical", "for i in 1..2 { R[i]: R a[i] -> a[i + 1] }", None),
+        ("a[1..3]: translation", "R: R a[1] -> a[3]\nwork 1 N on a[2].q", None),
+        ("a[1..2, 1..3]: translation", "for i in 1..2 { R[i]: R a[i, 1] -> a[i, 3]\nS[i]: R a[i, 2] }", None),
+    ],
+)
+def test_each_node_of_a_family_is_touched(declared, elements, left):
+    law = "dissipator(e = 5 ohm*f)" if "electrical" in declared else "dissipator(e = 5 N.s/m*f)"
+    found = [message for _, message, _ in said(f"node {declared}\n{elements.replace(': R ', f': {law} ')}")]
+    assert found == ([] if left is None else [f"node '{left}' touches no element"])
+
+
+@pytest.mark.parametrize(
     ("domain", "kind", "unit"), [("electrical", "effort(e", "V"), ("translation", "flow(f", "m/s")]
 )
 def test_sources_in_a_loop_are_named_and_no_others(domain, kind, unit):

@@ -139,6 +139,21 @@ def test_what_a_name_stands_for(read, text, value, unit):
 
 
 @pytest.mark.parametrize(
+    ("element", "member"),
+    [
+        ("t: effort(e = 1 V/s*t) a", "t.f"),
+        ("t: gyrator(e1 = 1 V/A/s*t*f2) a -> ground, b -> ground", "t.f1"),
+        ("t: cell(r = 3 ohm) p = a, m = b", "t.inner.f"),
+        ("for i in 1..2 { t[i]: flow(f = 1 A/s*t) a }", "t[2].f"),
+    ],
+)
+def test_the_time_is_not_hidden_by_an_element_of_its_name(fresh, element, member):
+    read = Read(TEXT.replace("  R:", f"  {element}\n  R:"))
+    assert read("t") == ("t", "s")
+    assert read(member)[1] == "A"
+
+
+@pytest.mark.parametrize(
     ("text", "code", "message", "help_"),
     [
         ("a", "E104", "node 'a' is not a value", "write a.e (potential)"),

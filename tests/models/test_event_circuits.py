@@ -240,7 +240,7 @@ scene s of shared {
 def test_two_capacitors_and_a_switch_alone(formulation, tmp_path):
     """One flow through all three, which nothing resists: its row alone says where the charge is behind the jump."""
     trace = run(SHARED, tmp_path, formulation)
-    behind = trace.time > 0.37
+    behind = trace.time >= 0.37
     assert np.abs(trace["v1"].values - np.where(behind, 4.0, 10.0)).max() < 1e-12
     assert np.abs(trace["v2"].values - np.where(behind, 4.0, 1.0)).max() < 1e-12
 
@@ -268,7 +268,7 @@ scene s of grounded {
 def test_what_series_capacitors_hold_besides_their_flow_stays_where_charge_jumps(formulation, tmp_path):
     """n3 at 7 V is grounded: each branch loses it in the inverse proportion of its capacities, its own charge stays."""
     trace = run(GROUNDED, tmp_path, formulation)
-    behind = trace.time > 0.211
+    behind = trace.time >= 0.211
     for name, before, after in (("v0", 2.0, 2 - 5.6), ("v1", 4.0, 4 - 2.8), ("v2", 5.0, 5 - 1.4), ("v3", 3.0, 3 - 4.2)):
         assert np.abs(trace[name].values - np.where(behind, after, before)).max() < 1e-12
 

@@ -110,7 +110,7 @@ def test_springs_without_masses_begin_at_the_stop_that_they_press_on(tmp_path, f
 def test_a_force_that_jumps_takes_massless_springs_to_the_stop_and_not_beyond(tmp_path, formulation):
     text = STOPPED.format(free="0 m", force="if t < 0.42 s then -1 N else 2 N")
     trace = trace_of(tmp_path, text, formulation=formulation)
-    behind = trace.time > 0.42
+    behind = trace.time >= 0.42
     for name, before, after in (("x", -0.02, 0.015), ("y", -0.04, 0.03), ("s", 0.0, 2.0 - 0.75)):
         assert np.abs(trace[name].values - np.where(behind, after, before)).max() < 1e-12
 

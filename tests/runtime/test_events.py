@@ -98,7 +98,7 @@ model supply {
 }
 scene s of supply {
   time 0 s to 2 s
-  trace C.e as u, trips, at every 0.3 s
+  trace C.e as u, R.f as i, trips, at every 0.3 s
 }
 """
 ROPE = """
@@ -126,6 +126,10 @@ def test_a_current_that_jumps_past_a_limit_with_its_source_trips(tmp_path, formu
     assert [e.time for e in trace.events] == pytest.approx([1.0], abs=1e-12)
     assert trace["trips"][-1] == 1.0
     assert trace["at"][-1] == pytest.approx(1.0, abs=1e-12)
+    (here,) = np.nonzero(np.abs(trace.time - 1.0) < 1e-12)
+    assert trace["trips"][here].tolist() == [0.0, 1.0]  # the instant stands twice, between those of `every`
+    assert trace["i"][here] == pytest.approx([np.exp(-1.0), 4.0 + np.exp(-1.0)], rel=1e-6)
+    assert trace.events[0].time == trace.time[here[1]]
     u = 5.0 - (4.0 + np.exp(-1.0)) * np.exp(-1.0)
     assert trace["u"][-1] == pytest.approx(u, rel=1e-6)
 
@@ -171,6 +175,9 @@ def test_an_impact_at_the_instant_of_a_sample_or_a_jump_is_counted(tmp_path, bes
     text = text.replace("  init", f"{counts}  {beside}\n  init")
     trace = run(text.replace("trace h,", "trace n, h,"), tmp_path)
     assert trace["n"][-1] == 2.0
+    struck = [e.time for e in trace.events if e.element == "floor"]
+    assert struck == pytest.approx([0.5, 1.3], abs=1e-9)
+    assert all(len(np.flatnonzero(np.abs(trace.time - t) < 1e-9)) == 2 for t in struck)
     assert trace["h"][-1] == pytest.approx(0.64 * 0.5 * G * 0.15 - 0.5 * G * 0.15**2, rel=1e-6)
 
 

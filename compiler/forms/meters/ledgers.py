@@ -123,7 +123,7 @@ def elements(entries: Iterable[Entry]) -> tuple[Element, ...]:
     made = (
         Element(_account(own), key[-1], add(*(e.expression for e in own)), own[0].place) for key, own in found.items()
     )
-    return tuple(e for e in made if not is_const(e.expression))
+    return tuple(e for e in made if not is_const(e.expression, 0.0))
 
 
 def _account(entries: Sequence[Entry]) -> str:
@@ -132,9 +132,12 @@ def _account(entries: Sequence[Entry]) -> str:
 
 
 def _varying(entry: Entry) -> Entry | None:
-    """The entry without additive constants; None where nothing is left."""
-    kept = add(*(piece for piece in summands(entry.expression) if variables(piece)))
-    return None if is_const(kept) else replace(entry, expression=kept)
+    """The entry without additive constants of what is stored; None where nothing is left.  Of a power none is left out:
+    its integral grows.
+    """
+    pieces = summands(entry.expression)
+    kept = add(*(piece for piece in pieces if entry.account not in STORED or variables(piece)))
+    return None if is_const(kept, 0.0) else replace(entry, expression=kept)
 
 
 def _parts(model: EnergyModel, entries: Sequence[Entry]) -> dict[str, str]:

@@ -389,6 +389,11 @@ int sd_run_accept(sd_run *run, double to, int32_t kind)
     return full;
 }
 
+void sd_run_row(sd_run *run, int32_t kind)
+{
+    emit(run, run->t_to, run->t_to, (double)kind, 1);
+}
+
 /* one step, or what happens where one ends */
 static int advance(sd_run *run)
 {

@@ -91,6 +91,8 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
  * rows are full, `sd_run_drain` goes on */
 int sd_run_accept(sd_run *run, double to, int32_t kind);
 int sd_run_drain(sd_run *run);
+/* a row of kind `kind` at the end of the last step, which counts and whose rows are drained */
+void sd_run_row(sd_run *run, int32_t kind);
 /* run->point, point_d at t within the last step moved onto the equations: by what the method has at hand, where that does; the
  * end of a step may be there */
 void sd_run_settle(sd_run *run, double t);

@@ -1,0 +1,59 @@
+"""Laws without a slope at a point: a flow, or an effort, that has no inertia has no rate there either.
+
+A law e = r f abs(f) is flat where f = 0, f = sqrt(e) infinitely steep where e = 0: the rate of what the law determines
+follows from its slope, which has no size at that point alone.  Told by the Jacobian at distances that shrink to it: the
+slope of a power falls, or grows, with each of them, that of a law which is but steep comes to a value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import RowLabel
+from sysdyn.runtime.model.scales import group_maximum
+from sysdyn.runtime.model.system import System
+
+LADDER = (1e-4, 1e-8, 1e-12, 1e-16, 1e-20, 1e-24)
+"""Of the largest unknown of its kind and unit: how far beside the point slopes are looked at."""
+FALLS = 0.1
+"""Of the slope at one of these distances: what is left of it at the next, at most (of the power 1.25)."""
+NONE = 1e-30
+"""Of any unit: an unknown that is no size."""
+
+WITH_A_SLOPE = "a law with a slope at rest, as of a laminar part (f*hypot(f, f0) for f*abs(f)), or a start in motion"
+"""What would help."""
+
+
+def no_slope(rows: Iterable[RowLabel]) -> str:
+    """That these laws have no slope, for a reader."""
+    names = list(dict.fromkeys(row.label.removesuffix(".law") for row in rows))
+    laws = f"the law at {names[0]} has" if len(names) == 1 else f"the laws at {', '.join(names[:3])} have"
+    return f"{laws} no slope at this state (it vanishes, or grows without bound, where nothing flows): no rate follows"
+
+
+def without_slope(system: System, t: float, y: Floats, yd: Floats) -> tuple[RowLabel, ...]:
+    """Rows in which the slope by an unknown of which no rate occurs vanishes, or grows without bound, at the point.
+
+    y, yd [unknowns] of the system.
+    """
+    row, column = system.pattern.row, system.pattern.columns_of()
+    algebraic = np.isin(system.kinds, ("f", "e"))
+    algebraic[column[system.structural()[1]]] = False
+    size = group_maximum(system, np.abs(y))
+    size = np.where(size > NONE, size, 1.0) * (1.0 + 0.1 * (np.arange(y.size) % 7))
+    seen = np.zeros(row.size, dtype=np.int64)
+    falls = rises = algebraic[column]
+    with np.errstate(all="ignore"):
+        before: Floats | None = None
+        for part in LADDER:
+            slope = np.abs(system.jacobian(t, y + part * size, yd)[0])
+            beyond = (part * size > np.abs(y))[column]
+            if before is not None:
+                falls = falls & (~beyond | (slope < FALLS * before))
+                rises = rises & (~beyond | ((slope > before / FALLS) & (before > 0.0)))
+            seen += beyond
+            before = slope
+    bent = (falls | rises) & (seen > 1)
+    return tuple(dict.fromkeys(system.row_label(int(k)) for k in row[bent]))

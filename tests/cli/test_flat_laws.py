@@ -1,0 +1,93 @@
+"""Laws without a slope at rest: what cannot start there says so, with what would; radau and bdf pass."""
+
+import pytest
+from sysdyn.cli.main import run
+from sysdyn.runtime.trace.trace import Trace
+
+VESSELS = """
+from std.fluid import tank, valve
+model vessels {{
+  node a, b: hydraulic
+  A: tank(A = 1 m^2) a
+  B: tank(A = 1 m^2) b
+  O: {law} a -> b
+  into: flow(f = 0.1 l/s^2*t) ground -> a
+  init a.e = 1e4 Pa
+  init b.e = {b}
+}}
+scene s of vessels {{
+  time 0 s to 10 s
+  trace O.f as f, a.e, b.e
+}}
+"""
+TURBULENT = "valve(Cr = 1e11 Pa.s^2/m^6)"
+LAMINAR = "dissipator(e = 1e11 Pa.s^2/m^6*f*hypot(f, 1e-6 m^3/s))"
+
+
+def simulated(tmp_path, capsys, law, *options, b="1e4 Pa"):
+    (tmp_path / "m.sd").write_text(VESSELS.format(law=law, b=b))
+    code = run(["simulate", str(tmp_path / "m.sd"), "-o", str(tmp_path / "t.h5"), *options])
+    return code, capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("formulation", "method", "code"),
+    [("lagrangian", "dopri", "E607"), ("co_lagrangian", "dopri", "E607"), ("co_lagrangian", "rosenbrock", "E931")],
+)
+def test_a_method_that_needs_the_slope_of_a_flat_law_says_so(tmp_path, capsys, formulation, method, code):
+    """No function is outside its domain (E933), and no inertia is missing."""
+    exit_, said = simulated(tmp_path, capsys, TURBULENT, "--formulation", formulation, "--method", method)
+    assert exit_ in (1, 3)
+    assert f"error {code}" in said
+    assert "no slope at this state" in said
+    assert "radau" in said
+    assert "hypot" in said
+    assert "E933" not in said
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+def test_the_remedies_hold(tmp_path, capsys, formulation):
+    """Other methods from rest; a laminar part; a start in motion."""
+    found = []
+    for law, method in ((TURBULENT, "radau"), (TURBULENT, "bdf"), (LAMINAR, "dopri"), (LAMINAR, "rosenbrock")):
+        exit_, said = simulated(tmp_path, capsys, law, "--formulation", formulation, "--method", method)
+        assert exit_ == 0, (law, method, said)
+        found.append(float(Trace.open(tmp_path / "t.h5")["f"].values[-1]))
+    assert found == pytest.approx([found[0]] * 4, rel=1e-3)
+    exit_, said = simulated(tmp_path, capsys, TURBULENT, "--formulation", formulation, "--method", "dopri", b="9e3 Pa")
+    assert exit_ == 0, said
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+@pytest.mark.parametrize("law", ["e = 1e5 Pa.s^2/m^6*abs(f)*f", "f = sign(e)*sqrt(abs(e)/(1e5 Pa.s^2/m^6))"])
+def test_a_start_from_which_no_rate_follows_is_no_contradiction(tmp_path, capsys, law, formulation):
+    """The flow grows as the root of time: the equations hold at the start, a rate of it there is none."""
+    (tmp_path / "m.sd").write_text(f"""model m {{
+  node a, b: hydraulic
+  P: effort(e = 1e5 Pa*sin(t/(1 s))) a
+  R: dissipator({law}) a -> b
+  C: potential(e = 1e4 Pa/m^3*q) b
+  init C.e = 0 Pa
+}}
+scene s of m {{ time 0 s to 10 s; trace R.f }}
+""")
+    assert run(["simulate", str(tmp_path / "m.sd"), "--formulation", formulation]) == 1
+    said = capsys.readouterr().err
+    assert "error E903" in said
+    assert "no slope at this state" in said
+
+
+def test_a_law_that_is_steep_but_has_a_slope_is_none_of_these(tmp_path, capsys):
+    """The exponential of a diode, which the values contradict: the reason said is that."""
+    (tmp_path / "m.sd").write_text("""from std.electrical import diode, resistor, voltage
+model m {
+  node a, b: electrical
+  V: voltage(v = 5 V) a
+  D: diode() a -> b
+  R: resistor(R = 1 kohm) b -> ground
+  init D.e = 3 V
+}
+scene s of m { time 0 s to 1 ms; trace D.e }
+""")
+    assert run(["simulate", str(tmp_path / "m.sd")]) in (1, 3)
+    assert "no slope" not in capsys.readouterr().err
