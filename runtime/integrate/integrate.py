@@ -63,6 +63,7 @@ class Integration:
         """origin: of this start, where it is known for several runs."""
         self.system, self.start, self.request = system, start, request
         self.cpu = 0.0
+        self._work: tuple[Statistics, bool] | None = None
         alone = origin is None and request.events is None
         system.trim()  # of the run before
         self.origin: Origin | None = origin or Origin(system, start, request.index)
@@ -240,10 +241,12 @@ class Integration:
         return None
 
     @property
-    def smooth(self) -> bool:
-        """Whether the bdf takes nearly all steps at its highest order."""
+    def work(self) -> tuple[Statistics, bool]:
+        """Counters so far; whether the bdf takes nearly all steps at its highest order: a smooth motion."""
+        if self._work is not None:
+            return self._work
         method = self.method.contents
-        return self.request.method == "bdf" and method.orders > SMOOTH * method.steps
+        return self.statistics(), self.request.method == "bdf" and method.orders > SMOOTH * method.steps
 
     def happened(self) -> tuple[Happened, ...]:
         """The events so far."""
@@ -308,8 +311,10 @@ class Integration:
                     raise failure(self, "step_too_small")
                 marked, at = method.steps, method.t
 
-    def run(self, sink: Sink, progress: Progress | None = None) -> Finished:
-        """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`."""
+    def run(self, sink: Sink, progress: Progress | None = None, *, spent: bool = True) -> Finished:
+        """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`.  spent:
+        nobody asks for the method or the settler behind the end.
+        """
         began = time.monotonic()
         self.stepped.core.residual_evaluations = self.stepped.core.jacobian_evaluations = 0
         method = self.method.contents
@@ -322,22 +327,33 @@ class Integration:
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)
         y, yd = self.method.point()
-        met, magnitude = self.sizes.at(y, last=True)
-        magnitude = self.confirmed(met, magnitude)
-        self._spare()
-        return Finished(
+        found = Finished(
             method.t,
             self.statistics(),
-            magnitude,
+            y,
             self.driver.largest(),
             self.cpu,
             self.settler.core.contents.failures,
             self.driver.ledgers,
             self.happened(),
             self.driver.run.beyond,
-            (y, yd, met),
-            method.opening if self.request.method in OPENED else 0.0,
+            opening=method.opening if self.request.method in OPENED else 0.0,
         )
+        if spent and self.system.unknowns > LARGE:
+            del method
+            self._leave_method()
+        met, magnitude = self.sizes.at(y, last=True)
+        magnitude = self.confirmed(met, magnitude)
+        self._spare()
+        return replace(found, magnitude=magnitude, last=(y, yd, met))
+
+    def _leave_method(self) -> None:
+        """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""
+        self._work = self.work
+        self.driver.ledgers.close()
+        for name in ("method", "driver", "told", "linear", "_taken", "settler", "settlers", "projection", "pieces"):
+            self.__dict__.pop(name, None)
+        self.system.trim()
 
 
 def integrate(
