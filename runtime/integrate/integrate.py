@@ -70,11 +70,11 @@ class Integration:
         origin = self.origin
         self._factors = origin.factors
         self.y, self.yd, self.start_rate = origin.point(own=alone)
-        self.roles: Roles = origin.roles
         self.underlying: Underlying | None = None
+        self.sizes = Sizes(system, start, request, origin)
+        self.roles: Roles = origin.roles
         if request.method in ON_UNDERLYING:
             self._solved, self.roles = origin.explicit
-        self.sizes = Sizes(system, start, request, origin)
         if system.form.name == "2":
             self._weigh()
         self._spare()
