@@ -120,11 +120,10 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """x, its largest scaled row and all scaled rows [number]."""
+    """x, its largest scaled row."""
 
     x: Floats
     residual: float
-    scaled: Floats
 
 
 def _numbered(places: Any, used: Mask) -> Any:
@@ -198,15 +197,15 @@ class _Linear:
             only = self.determined(u, r, beside=beside)
             if only is not None:
                 return only
-        i, j, v = self.entries()
+        held = [self.entries()]
         # what costs nothing stays where it is as far as it may
         stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else 0.0
-        aim = add_product(i, j, v, u - stays, np.negative(r, out=r))
+        aim = add_product(*held[0], u - stays, np.negative(r, out=r))
         del r, u  # of a large one the room counts
         if ordered:
-            return stays + in_order(self.shape, (i, j, v), aim, levels)
+            return stays + in_order(self.shape, held.pop(), aim, levels)
         idle = None if self.problem.idle is None else self.problem.idle[self.problem.free]
-        return stays + least_norm(self.shape, (i, j, v), aim, spent=True, idle=idle)
+        return stays + least_norm(self.shape, held.pop(), aim, spent=True, idle=idle)
 
 
 def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
@@ -237,11 +236,11 @@ def _in_core(
     if problem.check is not None:
         problem.check()
     work.spent, work.largest = search.spent, search.largest
-    return Solution(found, search.residual, scaled)
+    return Solution(found, search.residual)
 
 
 def _solve(problem: Problem, x: Floats, most: int) -> Solution:
-    best = Solution(x, np.inf, np.full(problem.number, np.inf))
+    best = Solution(x, np.inf)
     stale, taken, lost = 0, 0, 0
     for _ in range(most + _FOLDS):
         if taken == most or lost == _LOST:
@@ -259,7 +258,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
         size, scaled = measure(x)
         if size < best.residual:
             stale = stale if size > 0.5 * best.residual else 0
-            best = Solution(x, size, np.abs(scaled))
+            best = Solution(x, size)
         stale += 1
         if size <= _ROUND_OFF or not np.isfinite(size) or stale > (4 if best.residual < 1e-12 else 15):
             break

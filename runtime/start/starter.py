@@ -136,6 +136,12 @@ class Starter:
         finally:
             self.work = own
 
+    def spare(self) -> None:
+        """Lets go of what no search reads: of a large model the room counts."""
+        if self.equations.unknowns > LARGE:
+            self.system.spare()
+            self.system.put_away(whole=True)
+
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
         self.settled.forget()
@@ -379,9 +385,7 @@ def problem_of(
         levels = said & ~placed, said & placed, unsaid & ~starter.idle, unsaid & starter.idle
         scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
     weight = starter.weights(t, x, scale)
-    if x.size > LARGE:  # what the search reads it has; the room counts
-        starter.system.spare()
-        starter.system.put_away(whole=True)
+    starter.spare()
     return Problem(
         residual=lambda z: starter.residual(t, z),
         jacobian=lambda z: starter.jacobian(t, z),
