@@ -395,12 +395,14 @@ class _Condenser:
 
     def _renewed(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         whole = self.whole
-        jy, zero = whole.slopes(t, y, yd, rate=False), np.zeros(whole.unknowns)
+        large, zero = whole.unknowns > LARGE, np.zeros(whole.unknowns)
         constant = whole.residual(t, zero, zero)
-        allowed = definable(whole, jy, constant)
+        jy = None if large else whole.slopes(t, y, yd, rate=False)
+        allowed = definable(whole, whole.slopes(t, y, yd, rate=False) if jy is None else jy, constant)
         if self._found is None or not np.array_equal(allowed, self._allowed):
             self._allowed, self._found, self._forms = allowed, eliminate(whole, allowed), None
         found = self._found
+        jy = whole.slopes(t, y, yd, rate=False) if jy is None else jy
         few = found.place.size + found.unread.size < (1.0 - GAIN) * whole.unknowns
         if few or not np.isfinite(jy[found.entry]).all():
             return None
@@ -408,7 +410,7 @@ class _Condenser:
         del jy, zero, constant
         if not np.isfinite(numbers.constant).all():
             return None
-        if whole.unknowns > LARGE:  # the room counts: other numbers find all anew
+        if large:  # the room counts: other numbers find all anew
             self._allowed, self._found = allowed[:0].copy(), None
             whole.forget_once("may leave")
             held = [found, numbers]

@@ -30,7 +30,11 @@ class Origin:
         self.y, self.rate = start.for_form(system)
         self._index = index
         self._matrix: tuple[Floats, Floats] | None = None
-        self.yd = np.where(system.differential(self._rates()), self.rate, 0.0)
+        rates = self._rates()
+        self.yd = np.where(system.differential(rates), self.rate, 0.0)
+        if system.unknowns <= LARGE:
+            self.roles = roles(system, start.t, rates, index)
+        del rates
         self._sized: tuple[float, tuple[Floats, float]] | None = None
         self._explicit: tuple[System, Roles] | None = None
         self.kept: Roles | None = None

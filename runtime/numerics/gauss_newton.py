@@ -10,6 +10,7 @@ import ctypes as c
 import time
 from collections.abc import Callable
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -135,18 +136,25 @@ class _Linear:
     """The linearised rows at a point: A [used rows, free unknowns] in scaled unknowns and rows."""
 
     def __init__(self, problem: Problem, x: Floats) -> None:
-        self.problem = problem
-        self._values = problem.jacobian(x)
-        taken = problem.use[problem.rows] & problem.free[problem.columns] & np.isfinite(self._values)
-        if not taken.all():
-            self._values = np.where(taken, self._values, 0.0)
-        del taken
-        # a row is as large as its terms are, in magnitudes
-        size = np.zeros(problem.number)
-        add_sizes(problem.rows, problem.columns, self._values, problem.scale, size)
-        size[~(size > 0.0)] = 1.0
-        self.row_scale = np.divide(1.0, size, out=size)
+        self.problem, self._x = problem, x
         self.shape = int(problem.use.sum()), int(problem.free.sum())
+        self._values: Floats | None = self._slopes()
+
+    def _slopes(self) -> Floats:
+        """The entries at the point, zero where they are not in use."""
+        problem = self.problem
+        values = problem.jacobian(self._x)
+        taken = problem.use[problem.rows] & problem.free[problem.columns] & np.isfinite(values)
+        return values if taken.all() else np.where(taken, values, 0.0)
+
+    @cached_property
+    def row_scale(self) -> Floats:
+        """One over the size of each row [number]: a row is as large as its terms are, in magnitudes."""
+        problem, size = self.problem, np.zeros(self.problem.number)
+        values = self._slopes() if self._values is None else self._values
+        add_sizes(problem.rows, problem.columns, values, problem.scale, size)
+        size[~(size > 0.0)] = 1.0
+        return np.divide(1.0, size, out=size)
 
     @property
     def unit(self) -> Floats:
@@ -159,10 +167,11 @@ class _Linear:
 
     def _taken(self, *, spent: bool = False) -> tuple[Any, Any, Floats]:
         """Rows, columns and values of the entries in use; factors would fill from zeros too.  spent: at last."""
+        assert self._values is not None
         take = self._values != 0.0
         values = self._values[take]
         if spent:
-            del self._values
+            self._values = None
         return self.problem.rows[take], self.problem.columns[take], values
 
     def entries(self) -> tuple[Any, Any, Floats]:
@@ -172,6 +181,8 @@ class _Linear:
         for here in pieces(values.size):
             values[here] *= problem.scale[columns[here]] / problem.weight[columns[here]]
             values[here] *= self.row_scale[rows[here]]
+        if max(self.shape) > SINGULAR_VALUES:  # found again if asked
+            self.__dict__.pop("row_scale", None)
         rows = _numbered(rows, problem.use)
         columns = _numbered(columns, problem.free)
         return rows, columns, values

@@ -306,15 +306,17 @@ class Starter:
         """Of changes in magnitudes [unknowns]: unknowns of one kind and unit are moved by one measure, whatever their
         values; those that hold what stores do by their contents, flows by their momenta.
         """
-        weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
-        content = scale.copy()
+        inert = np.zeros(0)
         if self.balanced:
             y, yd = self.expand(x)
             some = self._momentum.size > 0
             jy, jyd = self.system.jacobian(t, y, yd) if some else (None, self.system.slopes(t, y, yd, rate=True))
+            del y, yd
             inert = own_inertia(self.system, jy, jyd)
-            del y, yd, jy, jyd
-            content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
+            del jy, jyd
+        weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
+        content = scale.copy()
+        content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
         measured = content / largest_of_group(self.measures, content)
         if x.size > LARGE:
             self.__dict__.pop("measures", None)
