@@ -31,7 +31,7 @@ from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.integrate.unknown_roles import Roles, general_rates, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.scales import confirmed
+from sysdyn.runtime.model.scales import confirmed, group_maxima
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import Order, net_order_of
 from sysdyn.runtime.start.settled import Settler
@@ -228,9 +228,9 @@ class Integration:
         return y, yd, self.sizes.at(y)[0]
 
     def confirmed(self, met: Floats, magnitude: Floats) -> Floats:
-        """Magnitudes as the run confirmed them [unknowns as written], by those it met and went by."""
+        """Largest magnitude of each kind and unit as the run confirmed them, by those it met and went by [unknowns]."""
         span = self.request.t_end - self.start.t
-        return confirmed(self.system, span, met, magnitude)[: self.system.form.written]
+        return group_maxima(self.system, confirmed(self.system, span, met, magnitude))
 
     def _drift(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
@@ -330,7 +330,7 @@ class Integration:
         found = Finished(
             method.t,
             self.statistics(),
-            y,
+            np.zeros(0),
             self.driver.largest(),
             self.cpu,
             self.settler.core.contents.failures,
@@ -343,7 +343,7 @@ class Integration:
             del method
             self._leave_method()
         met, magnitude = self.sizes.at(y, last=True)
-        magnitude = self.confirmed(met, magnitude)
+        magnitude, met = self.confirmed(met, magnitude), group_maxima(self.system, met)
         self._spare()
         return replace(found, magnitude=magnitude, last=(y, yd, met))
 

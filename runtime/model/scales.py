@@ -123,13 +123,17 @@ def alike(system: System) -> Ints:
 
 
 def _alike(system: System) -> Ints:
-    families = system.description.families
+    families, numbers = system.description.families, kinds_and_units(system)
+    number = [*(numbers[family.kind, family.unit] for family in families), len(numbers)]
+    return read_only(np.array(number, dtype=np.int32)[system.family_of])
+
+
+def kinds_and_units(system: System) -> dict[tuple[str, str], int]:
+    """Number of each kind and unit."""
     keys: dict[tuple[str, str], int] = {}
-    number = np.empty(len(families) + 1, dtype=np.int32)
-    for k, family in enumerate(families):
-        number[k] = keys.setdefault((family.kind, family.unit), len(keys))
-    number[-1] = len(keys)
-    return read_only(number[system.family_of])
+    for family in system.description.families:
+        keys.setdefault((family.kind, family.unit), len(keys))
+    return keys
 
 
 def group_maximum(system: System, values: Floats) -> Floats:
@@ -137,17 +141,27 @@ def group_maximum(system: System, values: Floats) -> Floats:
     return largest_of_group(alike(system), values)
 
 
-def largest_of_group(group: NDArray[np.integer], values: Floats) -> Floats:
-    """Of each value the largest of its group [values]; zero at least.  Groups lie in stretches, for families do."""
-    if not group.size:
-        return np.zeros(0)
+def group_maxima(system: System, values: Floats) -> Floats:
+    """The same of each kind and unit [numbers of `alike`]."""
+    return _largest(alike(system), values)[0]
+
+
+def _largest(group: NDArray[np.integer], values: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """Of each group the largest value, zero at least; where its stretches begin."""
     new = np.ones(group.size, dtype=bool)
     np.not_equal(group[1:], group[:-1], out=new[1:])
     begin = np.flatnonzero(new)
     of = group[begin]
-    largest = np.zeros(int(of.max()) + 1)
-    np.maximum.at(largest, of, np.maximum.reduceat(values, begin))
-    return np.repeat(largest[of], np.diff(begin, append=group.size))
+    largest = np.zeros(int(of.max(initial=-1)) + 1)
+    if begin.size:
+        np.maximum.at(largest, of, np.maximum.reduceat(values, begin))
+    return largest, begin
+
+
+def largest_of_group(group: NDArray[np.integer], values: Floats) -> Floats:
+    """Of each value the largest of its group [values]; zero at least.  Groups lie in stretches, for families do."""
+    largest, begin = _largest(group, values)
+    return np.repeat(largest[group[begin]], np.diff(begin, append=group.size))
 
 
 def balanced(system: System, y: Floats, jy: Floats) -> Floats:

@@ -52,8 +52,8 @@ def least_norm(
     idle: Mask | None = None,
 ) -> Floats:
     """The u of least norm with A u = aim; A [rows, unknowns] by its entries (row, column, value).  spent: nobody else
-    needs values and aim, which are overwritten, and the caller holds no entries: of a large matrix the room counts.  idle: unknowns of which nobody asks
-    for the least where rows leave them open.
+    needs values and aim, which are overwritten; of a large matrix the room counts, and the caller holds no entries
+    either.  idle: unknowns of which nobody asks for the least where rows leave them open.
     """
     i, j, v = entries
     del entries

@@ -32,8 +32,8 @@ MEMORY = 2
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """The matrix by those of its columns that are used [unknowns]: pattern, values [entries]; rows of it, to which empty
-    ones may have been added.
+    """The matrix by those of its columns that are used [unknowns]: pattern, values [entries]; rows: of it; the pattern
+    may have more, which are empty.
     """
 
     rows: int
@@ -150,7 +150,7 @@ def _factored(
     return int(lib.core.sd_determined(pattern.rows, pattern.unknowns, *places, *limits, *last))
 
 
-def _beside(idle: NDArray[np.bool_]) -> Callable[[_Columns, Floats, Floats], int]:
+def _beside(idle: NDArray[np.bool_]) -> Callable[[Columns, Floats, Floats], int]:
     """The same with unknowns that may be left open."""
 
     def factored(columns: Columns, aim: Floats, found: Floats) -> int:
