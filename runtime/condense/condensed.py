@@ -183,7 +183,9 @@ class Condensed:
         blocks = self.whole.description.blocks
         kernels = [kernel for name in OBSERVING for kernel in blocks.get(name, ())]
         read = {family for kernel in kernels for family in kernel.rates or ()}
-        return bool(read & set(self.whole.family_of[self.sums.place].tolist()))
+        gone = np.zeros(self.whole.unknowns, dtype=bool)
+        gone[self.sums.place] = True
+        return bool(read & self.whole.families_in(gone))
 
     def _own_rows(self) -> Ints:
         """Kept rows q' - f as stretches (core/system/condensed.h), where no block adds to any and none is held."""

@@ -57,12 +57,14 @@ def sizing(system: System) -> Sizing:
 
 
 def _sizing(system: System) -> Sizing:
-    rows, nominal = balance(system), system.nominal
+    rows, nominal = balance(system), system.named
     kind, own = _kinds(system), [places.astype(np.int32) for places in own_places(system)]
     effort, moved = (item.astype(np.int32) for item in _displaced(system))
-    partner = np.full(system.unknowns, -1, dtype=np.int32)
-    momenta, flows = with_flows(system)
-    partner[momenta] = flows
+    partner = None
+    if system.are("p").any():
+        partner = np.full(system.unknowns, -1, dtype=np.int32)
+        momenta, flows = with_flows(system)
+        partner[momenta] = flows
     arrays = nominal, kind, partner, *own, effort, moved
     core = lib.Sizing(
         balance=rows.address,
@@ -142,26 +144,28 @@ def group_maximum(system: System, values: Floats) -> Floats:
 
 
 def group_maxima(system: System, values: Floats) -> Floats:
-    """The same of each kind and unit [numbers of `alike`]."""
-    return _largest(alike(system), values)[0]
-
-
-def _largest(group: NDArray[np.integer], values: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """Of each group the largest value, zero at least; where its stretches begin."""
-    new = np.ones(group.size, dtype=bool)
-    np.not_equal(group[1:], group[:-1], out=new[1:])
-    begin = np.flatnonzero(new)
-    of = group[begin]
-    largest = np.zeros(int(of.max(initial=-1)) + 1)
+    """The same of each kind and unit, by its number in `alike`; zero at least."""
+    numbers, families, (first, which) = kinds_and_units(system), system.description.families, system.begins
+    of = [*(numbers[families[k].kind, families[k].unit] for k in which), len(numbers)]  # nu behind the others
+    more = system.unknowns > system.form.written
+    begin = np.append(first, np.int32(system.form.written))[: first.size + more]
+    largest = np.zeros(len(numbers) + 1)
     if begin.size:
-        np.maximum.at(largest, of, np.maximum.reduceat(values, begin))
-    return largest, begin
+        np.maximum.at(largest, of[: begin.size], np.maximum.reduceat(values, begin))
+    return largest
 
 
 def largest_of_group(group: NDArray[np.integer], values: Floats) -> Floats:
     """Of each value the largest of its group [values]; zero at least.  Groups lie in stretches, for families do."""
-    largest, begin = _largest(group, values)
-    return np.repeat(largest[group[begin]], np.diff(begin, append=group.size))
+    if not group.size:
+        return np.zeros(0)
+    new = np.ones(group.size, dtype=bool)
+    np.not_equal(group[1:], group[:-1], out=new[1:])
+    begin = np.flatnonzero(new)
+    of = group[begin]
+    largest = np.zeros(int(of.max()) + 1)
+    np.maximum.at(largest, of, np.maximum.reduceat(values, begin))
+    return np.repeat(largest[of], np.diff(begin, append=group.size))
 
 
 def balanced(system: System, y: Floats, jy: Floats) -> Floats:
@@ -244,7 +248,7 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
     kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
     round-off altogether.
     """
-    found, kind, like, nominal = np.zeros(system.unknowns), _kinds(system), alike(system), system.nominal
+    found, kind, like, nominal = np.zeros(system.unknowns), _kinds(system), alike(system), system.named
     rows = lib.Balance(unknowns=like.size, kinds=1 + int(like.max(initial=0)), kind=lib.pointer(like))  # none is read
     tables = lib.Sizing(balance=c.addressof(rows), nominal=lib.pointer(nominal), kind=lib.pointer(kind))
     arrays = lib.pointer(met), lib.pointer(magnitude), lib.pointer(found)

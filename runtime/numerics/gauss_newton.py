@@ -297,6 +297,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             lost += 1
         if best.residual >= 1e-12 and now <= 0.5 * norm:
             stale, taken = 0, taken - 1  # rows that shrink as fast as their terms do (a junction far above its voltage)
+        del linear, measure, target, u  # of a large one the room counts
         if not np.isfinite(problem.residual(tried)[problem.use]).all():
             break
         x = tried

@@ -351,7 +351,7 @@ class Starter:
         """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes; the largest
         (rates of fast and slow stores 1e12 apart) where generous.
         """
-        known, found, nominal = self.equations, np.zeros(x.size), self.settled.nominal
+        known, found, nominal = self.equations, np.zeros(x.size), self.settled.named
         x = np.ascontiguousarray(x, dtype=np.float64)
         values, free = self.jacobian(t, x), self.residual(t, x)
         rows, missed = known.guessed

@@ -192,7 +192,7 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const ch
     if (!most)
         return -1;
     for (int32_t k = 0; k < m->unknowns; k++)
-        scale[k] = k < first && nominal[k] > 0.0 ? nominal[k] : fabs(x[k]);
+        scale[k] = nominal && k < first && nominal[k] > 0.0 ? nominal[k] : fabs(x[k]);
     for (int32_t r = 0; r < m->rows; r++)
         residual[r] = isfinite(residual[r]) ? fabs(residual[r]) : 0.0;
     for (int32_t e = 0; e < m->entries; e++)

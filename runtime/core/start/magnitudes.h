@@ -56,7 +56,7 @@ int sd_propagate_beside(const sd_balance *balance, const double *size, const cha
                         const char *silent, const sd_bearing *bearing, int32_t flags, double *found);
 
 /* scale [unknowns] := magnitudes of x, by the entries of a Jacobian and a residual at x, which are overwritten by their
- * magnitudes (what is no number counts as 0).  nominal [first]: 0 where there is none; first: unknowns before the rates; rated [rows]: rows that say nothing of sizes
+ * magnitudes (what is no number counts as 0).  nominal [first]: 0 where there is none, NULL: nowhere; first: unknowns before the rates; rated [rows]: rows that say nothing of sizes
  * at first; member [first], members: number of the kind of an unknown.  Returns 0; -1: no memory. */
 int sd_scale(const sd_balance *balance, const double *nominal, int32_t first, const char *rated, const int32_t *member,
              int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale);
