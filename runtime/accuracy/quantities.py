@@ -65,8 +65,8 @@ class Quantities:
         return self._beside[2]
 
     def _units(self) -> tuple[Ints, Ints, int]:
-        """Number of the unit of each kind and unit of unknowns and of each stored quantity, and how many units there are;
-        0: pure numbers.
+        """Number of the unit of each kind and unit of unknowns and of each stored quantity, and how many units there
+        are; 0: pure numbers.
         """
         number = {"1": 0}
         of_kinds = [number.setdefault(unit, len(number)) for _, unit in kinds_and_units(self.system)]

@@ -414,9 +414,10 @@ class _Condenser:
             return None
         if large:  # the room counts: other numbers find all anew
             self._allowed, self._found = allowed[:0].copy(), None
-            whole.forget_once("may leave")
             held = [found, numbers]
             del found, numbers, allowed
+            whole.put_away(whole=True)
+            whole.spare()
             whole.trim()
             return self._made(held)
         if self._forms is None:
@@ -441,10 +442,6 @@ class _Condenser:
             return None
         rows_of = {whole: places_of(rows), self.settled: places_of(kept)}
         del rows, kept
-        if whole.unknowns > LARGE:
-            whole.put_away(whole=True)  # one is made after the other
-            whole.spare()
-            whole.trim()
         made = {}
         for system in (self.settled, whole):
             form = made[system] = Condensed(system, numbers, terms, straights, rows_of.pop(system))

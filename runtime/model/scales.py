@@ -24,7 +24,7 @@ from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_places, with_flows
 from sysdyn.runtime.model.patterns import read_only
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.values import dataclass
 
 ROUND_OFF = 1e-12
@@ -234,7 +234,7 @@ def magnitudes(
     motion = (None, None, None, None) if far is None else (*map(lib.pointer, far[:3]), far[3])
     answers = lib.pointer(found), lib.pointer(tau)
     tables = sizing(system)
-    if spent:
+    if system.unknowns > LARGE:
         system.spare()
     core = c.byref(tables.core), c.byref(system.core)
     if lib.core.sd_magnitudes(*core, t0, span, lib.pointer(a), lib.pointer(b), *motion, spent, *answers):

@@ -144,7 +144,9 @@ class _Linear:
         """The entries at the point, zero where they are not in use."""
         problem = self.problem
         values = problem.jacobian(self._x)
-        taken = problem.use[problem.rows] & problem.free[problem.columns] & np.isfinite(values)
+        taken = problem.use[problem.rows]
+        taken &= problem.free[problem.columns]
+        taken &= np.isfinite(values)
         return values if taken.all() else np.where(taken, values, 0.0)
 
     @cached_property
@@ -284,10 +286,11 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
         problem.spare()
         if not np.isfinite(target).all():
             break
-        step, tried, u = 1.0, x, linear.moved(x)
+        step, tried, move = 1.0, x, np.subtract(target, linear.moved(x), out=target)
+        move *= linear.unit
         for _ in range(_HALVINGS):
             tried = x.copy()
-            tried[problem.free] += step * (target - u) * linear.unit
+            tried[problem.free] += step * move
             now = float(np.linalg.norm(measure(tried)[1]))
             if np.isfinite(now) and now <= max((1.0 - 0.1 * step) * norm, 1e-11):
                 lost = 0
@@ -297,7 +300,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             lost += 1
         if best.residual >= 1e-12 and now <= 0.5 * norm:
             stale, taken = 0, taken - 1  # rows that shrink as fast as their terms do (a junction far above its voltage)
-        del linear, measure, target, u  # of a large one the room counts
+        del linear, measure, target, move  # of a large one the room counts
         if not np.isfinite(problem.residual(tried)[problem.use]).all():
             break
         x = tried
