@@ -109,6 +109,7 @@ class Condensed:
         own[column[alone]] = row[alone]
         free = np.ones(self.rows, dtype=bool)
         free[row[alone]] = False
+        del columns, rows, row_at, at, moving, row, column, here, alone  # of a large one the room counts
         left, open_ = np.flatnonzero(own < 0), np.flatnonzero(free)
         entries = (own[self.pattern.columns_of()] < 0) & free[self.pattern.row]
         number, place = np.cumsum(own < 0) - 1, np.cumsum(free) - 1

@@ -107,6 +107,8 @@ class Starter:
         self.work = Work()  # of one search for a start
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
+        if system.unknowns > LARGE:  # found again where it is asked
+            system.put_away(whole=True)
         self.given = _given(settled)
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
