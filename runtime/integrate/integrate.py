@@ -105,8 +105,8 @@ class Integration:
         self.origin = None
         self.sizes.let_go()
         if self.forms is not None:  # of what is kept the method has its own
-            nothing = np.zeros(0, dtype=np.int32)
-            self.roles = replace(self.roles, test=nothing, power=nothing, common=nothing)
+            nothing = np.zeros(0, dtype=np.int8)
+            self.roles = replace(self.roles, test=nothing, power=nothing, common=self.roles.common[:0].copy())
 
     def _spare(self) -> None:
         """Lets go of what a large model found on its way here, and would find again."""
