@@ -180,6 +180,18 @@ def test_what_follows_row_by_row_needs_no_factors(monkeypatch):
     assert (tall.determined(shape, in_order, aim) == tall.determined(shape, entries, aim)).all()
 
 
+def test_a_matrix_by_its_columns_is_that_by_its_entries():
+    """A column that nothing uses stays out of it, and of what its rows miss."""
+    shape, (i, j, v) = _sums()
+    of = tall.by_columns((shape[0], N + 1), (i, j + 1, v), fewer=False)
+    full, again = np.zeros((2, shape[0], N + 1))
+    for matrix, (rows, columns, values) in ((full, (i, j + 1, v)), (again, of.entries())):
+        np.add.at(matrix, (rows, columns), values)
+    assert (full == again).all()
+    x, aim = np.cos(np.arange(N + 1.0)), np.sin(np.arange(float(shape[0])))
+    np.testing.assert_allclose(of.missed(x, aim), aim - full @ x, rtol=0.0, atol=1e-12)
+
+
 def test_rows_in_excess_that_substitution_misses_are_left_to_factors():
     """x_(k+1) = 4 x_k - x_(k-1) from both first values: round-off grows by 3.7 each, and the last row says so."""
     n = 200
