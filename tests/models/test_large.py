@@ -120,7 +120,7 @@ def test_a_section_of_a_large_line_takes_few_bytes_to_the_first_step(tmp_path, m
     ids=["ladder", "sections"],
 )
 def test_a_section_of_a_run_holds_few_bytes(tmp_path, model, sections, most):
-    """Of arrays and of the core, while it steps: 1129 of a ladder by the bdf, 2257 of a line by radau today; 1633, 2932
+    """Of arrays and of the core, while it steps: 1129 of a ladder by the bdf, 2273 of a line by radau today; 1633, 2932
     where runs kept the start as they saw it, every place of their matrices, and vectors that nothing read; 1206, 2448
     where parameters were held twice, and factors and their solutions had work of their own.
     """

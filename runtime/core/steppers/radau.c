@@ -63,8 +63,8 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
         return NULL;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(system->unknowns + 1);
     double **vectors[] = {&radau->phi, &radau->yd, &radau->last, &radau->before, &radau->slope[0], &radau->slope[1],
-                          &radau->slope[2], &radau->y, &radau->rate, &radau->weight, &radau->pull, &radau->terms,
-                          &radau->first}; /* the last ones: of steep laws */
+                          &radau->slope[2], &radau->y, &radau->rate, &radau->ee, &radau->weight, &radau->pull,
+                          &radau->terms, &radau->first}; /* the last ones: of steep laws */
     double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full};
     size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep,
            sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
@@ -248,7 +248,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
 static int estimate_error(sd_radau *radau, double *error)
 {
     int32_t n = radau->n;
-    double *v = radau->rate, *ee = radau->d[0], strict = sd_radau_strictness(radau, radau->method);
+    double *v = radau->rate, *ee = radau->ee, strict = sd_radau_strictness(radau, radau->method);
     memcpy(radau->y, radau->phi, (size_t)n * sizeof(double));
     for (int again = 0;; again++) {
         sd_radau_combine(radau->method->stages, n, radau->method->estimate, radau->z, v);
