@@ -73,7 +73,7 @@ def _arrived(
         least_norm=options.redundancy == "minimum_norm" and bool(way.system.left_out),
     )
     run = Integration(way.system, start, request)
-    run.run(_nothing)
+    run.run(_nothing, spent=False)
     n = way.system.form.written
     y, yd = run.method.point()
     y, yd, settled = run.settler.settle(options.t_end, y[:n], yd[:n])

@@ -1,7 +1,8 @@
 """Pages that a command's arrays leave stay with its process, for the next arrays.
 
 The C library gives each large array's pages back to the system and asks for new ones, empty, for the next: at a million
-sections that was half of the CPU time to the first step (18.9 s of 34.9; 9.4 s of 25 so), for 4 % more memory.
+sections that was half of the CPU time to the first step (18.9 s of 34.9; 9.4 s of 25 so).  But gaps between arrays
+are memory too, a sixth of all: where a model is huge its arrays have pages of their own again (`System.trim`).
 """
 
 from __future__ import annotations

@@ -7,8 +7,6 @@ Received: a prepared model and its start; raises ModuleFault.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.run.prepare import Prepared
@@ -16,7 +14,7 @@ from sysdyn.cli.run.starting import Started
 from sysdyn.compiler.binding.sampled import Points, Sample, SampledRows
 from sysdyn.compiler.forms.descriptor import Block
 from sysdyn.runtime.model.scales import group_maximum, magnitudes
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.points import uniform
 
 Array = NDArray[np.float64]
@@ -74,7 +72,9 @@ def _apart(found: Array, sample: Sample, points: Points) -> NDArray[np.bool_]:
     both = ~np.isfinite(found) & ~np.isfinite(sample.value)  # a point outside the range of a root
     # the size of terms in which something overflows (one over cosh) is no number
     size = np.where(np.isfinite(sample.size), sample.size, np.abs(sample.value))
-    largest: Array = np.abs(np.hstack([points.y, points.yd])).max(axis=1, initial=1.0)[:, None]
+    largest = np.ones((points.t.size, 1))
+    for k, point in enumerate(zip(points.y, points.yd, strict=True)):
+        largest[k] = np.max([np.abs(x).max(initial=1.0) for x in point])
     wrong: NDArray[np.bool_] = ~both & ~(apart <= ROUNDING * size + FEW_DIGITS * largest)
     return wrong
 
@@ -89,24 +89,30 @@ def _points(system: System, whole: System, started: Started, oracle: SampledRows
     order = _order(whole)
     number = 1 + len(NEARBY)
     points = Points(np.full(number, t0), np.zeros((number, order.size)), np.zeros((number, order.size)))
-    extended = [np.concatenate([x, np.zeros(order.size - x.size)]) for x in (y, yd)]
-    sizes = [np.concatenate([x, np.ones(order.size - x.size)]) for x in (scale, scale / max(time, 1e-300))]
+    if system.unknowns > LARGE:  # the room counts
+        system.spare()
+        system.put_away(whole=True)
     later = 0.5 + 0.5 * uniform(number)
-    ways = _ways(2 * len(NEARBY), order.size)
-    for k, distance in enumerate((0.0, *NEARBY)):
-        points.t[k] += distance * (until - t0) * later[k]
-        for target, x, size in zip((points.y, points.yd), extended, sizes, strict=True):
-            target[k] = (x + distance * size * next(ways) if k else x)[order]
+    points.t[:] += np.array([0.0, *NEARBY]) * (until - t0) * later
+    for which, (target, x) in enumerate(((points.y, y), (points.yd, yd))):
+        beside = order.size - x.size
+        x = np.concatenate([x, np.zeros(beside)])
+        size = np.concatenate([scale / max(time, 1e-300) if which else scale, np.ones(beside)])
+        target[0] = x[order]
+        for k, distance in enumerate(NEARBY):
+            way = _way(2 * k + which, order.size)
+            way *= distance * size
+            way += x
+            target[k + 1] = way[order]
     return points
 
 
-def _ways(number: int, size: int) -> Iterator[Array]:
-    """Numbers [size] from -1.5 to -0.5 and from 0.5 to 1.5 that know nothing of each other, so many times."""
-    for k in range(number):
-        found = uniform(size, behind=k * size)
-        found += 0.5
-        found[uniform(size, 1, k * size) < 0.5] *= -1.0
-        yield found
+def _way(k: int, size: int) -> Array:
+    """Numbers [size] from -1.5 to -0.5 and from 0.5 to 1.5 that know nothing of those of another k."""
+    found = uniform(size, behind=k * size)
+    found += 0.5
+    found[uniform(size, 1, k * size) < 0.5] *= -1.0
+    return found
 
 
 def _order(system: System) -> NDArray[np.intp]:

@@ -98,6 +98,9 @@ def bind(
     starts = _starts(form, owners, parameters)
     offsets = offsets_of(form, owners, starts, parameters)
     p, where = _layout(program, network, parameters, offsets)
+    for name in (q.name for q in network.parameters if q.shape):  # what a large model has is held once
+        values, at = parameters.values[name], where[name]
+        parameters.values[name] = p[at : at + values.size].reshape(values.shape)
     ix = integers(program.slots, owners, parameters, where, network)
     rows = {(r.owner, r.block): k for k, r in enumerate(form.rows)}
     constants = tuple((rows[o.label, "phi"], where[o.name], offsets[o.name].size) for o in form.offsets)

@@ -37,7 +37,7 @@ class Accounts:
         """The run under way has ended."""
         self.cpu += integration.cpu
         self.wall += time.monotonic() - self.run
-        self.last, self.smooth = integration.statistics(), integration.smooth
+        self.last, self.smooth = integration.work
         self.statistics = self.statistics + self.last
 
     def take(self, other: Accounts) -> None:

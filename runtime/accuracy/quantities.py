@@ -12,7 +12,7 @@ from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.integrate.request import Finished
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.scales import ROUND_OFF
+from sysdyn.runtime.model.scales import ROUND_OFF, kinds_and_units
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.trace.trace import Column
 
@@ -47,7 +47,7 @@ class Quantities:
 
     def sizes(self, largest: Floats, magnitude: Floats) -> Floats:
         """What errors of the stored quantities are relative to [columns]: the largest met (largest [observed]), but no
-        less than round-off of the largest of the same unit, unknowns (magnitude [unknowns]) among them.
+        less than round-off of the largest of the same unit, unknowns (magnitude [kinds and units]) among them.
         """
         return np.asarray(np.maximum(largest[self.places], ROUND_OFF * self.beside(largest, magnitude)))
 
@@ -56,23 +56,22 @@ class Quantities:
         last = self._beside
         if last is not None and last[0] is largest and last[1] is magnitude:
             return last[2]
-        of_unknowns, of_columns, number = self.system.once("units", self._units)
+        of_kinds, of_columns, number = self.system.once("units", self._units)
         found = np.zeros(number)
         found[0] = PURE
-        np.fmax.at(found, of_unknowns, magnitude[: of_unknowns.size])
+        np.fmax.at(found, of_kinds[: magnitude.size], magnitude[: of_kinds.size])
         np.fmax.at(found, of_columns, largest[self.places])
         self._beside = largest, magnitude, np.asarray(found[of_columns])
         return self._beside[2]
 
     def _units(self) -> tuple[Ints, Ints, int]:
-        """Number of the unit of each unknown as written and of each stored quantity, and how many units there are; 0:
-        pure numbers.
+        """Number of the unit of each kind and unit of unknowns and of each stored quantity, and how many units there
+        are; 0: pure numbers.
         """
-        system, number = self.system, {"1": 0}
-        of_family = [number.setdefault(family.unit, len(number)) for family in system.description.families]
+        number = {"1": 0}
+        of_kinds = [number.setdefault(unit, len(number)) for _, unit in kinds_and_units(self.system)]
         of_columns = [number.setdefault(column.unit, len(number)) for column in self._columns]
-        of_unknowns = np.array([*of_family, 0], dtype=np.int32)[system.family_of[: system.form.written]]
-        return of_unknowns, np.array(of_columns, dtype=np.int32), len(number)
+        return np.array(of_kinds, dtype=np.int32), np.array(of_columns, dtype=np.int32), len(number)
 
     def nominal(self, largest: Floats, magnitude: Floats) -> dict[str, float]:
         """Nominal magnitude of each stored quantity."""

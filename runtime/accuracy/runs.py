@@ -24,6 +24,7 @@ from sysdyn.runtime.integrate.request import LONGEST, STEP, TRACE, Finished, Req
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.scales import group_maxima
 from sysdyn.runtime.model.system import LARGE
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.trace.keeping import Held, Writer, keeping
@@ -221,7 +222,8 @@ class Runs:
         """After a failure: the rows so far stay if there is no finished run to keep."""
         assert self.writer is not None
         if first:
-            nominal = self.quantities.nominal(integration.driver.largest(), integration.sizes.magnitude)
+            magnitude = group_maxima(self.system, integration.sizes.magnitude)
+            nominal = self.quantities.nominal(integration.driver.largest(), magnitude)
             attributes: dict[str, str | float | int] = {**self.accounts.attributes(None), "met": 0, "judged": ""}
             self.writer.finish(nominal, attributes, final=False, events=integration.happened())
             return

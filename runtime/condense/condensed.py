@@ -50,8 +50,8 @@ def _spans(full: NDArray[np.integer], number: NDArray[np.integer]) -> tuple[NDAr
 class Room:
     """Where points, rows and matrices of whole systems are evaluated, one after the other; made when asked for."""
 
-    def __init__(self, *systems: System) -> None:
-        self._systems, self.entries = systems, 0
+    def __init__(self, entries: int, *systems: System) -> None:
+        self._systems, self._entries = systems, entries
 
     @cached_property
     def y(self) -> Floats:
@@ -66,7 +66,7 @@ class Room:
     @cached_property
     def slope(self) -> Floats:
         """Rows or entries of a matrix."""
-        return np.zeros(max(self.entries, *(system.rows for system in self._systems)) + 1)
+        return np.zeros(max(self._entries, *(system.rows for system in self._systems)) + 1)
 
 
 class Condensed:
@@ -77,10 +77,10 @@ class Condensed:
     """
 
     def __init__(
-        self, system: System, found: Sums, terms: Composition, straights: Straights, kept_rows: Ints, room: Room
+        self, system: System, found: Sums, terms: Composition, straights: Straights, kept_rows: Ints
     ) -> None:
         """found: the structure, and the first numbers; terms: as sums of kept unknowns; straights: of found."""
-        self._room, self._composition, self._straights = room, terms, straights
+        self._composition, self._straights = terms, straights
         self.whole, self.sums = system, found
         self.kept, self.kept_rows = found.kept, kept_rows
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
@@ -109,6 +109,7 @@ class Condensed:
         own[column[alone]] = row[alone]
         free = np.ones(self.rows, dtype=bool)
         free[row[alone]] = False
+        del columns, rows, row_at, at, moving, row, column, here, alone  # of a large one the room counts
         left, open_ = np.flatnonzero(own < 0), np.flatnonzero(free)
         entries = (own[self.pattern.columns_of()] < 0) & free[self.pattern.row]
         number, place = np.cumsum(own < 0) - 1, np.cumsum(free) - 1
@@ -183,7 +184,9 @@ class Condensed:
         blocks = self.whole.description.blocks
         kernels = [kernel for name in OBSERVING for kernel in blocks.get(name, ())]
         read = {family for kernel in kernels for family in kernel.rates or ()}
-        return bool(read & set(self.whole.family_of[self.sums.place].tolist()))
+        gone = np.zeros(self.whole.unknowns, dtype=bool)
+        gone[self.sums.place] = True
+        return bool(read & self.whole.families_in(gone))
 
     def _own_rows(self) -> Ints:
         """Kept rows q' - f as stretches (core/system/condensed.h), where no block adds to any and none is held."""
@@ -223,7 +226,7 @@ class Condensed:
         made = elsewhere.core
         made.kinematics = kept_parts[0].size
         made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
-        made.k_scale = self._hold(whole.ones())
+        made.k_scale = None
         made.k_span, made.k_spans = self._hold(spans), 0 if self._own.size else len(spans)
         for k, planned in enumerate(form.calls):  # without loops that add to rows that are not kept alone
             whole.spare_loops(elsewhere.calls[k], planned.block, kept, planned.to)
@@ -253,7 +256,6 @@ class Condensed:
         unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
         rate = self._spans(self.kept, self._rated())
         rest = self._spans(self.kept_rows, self.kept_rows >= (whole.form.k_row.size if self._own.size else 0))
-        room = self._room
         self.condensed = lib.Condensed(
             full=c.addressof(self._trim),
             unknowns=self.unknowns,
@@ -272,10 +274,6 @@ class Condensed:
             straight=c.addressof(self._straights.array),
             observed_rates=int(self._observed_rates()),
             **self._told_products(),
-            y=lib.pointer(room.y),
-            yd=lib.pointer(room.yd),
-            r=lib.pointer(room.slope),
-            slope=lib.pointer(room.slope),
         )
         self.core = lib.System(
             unknowns=self.unknowns,
@@ -287,7 +285,13 @@ class Condensed:
             stop=whole.core.stop,
             together=whole.core.together,
         )
-        lib.core.sd_condensed_bind(c.byref(self.condensed), c.byref(self.core))
+
+    def bind(self, room: Room) -> None:
+        """Says where the whole system is evaluated: once it is known how much room all forms need."""
+        self._room, condensed = room, self.condensed
+        condensed.y, condensed.yd = lib.pointer(room.y), lib.pointer(room.yd)
+        condensed.r = condensed.slope = lib.pointer(room.slope)
+        lib.core.sd_condensed_bind(c.byref(condensed), c.byref(self.core))
 
     def _told_products(self) -> dict[str, int | None]:
         """The products as the core has them: of a large system by stretches, where these are few."""
@@ -310,8 +314,10 @@ class Condensed:
     @cached_property
     def key(self) -> tuple[int | bytes, ...]:
         """What of it an order of elimination and places in matrices depend on, beside the whole form."""
-        parts = self.kept, self.kept_rows, self.pattern.column, self.pattern.row
-        return self.unknowns, sha256(b"".join(part.tobytes() for part in parts)).digest()
+        digest = sha256()
+        for part in (self.kept, self.kept_rows, self.pattern.column, self.pattern.row):
+            digest.update(np.ascontiguousarray(part).data)
+        return self.unknowns, digest.digest()
 
     @cached_property
     def rates(self) -> Ints:
@@ -382,20 +388,24 @@ class _Condenser:
 
     def forms(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         """With the numbers of now; of the same start and parameters those of the last time."""
-        numbers = np.array([t]), y, yd, self.whole.description.p
-        asked = sha256(b"".join(item.tobytes() for item in numbers)).digest()
+        digest = sha256()
+        for item in (np.array([t]), y, yd, self.whole.description.p):
+            digest.update(np.ascontiguousarray(item).data)
+        asked = digest.digest()
         if self._last is None or self._last[1] != asked:
             self._last = self._renewed(t, y, yd), asked
         return self._last[0]
 
     def _renewed(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         whole = self.whole
-        jy, zero = whole.slopes(t, y, yd, rate=False), np.zeros(whole.unknowns)
+        large, zero = whole.unknowns > LARGE, np.zeros(whole.unknowns)
         constant = whole.residual(t, zero, zero)
-        allowed = definable(whole, jy, constant)
+        jy = None if large else whole.slopes(t, y, yd, rate=False)
+        allowed = definable(whole, whole.slopes(t, y, yd, rate=False) if jy is None else jy, constant)
         if self._found is None or not np.array_equal(allowed, self._allowed):
             self._allowed, self._found, self._forms = allowed, eliminate(whole, allowed), None
         found = self._found
+        jy = whole.slopes(t, y, yd, rate=False) if jy is None else jy
         few = found.place.size + found.unread.size < (1.0 - GAIN) * whole.unknowns
         if few or not np.isfinite(jy[found.entry]).all():
             return None
@@ -403,11 +413,12 @@ class _Condenser:
         del jy, zero, constant
         if not np.isfinite(numbers.constant).all():
             return None
-        if whole.unknowns > LARGE:  # the room counts: other numbers find all anew
+        if large:  # the room counts: other numbers find all anew
             self._allowed, self._found = allowed[:0].copy(), None
-            whole.forget_once("may leave")
             held = [found, numbers]
             del found, numbers, allowed
+            whole.put_away(whole=True)
+            whole.spare()
             whole.trim()
             return self._made(held)
         if self._forms is None:
@@ -430,29 +441,27 @@ class _Condenser:
         kept = settled_rows(whole, self.settled, ~rows, numbers)
         if kept is None:
             return None
-        places = places_of(rows), places_of(kept)
+        rows_of = {whole: places_of(rows), self.settled: places_of(kept)}
         del rows, kept
-        if whole.unknowns > LARGE:
-            whole.spare()
-            whole.trim()
-        room = Room(whole, self.settled)
-        stepped, settled = (
-            Condensed(system, numbers, terms, straights, rows, room)
-            for system, rows in zip((whole, self.settled), places, strict=True)
-        )
-        for form in (stepped, settled):
+        made = {}
+        for system in (self.settled, whole):
+            form = made[system] = Condensed(system, numbers, terms, straights, rows_of.pop(system))
             form.renew(numbers)
-        if whole.unknowns > LARGE:
-            del terms, numbers
-            straights.fix()
-            stepped.fix()
-            settled.fix()
-        for form in (stepped, settled):
+            if whole.unknowns > LARGE:
+                form.fix()
             form.renumber()
-        room.entries = max(stepped.places, settled.places)
-        for form in (stepped, settled):
             form.make()
-        return Forms(stepped, settled)
+            if system is not whole and whole.unknowns > LARGE:
+                assert form.rates is not None  # found by its pattern
+                system.put_away(whole=True)
+                whole.spare()
+                whole.trim()
+        if whole.unknowns > LARGE:
+            straights.fix()
+        room = Room(max(form.places for form in made.values()), whole, self.settled)
+        for form in made.values():
+            form.bind(room)
+        return Forms(made[whole], made[self.settled])
 
 
 def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:

@@ -102,7 +102,9 @@ def definable(system: System, jy: Floats, constant: Floats) -> Mask:
     what is left of each row where all unknowns are zero.
     """
     columns, rows = system.pattern.columns_of(), system.pattern.row
-    size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
+    size = np.abs(jy)
+    del jy
+    size[~np.isfinite(size)] = 0.0
     by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
     here, gone, carried = system.once("may leave", lambda: _candidates(system))
     i, j = rows[here], columns[here]
@@ -156,8 +158,9 @@ class _Search:
     def __init__(self, system: System, allowed: Mask) -> None:
         self.columns, self.rows = system.pattern.columns_of(), system.pattern.row
         self.of, self.allowed = system.family_of[self.columns], allowed
-        number = np.arange(self.rows.size, dtype=np.int32)
-        _, self.start, self.entry = numbered(system.pattern.row, number, system.rows, number.size)
+        entries = np.arange(self.rows.size, dtype=np.int32)
+        self.start, self.entry = numbered(self.rows, entries, system.rows, entries.size)[1:]
+        del entries
         self.seen: dict[tuple[int, int], _Span] = {}
         self.defined, self.free = np.zeros(system.unknowns, dtype=bool), np.ones(system.rows, dtype=bool)
         self.reads: dict[int, set[int]] = {}

@@ -47,7 +47,8 @@ def settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) ->
     if not _defining(rows[rates], columns[rates]):
         return None
     read = {family for kernel in description.blocks.get("observe_rate", ()) for family in kernel.rates or ()}
-    open_ = columns[moving & dropped[rows] & ~derived[columns]]
-    if read & set(settled.family_of[open_].tolist()):
+    open_ = np.zeros(settled.unknowns, dtype=bool)
+    open_[columns[moving & dropped[rows] & ~derived[columns]]] = True
+    if read & settled.families_in(open_):
         return None
     return kept & ~dropped

@@ -37,7 +37,7 @@ def failure(run: Integration, cause: str) -> SolverFailure:
         cause = "newton" if cause == "singular" else cause
     if cause in ("error_test", "step_too_small", "newton"):
         unknown = _worst(run)
-    return SolverFailure(cause, method.t, method.h, unknown, row, smooth=run.smooth)
+    return SolverFailure(cause, method.t, method.h, unknown, row, smooth=run.work[1])
 
 
 def placed(run: Integration, cause: str) -> SolverFailure:

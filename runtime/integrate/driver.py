@@ -101,9 +101,8 @@ class Driver:
 
     def _bare(self, keeps: NDArray[np.bool_]) -> bool:
         """Whether all that is observed follows from the state: nothing that a row has to be settled for."""
-        description, written = self.system.description, self.system.family_of[: self.system.form.written]
-        follows = frozenset(written[~keeps].tolist())
-        read = [(kernel.reads, kernel.rates) for kernel in description.blocks.get("observe", ())]
+        follows = self.system.families_in(~keeps)
+        read = [(kernel.reads, kernel.rates) for kernel in self.system.description.blocks.get("observe", ())]
         return all(reads is not None and not (reads & follows) and rates == frozenset() for reads, rates in read)
 
     @property

@@ -31,7 +31,7 @@ from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.integrate.unknown_roles import Roles, general_rates, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.scales import confirmed
+from sysdyn.runtime.model.scales import confirmed, group_maxima
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import Order, net_order_of
 from sysdyn.runtime.start.settled import Settler
@@ -63,6 +63,7 @@ class Integration:
         """origin: of this start, where it is known for several runs."""
         self.system, self.start, self.request = system, start, request
         self.cpu = 0.0
+        self._work: tuple[Statistics, bool] | None = None
         alone = origin is None and request.events is None
         system.trim()  # of the run before
         if request.begin is not None:  # nor are the numbers part of this start that its events left
@@ -72,11 +73,11 @@ class Integration:
         origin = self.origin
         self._factors = origin.factors
         self.y, self.yd, self.start_rate = origin.point(own=alone)
-        self.roles: Roles = origin.roles
         self.underlying: Underlying | None = None
+        self.sizes = Sizes(system, start, request, origin)
+        self.roles: Roles = origin.roles
         if request.method in ON_UNDERLYING:
             self._solved, self.roles = origin.explicit
-        self.sizes = Sizes(system, start, request, origin)
         if system.form.name == "2":
             self._weigh()
         self._spare()
@@ -107,8 +108,8 @@ class Integration:
         self.origin = None
         self.sizes.let_go()
         if self.forms is not None:  # of what is kept the method has its own
-            nothing = np.zeros(0, dtype=np.int32)
-            self.roles = replace(self.roles, test=nothing, power=nothing, common=nothing)
+            nothing = np.zeros(0, dtype=np.int8)
+            self.roles = replace(self.roles, test=nothing, power=nothing, common=self.roles.common[:0].copy())
 
     def _spare(self) -> None:
         """Lets go of what a large model found on its way here, and would find again."""
@@ -230,9 +231,9 @@ class Integration:
         return y, yd, self.sizes.at(y)[0]
 
     def confirmed(self, met: Floats, magnitude: Floats) -> Floats:
-        """Magnitudes as the run confirmed them [unknowns as written], by those it met and went by."""
+        """Largest magnitude of each kind and unit as the run confirmed them, by those it met and went by [unknowns]."""
         span = self.request.t_end - self.start.t
-        return confirmed(self.system, span, met, magnitude)[: self.system.form.written]
+        return group_maxima(self.system, confirmed(self.system, span, met, magnitude))
 
     def _drift(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
@@ -243,10 +244,12 @@ class Integration:
         return None
 
     @property
-    def smooth(self) -> bool:
-        """Whether the bdf takes nearly all steps at its highest order."""
+    def work(self) -> tuple[Statistics, bool]:
+        """Counters so far; whether the bdf takes nearly all steps at its highest order: a smooth motion."""
+        if self._work is not None:
+            return self._work
         method = self.method.contents
-        return self.request.method == "bdf" and method.orders > SMOOTH * method.steps
+        return self.statistics(), self.request.method == "bdf" and method.orders > SMOOTH * method.steps
 
     def happened(self) -> tuple[Happened, ...]:
         """The events so far."""
@@ -311,8 +314,10 @@ class Integration:
                     raise failure(self, "step_too_small")
                 marked, at = method.steps, method.t
 
-    def run(self, sink: Sink, progress: Progress | None = None) -> Finished:
-        """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`."""
+    def run(self, sink: Sink, progress: Progress | None = None, *, spent: bool = True) -> Finished:
+        """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`.  spent:
+        nobody asks for the method or the settler behind the end.
+        """
         began = time.monotonic()
         self.stepped.core.residual_evaluations = self.stepped.core.jacobian_evaluations = 0
         method = self.method.contents
@@ -325,22 +330,33 @@ class Integration:
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)
         y, yd = self.method.point()
-        met, magnitude = self.sizes.at(y, last=True)
-        magnitude = self.confirmed(met, magnitude)
-        self._spare()
-        return Finished(
+        found = Finished(
             method.t,
             self.statistics(),
-            magnitude,
+            np.zeros(0),
             self.driver.largest(),
             self.cpu,
             self.settler.core.contents.failures,
             self.driver.ledgers,
             self.happened(),
             self.driver.run.beyond,
-            (y, yd, met),
-            method.opening if self.request.method in OPENED else 0.0,
+            opening=method.opening if self.request.method in OPENED else 0.0,
         )
+        if spent and self.system.unknowns > LARGE:
+            del method
+            self._leave_method()
+        met, magnitude = self.sizes.at(y, last=True)
+        magnitude, met = self.confirmed(met, magnitude), group_maxima(self.system, met)
+        self._spare()
+        return replace(found, magnitude=magnitude, last=(y, yd, met))
+
+    def _leave_method(self) -> None:
+        """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""
+        self._work = self.work
+        self.driver.ledgers.close()
+        for name in ("method", "driver", "told", "linear", "_taken", "settler", "settlers", "projection", "pieces"):
+            self.__dict__.pop(name, None)
+        self.system.trim()
 
 
 def integrate(

@@ -68,6 +68,7 @@ class Ledgers:
         self._arrays |= {name: np.zeros(elements + 1) for name in ("most", "value", "before")}
         self._element = np.full(count + 1, -1, dtype=np.int32)
         self._of = of
+        self._stored: list[float] | None = None
         self._contents = system.observer("ledger") if elements else None
         self.core = lib.Ledgers(
             count=count,
@@ -97,6 +98,20 @@ class Ledgers:
             element -= row.size
         raise IndexError(element)
 
+    @property
+    def stored(self) -> list[float]:
+        """Of each ledger the sum over its elements of what each stored at most."""
+        if self._stored is not None:
+            return self._stored
+        return [float(self._arrays["most"][:-1][self._of[:-1] == k].sum()) for k in range(len(self._heads))]
+
+    def close(self) -> None:
+        """Lets go of what the core notes of each element: no step follows."""
+        self._stored = self.stored
+        nothing = np.zeros(0)
+        self._arrays |= {"most": nothing, "value": nothing, "before": nothing}
+        self._of = self._inertia = np.zeros(0, dtype=np.int32)
+
     def balances(self) -> tuple[Balance, ...]:
         """What came of each ledger."""
         records = c.cast(self.core.record, c.POINTER(lib.Record))
@@ -104,13 +119,13 @@ class Ledgers:
         for k in range(self.core.records):
             record = records[k]
             risen[record.ledger].append((record.t, record.value))
-        return tuple(self._balance(k, found) for k, found in enumerate(risen))
+        return tuple(self._balance(k, *found) for k, found in enumerate(zip(self.stored, risen, strict=True)))
 
-    def _balance(self, k: int, records: list[tuple[float, float]]) -> Balance:
+    def _balance(self, k: int, stored: float, records: list[tuple[float, float]]) -> Balance:
         label, unit, first = self._heads[k]
         kind, _, title = label.partition(": ")
         passed = float(self._arrays["gross"][k])
-        turnover = passed + float(self._arrays["most"][:-1][self._of[:-1] == k].sum())
+        turnover = passed + stored
         value = float(self._arrays["highest"][k])
         highest = max((v for _, v in records), default=0.0) if math.isfinite(value) else math.inf
         element = self._label(int(self._element[k])) if self._element[k] >= 0 else first

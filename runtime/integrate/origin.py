@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from sysdyn.runtime.integrate.factors import Factors
 from sysdyn.runtime.integrate.underlying import Accelerations, underlying_form
@@ -20,18 +22,19 @@ class Origin:
     """system: in any form; index: of that form as the error test takes it.
 
     y, rate [unknowns] and the entries jy, jyd of the Jacobian there; yd: rates of what is differentiated, those of
-    algebraic unknowns do not follow from the start's equations; roles; least [unknowns]: what round-off leaves open of
-    displacements and flows.
+    algebraic unknowns do not follow from the start's equations.
     """
 
     def __init__(self, system: System, start: ConsistentState, index: int) -> None:
         self.system, self.start, self.t = system, start, start.t
         self.y, self.rate = start.for_form(system)
+        self._index = index
         self._matrix: tuple[Floats, Floats] | None = None
-        rates = general_rates(system, start.t, self.y, self.rate, self.jyd)
+        rates = self._rates()
         self.yd = np.where(system.differential(rates), self.rate, 0.0)
-        self.roles: Roles = roles(system, start.t, rates, index)
-        self.least = np.where(system.are("q", "f"), UNRESOLVED * unresolved(system, self.y, self.jy), 0.0)
+        if system.unknowns <= LARGE:
+            self.roles = roles(system, start.t, rates, index)
+        del rates
         self._sized: tuple[float, tuple[Floats, float]] | None = None
         self._explicit: tuple[System, Roles] | None = None
         self.kept: Roles | None = None
@@ -52,6 +55,24 @@ class Origin:
         """dF/dy' [entries] at the start."""
         return self._entries()[1]
 
+    def _rates(self) -> Floats:
+        """dF/dy' [entries] as roles are told by it."""
+        known = self._matrix is not None or self.system.unknowns <= LARGE
+        jyd = self.jyd if known else self.system.slopes(self.t, self.y, self.rate, rate=True)
+        return general_rates(self.system, self.t, self.y, self.rate, jyd)
+
+    @cached_property
+    def roles(self) -> Roles:
+        """Of the unknowns: of a large system asked for where it is clear who steps, and let go of with the rest."""
+        return roles(self.system, self.t, self._rates(), self._index)
+
+    @cached_property
+    def least(self) -> Floats:
+        """What round-off leaves open of displacements and flows [unknowns]."""
+        known = self._matrix is not None or self.system.unknowns <= LARGE
+        jy = self.jy if known else self.system.slopes(self.t, self.y, self.rate, rate=False)
+        return np.where(self.system.are("q", "f"), UNRESOLVED * unresolved(self.system, self.y, jy), 0.0)
+
     def _entries(self) -> tuple[Floats, Floats]:
         if self._matrix is None:
             self._matrix = self.system.jacobian(self.t, self.y, self.rate)
@@ -60,6 +81,9 @@ class Origin:
     def let_go(self) -> None:
         """Of the Jacobian and what follows from it: found again if asked."""
         self._matrix = self._sized = None
+        if self.system.unknowns > LARGE:
+            self.__dict__.pop("least", None)
+            self.__dict__.pop("roles", None)
 
     def sized(self, t_end: float) -> tuple[Floats, float]:
         """Magnitudes of the unknowns and the time scale (s) of the start, of a run to t_end (s)."""

@@ -23,6 +23,7 @@ from sysdyn.runtime.integrate.round_off import left_open
 from sysdyn.runtime.integrate.segments import Segment
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.scales import group_maxima
 
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
@@ -208,7 +209,8 @@ class Pieces:
         rows = [w.row for w in which if w.relation >= 0]
         if not any(observer.largest[row] <= FAINT * self._open[row] for row in rows):
             return False
-        method, last = run.method.contents, run.last()
+        method, (y, yd, met) = run.method.contents, run.last()
+        last = y, yd, group_maxima(run.system, met)
         step = max((method.t - run.start.t) / max(method.steps, 1), method.h)
         self._open = left_open(run.system, method.t, last, step).quantities
         faint = [row for row in rows if observer.largest[row] < self._open[row]]

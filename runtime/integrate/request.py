@@ -100,10 +100,10 @@ class Statistics:
 class Finished:
     """An integration that reached its end.
 
-    magnitude [unknowns as written]: as the run confirmed them; largest [observed]: of the values and of the terms of
-    their expressions; cpu [s]; ledgers: what came of them is read of the run that is kept; beyond: the largest unknown
-    of a row within a step, in magnitudes that it has at steps; last [unknowns]: y and yd at its end, the largest |y|;
-    opening: for the next run's request.
+    magnitude [kinds and units]: the largest, as the run confirmed it; largest [observed]: of the values and of the
+    terms of their expressions; cpu [s]; ledgers: what came of them is read of the run that is kept; beyond: the largest
+    unknown of a row within a step, in magnitudes that it has at steps; last: y and yd at its end [unknowns], the
+    largest |y| of each kind and unit; opening: for the next run's request.
     """
 
     reached: float

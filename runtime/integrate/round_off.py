@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.scales import group_maximum
+from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.least_change import least_norm
@@ -44,9 +44,10 @@ class LeftOpen(NamedTuple):
 def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], step: float) -> LeftOpen:
     """What round-off leaves open in a run that ended at t (s) in steps of `step` (s).
 
-    last [unknowns]: its last y and yd, the largest |y| met.  Zero where the Jacobian says nothing.
+    last: its last y and yd [unknowns], the largest |y| met of each kind and unit.  Zero where the Jacobian says
+    nothing.
     """
-    y, yd, met = *last[:2], group_maximum(system, last[2])
+    y, yd, met = *last[:2], last[2][alike(system)]
     k_q, k_f = system.form.k_q, system.form.k_f
     # faster than that it was in shorter steps, which are over
     met[k_f] = np.minimum(met[k_f], np.maximum(2.0 * met[k_q] / step, np.abs(y[k_f])))

@@ -27,17 +27,17 @@ class Told:
         atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * sizes.magnitude)
         self.atol = atol if atol is None or kept is None else atol[kept]
         self.magnitude, self.met = sizes.stepped(kept)
-        self.smooth = roles.smooth.astype(np.int32)
+        self.test, self.power, self.smooth = (x.astype(np.int32) for x in (roles.test, roles.power, roles.smooth))
         if kept is not None:  # as where their rates are unknowns too: rows q' = f pull at nothing
             self.smooth[roles.smooth & system.are("q")[kept]] = UNPULLED
-        self.idle = roles.idle.astype(np.int32)
+        self.idle = roles.idle.astype(np.int32) if system.form.scales else None
         self.groups = roles.groups() if request.method == "bdf" and (roles.common >= 0).any() else None
 
     def tell(self, method: Method) -> None:
         """The core's structure has the addresses; the arrays live as long as this."""
         core = method.contents
         core.atol, core.magnitude, core.met = map(lib.pointer, (self.atol, self.magnitude, self.met))
-        core.test, core.power = lib.pointer(self.roles.test), lib.pointer(self.roles.power)
+        core.test, core.power = lib.pointer(self.test), lib.pointer(self.power)
         if self.groups is not None:
             core.common_from, core.common = map(lib.pointer, self.groups)
             core.commons = self.groups[0].size - 1

@@ -26,6 +26,7 @@ from sysdyn.values import dataclass
 BALANCED = 1e-12
 """Sum of a row of dF/dyd over that of its magnitudes that is round-off."""
 
+Few = NDArray[np.int8]
 BESIDE = 1e-3
 """Relative move of displacements: an inertia that vanishes at the start by chance does not vanish beside it."""
 
@@ -39,8 +40,8 @@ class Roles:
     states (-1: of none); idle [unknowns]: steep laws may leave them open where their slopes underflow.
     """
 
-    test: Ints
-    power: Ints
+    test: Few
+    power: Few
     state: NDArray[np.bool_]
     differential: NDArray[np.bool_]
     smooth: NDArray[np.bool_]
@@ -55,8 +56,9 @@ class Roles:
 
     def kept(self, places: Ints) -> Roles:
         """The roles of these unknowns; a group of which others leave is none."""
-        left = np.delete(self.common, places)
-        common = np.where(np.isin(self.common, left), -1, self.common)
+        common = self.common
+        if (common >= 0).any():
+            common = np.where(np.isin(common, np.delete(common, places)), -1, common)
         arrays = (common if f.name == "common" else getattr(self, f.name) for f in fields(Roles))
         return Roles(*(np.ascontiguousarray(array[places]) for array in arrays))
 
@@ -83,8 +85,8 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     smooth = unique(system, jyd)
     state = system.are("q", "p", "s") | (flows & _inertial(system, jyd))
     stepped = state | (flows & differential)  # of index 1 and 0 also those whose rates derived constraints hold
-    test = np.where(stepped, np.int32(0), np.int32(-1))
-    power = np.zeros(system.unknowns, dtype=np.int32)
+    test = np.where(stepped, np.int8(0), np.int8(-1))
+    power = np.zeros(system.unknowns, dtype=np.int8)
     multiplier = system.are("kappa", "mu", "nu")
     if index >= 2:
         steep = np.zeros(system.unknowns, dtype=bool)
@@ -119,9 +121,9 @@ def _inertial(system: System, jyd: Floats) -> NDArray[np.bool_]:
 
 def _common(system: System, jyd: Floats, shared: NDArray[np.bool_]) -> Ints:
     """Group of each unknown (-1: none): components of dF/dyd within `shared` all of whose rows sum to zero."""
-    found = np.full(system.unknowns, -1, dtype=np.int32)
     if not shared.any():
-        return found
+        return np.broadcast_to(np.int32(-1), system.unknowns)
+    found = np.full(system.unknowns, -1, dtype=np.int32)
     column, row = system.pattern.columns_of(), system.pattern.row
     there = jyd != 0.0
     read = np.zeros(system.rows, dtype=bool)
@@ -140,10 +142,10 @@ def without_rate(found: Roles, flows: NDArray[np.bool_]) -> Roles:
     """The roles where these flows are solved for at each point: they carry nothing and are not tested."""
     return replace(
         found,
-        test=np.where(flows, -1, found.test).astype(np.int32),
+        test=np.where(flows, -1, found.test).astype(np.int8),
         state=found.state & ~flows,
         differential=found.differential & ~flows,
         smooth=found.smooth & ~flows,
         idle=found.idle | flows,
-        common=np.full_like(found.common, -1),
+        common=np.broadcast_to(np.int32(-1), found.common.size),
     )

@@ -138,9 +138,30 @@ class Facts:
         return read_only(found)
 
     @property
+    def begins(self) -> tuple[Ints, Ints]:
+        """Where families begin among the unknowns as written, in their order, and which; those without any left out."""
+        return self.once("begins", self._begins)
+
+    def _begins(self) -> tuple[Ints, Ints]:
+        families = enumerate(zip(self.description.families, self.form.at, strict=True))
+        written = [(first, k) for k, (f, first) in families if 0 <= first < self.form.written and f.size]
+        first, number = np.array(sorted(written), dtype=np.int32).reshape(-1, 2).T
+        return first, number
+
+    def families_in(self, mask: Mask) -> frozenset[int]:
+        """Families of which some unknown is in a mask [unknowns as written]."""
+        first, number = self.begins
+        return frozenset(number[np.logical_or.reduceat(mask, first)].tolist()) if first.size else frozenset()
+
+    @property
     def nominal(self) -> Floats:
         """Nominal magnitudes from the manifest; 0 where it names none; read-only."""
         return self.once_if_small("nominal", self._nominal)
+
+    @property
+    def named(self) -> Floats | None:
+        """The same; None where the manifest names none."""
+        return self.nominal if any(family.nominal is not None for family in self.description.families) else None
 
     def _nominal(self) -> Floats:
         values = [0.0 if family.nominal is None else family.nominal for family in self.description.families]

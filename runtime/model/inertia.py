@@ -18,9 +18,9 @@ CANCELS = 1e-12
 
 def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
     """The entry of each unknown of a kind in its coordinate's row of a group [unknowns]; 0 where there is none."""
-    found, columns = np.zeros(system.unknowns), system.pattern.columns_of()
     mine = _own_places(system, group, kind)
-    found[columns[mine]] = values[mine]
+    found = np.zeros(system.unknowns)
+    found[system.pattern.columns_of()[mine]] = values[mine]
     return found
 
 

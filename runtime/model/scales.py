@@ -24,7 +24,7 @@ from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_places, with_flows
 from sysdyn.runtime.model.patterns import read_only
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.values import dataclass
 
 ROUND_OFF = 1e-12
@@ -57,12 +57,14 @@ def sizing(system: System) -> Sizing:
 
 
 def _sizing(system: System) -> Sizing:
-    rows, nominal = balance(system), system.nominal
+    rows, nominal = balance(system), system.named
     kind, own = _kinds(system), [places.astype(np.int32) for places in own_places(system)]
     effort, moved = (item.astype(np.int32) for item in _displaced(system))
-    partner = np.full(system.unknowns, -1, dtype=np.int32)
-    momenta, flows = with_flows(system)
-    partner[momenta] = flows
+    partner = None
+    if system.are("p").any():
+        partner = np.full(system.unknowns, -1, dtype=np.int32)
+        momenta, flows = with_flows(system)
+        partner[momenta] = flows
     arrays = nominal, kind, partner, *own, effort, moved
     core = lib.Sizing(
         balance=rows.address,
@@ -123,18 +125,34 @@ def alike(system: System) -> Ints:
 
 
 def _alike(system: System) -> Ints:
-    families = system.description.families
+    families, numbers = system.description.families, kinds_and_units(system)
+    number = [*(numbers[family.kind, family.unit] for family in families), len(numbers)]
+    return read_only(np.array(number, dtype=np.int32)[system.family_of])
+
+
+def kinds_and_units(system: System) -> dict[tuple[str, str], int]:
+    """Number of each kind and unit."""
     keys: dict[tuple[str, str], int] = {}
-    number = np.empty(len(families) + 1, dtype=np.int32)
-    for k, family in enumerate(families):
-        number[k] = keys.setdefault((family.kind, family.unit), len(keys))
-    number[-1] = len(keys)
-    return read_only(number[system.family_of])
+    for family in system.description.families:
+        keys.setdefault((family.kind, family.unit), len(keys))
+    return keys
 
 
 def group_maximum(system: System, values: Floats) -> Floats:
     """Largest value among the unknowns of the same kind and unit."""
     return largest_of_group(alike(system), values)
+
+
+def group_maxima(system: System, values: Floats) -> Floats:
+    """The same of each kind and unit, by its number in `alike`; zero at least."""
+    numbers, families, (first, which) = kinds_and_units(system), system.description.families, system.begins
+    of = [*(numbers[families[k].kind, families[k].unit] for k in which), len(numbers)]  # nu behind the others
+    more = system.unknowns > system.form.written
+    begin = np.append(first, np.int32(system.form.written))[: first.size + more]
+    largest = np.zeros(len(numbers) + 1)
+    if begin.size:
+        np.maximum.at(largest, of[: begin.size], np.maximum.reduceat(values, begin))
+    return largest
 
 
 def largest_of_group(group: NDArray[np.integer], values: Floats) -> Floats:
@@ -216,7 +234,7 @@ def magnitudes(
     motion = (None, None, None, None) if far is None else (*map(lib.pointer, far[:3]), far[3])
     answers = lib.pointer(found), lib.pointer(tau)
     tables = sizing(system)
-    if spent:
+    if system.unknowns > LARGE:
         system.spare()
     core = c.byref(tables.core), c.byref(system.core)
     if lib.core.sd_magnitudes(*core, t0, span, lib.pointer(a), lib.pointer(b), *motion, spent, *answers):
@@ -230,7 +248,7 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
     kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
     round-off altogether.
     """
-    found, kind, like, nominal = np.zeros(system.unknowns), _kinds(system), alike(system), system.nominal
+    found, kind, like, nominal = np.zeros(system.unknowns), _kinds(system), alike(system), system.named
     rows = lib.Balance(unknowns=like.size, kinds=1 + int(like.max(initial=0)), kind=lib.pointer(like))  # none is read
     tables = lib.Sizing(balance=c.addressof(rows), nominal=lib.pointer(nominal), kind=lib.pointer(kind))
     arrays = lib.pointer(met), lib.pointer(magnitude), lib.pointer(found)

@@ -54,7 +54,8 @@ class System(Facts):
             made[index_form, left_out] = self
         elif description.systems is not None:
             self.description = description
-            self.kinematic_scale[:] = 1.0
+            if index_form == "2":
+                self.kinematic_scale[:] = 1.0
         return self
 
     def another(self, index_form: str) -> System:
@@ -143,7 +144,8 @@ class System(Facts):
         for k, scale in enumerate(form.scales):
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
-        self.kinematic_scale = self.ones() if form.name != "2" else self.ones().copy()
+        ones = np.broadcast_to(1.0, form.k_row.size)
+        self.kinematic_scale: Floats = ones.copy() if form.name == "2" else ones
         self.work = self._work(layout.entries)
         self._keep += [calls]
         self._reads_rate, self._may_hold = layout.reads_rate, layout.may_hold
@@ -159,7 +161,7 @@ class System(Facts):
             k_q=lib.pointer(form.k_q),
             k_f=lib.pointer(form.k_f),
             k_span=lib.pointer(form.k_span),
-            k_scale=lib.pointer(self.kinematic_scale),
+            k_scale=lib.pointer(self.kinematic_scale) if form.name == "2" else None,
             scales=len(form.scales),
             scale=c.addressof(scales),
             v=lib.pointer(self.work),
@@ -201,11 +203,6 @@ class System(Facts):
     def pattern(self) -> Pattern:
         """Of the Jacobian."""
         return (self._layout or self._bring_back()).pattern
-
-    def ones(self) -> Floats:
-        """Factors of rows q' - f where no metric gives them others: the same for all forms."""
-        number = self.form.k_row.size
-        return self.description.layouts.setdefault(("ones", number), np.ones(number))  # type: ignore[no-any-return]
 
     def _work(self, entries: int) -> Floats:
         """Room for the entries of any part, one after the other: all systems of a description have the same."""

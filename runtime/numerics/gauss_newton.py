@@ -10,6 +10,7 @@ import ctypes as c
 import time
 from collections.abc import Callable
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -120,11 +121,10 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """x, its largest scaled row and all scaled rows [number]."""
+    """x, its largest scaled row."""
 
     x: Floats
     residual: float
-    scaled: Floats
 
 
 def _numbered(places: Any, used: Mask) -> Any:
@@ -136,18 +136,27 @@ class _Linear:
     """The linearised rows at a point: A [used rows, free unknowns] in scaled unknowns and rows."""
 
     def __init__(self, problem: Problem, x: Floats) -> None:
-        self.problem = problem
-        self._values = problem.jacobian(x)
-        taken = problem.use[problem.rows] & problem.free[problem.columns] & np.isfinite(self._values)
-        if not taken.all():
-            self._values = np.where(taken, self._values, 0.0)
-        del taken
-        # a row is as large as its terms are, in magnitudes
-        size = np.zeros(problem.number)
-        add_sizes(problem.rows, problem.columns, self._values, problem.scale, size)
-        size[~(size > 0.0)] = 1.0
-        self.row_scale = np.divide(1.0, size, out=size)
+        self.problem, self._x = problem, x
         self.shape = int(problem.use.sum()), int(problem.free.sum())
+        self._values: Floats | None = self._slopes()
+
+    def _slopes(self) -> Floats:
+        """The entries at the point, zero where they are not in use."""
+        problem = self.problem
+        values = problem.jacobian(self._x)
+        taken = problem.use[problem.rows]
+        taken &= problem.free[problem.columns]
+        taken &= np.isfinite(values)
+        return values if taken.all() else np.where(taken, values, 0.0)
+
+    @cached_property
+    def row_scale(self) -> Floats:
+        """One over the size of each row [number]: a row is as large as its terms are, in magnitudes."""
+        problem, size = self.problem, np.zeros(self.problem.number)
+        values = self._slopes() if self._values is None else self._values
+        add_sizes(problem.rows, problem.columns, values, problem.scale, size)
+        size[~(size > 0.0)] = 1.0
+        return np.divide(1.0, size, out=size)
 
     @property
     def unit(self) -> Floats:
@@ -160,10 +169,11 @@ class _Linear:
 
     def _taken(self, *, spent: bool = False) -> tuple[Any, Any, Floats]:
         """Rows, columns and values of the entries in use; factors would fill from zeros too.  spent: at last."""
+        assert self._values is not None
         take = self._values != 0.0
         values = self._values[take]
         if spent:
-            del self._values
+            self._values = None
         return self.problem.rows[take], self.problem.columns[take], values
 
     def entries(self) -> tuple[Any, Any, Floats]:
@@ -173,6 +183,8 @@ class _Linear:
         for here in pieces(values.size):
             values[here] *= problem.scale[columns[here]] / problem.weight[columns[here]]
             values[here] *= self.row_scale[rows[here]]
+        if max(self.shape) > SINGULAR_VALUES:  # found again if asked
+            self.__dict__.pop("row_scale", None)
         rows = _numbered(rows, problem.use)
         columns = _numbered(columns, problem.free)
         return rows, columns, values
@@ -198,15 +210,15 @@ class _Linear:
             only = self.determined(u, r, beside=beside)
             if only is not None:
                 return only
-        i, j, v = self.entries()
+        held = [self.entries()]
         # what costs nothing stays where it is as far as it may
         stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else 0.0
-        aim = add_product(i, j, v, u - stays, np.negative(r, out=r))
+        aim = add_product(*held[0], u - stays, np.negative(r, out=r))
         del r, u  # of a large one the room counts
         if ordered:
-            return stays + in_order(self.shape, (i, j, v), aim, levels)
+            return stays + in_order(self.shape, held.pop(), aim, levels)
         idle = None if self.problem.idle is None else self.problem.idle[self.problem.free]
-        return stays + least_norm(self.shape, (i, j, v), aim, spent=True, idle=idle)
+        return stays + least_norm(self.shape, held.pop(), aim, spent=True, idle=idle)
 
 
 def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
@@ -237,11 +249,11 @@ def _in_core(
     if problem.check is not None:
         problem.check()
     work.spent, work.largest = search.spent, search.largest
-    return Solution(found, search.residual, scaled)
+    return Solution(found, search.residual)
 
 
 def _solve(problem: Problem, x: Floats, most: int) -> Solution:
-    best = Solution(x, np.inf, np.full(problem.number, np.inf))
+    best = Solution(x, np.inf)
     stale, taken, lost = 0, 0, 0
     for _ in range(most + _FOLDS):
         if taken == most or lost == _LOST:
@@ -259,7 +271,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
         size, scaled = measure(x)
         if size < best.residual:
             stale = stale if size > 0.5 * best.residual else 0
-            best = Solution(x, size, np.abs(scaled))
+            best = Solution(x, size)
         stale += 1
         if size <= _ROUND_OFF or not np.isfinite(size) or stale > (4 if best.residual < 1e-12 else 15):
             break
@@ -274,10 +286,11 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
         problem.spare()
         if not np.isfinite(target).all():
             break
-        step, tried, u = 1.0, x, linear.moved(x)
+        step, tried, move = 1.0, x, np.subtract(target, linear.moved(x), out=target)
+        move *= linear.unit
         for _ in range(_HALVINGS):
             tried = x.copy()
-            tried[problem.free] += step * (target - u) * linear.unit
+            tried[problem.free] += step * move
             now = float(np.linalg.norm(measure(tried)[1]))
             if np.isfinite(now) and now <= max((1.0 - 0.1 * step) * norm, 1e-11):
                 lost = 0
@@ -287,6 +300,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             lost += 1
         if best.residual >= 1e-12 and now <= 0.5 * norm:
             stale, taken = 0, taken - 1  # rows that shrink as fast as their terms do (a junction far above its voltage)
+        del linear, measure, target, move  # of a large one the room counts
         if not np.isfinite(problem.residual(tried)[problem.use]).all():
             break
         x = tried

@@ -17,7 +17,7 @@ from sysdyn.runtime.numerics.equilibrate import factors, sparse_factors
 from sysdyn.runtime.numerics.products import add_product, largest_product
 from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
 from sysdyn.runtime.numerics.symmetric import Symmetric
-from sysdyn.runtime.numerics.tall import determined
+from sysdyn.runtime.numerics.tall import by_columns, solved
 
 Mask = NDArray[np.bool_]
 SINGULAR_VALUES = 120
@@ -52,28 +52,29 @@ def least_norm(
     idle: Mask | None = None,
 ) -> Floats:
     """The u of least norm with A u = aim; A [rows, unknowns] by its entries (row, column, value).  spent: nobody else
-    needs values and aim, which are overwritten: of a large matrix the room counts.  idle: unknowns of which nobody asks
-    for the least where rows leave them open.
+    needs values and aim, which are overwritten; of a large matrix the room counts, and the caller holds no entries
+    either.  idle: unknowns of which nobody asks for the least where rows leave them open.
     """
     i, j, v = entries
+    del entries
     if not (np.isfinite(v).all() and np.isfinite(aim).all()):
         raise NotFiniteError
     v = v if spent else v.copy()
     back = _to_size_one(i, v, shape[0])
     aim = np.divide(aim, back, out=aim if spent else None)
     small = MET * largest_product(aim, back)
-    tried: list[tuple[float, Floats]] = []
-
-    def missed_by(found: Floats) -> float:
-        return largest_product(add_product(i, j, v, found, -aim), back)
-
-    if max(shape) > SINGULAR_VALUES:
-        only = determined(shape, (i, j, v), aim, lambda found: missed_by(found) <= small, idle)
+    columns = None if max(shape) <= SINGULAR_VALUES else by_columns(shape, (i, j, v), fewer=idle is not None)
+    if columns is not None:
+        matrix = columns
+        del i, j, v
+        only = solved(matrix, aim, lambda u: largest_product(matrix.missed(u, aim), back) <= small, idle)
         if only is not None:
             return only
+        i, j, v = columns.entries()
+    tried: list[tuple[float, Floats]] = []
     for way in _DENSE if max(shape) <= SINGULAR_VALUES else _SPARSE:
         found = way(shape, (i, j, v), aim)
-        missed = missed_by(found)
+        missed = largest_product(add_product(i, j, v, found, -aim), back)
         if not missed > small:
             return found
         tried.append((missed, found))

@@ -36,5 +36,10 @@ def uniform(number: int, which: int = 0, behind: int = 0) -> NDArray[np.float64]
 def normal(*shape: int) -> NDArray[Any]:
     """Numbers [shape] as from the normal distribution (Box and Muller, 1958)."""
     number = int(np.prod(shape))
-    radius = np.sqrt(-2.0 * np.log1p(-uniform(number)))
-    return np.asarray((radius * np.cos(2.0 * np.pi * uniform(number, 1))).reshape(shape))
+    radius, angle = uniform(number), uniform(number, 1)
+    np.log1p(np.negative(radius, out=radius), out=radius)
+    radius *= -2.0
+    np.sqrt(radius, out=radius)
+    angle *= 2.0 * np.pi
+    radius *= np.cos(angle, out=angle)
+    return radius.reshape(shape)

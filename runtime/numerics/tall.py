@@ -31,9 +31,12 @@ MEMORY = 2
 
 
 @dataclass(frozen=True, slots=True)
-class _Columns:
-    """The matrix by those of its columns that are used [unknowns]: pattern, values [entries]."""
+class Columns:
+    """The matrix by those of its columns that are used [unknowns]: pattern, values [entries]; rows: of it; the pattern
+    may have more, which are empty.
+    """
 
+    rows: int
     used: NDArray[np.bool_]
     pattern: Pattern
     values: Floats
@@ -44,12 +47,27 @@ class _Columns:
 
     def whole(self, found: Floats, *, rest: float = 0.0) -> Floats:
         """Of all unknowns, `rest` those of columns without entries."""
+        if self.used.all():
+            return found
         whole = np.full(self.used.size, rest)
         whole[self.used] = found
         return whole
 
+    def entries(self) -> Entries:
+        """Of the matrix with all unknowns."""
+        columns = self.pattern.columns_of()
+        return self.pattern.row, columns if self.used.all() else np.flatnonzero(self.used)[columns], self.values
 
-def _columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> _Columns | None:
+    def missed(self, x: Floats, aim: Floats) -> Floats:
+        """What aim [rows] is more than A x [rows]; x: of all unknowns."""
+        found = np.zeros(self.rows)
+        x = np.ascontiguousarray(x if self.used.all() else x[self.used])
+        places = (lib.pointer(item) for item in self.arrays())
+        lib.core.sd_miss(self.rows, x.size, *places, *map(lib.pointer, (aim, x, found)))
+        return found
+
+
+def by_columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> Columns | None:
     """fewer: rows may be fewer than the columns that are used, and empty ones make up for it; else there is none."""
     i, j, v = entries
     here = v != 0.0
@@ -68,11 +86,11 @@ def _columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> _Colum
         begin[1:-1] = np.flatnonzero(j[1:] != j[:-1])
         begin[1:-1] += 1
         row, values = np.ascontiguousarray(i, dtype=np.int32), np.ascontiguousarray(v, dtype=np.float64)
-        return _Columns(used, Pattern(rows, unknowns, begin, row), values)
+        return Columns(shape[0], used, Pattern(rows, unknowns, begin, row), values)
     number = np.cumsum(used, dtype=np.int32) - 1
     pattern, (slot,) = compress(rows, unknowns, [Places(i, number[j])])
     values = np.bincount(slot, weights=v, minlength=pattern.entries).astype(np.float64, copy=False)
-    return _Columns(used, pattern, values)
+    return Columns(shape[0], used, pattern, values)
 
 
 def _in_order(i: Any, j: Any) -> bool:
@@ -92,11 +110,20 @@ def determined(
 
     idle: unknowns [mask] that rows may leave open, as long as they move none but these: some of those are zero then.
     """
-    columns = _columns(shape, entries, fewer=idle is not None)
-    if columns is None:
-        return None
-    if columns.pattern.rows > shape[0]:
-        aim = np.append(aim, np.zeros(columns.pattern.rows - shape[0]))
+    columns = by_columns(shape, entries, fewer=idle is not None)
+    return None if columns is None else solved(columns, aim, met, idle)
+
+
+def solved(
+    columns: Columns,
+    aim: Floats,
+    met: Callable[[Floats], bool] = lambda _: True,
+    idle: NDArray[np.bool_] | None = None,
+) -> Floats | None:
+    """The same by columns."""
+    more = columns.pattern.rows - columns.rows
+    if more:
+        aim = np.append(aim, np.zeros(more))
     for way in (_substituted, _factored if idle is None else _beside(idle[columns.used])):
         found = np.zeros(columns.pattern.unknowns)
         failed = way(columns, aim, found)
@@ -108,13 +135,13 @@ def determined(
     return None
 
 
-def _substituted(columns: _Columns, aim: Floats, found: Floats) -> int:
+def _substituted(columns: Columns, aim: Floats, found: Floats) -> int:
     places, rows = (lib.pointer(item) for item in columns.arrays()), columns.pattern.rows
     return int(lib.core.sd_substituted(rows, found.size, *places, PIVOT, lib.pointer(aim), lib.pointer(found)))
 
 
 def _factored(
-    columns: _Columns, aim: Floats | None, found: Floats | None, idle: Ints | None = None, along: Floats | None = None
+    columns: Columns, aim: Floats | None, found: Floats | None, idle: Ints | None = None, along: Floats | None = None
 ) -> int:
     """Of core/linear/tall.h."""
     pattern, arrays = columns.pattern, (*columns.arrays(), tall_order(columns.pattern), idle)
@@ -123,10 +150,10 @@ def _factored(
     return int(lib.core.sd_determined(pattern.rows, pattern.unknowns, *places, *limits, *last))
 
 
-def _beside(idle: NDArray[np.bool_]) -> Callable[[_Columns, Floats, Floats], int]:
+def _beside(idle: NDArray[np.bool_]) -> Callable[[Columns, Floats, Floats], int]:
     """The same with unknowns that may be left open."""
 
-    def factored(columns: _Columns, aim: Floats, found: Floats) -> int:
+    def factored(columns: Columns, aim: Floats, found: Floats) -> int:
         along = _generic(idle.size)
         failed = _factored(columns, aim, found, idle.astype(np.int32), along)  # A along = 0: what it moves is open
         return failed or int((np.abs(along[~idle]) > OPEN * np.abs(along).max(initial=0.0)).any())
@@ -143,7 +170,7 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
     """A direction [unknowns] of length one (largest entry) that rows leave open, a random one of them: an unknown that
     some of them move is moved by it.  Zero where rows determine everything; None where that would cost too much.
     """
-    columns = _columns(shape, entries, fewer=True)
+    columns = by_columns(shape, entries, fewer=True)
     assert columns is not None
     found = _generic(columns.pattern.unknowns)
     failed = _factored(columns, None, None, along=found)

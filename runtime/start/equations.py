@@ -42,7 +42,7 @@ class Equations:
         self._kinds(settled)
         self.measured = self._measured(settled)
         self.joined = joined(settled)
-        self.rated_rows = settled.of_groups("dynamics_rate").astype(np.int32)
+        self.rated_rows = settled.of_groups("dynamics_rate")
 
     def _entries(self, settled: System) -> None:
         """Those of dF/dy, of dF/dy' where the derivative is an unknown."""

@@ -136,7 +136,7 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
     """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
     x = _begun(starter, t, guess, free)
-    best = Solution(x, np.inf, np.zeros(0))
+    best = Solution(x, np.inf)
     for name, strategy in applicable(starter, t, x):
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = _anew(starter, t, found, x, guess, free)
@@ -156,11 +156,10 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
         return InconsistentStart("nonfinite", float("inf"), rows)
     starter.work = Work(EXPLAINED, starter.work.until)
-    x, scaled = best.x, best.scaled
+    x = best.x
     if x.size <= DENSE:
-        problem = problem_of(starter, t, guess, guess, rows=starter.every, free=free)
-        x = least_residual(problem, x)
-        scaled = np.abs(starter.residual(t, x)) * starter.row_scale(t, x, problem.scale)
+        x = least_residual(problem_of(starter, t, guess, guess, rows=starter.every, free=free), x)
+    scaled = np.abs(starter.residual(t, x)) * starter.row_scale(t, x, starter.scale(t, guess))
     raw, scaled = (np.where(starter.every, item, 0.0) for item in (np.abs(starter.residual(t, x)), scaled))
     order = np.argsort(-scaled)
     worst = [int(row) for row in order[:5] if scaled[row] > 0.1 * scaled[order[0]]]
@@ -242,10 +241,12 @@ def _consistent(
         raise _explain(starter, t0, guess, starter.free, best)
     if constants:
         system.description.p[places] += starter.residual(t0, best.x)[integrated]
-    y, yd = (np.where(np.abs(values) < NOTHING, 0.0, values) for values in starter.expand(best.x))
-    moved = tuple(moved_guesses(starter, t0, best.x, starter.scale(t0, best.x)))
+    starter.spare()
     largest = np.maximum(starter.scale(t0, guess), starter.largest_alike(best.x))
-    zeros = (np.abs(best.x) <= EXACT * largest)[: y.size]
+    zeros = (np.abs(best.x) <= EXACT * largest)[: system.form.written].copy()
+    del largest
+    moved = tuple(moved_guesses(starter, t0, best.x, starter.scale(t0, best.x)))
+    y, yd = (np.where(np.abs(values) < NOTHING, 0.0, values) for values in starter.expand(best.x))
     if best.x.size > LARGE:
         starter.forget()
         del starter, guess

@@ -107,6 +107,8 @@ class Starter:
         self.work = Work()  # of one search for a start
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
+        if system.unknowns > LARGE:  # found again where it is asked
+            system.put_away(whole=True)
         self.given = _given(settled)
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
@@ -135,6 +137,12 @@ class Starter:
             yield
         finally:
             self.work = own
+
+    def spare(self) -> None:
+        """Lets go of what no search reads: of a large model the room counts."""
+        if self.equations.unknowns > LARGE:
+            self.system.spare()
+            self.system.put_away(whole=True)
 
     def forget(self) -> None:
         """Lets go of what stands in the structures of the text for this search alone."""
@@ -300,15 +308,17 @@ class Starter:
         """Of changes in magnitudes [unknowns]: unknowns of one kind and unit are moved by one measure, whatever their
         values; those that hold what stores do by their contents, flows by their momenta.
         """
-        weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
-        content = scale.copy()
+        inert = np.zeros(0)
         if self.balanced:
             y, yd = self.expand(x)
             some = self._momentum.size > 0
             jy, jyd = self.system.jacobian(t, y, yd) if some else (None, self.system.slopes(t, y, yd, rate=True))
+            del y, yd
             inert = own_inertia(self.system, jy, jyd)
-            del y, yd, jy, jyd
-            content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
+            del jy, jyd
+        weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
+        content = scale.copy()
+        content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
         measured = content / largest_of_group(self.measures, content)
         if x.size > LARGE:
             self.__dict__.pop("measures", None)
@@ -343,7 +353,7 @@ class Starter:
         """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes; the largest
         (rates of fast and slow stores 1e12 apart) where generous.
         """
-        known, found, nominal = self.equations, np.zeros(x.size), self.settled.nominal
+        known, found, nominal = self.equations, np.zeros(x.size), self.settled.named
         x = np.ascontiguousarray(x, dtype=np.float64)
         values, free = self.jacobian(t, x), self.residual(t, x)
         rows, missed = known.guessed
@@ -379,9 +389,7 @@ def problem_of(
         levels = said & ~placed, said & placed, unsaid & ~starter.idle, unsaid & starter.idle
         scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
     weight = starter.weights(t, x, scale)
-    if x.size > LARGE:  # what the search reads it has; the room counts
-        starter.system.spare()
-        starter.system.put_away(whole=True)
+    starter.spare()
     return Problem(
         residual=lambda z: starter.residual(t, z),
         jacobian=lambda z: starter.jacobian(t, z),

@@ -38,7 +38,7 @@ def rescaled(
     Magnitudes that proved wrong (currents of 1e-12 A at the guess, a diode at 2 V) are taken anew: the rows must hold
     in the magnitudes of the solution too.
     """
-    at, best = x if sized is None else sized, Solution(x, np.inf, np.zeros(0))
+    at, best = x if sized is None else sized, Solution(x, np.inf)
     for k in range(_RESCALINGS):
         if k and starter.work.done:
             break
@@ -79,7 +79,7 @@ Strategy = Callable[[Starter, float, Floats, Floats, Mask], Tries]
 
 def first(tries: Tries, x: Floats) -> tuple[Solution, bool]:
     """The first at which all rows hold, else the one of the least residual; x where there is none."""
-    best = Solution(x, np.inf, np.zeros(0))
+    best = Solution(x, np.inf)
     for found, holds in tries:
         if holds:
             return found, True

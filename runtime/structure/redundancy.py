@@ -151,9 +151,11 @@ def vanished(system: System, state: ConsistentState) -> Ints:
     entry, which, number = reacting.entry, reacting.which, reacting.multipliers.size
     if not number:
         return NONE
+    beside = BESIDE * _moves(system, state)[1]
     a, found = np.zeros((1 + POINTS, system.form.extended)), np.zeros((1 + POINTS, number))
     a[:, : state.y.size] = state.y
-    a[1:, : state.y.size] += BESIDE * _moves(system, state)[1]
+    a[1:, : state.y.size] += beside
+    del beside  # of a large model the room counts
     b, places = system._buffer(state.yd), (entry.size, lib.pointer(entry), lib.pointer(which), number)
     at = state.t, *a.shape, lib.pointer(a), lib.pointer(b)
     if lib.core.sd_row_sizes(c.byref(system.core), *at, *places, lib.pointer(found)):

@@ -7,6 +7,7 @@ from sysdyn.runtime.many.mass_matrix import mass_matrix
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.inertia import inertia
 from sysdyn.runtime.model.layout import entries_of, laid_out
+from sysdyn.runtime.model.scales import alike, group_maxima, group_maximum
 from sysdyn.runtime.model.system import System
 
 
@@ -32,6 +33,16 @@ def test_the_stabilised_form_has_its_multipliers_behind_those_as_written():
     assert of.are("nu").tolist() == [False] * 5 + [True]
     assert of.family_of[-1] == -1
     assert not of.are("kappa")[-1]
+
+
+def test_families_are_those_of_which_some_unknown_is_asked_for():
+    """By where they begin, against the family of each unknown; nu is of none, and the largest is asked of it too."""
+    of = system("2")
+    for mask in np.eye(of.form.written, dtype=bool):
+        assert of.families_in(mask) == frozenset(of.family_of[: mask.size][mask].tolist())
+    assert of.families_in(np.zeros(of.form.written, dtype=bool)) == frozenset()
+    values = np.arange(1.0, 1.0 + of.unknowns) ** 2
+    assert group_maxima(of, values)[alike(of)].tolist() == group_maximum(of, values).tolist() == [4, 4, 16, 16, 25, 36]
 
 
 def test_what_is_made_once_is_made_again_once_it_was_let_go():

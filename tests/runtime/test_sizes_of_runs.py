@@ -30,7 +30,8 @@ def quantities(**asked):
     return Quantities(masses(), columns, Options(None, 0.0, 1.0, **asked))
 
 
-MAGNITUDE = np.array([2.0, 5.0, 0.1, 0.2])
+MAGNITUDE = np.array([5.0, 0.2])
+"""The largest of displacements and of flows."""
 
 
 def test_what_is_round_off_of_the_largest_of_its_unit_is_relative_to_that():
@@ -135,7 +136,7 @@ def test_a_forecast_counts_the_run_behind_a_draft(monkeypatch):
 def test_counters_of_all_runs_add_up():
     one, other = Accounts(Options(None, 0.0, 1.0)), Accounts(Options(None, 0.0, 1.0, timings=False))
     for cost, of in enumerate((one, other), start=1):
-        run = SimpleNamespace(cpu=float(cost), smooth=True, statistics=lambda n=cost: Statistics(steps=10 * n))
+        run = SimpleNamespace(cpu=float(cost), work=(Statistics(steps=10 * cost), True))
         of.add(run)
     one.take(other)
     assert (one.statistics.steps, one.cpu, one.last.steps) == (30, 3.0, 10)

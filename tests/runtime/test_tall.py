@@ -176,8 +176,20 @@ def test_what_follows_row_by_row_needs_no_factors(monkeypatch):
     i, j, v = entries
     by_columns = np.lexsort((i, j))  # as a pattern has them: taken as they stand
     in_order = i[by_columns], j[by_columns], v[by_columns]
-    assert tall._columns(shape, in_order, fewer=False).values is in_order[2]
+    assert tall.by_columns(shape, in_order, fewer=False).values is in_order[2]
     assert (tall.determined(shape, in_order, aim) == tall.determined(shape, entries, aim)).all()
+
+
+def test_a_matrix_by_its_columns_is_that_by_its_entries():
+    """A column that nothing uses stays out of it, and of what its rows miss."""
+    shape, (i, j, v) = _sums()
+    of = tall.by_columns((shape[0], N + 1), (i, j + 1, v), fewer=False)
+    full, again = np.zeros((2, shape[0], N + 1))
+    for matrix, (rows, columns, values) in ((full, (i, j + 1, v)), (again, of.entries())):
+        np.add.at(matrix, (rows, columns), values)
+    assert (full == again).all()
+    x, aim = np.cos(np.arange(N + 1.0)), np.sin(np.arange(float(shape[0])))
+    np.testing.assert_allclose(of.missed(x, aim), aim - full @ x, rtol=0.0, atol=1e-12)
 
 
 def test_rows_in_excess_that_substitution_misses_are_left_to_factors():
@@ -199,7 +211,7 @@ def test_rows_in_excess_that_substitution_misses_are_left_to_factors():
 def test_an_unknown_does_not_follow_by_an_entry_that_is_next_to_none():
     shape, (i, j, v) = _sums()
     faint = np.where((j == 9) & (np.isin(i, i[(j == 9) & (v > 0.5)])), 1e-12, v)
-    columns = tall._columns(shape, (i, j, faint), fewer=False)
+    columns = tall.by_columns(shape, (i, j, faint), fewer=False)
     assert tall._substituted(columns, np.ones(shape[0]), np.zeros(N)) == 1
 @pytest.mark.parametrize("n", [150, 500])
 def test_what_stands_in_every_row_is_eliminated_last(n):

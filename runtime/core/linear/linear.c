@@ -14,11 +14,12 @@ void sd_linear_free(sd_linear *linear)
 {
     if (!linear)
         return;
+    free(linear->sparse ? linear->work2 : linear->work);
     sd_sparse_free(linear->sparse);
     sd_elimination_free(linear->elimination);
     free(linear->null);
     free(linear->row_scale);
-    free(linear->work);
+    free(linear->scaled);
     free(linear->dense);
     free(linear->pivot);
     free(linear);
@@ -35,8 +36,7 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
     linear->column = column;
     linear->row = row;
     linear->row_scale = calloc(2 * m + 1, sizeof(double));
-    size_t left = order ? 0 : m; /* what is left of a right side, by sparse factors in room of theirs */
-    linear->work = calloc(m + left + nnz + SD_LANES, sizeof(sd_number));
+    linear->scaled = calloc(nnz + SD_LANES, sizeof(sd_number));
     linear->pivot = calloc(order ? 1 : 2 * m + 1, sizeof(int32_t)); /* of dense ones */
     linear->place = !linear->pivot || order ? NULL : linear->pivot + m;
     linear->rank = n;
@@ -44,13 +44,13 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
         linear->sparse = sd_sparse_new(n, n, order);
     else
         linear->dense = calloc(m * m + 1, sizeof(sd_number));
-    if (!linear->row_scale || !linear->work || !linear->pivot || !(order ? (void *)linear->sparse : (void *)linear->dense)) {
+    linear->work = !order ? calloc(2 * m + 1, sizeof(sd_number)) : linear->sparse ? linear->sparse->x : NULL;
+    if (!linear->row_scale || !linear->scaled || !linear->work || !linear->pivot || (!order && !linear->dense)) {
         sd_linear_free(linear);
         return NULL;
     }
     linear->column_scale = linear->row_scale + m;
     linear->work2 = order ? NULL : linear->work + m;
-    linear->scaled = linear->work + m + left;
     return linear;
 }
 
@@ -211,6 +211,7 @@ static int without_pairs(sd_linear *linear)
         return 2;
     sd_sparse_free(linear->sparse);
     linear->sparse = lu;
+    linear->work = lu->x;
     linear->otherwise = NULL;
     allow(linear);
     return sd_sparse_pivot(lu, linear->column, linear->row, linear->scaled);
@@ -233,7 +234,10 @@ static int sparse_factor(sd_linear *linear)
     linear->rank = lu->rank;
     linear->bad_row = lu->bad_row;
     linear->bad_column = lu->bad_column;
-    return failed;
+    int refined = linear->smallest < REFINE || linear->rank < linear->n;
+    if (!failed && refined && !linear->work2)
+        linear->work2 = calloc((size_t)linear->n + 1, sizeof(sd_number));
+    return !failed && refined && !linear->work2 ? 2 : failed;
 }
 
 static void scaled_solve(sd_linear *linear, sd_number *x)
@@ -369,7 +373,7 @@ void sd_linear_again(sd_linear *linear)
 static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
 {
     int32_t n = linear->n;
-    sd_number *rest = linear->sparse ? linear->sparse->x : linear->work2;
+    sd_number *rest = linear->work2;
     if (linear->sparse && linear->smallest >= REFINE && linear->rank == n) {
         sd_sparse_solve(linear->sparse, x, linear->work, linear->row_scale, linear->column_scale);
         return;
@@ -385,8 +389,6 @@ static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
         for (int32_t i = 0; i < n; i++)
             x[i] += isfinite(sd_size(rest[i])) ? rest[i] : 0.0;
     }
-    if (linear->sparse)
-        memset(rest, 0, (size_t)n * sizeof *rest);
     if (linear->rank < n)
         shorten(linear, x);
     for (int32_t i = 0; i < n; i++)

@@ -36,7 +36,7 @@ typedef struct sd_linear {
     sd_number *dense;               /* LU of small matrices, [n][n] by columns; NULL for sparse ones */
     int32_t *pivot;
     sd_sparse *sparse;
-    sd_number *work, *work2;     /* [n]; work2: of dense ones, NULL beside sparse factors */
+    sd_number *work, *work2;     /* [n]; work: of sparse factors theirs; work2: beside these where solutions are refined */
     double smallest;             /* smallest pivot relative to its column: 0 singular */
     int32_t bad_row, bad_column; /* where it was found */
     int64_t factorisations, pivotings;

@@ -435,6 +435,7 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
     if (failed)
         return 1;
     lu->smallest = 1.0;
+    memset(lu->x, 0, ((size_t)lu->n + 1) * sizeof *lu->x);
     unsigned before = sd_no_subnormals();
     for (int32_t k = 0; k < lu->rest && !failed; k++)
         failed = is_link(lu, k) ? refactor_link(lu, column, row, value, k)
@@ -442,11 +443,8 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
     if (!failed && lu->rest < lu->n)
         failed = renew_rest(lu, column, row, value, block);
     sd_subnormals(before);
-    if (failed) {
-        memset(lu->x, 0, ((size_t)lu->n + 1) * sizeof *lu->x);
+    if (failed)
         lu->pivoted = 0;
-    }
-    lu->x[lu->n] = 0.0;
     free(block);
     return failed;
 }

@@ -32,7 +32,7 @@ typedef struct sd_sparse {
     sd_chain *lower, *upper;     /* [lowers], [uppers] of L and of U; none: the factors are no line's */
     int32_t lowers, uppers;
     char *pulled;                /* [n] which substitutions take what a column makes of another position within a chain */
-    sd_number *x;                /* [the larger of n and rows, + 1] */
+    sd_number *x;                /* [the larger of n and rows, + 1] work, of solutions by these factors too */
     int pivoted;                 /* a valid pattern exists */
     int paired;                  /* row own[c] pivots in column c wherever its entry will do: the order is one of A + A^T;
                                     2: however faint that is, of quasi-definite matrices */

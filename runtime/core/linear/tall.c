@@ -9,9 +9,8 @@
 #define REFINEMENTS 2
 #define ROUND_OFF 1e-14 /* what is left of a row in excess that agrees; of others the refinement makes up for it */
 
-/* rest := b - A x */
-static void miss(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
-                 const double *b, const double *x, double *rest)
+void sd_miss(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
+             const double *b, const double *x, double *rest)
 {
     memcpy(rest, b, (size_t)rows * sizeof *rest);
     for (int32_t j = 0; j < columns; j++)
@@ -24,7 +23,7 @@ static void refine(sd_sparse *lu, const int32_t *column, const int32_t *row, con
                    double *x, double *rest)
 {
     for (int k = 0; k <= REFINEMENTS; k++) {
-        miss(lu->rows, lu->n, column, row, value, b, x, rest);
+        sd_miss(lu->rows, lu->n, column, row, value, b, x, rest);
         sd_sparse_solve(lu, rest, rest + lu->rows, NULL, NULL);
         for (int32_t j = 0; j < lu->n; j++)
             x[j] += rest[j];
@@ -147,7 +146,7 @@ int sd_substituted(int32_t rows, int32_t columns, const int32_t *column, const i
     failed = failed || rest ? failed : 2;
     memset(x, 0, (size_t)columns * sizeof *x);
     for (int pass = 0; pass <= REFINEMENTS && !failed; pass++) {
-        miss(rows, columns, column, row, value, b, x, rest);
+        sd_miss(rows, columns, column, row, value, b, x, rest);
         for (int32_t k = 0; k < columns; k++) {
             double step = rest[row[pivot[k]]] / value[pivot[k]];
             x[of[k]] += step;

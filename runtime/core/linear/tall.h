@@ -23,6 +23,10 @@ int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const in
 int sd_substituted(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
                    double least, const double *b, double *x);
 
+/* rest [rows] := b - A x */
+void sd_miss(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
+             const double *b, const double *x, double *rest);
+
 /* out += A x of a matrix by its entries: row, column, value [entries] */
 void sd_add_product(int32_t entries, const int32_t *row, const int32_t *column, const double *value, const double *x,
                     double *out);

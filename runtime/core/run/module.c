@@ -7,14 +7,17 @@
 #endif
 
 #define OWN_PAGES (1 << 22) /* bytes */
+#define OWNERS 65536        /* arrays at most: glibc's own bound */
 
 /* Hands memory that was let go back to the machine: between the stages of a large run little of it would fit.  huge: from
  * now on arrays have pages of their own, which go back as they do; between others they would leave gaps. */
 void sd_trim(int huge)
 {
 #ifdef __GLIBC__
-    if (huge)
+    if (huge) {
+        mallopt(M_MMAP_MAX, OWNERS); /* a command had said none */
         mallopt(M_MMAP_THRESHOLD, OWN_PAGES);
+    }
     malloc_trim(0);
 #endif
 }

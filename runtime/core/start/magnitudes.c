@@ -113,7 +113,7 @@ static void bear(const sd_balance *m, const sd_bearing *bearing, const double *s
     }
 }
 
-int sd_propagate(const sd_balance *m, const double *size, const double *excited, const int32_t *silent, int32_t flags,
+int sd_propagate(const sd_balance *m, const double *size, const double *excited, const char *silent, int32_t flags,
                  double *found)
 {
     if (closed(m, found))
@@ -125,7 +125,7 @@ int sd_propagate(const sd_balance *m, const double *size, const double *excited,
 }
 
 int sd_propagate_beside(const sd_balance *m, const double *size, const char *small, const double *excited,
-                        const int32_t *silent, const sd_bearing *bearing, int32_t flags, double *found)
+                        const char *silent, const sd_bearing *bearing, int32_t flags, double *found)
 {
     size_t n = (size_t)m->unknowns, rows = (size_t)m->rows;
     int open = !closed(m, found);
@@ -185,14 +185,14 @@ int sd_propagate_beside(const sd_balance *m, const double *size, const char *sma
     return 0;
 }
 
-int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const int32_t *rated, const int32_t *member,
+int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const char *rated, const int32_t *member,
              int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale)
 {
     double *most = calloc((size_t)members + 1, sizeof *most);
     if (!most)
         return -1;
     for (int32_t k = 0; k < m->unknowns; k++)
-        scale[k] = k < first && nominal[k] > 0.0 ? nominal[k] : fabs(x[k]);
+        scale[k] = nominal && k < first && nominal[k] > 0.0 ? nominal[k] : fabs(x[k]);
     for (int32_t r = 0; r < m->rows; r++)
         residual[r] = isfinite(residual[r]) ? fabs(residual[r]) : 0.0;
     for (int32_t e = 0; e < m->entries; e++)

@@ -34,7 +34,7 @@ enum { SD_LARGEST = 1, SD_CAPPED = 2 };
 /* found [unknowns]: zeros become what balances the rows; size [entries]: |coefficient|, 0: no place; excited [rows]:
  * magnitude of the free terms; silent [rows]: rows that propose nothing (NULL: none); flags: SD_LARGEST of several proposals, SD_CAPPED by the largest known of the kind.
  * Returns 0; -1: no memory. */
-int sd_propagate(const sd_balance *balance, const double *size, const double *excited, const int32_t *silent,
+int sd_propagate(const sd_balance *balance, const double *size, const double *excited, const char *silent,
                  int32_t flags, double *found);
 
 /* A point at which steep laws are asked what they make of a proposal, and room: [rows + 2 unknowns +
@@ -53,12 +53,12 @@ char *sd_small(const sd_balance *balance, const double *size);
 /* bearing: proposals are what steep laws bear (NULL: as slopes say): by the slope of a diode that blocks 1e50 V balance a
  * current, and a fraction of one volt does */
 int sd_propagate_beside(const sd_balance *balance, const double *size, const char *small, const double *excited,
-                        const int32_t *silent, const sd_bearing *bearing, int32_t flags, double *found);
+                        const char *silent, const sd_bearing *bearing, int32_t flags, double *found);
 
 /* scale [unknowns] := magnitudes of x, by the entries of a Jacobian and a residual at x, which are overwritten by their
- * magnitudes (what is no number counts as 0).  nominal [first]: 0 where there is none; first: unknowns before the rates; rated [rows]: rows that say nothing of sizes
+ * magnitudes (what is no number counts as 0).  nominal [first]: 0 where there is none, NULL: nowhere; first: unknowns before the rates; rated [rows]: rows that say nothing of sizes
  * at first; member [first], members: number of the kind of an unknown.  Returns 0; -1: no memory. */
-int sd_scale(const sd_balance *balance, const double *nominal, int32_t first, const int32_t *rated, const int32_t *member,
+int sd_scale(const sd_balance *balance, const double *nominal, int32_t first, const char *rated, const int32_t *member,
              int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale);
 
 /* size [points][sizes] := largest |entry| of dF/dy at (t, y [points][extended], yd) among those of each number: entry

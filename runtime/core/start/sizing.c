@@ -25,6 +25,11 @@ typedef struct sd_motion {
     const sd_order *order;
 } sd_motion;
 
+static double named(const sd_sizing *s, int32_t k)
+{
+    return s->nominal ? s->nominal[k] : 0.0;
+}
+
 /* most [kinds] := the largest of each kind and unit */
 static void group_largest(const sd_balance *b, const double *x, double *most)
 {
@@ -204,7 +209,7 @@ static void known_sizes(const sd_sizing *s, const sd_system *system, const doubl
     for (int32_t k = 0; k < n; k++) {
         double largest = divisor[k] * most[b->kind[k]], own = sd_larger(fabs(y[k]), moves[k]);
         known[k] = fabs(y[k]) > NOTHING * largest ? own : sd_larger(own, GROUP * largest);
-        known[k] = s->nominal[k] > 0.0 ? s->nominal[k] : known[k];
+        known[k] = named(s, k) > 0.0 ? named(s, k) : known[k];
     }
 }
 
@@ -275,7 +280,7 @@ static int bounded(const sd_sizing *s, sd_system *system, const sd_order *order,
     const sd_balance *b = s->balance;
     int32_t n = b->unknowns, zeros = 0;
     for (int32_t k = 0; k < n; k++)
-        zeros += carries[k] && y[k] == 0.0 && moves[k] == 0.0 && s->nominal[k] == 0.0;
+        zeros += carries[k] && y[k] == 0.0 && moves[k] == 0.0 && named(s, k) == 0.0;
     if (!zeros || !isfinite(quick))
         return 0;
     int answered = sd_response(b, system, order, t0, quick, span, y, found, least, most);
@@ -290,7 +295,7 @@ static int bounded(const sd_sizing *s, sd_system *system, const sd_order *order,
             bound[side][k] = divisor[k] * sd_larger(bound[side][k], GROUP * largest[b->kind[k]]);
     }
     for (int32_t k = 0; k < n; k++)
-        if (carries[k] && y[k] == 0.0 && moves[k] == 0.0 && s->nominal[k] == 0.0 && most[k] > 0.0)
+        if (carries[k] && y[k] == 0.0 && moves[k] == 0.0 && named(s, k) == 0.0 && most[k] > 0.0)
             found[k] = sd_larger(sd_smaller(found[k], most[k]), least[k]);
     return 0;
 }
@@ -372,7 +377,7 @@ int sd_confirmed(const sd_sizing *s, const sd_system *system, double span, const
         found[k] = sd_larger(met[k], GROUP * most[b->kind[k]]);
     flows(system, span, found, most + b->kinds);
     for (int32_t k = 0; k < b->unknowns; k++) {
-        int free_ = (s->kind[k] & SD_STATE) && s->nominal[k] == 0.0;
+        int free_ = (s->kind[k] & SD_STATE) && named(s, k) == 0.0;
         found[k] = free_ ? sd_smaller(sd_larger(found[k], NOISE * magnitude[k]), magnitude[k]) : magnitude[k];
     }
     free(most);

@@ -16,9 +16,9 @@ enum { SD_STATE = 1, SD_FLOW = 2, SD_OF_MOMENTUM = 4, SD_DISPLACEMENT = 8, SD_MO
 /* What of it depends on the structure of a form alone; shared by threads. */
 typedef struct sd_sizing {
     const sd_balance *balance;       /* rows of the Jacobian; kinds and units of the unknowns */
-    const double *nominal;           /* [n] 0: none */
+    const double *nominal;           /* [n] 0: none; NULL: nowhere */
     const int32_t *kind;             /* [n] a sum of the above */
-    const int32_t *partner;          /* [n] of a momentum: the flow of its coordinate; -1 */
+    const int32_t *partner;          /* [n] of a momentum: the flow of its coordinate; -1; NULL where none is */
     /* places in the pattern of what a coordinate's own row holds of it: flows in rows of dynamics, displacements there,
      * flows in rows of momentum, momenta there */
     const int32_t *own[4];

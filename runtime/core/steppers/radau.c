@@ -63,8 +63,8 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
         return NULL;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(system->unknowns + 1);
     double **vectors[] = {&radau->phi, &radau->yd, &radau->last, &radau->before, &radau->slope[0], &radau->slope[1],
-                          &radau->slope[2], &radau->y, &radau->rate, &radau->ee, &radau->weight, &radau->newton_weight,
-                          &radau->scale, &radau->pull, &radau->terms, &radau->first}; /* the last ones: of steep laws */
+                          &radau->slope[2], &radau->y, &radau->rate, &radau->ee, &radau->weight, &radau->pull,
+                          &radau->terms, &radau->first}; /* the last ones: of steep laws */
     double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full};
     size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep,
            sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
@@ -110,6 +110,7 @@ void sd_radau_free(sd_radau *radau)
     if (!radau)
         return;
     free(radau->memory);
+    free(radau->powered);
     free(radau->right);
     free(radau->gap);
     free(radau->beside);
@@ -137,10 +138,24 @@ static void set_weights(sd_radau *radau)
     }
 }
 
+/* Newton's weights and the scale of columns: of unknowns that all count as they are those that there are; where memory for
+ * others is missing none, which the first step tells */
+static void provide_newton_weights(sd_radau *radau)
+{
+    size_t m = (size_t)sd_whole_lanes(radau->n + 1);
+    int powers = 0;
+    for (int32_t i = 0; i < radau->n; i++)
+        powers |= radau->power[i] != 0;
+    if (powers && !radau->powered)
+        radau->powered = calloc(2 * m, sizeof *radau->powered);
+    radau->newton_weight = powers ? radau->powered : radau->weight;
+    radau->scale = !powers ? radau->magnitude : radau->powered ? radau->powered + m : NULL;
+}
+
 /* index-2 unknowns and index-3 multipliers count with powers of h */
 static void set_newton_weights(sd_radau *radau)
 {
-    for (int32_t i = 0; i < radau->n; i++) {
+    for (int32_t i = 0; i < radau->n && radau->newton_weight != radau->weight; i++) {
         double power = radau->power[i] == 0 ? 1.0 : radau->power[i] == 1 ? radau->h : radau->h * radau->h;
         radau->newton_weight[i] = radau->weight[i] * power;
         radau->scale[i] = radau->magnitude[i] / power;
@@ -208,6 +223,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->since = radau->hold = 0;
     show_nodes(radau);
     radau->h = 1.0;
+    provide_newton_weights(radau);
     set_weights(radau);
     double span = radau->t_end - t, change = sd_radau_norm(radau, yd) * radau->tolerance;
     double power = power_of(radau);
@@ -232,23 +248,23 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
 static int estimate_error(sd_radau *radau, double *error)
 {
     int32_t n = radau->n;
-    double *v = radau->rate, strict = sd_radau_strictness(radau, radau->method);
+    double *v = radau->rate, *ee = radau->ee, strict = sd_radau_strictness(radau, radau->method);
     memcpy(radau->y, radau->phi, (size_t)n * sizeof(double));
     for (int again = 0;; again++) {
         sd_radau_combine(radau->method->stages, n, radau->method->estimate, radau->z, v);
         for (int32_t i = 0; i < n; i++)
             v[i] = -v[i] / radau->h;
-        sd_residual(radau->system, radau->t, radau->y, v, radau->ee);
+        sd_residual(radau->system, radau->t, radau->y, v, ee);
         if (*radau->system->stop)
             return SD_STOPPED;
         for (int32_t i = 0; i < n; i++)
-            radau->ee[i] = -radau->ee[i];
-        sd_linear_solve(radau->linear, radau->ee);
-        *error = sd_radau_norm(radau, radau->ee);
+            ee[i] = -ee[i];
+        sd_linear_solve(radau->linear, ee);
+        *error = sd_radau_norm(radau, ee);
         if (!(*error * strict >= 1.0) || again || !(radau->taken == 0 || radau->rejected))
             break;
         for (int32_t i = 0; i < n; i++)
-            radau->y[i] = radau->phi[i] + (radau->test[i] >= 0 ? radau->ee[i] : 0.0);
+            radau->y[i] = radau->phi[i] + (radau->test[i] >= 0 ? ee[i] : 0.0);
     }
     *error *= strict;
     *error = isfinite(*error) ? fmax(*error, 1e-10) : INFINITY;
@@ -360,7 +376,9 @@ int sd_radau_step(sd_radau *radau)
     int singular = 0, iterations = 0, failures = 0, leap = 0;
     double retry = 0.5, error = 0.0;
     set_weights(radau);
-    radau->cause = SD_FINE;
+    radau->cause = radau->newton_weight ? SD_FINE : SD_MEMORY;
+    if (radau->cause)
+        return radau->cause;
     for (;;) {
         fit_end(radau);
         double left = radau->t_end - radau->t;

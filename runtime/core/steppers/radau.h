@@ -94,7 +94,8 @@ typedef struct sd_radau {
                                                * their sum */
     double *at_zero;          /* [entries] dF/dy where all unknowns are zero, of steep laws; made when first needed */
     char *open;               /* [n] columns that factors left */
-    double *y, *rate, *ee, *weight, *newton_weight, *scale, *terms, *jy, *jyd, *g, *memory;
+    double *y, *rate, *ee, *weight, *terms, *jy, *jyd, *g, *memory;
+    double *newton_weight, *scale, *powered; /* of Newton's norm, of columns; their memory where powers of h count */
     double complex *w[SD_PAIRS], *right; /* right sides and solutions; their memory */
     struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
     sd_system *other;             /* its system */

@@ -20,11 +20,14 @@
 static inline void add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r)
 {
     const double *scale = system->k_scale;
-    for (const int32_t *span = system->k_span, *end = span + 4 * (size_t)system->k_spans; span < end; scale += *span, span += 4) {
+    for (const int32_t *span = system->k_span, *end = span + 4 * (size_t)system->k_spans; span < end; span += 4) {
         const double *restrict own = scale, *restrict q = yd + span[2], *restrict f = y + span[3];
         double *restrict to = r + span[1];
         for (int32_t i = 0; i < span[0]; i++)
-            to[i] = own[i] * (q[i] - f[i]);
+            to[i] = q[i] - f[i];
+        for (int32_t i = 0; i < span[0] && own; i++)
+            to[i] *= own[i];
+        scale = own ? own + span[0] : NULL;
     }
     for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++)
         call->rows(&call->frame, t, y, yd, r);
@@ -73,8 +76,10 @@ static void add_entries(const sd_call *call, int rate, double t, const double *y
 void sd_slopes(const sd_system *system, double t, const double *y, const double *yd, int rate, double *values)
 {
     memset(values, 0, (size_t)system->entries * sizeof *values);
-    for (int32_t i = 0; i < system->kinematics; i++)
-        values[rate ? system->k_slot_q[i] : system->k_slot_f[i]] += rate ? system->k_scale[i] : -system->k_scale[i];
+    for (int32_t i = 0; i < system->kinematics; i++) {
+        double scale = system->k_scale ? system->k_scale[i] : 1.0;
+        values[rate ? system->k_slot_q[i] : system->k_slot_f[i]] += rate ? scale : -scale;
+    }
     for (int32_t c = 0; c < system->calls; c++)
         add_entries(&system->call[c], rate, t, y, yd, system->v, values);
     for (int32_t i = 0; i < system->clear; i++)

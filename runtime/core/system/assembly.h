@@ -10,7 +10,7 @@
  *   slot_dy [n_dy], slot_dyd [n_dyd]      place in jy / jyd of each entry of the block's list
  *   k_row, k_q, k_f, k_slot_q, k_slot_f [kinematics]      the rows q' - f and their two entries
  *   k_span [k_spans][4]                the same rows as stretches: number, first row, q and f
- *   k_scale [kinematics]               factors of these rows: beside Phi_q^T nu they are the inverse metric of q
+ *   k_scale [kinematics]               factors of these rows: beside Phi_q^T nu they are the inverse metric of q; NULL: ones
  *   held_row, held_unknown, held_slot [held]   rows that read "unknown = 0" in the place of their equation (the
  *                                      multiplier of a redundant constraint), with their entry
  *   held_rate [held]                   1: the row reads "derivative of the unknown = 0"

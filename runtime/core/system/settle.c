@@ -34,7 +34,7 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
     size_t kept = system->left ? (size_t)system->unknowns + 8 : 0;
     size_t most = linear && (size_t)linear->entries > 2 * m ? (size_t)linear->entries : 2 * m;
     size_t steep = system->scales > 0 ? n : 0;
-    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 6 * n + steep + 2 * kept, sizeof(double));
+    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 5 * n + steep + 2 * kept, sizeof(double));
     if (!settle->memory) {
         free(settle);
         return NULL;
