@@ -41,6 +41,8 @@ from sysdyn.dsl.tree import syntax
 
 AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
 AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE, "drift": NONE}
+
+
 class Members(Quantities):
     """Members of what a path leads to."""
 
