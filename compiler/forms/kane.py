@@ -5,6 +5,8 @@
 (book, afterword; Kane, Levinson: Dynamics, 1985, 4.6).  Psi needs no multipliers: its reactions do no work along the
 columns of B.  B is found by elimination without division, so that it is regular wherever a pivot is; one that is a
 number comes first.  A reaction that something reads is kept with Psi_f Psi_f^T mu = Psi_f (Upsilon - ...) as its row.
+Rows that hold by turns may follow from each other (a thyristor blocks, or lets pass one way): such a one adds to the
+rows of the reactions of those that it follows from, and has its own row of Psi, or mu = 0, as in Lagrange's form.
 """
 
 from __future__ import annotations
@@ -31,18 +33,19 @@ Entries = dict[str, Node]
 @dataclass(frozen=True, slots=True)
 class Projection:
     """free: B by coordinate that keeps its balance, column by column; bound: coordinates that lose it; rows: Psi_f by
-    label.
+    label; following: labels of rows that follow from the others.
     """
 
     free: Mapping[str, Entries]
     bound: frozenset[str]
     rows: Mapping[str, Entries]
+    following: frozenset[str]
 
     def along(self, speeds: Speeds) -> Projection:
         """The same with partial velocities in the place of the columns of their coordinates."""
         free = {name: column for name, column in self.free.items() if name not in speeds.rest}
         bound = self.bound - set(speeds.rest)
-        return Projection({**free, **{u: dict(c) for u, c in speeds.columns.items()}}, bound, self.rows)
+        return replace(self, free={**free, **{u: dict(c) for u, c in speeds.columns.items()}}, bound=bound)
 
 
 def kane(model: EnergyModel) -> DescriptorForm:
@@ -50,6 +53,9 @@ def kane(model: EnergyModel) -> DescriptorForm:
     found = projection(model)
     form = lagrangian(model)
     read = _joined(found, _reactions_read(form))
+    for row in model.of_kind("psi"):
+        if row.name in found.following - read:
+            raise _impossible(row, f"psi {row.name} follows from the others")
     speeds = speeds_of(model, read)
     if speeds.speeds:
         form = lagrangian(_seen(model, speeds))
@@ -81,13 +87,13 @@ def projection(model: EnergyModel) -> Projection:
         rows[row.name] = _entries(row, families)
     reduced = {name: dict(entries) for name, entries in rows.items()}
     pivots: dict[str, str] = {}
-    for _ in rows:
-        name, column = _pivot(reduced, pivots, model)
+    while (chosen := _pivot(reduced, pivots)) is not None:
+        name, column = chosen
         pivots[name] = column
         _eliminate(reduced, name, column)
     bound = frozenset(pivots.values())
     free = {c.name: _column(c.name, reduced, pivots) for c in model.coordinates if c.name not in bound}
-    return Projection(free, bound, rows)
+    return Projection(free, bound, rows, frozenset(rows) - frozenset(pivots))
 
 
 def _impossible(row: Row, why: str) -> ModelError:
@@ -110,8 +116,10 @@ def _entries(row: Row, families: Mapping[str, Family]) -> Entries:
     return {name: value for name, value in found.items() if not is_const(value, 0.0)}
 
 
-def _pivot(reduced: Mapping[str, Entries], pivots: Mapping[str, str], model: EnergyModel) -> tuple[str, str]:
-    """The next row and column: a number rather than a function, of a column in few rows, the shorter expression."""
+def _pivot(reduced: Mapping[str, Entries], pivots: Mapping[str, str]) -> tuple[str, str] | None:
+    """The next row and column: a number rather than a function, of a column in few rows, the shorter expression; None
+    where the rows that are left follow from the others.
+    """
     uses: dict[str, int] = {}
     for entries in reduced.values():
         for column in entries:
@@ -122,10 +130,7 @@ def _pivot(reduced: Mapping[str, Entries], pivots: Mapping[str, str], model: Ene
         if name not in pivots
         for column, value in entries.items()
     ]
-    if not choices:
-        row = next(r for r in model.of_kind("psi") if r.name not in pivots)
-        raise _impossible(row, f"psi {row.name} follows from the others")
-    return min(choices)[-2:]
+    return min(choices)[-2:] if choices else None
 
 
 def _eliminate(reduced: dict[str, Entries], pivot_row: str, column: str) -> None:
@@ -210,11 +215,11 @@ class _Projected:
                 if row.block == "dynamics":
                     self.assembly.family(replace(row, block="phi_normal", kind="phi_normal"))
         multipliers = {f.owner: f for f in self.lagrange.families if f.kind == "mu"}
-        for label in sorted(self.read):
+        for label in sorted(self.read - self.found.following):
             family = multipliers[label]
             self.assembly.family(Equations("dynamics", family.name, label, "dynamics", family.unit, family.place))
         self._copy()
-        for label in sorted(self.read):
+        for label in sorted(self.read - self.found.following):
             self._reaction(label)
         for name in self.speeds.rest:
             zero = kinematics(self.speeds, name)
@@ -277,7 +282,7 @@ class _Projected:
                 if name in self.rated and all(n.data[1] == "f" for n in rates):
                     acting = substitute(mixed, dict.fromkeys(rates, const(0.0)))
                     self.assembly.add("dynamics_rate", name, at, nest, total_rate(acting))
-        for label in self.read:
+        for label in self.read - self.found.following:
             if owner in self.found.rows[label]:
                 self.assembly.add(block, label, at, nest, mul(_here(self.found.rows[label][owner], at), value))
 
