@@ -1,5 +1,7 @@
 """Efforts by class of a coordinate, momenta of all branches, drift: traced by name, against closed forms."""
 
+import json
+
 import numpy as np
 import pytest
 from sysdyn import api
@@ -294,6 +296,14 @@ def test_a_port_of_a_bundle_carries_the_force_of_a_pin(tmp_path):
     fall = 1.5 * 9.80665 * 0.2 / (0.02 + 1.5 * 0.2**2)
     assert got["x"][0] == pytest.approx(1.5 * 3.0**2 * 0.2, rel=1e-9)
     assert got["y"][0] == pytest.approx(-1.5 * (9.80665 - 0.2 * fall), rel=1e-9)
+
+
+def test_what_can_be_read_of_ports_is_listed(tmp_path, capsys):
+    code, answer = run_json(capsys, "list", write(tmp_path, PORTS))
+    listed = json.dumps(answer["result"])
+    assert code == 0
+    assert "X.p.e" in listed
+    assert "X.v.f" in listed
 
 
 @pytest.mark.parametrize(
