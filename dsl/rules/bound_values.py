@@ -56,9 +56,11 @@ def run(model: Elaborator, known: Values, report: Report) -> None:
 
 def _allowances(model: Elaborator, known: Values, report: Report) -> None:
     """E912: what a claim allows is not negative."""
-    for e in (*model.parts.expectations, *model.parts.goldens):
-        if e.within is not None and known.number(e.within) < 0.0:
-            report.error("E912", "what 'within' allows is negative: nothing could hold", e.place, help="within 1e-3")
+    allowed = [(e.within, e.place) for e in model.parts.expectations]
+    allowed += [(g.within, g.place) for g in model.parts.goldens]
+    for within, place in allowed:
+        if within is not None and known.number(within) < 0.0:
+            report.error("E912", "what 'within' allows is negative: nothing could hold", place, help="within 1e-3")
 
 
 def _parameters(node: Node) -> list[Node]:
