@@ -74,7 +74,7 @@ def instants(
     tables: Sequence[Table] = (),
     read: Sequence[Node] = (),
 ) -> Instants:
-    """All instants in (t0, t1); tables: of the network; read: what events read.  None of them, with a note, where they
+    """All instants in (t0, t1]; tables: of the network; read: what events read.  None of them, with a note, where they
     are more than MOST.
     """
     search = _Search(binding, t0, t1)
@@ -212,7 +212,7 @@ class _Search:
             return
         found = labels.bisect(*brackets)
         # the start lies on its own right side
-        found = distinct(found[(found > self.t0 + ROUND_OFF * (self.t1 - self.t0)) & (found < self.t1)])
+        found = distinct(found[(found > self.t0 + ROUND_OFF * (self.t1 - self.t0)) & (found <= self.t1)])
         before = self._found.get(watched.node, found)
         self._found[watched.node] = distinct(before, found)
         self.times()

@@ -115,6 +115,7 @@ class Elaborator(Instances):
                     if kind in kinds:
                         self.each(body.of(kind), partial(STATEMENTS[kind], self))
                 self._definitions()
+        self.resolver.said = True
 
     def _said(self, kind: type[syntax.Statement], do: Callable[..., None]) -> None:
         """Carry out all statements of a kind, in the bodies where they stand."""

@@ -28,6 +28,7 @@ from sysdyn.dsl.names.symbols import (
     InstanceSymbol,
     NodeSymbol,
     ParameterSymbol,
+    PortSymbol,
     Scope,
     Symbol,
     TwoPortSymbol,
@@ -185,6 +186,8 @@ class _Walk:
                 return "implicit", ("",), symbol.shape
             case NodeSymbol():
                 return "node", _tails(symbol.domain), symbol.family.shape
+            case PortSymbol():  # its node is the user's; what the component takes in there is its own
+                return "port", (".f",) if symbol.end.domain.common == "effort" else (".e",), ()
             case BranchSymbol():
                 return "element", _BRANCH, symbol.family.shape
             case TwoPortSymbol():

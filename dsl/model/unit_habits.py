@@ -132,16 +132,25 @@ _LONG_PREFIXES |= {"centi": "c", "deci": "d"}
 
 def _cased(name: str) -> str | None:
     """The unit that differs in upper and lower case alone: `hz`, `RPM`, `KN`, `Kg`, `mhz`; never `Nm` as `nm`."""
+    found = cased(name)
+    return found[0] if len(found) == 1 else None
+
+
+def cased(name: str) -> list[str]:
+    """All units that differ in upper and lower case alone, those without a prefix first: `pa` is Pa or pA; none of what
+    may be milli or mega.
+    """
+    head, tail = name[:1], name[1:]
+    prefix = "k" if head == "K" else head
+    whole, prefixed = [], []
     for base in names():
         if base.lower() == name.lower():
-            return base
-        if name[:1].lower() == "m" and name[1:].lower() == base.lower() and base != "l":
-            return None  # milli or mega
-        head, tail = name[:1], name[1:]
-        prefix = "k" if head == "K" else head
-        if base.lower() == tail.lower() and known(prefix + base) and (tail != base or prefix != head):
-            return prefix + base
-    return None
+            whole.append(base)
+        elif head.lower() == "m" and tail.lower() == base.lower() and base != "l":
+            return whole
+        elif base.lower() == tail.lower() and known(prefix + base) and (tail != base or prefix != head):
+            prefixed.append(prefix + base)
+    return [*whole, *prefixed]
 
 
 def _parted(name: str) -> list[str] | None:

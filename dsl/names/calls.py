@@ -147,9 +147,22 @@ class Calls(Context):
             return Typed(ex.add(values[0].node, ex.const(273.15)), dim.result(name, NONE))
         return Typed(ex.call(name, *(v.node for v in values)), dim.result(name, common))
 
+    def _divided(self, e: object) -> str | None:
+        """What is meant by a quantity whose last unit is a variable in sight too: `300 K/T` is not divided by it."""
+        if not isinstance(e, syntax.Quantity) or len(e.unit.factors) < 2:
+            return None
+        last = e.unit.factors[-1]
+        if last.op != "/" or last.exponent != 1 or self.scope.find(last.name) is None:
+            return None
+        written = f"{e.text} {e.unit.text.rpartition('/')[0]} / {last.name}"
+        return f"'{written}' divides by the variable {last.name}; '{e.text} {e.unit.text}' is one quantity"
+
     def _not_plain(self, name: str, dimension: Dimension | None, e: syntax.Expr) -> None:
         text = self.source.text[e.span.start : e.span.end]
         help_ = f"{name}({text}/(1 {dim.show(dimension)}))" if len(text) < 60 else None
+        divided = next(filter(None, map(self._divided, walk(e))), None)
+        if divided is not None:
+            raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=divided)
         if help_ and dimension == dim.TIME:
             help_ += ", or the unit of a frequency: 50 Hz"
         raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=help_)

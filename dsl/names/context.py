@@ -129,6 +129,7 @@ class Context:
         self.lenient = False  # what the chosen level lacks is a note (language, decision 5)
         self.virtual = False  # outputs and inputs are signals, held by virtual displacements
         self.complete = False  # all elements are known
+        self.said = False  # and all that the model says of them
         self.statics = False  # static quantities are in sight (expect static)
 
     @contextmanager

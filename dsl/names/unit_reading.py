@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container
 from fractions import Fraction
 
-from sysdyn.dsl.model.unit_habits import declaration, respelled
+from sysdyn.dsl.model.unit_habits import cased, declaration, respelled
 from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, Dimension, Unit, known, multiply, names, si_text
 from sysdyn.dsl.names.symbols import Scope, nearest
 from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
@@ -93,6 +93,9 @@ def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     alone = respelled(factor.name)
     if alone is not None:
         return f"write '{alone}' for '{factor.name}'"
+    several = cased(factor.name)
+    if several:
+        return f"write {' or '.join(repr(unit) for unit in several)}"
     line = declaration(factor.name)
     if line is not None:
         return f"declare it at the top of the file: {line}"

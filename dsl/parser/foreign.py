@@ -35,6 +35,11 @@ def glued(number: str, unit: str) -> tuple[str, str | None]:
         digits, _, exponent = plain.partition("e")
         example = _EXAMPLES.get(f"e{exponent}")
         return f"{plain}, or with its unit, as in '{digits} {example}'" if example else plain, None
+    if re.fullmatch(r"(_[0-9]{3})+", unit):
+        whole = number + unit.replace("_", "")
+        return f"{whole}: digits stand together", None
+    if re.fullmatch(r"[dD][0-9]+", unit):
+        return f"{number}e{unit[1:]} for a power of ten, {number} {unit[0]}^{unit[1:]} for one of a unit", None
     right = unit if known(unit.partition(".")[0].partition("/")[0].partition("^")[0]) else respelled(unit)
     if right:
         return f"{number} {right}", f"{number} {right}"

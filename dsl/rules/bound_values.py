@@ -27,7 +27,14 @@ LOOKED_AT = 1000
 
 def run(model: Elaborator, known: Values, report: Report) -> None:
     """E119, E322, E324, E805 with the values bound."""
+    _allowances(model, known, report)
     for r in model.parts.requirements:
+        read = min(map(str, ex.variables(r.condition)), default=None)
+        if read is not None:
+            text = format_expression(r.written)
+            message = f"require {text} reads '{read}', which is no parameter: it changes in a run"
+            report.error("E322", message, r.place, help=f"expect always: {text}")
+            continue
         for at in r.failures(known):
             met = {n: known.number(n, at) for n in _parameters(r.condition)}
             if not any(map(math.isnan, met.values())):
@@ -45,6 +52,15 @@ def run(model: Elaborator, known: Values, report: Report) -> None:
     _branches(model, known, report)
     _elements(model, known, report)
     _indices(model, known, report)
+
+
+def _allowances(model: Elaborator, known: Values, report: Report) -> None:
+    """E912: what a claim allows is not negative."""
+    allowed = [(e.within, e.place) for e in model.parts.expectations]
+    allowed += [(g.within, g.place) for g in model.parts.goldens]
+    for within, place in allowed:
+        if within is not None and known.number(within) < 0.0:
+            report.error("E912", "what 'within' allows is negative: nothing could hold", place, help="within 1e-3")
 
 
 def _parameters(node: Node) -> list[Node]:

@@ -1,4 +1,4 @@
-"""Rules on the network graph and on the laws of its elements (E306, E313, E314, E321, E325, E409, E411, E412)."""
+"""Rules on the network graph and on the laws of its elements (E306, E313, E321, E325, E409, E411, E412)."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, NodeFamily, Terminal
 from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.model.values import Values, as_constants
+from sysdyn.dsl.rules import lossless
 from sysdyn.dsl.rules.untouched import Box, shown, untouched
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
@@ -31,7 +32,7 @@ def run(model: Elaborator, known: Values, read: frozenset[str], report: Report) 
     _lonely_nodes(model, known, read, report)
     _loops_of_sources(model, report)
     _idle_branches(model, report)
-    _lossless(model, report)
+    lossless.run(model, known, report)
     for branch in model.parts.branches:
         _sign(branch, known, report)
 
@@ -178,25 +179,6 @@ def _idle_branches(model: Elaborator, report: Report) -> None:
         if branch.kind == "field" and branch.name not in used:
             message = f"branch '{branch.name}' has no law and occurs in no energy, content, work or constraint"
             report.error("E306", message, branch.place, help="law e = ...")
-
-
-def _lossless(model: Elaborator, report: Report) -> None:
-    """E314: `lossless` holds by construction where a component is made of couplings alone."""
-    for space, body in model.bodies:
-        claims = body.of(syntax.Lossless)
-        if not claims:
-            continue
-        inside = [b for b in model.parts.branches if b.name.startswith(f"{space.path}.")]
-        place = Place(space.source, claims[0][0].span)
-        wrong = next((b for b in inside if b.kind in ("dissipator", "effort", "flow", "kinetic", "potential")), None)
-        if wrong is not None and wrong.kind in ("dissipator", "effort", "flow"):
-            what = (
-                "a dissipator"
-                if wrong.kind == "dissipator"
-                else {"effort": "an effort source", "flow": "a flow source"}[wrong.kind]
-            )
-            message = f"'lossless' fails: '{wrong.name}' is {what}"
-            report.error("E314", message, place)
 
 
 def _rises(law: Node, own: Node, known: Values) -> bool:

@@ -33,6 +33,8 @@ KEPT = 10_000
 """Instants of rows up to which they are kept for the next run."""
 APART = 0.1
 """Of the time between two events: where two runs differ by more in the instant of one, they are compared there too."""
+AT_ONCE = 1e-7
+"""Of the span: what a run has at once is one event, however often a condition turns."""
 
 
 class Thinned:
@@ -104,19 +106,39 @@ def common(stored: Floats, options: Options) -> Floats:
 
 
 def beside(instants: Floats, one: Floats, two: Floats, span: float) -> NDArray[np.bool_]:
-    """Which instants lie between those at which two runs have the same event (one, two [s] ascending): a value on one
-    side of a jump is no error of one on the other.  What the jumps do is compared behind them.  Where both have it at
-    the same instant, as sampled actions are, both values there are those before it.
+    """Which instants lie between those at which two runs have the same event (one, two [s] ascending): each of both is
+    the nearest to the other.  A value on one side of a jump is no error of one on the other.  What the jumps do is
+    compared behind them.  Where both have it at the same instant, as sampled actions are, both values there are those
+    before it.
     """
-    number = min(one.size, two.size)
-    if not number:
+    one, two = _grouped(one, span), _grouped(two, span)
+    if not (one.size and two.size):
         return np.zeros(instants.size, dtype=bool)
-    low, high = np.minimum(one[:number], two[:number]), np.maximum(one[:number], two[:number])
-    gap = np.diff(two, prepend=-np.inf, append=np.inf)
-    near = (low < high) & (high - low <= APART * np.minimum(gap[:-1], gap[1:])[:number])
+    own = _nearest(one[:, 0], two[:, 0])
+    same = _nearest(two[:, 0], one[:, 0])[own] == np.arange(len(two))
+    low, high = np.minimum(one[own, 0], two[:, 0]), np.maximum(one[own, 1], two[:, 1])
+    gap = np.diff(two[:, 0], prepend=-np.inf, append=np.inf)
+    near = same & (low < high) & (high - low <= APART * np.minimum(gap[:-1], gap[1:]))
     low, high = low[near] - NEAR * span, high[near] + NEAR * span
     place = np.searchsorted(low, instants, side="right")
     return np.asarray(instants <= np.append(-np.inf, high)[place])
+
+
+def _grouped(events: Floats, span: float) -> Floats:
+    """First and last [groups, 2] of what a run has at one event: a condition that stands at its edge may turn again at
+    once in one run, and not in another.
+    """
+    new = np.diff(events, prepend=-np.inf) > AT_ONCE * span
+    last = np.append(new[1:], True)[: events.size]
+    return np.stack([events[new], events[last]], axis=1)
+
+
+def _nearest(times: Floats, wanted: Floats) -> NDArray[np.intp]:
+    """Which of ascending times is nearest to each that is wanted."""
+    right = np.clip(np.searchsorted(times, wanted), 1, max(times.size - 1, 1))
+    right = np.minimum(right, times.size - 1)
+    left = np.maximum(right - 1, 0)
+    return np.where(np.abs(times[left] - wanted) <= np.abs(times[right] - wanted), left, right)
 
 
 def joined(instants: Floats, kinds: Ints, compared: Floats) -> tuple[Floats, Ints]:

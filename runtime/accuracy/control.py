@@ -275,7 +275,7 @@ def control(
     estimate, longest = _Estimate(law, target), LONGEST
     still = _quiet(last)
     shorter: float | None = None
-    number = 1
+    number, away = 1, False
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
     ratio = max(law.ratio, TENTH) if last.tolerance >= law.loosest else law.ratio
@@ -301,10 +301,13 @@ def control(
         before, still = still, _held(now, longest)
         held = before and still
         if now.tolerance <= 1.01 * law.finest and not held:
+            last = now
             break
         shorter = estimate.shorter() if held else None
         last, longest = now, longest * (shorter or 1.0 / STRETCH)
         tolerance = min(estimate.next_tolerance(now.tolerance), TAME if away else 1.0)
+    if estimate.over <= 1.0 and not away:  # doubted, and no finer run can tell: one with other steps can
+        return _shifted(run, last, target, number)
     return _achieved(estimate.apart, False, number, last.tolerance)
 
 

@@ -1,7 +1,8 @@
 """The smooth pieces of an integration whose text jumps or has kinks at known instants.
 
 A step ends just before such an instant and the next begins just after it, so that every residual sees one side
-(language, rule 17).  Instants nearer to each other than CLOSE of the span are passed as one.
+(language, rule 17).  Instants nearer to each other than CLOSE of the span are passed as one.  Where the text jumps at
+the very end the last piece has no length: no step sees what holds from there on, and the row of the end does.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ class Segment:
 
 
 def segments(t0: float, t1: float, stops: Floats | None) -> tuple[Segment, ...]:
-    """The pieces of t0..t1; stops outside are left out."""
+    """The pieces of t0..t1; stops before and behind are left out."""
     if stops is None or not np.size(stops):
         return (Segment(t0, t1, t0),)
     inside = np.unique(np.asarray(stops, dtype=np.float64))
     inside = inside[np.isfinite(inside)]
     least = CLOSE * max(abs(t0), abs(t1), t1 - t0)
-    inside = inside[(inside > t0) & (inside < t1)]
+    inside = inside[(inside > t0) & (inside <= t1)]
     found: list[Segment] = []
     begin, label = t0, t0
     k = 0
@@ -41,7 +42,7 @@ def segments(t0: float, t1: float, stops: Floats | None) -> tuple[Segment, ...]:
         before, after = float(np.nextafter(inside[k], -np.inf)), float(np.nextafter(inside[last], np.inf))
         first, k = float(inside[last]), last + 1
         if after >= t1:
-            break
+            after = first = t1
         if before > begin:
             found.append(Segment(begin, before, label))
         begin, label = after, first

@@ -1,5 +1,7 @@
 """Efforts by class of a coordinate, momenta of all branches, drift: traced by name, against closed forms."""
 
+import json
+
 import numpy as np
 import pytest
 from sysdyn import api
@@ -257,6 +259,68 @@ def test_a_port_whose_power_has_no_closed_form_is_refused(inside, tmp_path, caps
     code, answer = run_json(capsys, "simulate", write(tmp_path, text))
     assert code == 1
     assert [d["code"] for d in answer["diagnostics"] if d["severity"] == "error"] == ["E608"]
+
+
+@pytest.mark.parametrize("formulation", PRIMAL)
+def test_what_a_port_carries_is_read_as_the_effort_or_the_flow(formulation, tmp_path):
+    """All that is asked of the node: what is left of it moves the mass; the flow is that of the resistance."""
+    traces = "trace X.p.e as e, X.v.f as i, M.e as m, F.e as f, X.p.e*X.p.f as power, energy_through(X.p) as w"
+    text = PORTS.replace("trace M.energy, F.energy, energy_through(X.p) as port, energy_through(X.v) as heat", traces)
+    got = traced(write(tmp_path, text), formulation=formulation, output=str(tmp_path / "o.h5"))
+    assert np.ptp(got["e"]) > 1.0
+    assert np.abs(got["e"] + got["m"] - got["f"]).max() < 1e-5 * np.abs(got["e"]).max()
+    assert got["i"] == pytest.approx(2.0 / 3.0, rel=1e-9)
+    work = np.concatenate([[0.0], np.cumsum(np.diff(got["t"]) * (got["power"][1:] + got["power"][:-1]) / 2)])
+    assert got["w"] == pytest.approx(work, abs=0.02 * np.abs(work).max())
+
+
+PIN = """
+from std.mechanical import body2d, revolute2d
+model pendulum {
+  node b: planar
+  B: body2d(m = 1.5 kg, J = 0.02 kg.m^2) cm = b
+  P: revolute2d(ra = [0 m, 0 m], rb = [-0.2 m, 0 m]) a = ground, b = b
+  init b.th.f = 3 rad/s
+}
+scene s of pendulum {
+  time 0 s to 0.1 s
+  trace P.b.x.e as x, P.b.y.e as y, b.th.q as th
+  accuracy 1e-6
+}
+"""
+
+
+def test_a_port_of_a_bundle_carries_the_force_of_a_pin(tmp_path):
+    """Of a body at rest over its pin's side: m*(w^2*r) towards the pin, m*(g - a) upwards, both against the body's."""
+    got = traced(write(tmp_path, PIN), output=str(tmp_path / "o.h5"))
+    fall = 1.5 * 9.80665 * 0.2 / (0.02 + 1.5 * 0.2**2)
+    assert got["x"][0] == pytest.approx(1.5 * 3.0**2 * 0.2, rel=1e-9)
+    assert got["y"][0] == pytest.approx(-1.5 * (9.80665 - 0.2 * fall), rel=1e-9)
+
+
+def test_what_can_be_read_of_ports_is_listed(tmp_path, capsys):
+    code, answer = run_json(capsys, "list", write(tmp_path, PORTS))
+    listed = json.dumps(answer["result"])
+    assert code == 0
+    assert "X.p.e" in listed
+    assert "X.v.f" in listed
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "said", "help_"),
+    [
+        ("P.b.x.e as x", "energy_through(P.b)", "'P.b' is a bundle of ports", "one of P.b.x, P.b.y, P.b.th"),
+        ("P.b.x.e as x", "energy_through(b.x)", "'b.x' is no port of a component", "LABEL.PORT"),
+        ("}\nscene", "  let F = P.b.x.e\n}\nscene", "what goes through a port is a result", "LABEL.PORT.e"),
+    ],
+)
+def test_what_is_no_port_is_told(was, now, said, help_, tmp_path, capsys):
+    code, answer = run_json(capsys, "check", write(tmp_path, PIN.replace(was, now, 1)))
+    assert code == 1
+    (found,) = [d for d in answer["diagnostics"] if d["severity"] == "error"]
+    assert found["code"] == "E102"
+    assert said in found["message"]
+    assert help_ in found["help"]
 
 
 LEVER = """

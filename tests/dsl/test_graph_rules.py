@@ -170,6 +170,48 @@ def test_what_loses_power_is_not_lossless():
     assert said(INSIDE, driven) == [("E314", "'lossless' fails: 'M.U' is an effort source", "lossless")]
 
 
+ENDS = """component part {{
+  branch coil: electrical
+  port shaft: rotation
+  port hot, cold: thermal
+  param k = 2 V.s
+  let Q = (3 W/K)*(hot.e - cold.e)
+  {}
+  lossless
+}}
+"""
+AROUND = """node a: electrical
+node s: rotation
+node h, c: thermal
+M: part() coil = a -> ground, shaft = s, hot = h, cold = c
+U: effort(e = 1 V) a -> ground
+J: kinetic(p = 1 kg.m^2*f) s
+H: potential(e = 300 K*exp(q/(1 J/K))) h -> ground
+C: potential(e = 400 K*exp(q/(1 J/K))) c -> ground
+HC: flow(f = 0 W/K) h -> c"""
+
+
+@pytest.mark.parametrize(
+    ("inside", "fails"),
+    [
+        ("A: flow(f = Q/hot.e) hot -> ground\nB: flow(f = -Q/cold.e) cold -> ground", ""),
+        ("A: flow(f = Q/hot.e) hot -> ground\nB: flow(f = -Q/hot.e) cold -> ground", "'M.A' is a flow source"),
+        ("work k*coil.f on shaft.q\nwork -k*shaft.f on coil.q", ""),
+        ("work k*coil.f on shaft.q\nwork k*shaft.f on coil.q", "a work"),
+        ("content D = 1/2*(1 N.m.s)*shaft.f^2", "a content"),
+        ("energy T* = 1/2*(1 kg.m^2)*shaft.f^2", "an energy T* stores energy"),
+        ("K: potential(e = 1 N.m*q) shaft -> ground", "'M.K' stores energy"),
+        ("phi turns: shaft.q = 1 Hz*t", "'M.turns' moves with time"),
+        ("phi stands: shaft.q = 0", ""),
+    ],
+)
+def test_lossless_adds_up_the_powers_inside(inside, fails):
+    """A conductor of heat, a machine written as two works: each absorbs what the other gives."""
+    tied = inside if "coil" in inside else f"{inside}\nR: gyrator(e1 = k*f2) on coil.q, on shaft.q"
+    expected = [("E314", f"'lossless' fails: {fails}", "lossless")] if fails else []
+    assert said(AROUND, ENDS.format(tied)) == expected
+
+
 def test_a_branch_that_stands_in_nothing():
     idle = "component c {\n  branch one: electrical\n  branch two: electrical\n  energy V = one.q^2/(2*(1 F))\n}\n"
     body = f"node a: electrical\nX: c() one = a -> ground, two = a -> ground\nR: {R} a -> ground"

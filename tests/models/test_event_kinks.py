@@ -222,3 +222,45 @@ def test_a_law_beside_one_that_ends_is_as_smooth_as_alone(tmp_path, method):
     run = simulate(path, method=method, accuracy=1e-4, o=tmp_path / "t.h5")
     exact = solve_ivp(rate, (0.0, 8.0), [0.0], method="LSODA", rtol=1e-11, atol=1e-13, t_eval=run.time, max_step=0.01)
     assert np.abs(run["v"].values - exact.y[0]).max() < 1e-4 * exact.y[0].max()
+
+
+OVEN = """
+from std.control import hysteresis
+from std.thermal import capacity, conductance, temperature, heat_flow
+model oven {
+  node o, r: heat
+  H: hysteresis(on_at = celsius(98), off_at = celsius(95), lo = 0 W, hi = 900 W) u = 2*celsius(98) - o.e
+  Q: heat_flow(Q = H.y) ground -> o
+  C: capacity(C = 2 kJ/K) o
+  G: conductance(G = 5 W/K) o -> r
+  T: temperature(T = celsius(20)) r
+  init C.e = celsius(20)
+}
+scene s of oven { time 0 s to 600 s; trace o.e in degC as T, H.y as P }
+"""
+
+
+@pytest.mark.parametrize("method", ["dopri", "energy", "rosenbrock"])
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-5])
+def test_a_thermostat_whose_temperature_is_a_multiplier(method, accuracy, tmp_path):
+    """A heat flow is the difference of two temperatures: at 374 K it cannot be told to the last digit of 405 W.  At an
+    edge the condition turns again at once, in one run and not in another: that is one event.
+    """
+    (tmp_path / "oven.sd").write_text(OVEN)
+    at = [100.0, 250.0, 400.0, 590.0]
+    trace = simulate(
+        tmp_path / "oven.sd",
+        method=method,
+        accuracy=accuracy,
+        formulation="lagrangian",
+        at=at,
+        output=tmp_path / "o.h5",
+    )
+    temperature, t, on = 20.0, 0.0, True
+    while t < at[-1]:
+        rest, goal = (200.0, 101.0) if on else (20.0, 98.0)
+        span = 400.0 * math.log((temperature - rest) / (goal - rest))
+        for k in np.flatnonzero(np.isin(trace.time, at) & (trace.time >= t) & (trace.time < t + span)):
+            expected = rest + (temperature - rest) * math.exp(-(trace.time[k] - t) / 400.0)
+            assert trace["T"][k] == pytest.approx(expected, abs=101.0 * accuracy)
+        temperature, t, on = goal, t + span, not on

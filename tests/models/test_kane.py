@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from reduced import ROOT, load
 from scipy.integrate import solve_ivp
+from sysdyn.api import simulate
 from sysdyn.cli.main import run as main
 from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.running import run
@@ -285,3 +286,49 @@ def test_quasi_velocities_are_the_unknown_speeds(tmp_path, capsys):
     assert np.max(np.abs(trace["om"].values - (0.5 + 0.5 * t))) <= 1e-7 * 2
     assert 0.5 * np.pi < 0.5 * 3 + 0.25 * 9  # the heading has passed pi/2
     assert np.max(np.abs(trace["slip"].values)) <= 1e-9
+
+
+DIMMER = """
+from std.electrical import thyristor, resistor, inductor
+model dimmer {
+  param fired = 60 deg
+  let at = mod(t, 20 ms) - fired/(2*pi*50 Hz)
+  node a, b, c: electrical
+  V: effort(e = 325 V*sin(2*pi*50 Hz*t)) a -> ground
+  T: thyristor() gate = (if at > 0 s and at < 1 ms then 1 else 0), a -> b
+  R: resistor(R = 20 ohm) b -> c
+  L: inductor(L = 60 mH) c -> ground
+}
+scene s of dimmer { time 0 s to 45 ms; trace L.f as i; accuracy 1e-6; formulation kane }
+"""
+TWICE = """
+model sleds {
+  coord x, y: translation = 0 m
+  energy T* = 1/2*(1 kg)*x'^2 + 1/2*(2 kg)*y'^2
+  work 1 N on x
+  psi a: x' = y'
+  psi b: 2*x' = 2*y'
+}
+scene s of sleds {
+  time 0 s to 1 s; trace a.multiplier as a, b.multiplier as b
+  formulation kane; redundancy minimum_norm
+}
+"""
+
+
+def test_rows_that_hold_by_turns_may_follow_from_each_other(tmp_path):
+    """A thyristor blocks, or lets pass one way, the same current; two rows of one bond share its force."""
+    (tmp_path / "dimmer.sd").write_text(DIMMER)
+    at = [0.002, 0.005, 0.009, 0.018, 0.026, 0.033]
+    trace = simulate(tmp_path / "dimmer.sd", at=at, output=tmp_path / "o.h5")
+    w, fired, late = 100 * np.pi, np.pi / 3, np.arctan2(100 * np.pi * 0.06, 20.0)
+    angle = np.mod(w * np.array(at), 2 * np.pi)
+    decay = np.exp(-(angle - fired) * 20.0 / (w * 0.06))
+    whole = 325 / np.hypot(20.0, w * 0.06) * (np.sin(angle - late) - np.sin(fired - late) * decay)
+    expected = np.where(angle > fired, np.maximum(whole, 0.0), 0.0)  # of one sign between fired and a whole turn
+    found = trace["i"][np.searchsorted(trace.time, at)]
+    assert found == pytest.approx(expected, abs=3e-6 * expected.max())
+    (tmp_path / "sleds.sd").write_text(TWICE)
+    trace = simulate(tmp_path / "sleds.sd", output=tmp_path / "o.h5")
+    assert trace["a"][-1] == pytest.approx(2 / 15, rel=1e-9)
+    assert trace["b"][-1] == pytest.approx(4 / 15, rel=1e-9)

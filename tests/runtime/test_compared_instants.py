@@ -65,6 +65,21 @@ def test_between_one_event_of_two_runs_nothing_is_compared():
     assert not beside(instants, one, np.zeros(0), 1.0).any()
 
 
+def test_a_condition_that_turns_again_at_once_is_one_event():
+    """One run has three instants where the other has two: the second of both is theirs all the same."""
+    instants = np.array([0.2, 0.4, 0.60005, 0.7])
+    one, two = np.array([0.3, 0.3 + 1e-9, 0.6]), np.array([0.3, 0.6001])
+    for first, second in ((one, two), (two, one)):
+        assert beside(instants, first, second, 1.0).tolist() == [False, False, True, False]
+
+
+def test_events_that_one_run_lacks_leave_the_others_in_their_places():
+    instants = np.array([0.10005, 0.3, 0.50005, 0.70005])
+    one, two = np.array([0.1, 0.3, 0.5, 0.7]), np.array([0.1001, 0.5001, 0.7001])
+    assert beside(instants, one, two, 1.0).tolist() == [True, False, True, True]
+    assert beside(instants, two, one, 1.0).tolist() == [True, False, True, True]
+
+
 def test_of_two_rows_at_one_instant_the_former_is_kept():
     thinned = Thinned()
     thinned.take(np.array([[0.0, 1.0], [1.0, 2.0]]))

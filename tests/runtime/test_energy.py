@@ -4,6 +4,8 @@ SYSDYN_LONG=1: many more periods.
 """
 
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -241,3 +243,26 @@ def test_what_has_no_energy_to_move_is_left_alone():
     found = []
     Integration(system, consistent_start(system, 0.0), request).run(found.append)
     assert np.abs(np.concatenate(found)[:, 2:]).max() == 0.0
+
+
+JUNCTION = """
+model junction {
+  param Phi = 2e-15 Wb
+  node a: electrical
+  J: kinetic(f = 0.1 mA*sin(2*pi*p/Phi)) a -> ground
+  R: dissipator(e = 2 ohm*f) a -> ground
+  C: potential(q = 1 pF*e) a -> ground
+  I: flow(f = 0.12 mA*tanh(t/(5 ps))) ground -> a
+}
+scene s of junction { time 0 s to 60 ps; trace a.e; accuracy 1e-5; solver energy }
+"""
+"""A flux whose current has no inverse at a quarter of a quantum: there no step can be halved in Lagrange's form."""
+
+
+def test_a_first_step_whose_halves_cannot_be_made_is_not_tried_for_ever(tmp_path):
+    """A process of its own: nothing within it could end a step that does not."""
+    (tmp_path / "j.sd").write_text(JUNCTION)
+    command = [sys.executable, "-c", "from sysdyn.cli.main import main; main()", "simulate", "j.sd", "--quiet"]
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode in (0, 3), ended.stderr
+    assert ended.returncode == 0 or "E930" in ended.stderr

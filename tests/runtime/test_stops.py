@@ -189,7 +189,7 @@ def test_both_sides_of_a_jump_are_accepted_steps(tmp_path):
 def test_segments():
     inf = np.inf
     assert [(s.begin, s.end) for s in segments(0.0, 1.0, None)] == [(0.0, 1.0)]
-    parts = segments(0.0, 1.0, np.array([0.5, -1.0, 0.0, 1.0, 2.0, np.nan]))
+    parts = segments(0.0, 1.0, np.array([0.5, -1.0, 0.0, 2.0, np.nan]))
     assert [(s.begin, s.end, s.label) for s in parts] == [
         (0.0, np.nextafter(0.5, -inf), 0.0),
         (np.nextafter(0.5, inf), 1.0, 0.5),
@@ -199,3 +199,46 @@ def test_segments():
     assert len(parts) == 3
     assert parts[1].begin == np.nextafter(0.1 + 0.2, inf)
     assert parts[0].end == np.nextafter(0.3, -inf)
+
+
+SAW = """
+from std.electrical import resistor, capacitor, voltage
+model m {
+  node a, b: electrical
+  Vs: voltage(v = 1 V*mod(t, 0.3 s)/(0.3 s)) a -> ground
+  R: resistor(R = 1 kohm) a -> b
+  C: capacitor(C = 50 uF) b -> ground
+  init C.e = 0 V
+}
+scene s of m { time 0 s to 0.9 s; trace C.e as u, a.e as v }
+"""
+
+
+def saw(t):
+    """u' = (v - u)/(0.05 s) over three teeth of 0.3 s."""
+    u, tau, slope = 0.0, 0.05, 1 / 0.3
+    for _ in range(3):
+        rest = min(t, 0.3)
+        u = slope * (rest - tau) + (u + slope * tau) * np.exp(-rest / tau)
+        t -= rest
+    return u
+
+
+@pytest.mark.parametrize("method", ["rosenbrock", "radau", "bdf", "dopri", "energy"])
+def test_no_step_sees_what_holds_from_the_end_on(method, tmp_path):
+    """A saw tooth falls where the run ends: the last step ends before it, the last row stands behind it."""
+    t, columns, outcome = run(SAW, tmp_path, accuracy=1e-6, method=method)
+    assert outcome.final
+    assert outcome.met
+    assert t[-1] == 0.9
+    assert columns["u"][-1] == pytest.approx(saw(0.9), abs=3e-6)
+    assert columns["v"][-1] == pytest.approx(0.0, abs=1e-12)
+    assert outcome.statistics["rejected_steps"] < 20
+
+
+def test_a_last_piece_has_no_length_where_the_text_jumps_at_the_end():
+    parts = segments(0.0, 1.0, np.array([0.5, np.nextafter(1.0, 0.0), 1.0]))
+    assert [(s.begin, s.end, s.label) for s in parts[1:]] == [
+        (np.nextafter(0.5, 2.0), np.nextafter(np.nextafter(1.0, 0.0), 0.0), 0.5),
+        (1.0, 1.0, 1.0),
+    ]

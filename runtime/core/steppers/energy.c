@@ -265,6 +265,7 @@ static int stands(sd_energy *energy)
         return 1;
     if (halved(energy, &error)) {
         shrink(energy, 0.5);
+        energy->finding = 0; /* a length whose halves cannot be made is not tried again */
         energy->newton_failures++;
         return 0;
     }

@@ -12,7 +12,7 @@
 #define SLOW 0.1        /* contraction above which the factors are taken anew */
 #define MOVES 6         /* of a projection */
 #define EXACT 1e-16     /* next move, in magnitudes, that is not worth making */
-#define CLOSE 1e-12     /* move with which a projection that stagnates is content */
+#define CLOSE 1e-12     /* move with which a projection, or an iteration, that stagnates is content */
 #define STAGNANT 0.3
 #define BORNE 1e3       /* of multipliers: slopes are solved for once, nothing corrects their digits */
 
@@ -251,6 +251,8 @@ int sd_underlying_slopes(sd_underlying *u, double t, double *y, double *yd)
             return kinematics(u, y, yd);
         double ratio = m > 0 ? size / before : 1.0;
         if (m > 0 && ratio < 1.0 && size * ratio <= u->tolerance * (1.0 - ratio))
+            return kinematics(u, y, yd);
+        if (m > 1 && ratio > STAGNANT && size <= CLOSE) /* at the round-off of its rows: nothing is left to find */
             return kinematics(u, y, yd);
         if (m > 0 && ratio > SLOW)
             u->ready = 0;
