@@ -16,7 +16,7 @@ from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.model.values import Values, as_constants
 from sysdyn.dsl.rules import lossless
 from sysdyn.dsl.rules.untouched import Box, shown, untouched
-from sysdyn.dsl.text.diagnostics import Place, Report
+from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.tree import syntax
 
 NEAR = 3
