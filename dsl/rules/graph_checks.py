@@ -17,7 +17,6 @@ from sysdyn.dsl.model.values import Values, as_constants
 from sysdyn.dsl.rules import lossless
 from sysdyn.dsl.rules.untouched import Box, shown, untouched
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.dsl.tree import syntax
 
 NEAR = 3
 """Names that a finding shows beside a node's."""
