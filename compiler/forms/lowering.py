@@ -85,11 +85,6 @@ def whole(family: Family) -> tuple[Nest, tuple[Node, ...]]:
     return nest, tuple(counter(k) for k in range(len(nest)))
 
 
-def _rate(name: str) -> str:
-    """As the flow of a displacement is shown."""
-    return f"({name})'" if " " in name else f"{name}'"
-
-
 def _drift(model: EnergyModel) -> tuple[str, ...]:
     """`drift` where something reads it."""
     read = (n for quantity in model.quantities for n in variables(quantity.expression))
@@ -180,7 +175,8 @@ class _Lowering:
         found = [
             Unknowns(c.shown, "q", c.name, c.units["q"], c.place) for c in m.coordinates if c.tangible or c.name in seen
         ]
-        found += [Unknowns(_rate(c.shown), "f", c.name, c.units["f"], c.place) for c in m.coordinates]
+        rates = [f"({c.shown})'" if c.less else f"{c.name}'" for c in m.coordinates]
+        found += [Unknowns(r, "f", c.name, c.units["f"], c.place) for c, r in zip(m.coordinates, rates, strict=True)]
         found += [
             Unknowns(f"{c.name}.p", "p", c.name, c.units["p"], c.place)
             for c in m.coordinates

@@ -20,7 +20,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.model.energies import EnergyModel, Family, moved, reading, tangible
 from sysdyn.compiler.model.terms import Nest, has_reduction, local_variables, vanishes
-from sysdyn.dsl.model.calculus import differential
+from sysdyn.dsl.model.calculus import derivative, differential
 from sysdyn.dsl.model.expression import (
     Node,
     add,
@@ -171,7 +171,8 @@ def _floats(model: EnergyModel, group: _Anchors) -> bool:
 
 
 def _is_ignorable(model: EnergyModel, group: _Anchors) -> bool:
-    """Whether nothing that makes a coordinate tangible, and no `init`, reads displacements but in differences.
+    """Whether nothing that makes a coordinate tangible, and no `init`, reads displacements but in differences, and what
+    reads flows does so linearly.
 
     Elements of the anchor that no potential energy reaches do not count.
     """
@@ -181,7 +182,25 @@ def _is_ignorable(model: EnergyModel, group: _Anchors) -> bool:
     read = ((expression, loops) for expression, loops, _ in reading(model))
     if any(along.changes(expression, loops, m.coordinate) for expression, loops in (*read, *said)):
         return False
-    return _without_conjugates(model, {name for name, anchor in group.items() if name != anchor.name})
+    linear = all(_is_linear_in_flows(root, group, m.rate) for root in _efforts_and_rows(model))
+    return linear and _without_conjugates(model, {name for name, anchor in group.items() if name != anchor.name})
+
+
+def _efforts_and_rows(model: EnergyModel) -> Iterator[Node]:
+    """What balances and rows are made of: slopes of functions of flows, efforts of works, rows."""
+    m = model.mirror
+    for term in (*model.function(m.coenergy), *model.function(m.content)):
+        yield from (derivative(term.expression, n) for n in local_variables(term.expression, m.rate))
+    yield from (work.effort for work in model.works)
+    yield from (t.expression for row in model.rows for t in row.terms)
+
+
+def _is_linear_in_flows(root: Node, group: _Anchors, rate: str) -> bool:
+    """Whether flows of the group enter linearly: one that a steep law reads stays an unknown of its own, by which an
+    iteration climbs down.
+    """
+    own = [n for n in local_variables(root, rate) if n.data[0] in group]
+    return all(n.data[0] not in group for by in own for n in local_variables(derivative(root, by), rate))
 
 
 def _without_conjugates(model: EnergyModel, names: set[str]) -> bool:
