@@ -33,6 +33,13 @@ def given(model: EnergyModel) -> frozenset[str]:
     return frozenset(n.data[0] for t in pieces for n in local_variables(t.expression, kind))
 
 
+def moved(model: EnergyModel) -> frozenset[str]:
+    """Coordinates that some kinetic store moves with."""
+    rate = model.mirror.rate
+    pieces = model.function(model.mirror.coenergy)
+    return given(model) | frozenset(n.data[0] for t in pieces for n in local_variables(t.expression, rate))
+
+
 def inertial(model: EnergyModel) -> frozenset[str]:
     """Coordinates by whose flow T* has a second derivative that is not zero by its structure."""
     found = set()

@@ -18,7 +18,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from sysdyn.compiler.model.energies import EnergyModel, Family, moved, reading, tangible
+from sysdyn.compiler.forms.momenta import moved
+from sysdyn.compiler.model.energies import EnergyModel, Family, reading, tangible
 from sysdyn.compiler.model.terms import Nest, has_reduction, local_variables, vanishes
 from sysdyn.dsl.model.calculus import derivative, differential
 from sysdyn.dsl.model.expression import (

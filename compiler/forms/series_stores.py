@@ -14,7 +14,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from sysdyn.compiler.forms.efforts import Effort, efforts
-from sysdyn.compiler.model.energies import EnergyModel, Row, moved
+from sysdyn.compiler.forms.momenta import moved
+from sysdyn.compiler.model.energies import EnergyModel, Row
 from sysdyn.compiler.model.terms import Nest, local_variables
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node, div, neg, substitute, variables

@@ -299,14 +299,6 @@ def tangible(model: EnergyModel) -> dict[str, Place]:
     return found
 
 
-def moved(model: EnergyModel) -> frozenset[str]:
-    """Coordinates that some kinetic store moves with."""
-    m = model.mirror
-    pairs = ((m.coenergy, m.rate), (m.energy, m.conjugate))
-    terms = ((t, kind) for name, kind in pairs for t in model.function(name))
-    return frozenset(n.data[0] for t, kind in terms for n in local_variables(t.expression, kind))
-
-
 def show(model: EnergyModel) -> str:
     """The energy model as text, for --dump energies."""
     lines = [f"coordinate {c.name}{_extent(c.shape)}{' tangible' if c.tangible else ''}" for c in model.coordinates]
