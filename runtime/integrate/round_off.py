@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.scales import alike
+from sysdyn.runtime.model.description import Floats, Ints, stated
+from sysdyn.runtime.model.scales import alike, group_maxima
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.least_change import least_norm
@@ -45,7 +45,8 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     """What round-off leaves open in a run that ended at t (s) in steps of `step` (s).
 
     last: its last y and yd [unknowns], the largest |y| met of each kind and unit.  Zero where the Jacobian says
-    nothing.
+    nothing, or that nothing at all is known: not even what the text gives some unknown at the start (where constraints
+    lose rank their multipliers were so large, in steps that are over).
     """
     y, yd, met = *last[:2], last[2][alike(system)]
     k_q, k_f = system.form.k_q, system.form.k_f
@@ -69,12 +70,21 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
         scaled = rows, columns, of_step * of_column[columns] / of_row[rows]
     if not np.isfinite(scaled[2]).all():
         return found
+    given = _given(system)
     for error in normal(PROBES, system.rows):
         change = of_column * least_norm((system.rows, system.unknowns), scaled, EPS * np.where(size > 0.0, error, 0.0))
+        if (np.abs(change)[given > 0.0] > given[given > 0.0]).any():
+            return LeftOpen(*map(np.zeros_like, before))
         moved = t, y + change, yd + change / step
         for largest, now, was in zip(found, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
             np.fmax(largest, MARGIN * np.abs(now - was), out=largest)
     return found
+
+
+def _given(system: System) -> Floats:
+    """Largest initial value that the text gives an unknown of its kind and unit [unknowns]."""
+    values, *_ = stated(system.form.at, system.unknowns, system.description.initial)
+    return group_maxima(system, np.abs(values))[alike(system)]
 
 
 def _eliminated(system: System, entries: tuple[Ints, Ints, Floats], size: Floats) -> Floats:

@@ -151,6 +151,10 @@ def test_round_off_of_a_quantity_is_that_of_its_terms():
     y, yd = point(of, q_x=1.0), np.zeros(of.unknowns)
     found = left_open(of, 0.0, (y, yd, group_maxima(of, np.abs(y))), 1e-2)
     assert 1e-17 < found.quantities[0] < 1e-12
+    # a rate that large leaves the charge open that the text gives: then nothing is excused
+    vast = left_open(of, 0.0, (y, yd, np.full(8, 1e20)), 1e-2)
+    assert not vast.quantities.any()
+    assert not vast.ledgers.any()
 
 
 def test_equations_of_a_start_are_rows_and_unknowns_of_the_settled_form():

@@ -117,6 +117,7 @@ void sd_radau_free(sd_radau *radau)
     free(radau->at_zero);
     free(radau->open);
     free(radau->point_y);
+    sd_radau_free_coupled(radau->coupled);
     free(radau);
 }
 
@@ -239,7 +240,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->growth = SD_GROWTH;
     radau->longest = 0.0;
     radau->pressed = radau->balances;
-    radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = 0;
+    radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = radau->strained = radau->turned = 0;
     sd_radau_leave_below(radau, radau->linear->idle ? SD_LEAST_PIVOT : 0.0);
     radau->theta = 1.0;
 }
@@ -371,9 +372,17 @@ static void project(sd_radau *radau)
             radau->slope[0][i] = radau->yd[i] = radau->rate[i];
 }
 
+/* the stages all at once; the error is then judged by slopes at the end of the step, those at its start having failed */
+static int coupled(sd_radau *radau, int *iterations)
+{
+    int cause = sd_radau_iterate_coupled(radau, iterations);
+    radau->turned = cause == SD_FINE;
+    return cause ? cause : sd_radau_factorise(radau, 1);
+}
+
 int sd_radau_step(sd_radau *radau)
 {
-    int singular = 0, iterations = 0, failures = 0, leap = 0;
+    int singular = 0, iterations = 0, failures = 0, leap = 0, strained = 0;
     double retry = 0.5, error = 0.0;
     set_weights(radau);
     radau->cause = radau->newton_weight ? SD_FINE : SD_MEMORY;
@@ -408,6 +417,10 @@ int sd_radau_step(sd_radau *radau)
             cause = sd_radau_iterate_damped(radau, &iterations);
             fresh = 1;
         }
+        strained |= cause == SD_NEWTON && fresh;
+        /* once it fails in any model: twice in a row it may be for no step's length */
+        if (cause == SD_NEWTON && fresh && radau->strained && leap == 0 && radau->system->scales == 0)
+            cause = coupled(radau, &iterations);
         if (cause == SD_FINE && !(radau->fixed_h > 0.0)) {
             cause = estimate_error(radau, &error);
             if (cause == SD_FINE && error < 1.0 && radau->system->scales > 0 && sd_radau_astray(radau))
@@ -457,6 +470,8 @@ int sd_radau_step(sd_radau *radau)
         }
     }
     radau->cause = SD_FINE;
+    radau->strained = strained;
+    radau->turned = radau->turned && strained;
     radau->creeping = failures > 0 && error < IDLE ? radau->creeping + 1 : 0;
     accept(radau, error, iterations, failures > 0);
     if (radau->project)

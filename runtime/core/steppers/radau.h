@@ -77,6 +77,8 @@ typedef struct sd_radau {
     int32_t since;                                  /* steps accepted since the method changed */
     int32_t hold;                                   /* steps that still take three stages */
     int32_t creeping;                               /* steps in a row for which Newton failed at first */
+    int32_t strained, turned;                       /* in the last one Newton failed with fresh slopes; all its stages were
+                                                     * solved for at once */
     double lead[SD_STAGES][SD_STAGES], h_lead;      /* A^-1 / h, of the h and the method that they were made for */
     const sd_radau_method *of_lead;
     double *phi, *yd;         /* [n] the last accepted point */
@@ -100,6 +102,7 @@ typedef struct sd_radau {
     struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
     sd_system *other;             /* its system */
     double *point_y, *point_rate; /* [n] */
+    struct sd_coupled *coupled;   /* radau_coupled.c: all stages at once; made when first needed */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations, factorisations, taken;
     int32_t cause, bad_row, bad_column;
@@ -144,6 +147,10 @@ void sd_radau_leave_below(sd_radau *radau, double null_pivot);
 int sd_radau_iterations(const sd_radau *radau);
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry);
 int sd_radau_iterate_damped(sd_radau *radau, int *used);
+double sd_radau_newton_tolerance(const sd_radau *radau);
+/* radau_coupled.c: where the slopes of the step's start fade or turn within it, in one direction; else SD_NEWTON */
+int sd_radau_iterate_coupled(sd_radau *radau, int *used);
+void sd_radau_free_coupled(struct sd_coupled *coupled);
 /* radau_choice.c */
 double sd_radau_choose(sd_radau *radau, double next, double error, int iterations, int troubled);
 

@@ -96,7 +96,7 @@ int sd_radau_iterations(const sd_radau *radau)
 }
 
 /* Of Newton's corrections in its weights; stages of more have larger round-off */
-static double newton_tolerance(const sd_radau *radau)
+double sd_radau_newton_tolerance(const sd_radau *radau)
 {
     double least = round_off[radau->method - sd_radau_methods] * DBL_EPSILON / radau->tolerance;
     return fmax(least, fmin(0.03, sqrt(radau->tolerance)));
@@ -123,7 +123,7 @@ static double noted_correction(sd_radau *radau)
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
 {
-    double tolerance = newton_tolerance(radau);
+    double tolerance = sd_radau_newton_tolerance(radau);
     double before = 0.0, ratio_before = 0.0, trust = 1.0;
     int patient = full || radau->fixed_h > 0.0;
     *retry = 0.5;
@@ -252,7 +252,7 @@ static double walk(sd_radau *radau, size_t way, double tolerance, int known, int
  * point may lie far up an exponential, from where it is 1/a at a time.) */
 int sd_radau_iterate_damped(sd_radau *radau, int *used)
 {
-    double tolerance = newton_tolerance(radau);
+    double tolerance = sd_radau_newton_tolerance(radau);
     for (int s = 0; s < radau->method->stages; s++)
         memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
     for (int m = 1; m <= WALK; m++) {
