@@ -27,6 +27,7 @@ from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import Space, nearest
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.rules import bound_values, checks, graph_checks, laws
+from sysdyn.dsl.rules.claims import exact_claims
 from sysdyn.dsl.rules.floating import floating
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
@@ -157,6 +158,7 @@ def _judged(
     elaborator.quadratures()
     checks.run(elaborator, report, required=required)
     checks.set_valued_results(elaborator, reader.observations, report)
+    exact_claims(elaborator, report)
     _begin(elaborator, read_scene)
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
