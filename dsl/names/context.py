@@ -20,7 +20,6 @@ from sysdyn.dsl.names.failures import Failed, Part, SeveralError
 from sysdyn.dsl.names.fitting import Sight
 from sysdyn.dsl.names.symbols import (
     Definition,
-    End,
     InstanceSymbol,
     Scope,
     Space,
@@ -112,7 +111,7 @@ class Context:
         self.laws: dict[str, Any] = {}  # of branches, by family (laws.LawOf)
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
-        self.taken: Callable[[str, End, Place], Node]  # what an instance takes in at an end (elaborate/port_efforts.py)
+        self.taken: Callable[..., Node]  # what an instance takes in at an end (elaborate/port_efforts.py)
         self.constraints: dict[str, list[Constraint]] = {}
         self._quantities: dict[tuple[int, int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number, unit
         self._values: dict[tuple[Definition, bool], Value | None] = {}
