@@ -20,6 +20,7 @@ from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.depth import deep
 from sysdyn.dsl.model.network import Network, Parameter, Scene
 from sysdyn.dsl.model.rewriting import nodes_read, with_common_sizes, with_literal_ranges
+from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import Dimension
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
@@ -299,12 +300,16 @@ def _incomplete(report: Report) -> bool:
 def constant(document: Document, text: str, dimension: Dimension, name: str, report: Report) -> float | None:
     """A constant expression of the command line in SI; a bare number is in SI units; None after reporting."""
     source = SourceText(name, f"const value = {text}\n")
+    if not text.strip():
+        report.error("E207", f"{name}: a value is missing", source.place(0, 0))
+        return None
     inner = Report()
     file, problems = parse(source)
     inner.extend(problems)
     items = [i for i in file.items if isinstance(i, syntax.Const)]
     if inner.failed or "\n" in text or len(items) != 1 or len(file.items) != 1:
-        report.extend(inner)
+        unit = common(dimension) if dimension else ""
+        report.extend(replace(d, help=f"one expression: 3 {unit}") if d.code == "E113" else d for d in inner)
         if not inner.failed:
             report.error("E207", f"{name} {text[:40]}: one expression is wanted", source.place(0, 0))
         return None
