@@ -262,7 +262,7 @@ def formed(
     flat = without_slope(written, start.t, *start.for_form(written)) if missing else ()
     if flat:
         remedy = f"{WITH_A_SLOPE}, or index 2 or 3 with bdf or radau"
-        raise NoSuchForm(f"{no_slope(flat)}, and there is no underlying equation: {remedy}")
+        raise NoSuchForm(f"{no_slope(flat)}, and there is no underlying equation: {remedy}", flat)
     if missing:
         still = list(dict.fromkeys(name.rstrip("'") for name in missing if name.endswith("'")))[:3]
         remedy = f"inertia on {', '.join(still)}, constraints that hold it, or " if still else ""

@@ -13,6 +13,7 @@ from sysdyn.cli.export.index_parameters import index_parameters
 from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tables
 from sysdyn.cli.export.naming import elements
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.flat_laws import impossible
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.starting import start
 from sysdyn.dsl import load as load_
@@ -169,7 +170,7 @@ def compile_model(
         try:
             return Module(choose(prepared, started, None if index == "auto" else index))
         except NoSuchForm as error:
-            report.error("E607", str(error), prepared.network.place)
+            report.error("E607", impossible(prepared, error)[0], prepared.network.place)
             raise ModelError(report.diagnostics) from error
 
 

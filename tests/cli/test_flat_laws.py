@@ -106,6 +106,37 @@ scene s of m {{ time 0 s to 1 s; trace a.e, out.f }}
     assert trace["out.f"].values[-1] == pytest.approx(rooted(expected / 1e9), rel=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("formulation", "method", "code"),
+    [("lagrangian", "dopri", "E607"), ("lagrangian", "rosenbrock", "E931"), ("co_lagrangian", "dopri", "E607")],
+)
+def test_the_element_is_named_not_the_balance_that_holds_it(tmp_path, capsys, formulation, method, code):
+    """R and C are in series: one balance holds both."""
+    (tmp_path / "m.sd").write_text("""model m {
+  node a, b: hydraulic
+  P: effort(e = 1e5 Pa*sin(t/(1 s))) a
+  R: dissipator(e = 1e5 Pa.s^2/m^6*abs(f)*f) a -> b
+  C: potential(e = 1e4 Pa/m^3*q) b
+  init C.e = 0 Pa
+}
+scene s of m { time 0 s to 10 s; trace R.f }
+""")
+    given = ["--formulation", formulation, "--method", method, "-o", str(tmp_path / "t.h5")]
+    assert run(["simulate", str(tmp_path / "m.sd"), *given]) in (1, 3)
+    said = capsys.readouterr().err
+    assert f"error {code}" in said
+    assert "the law at R has no slope" in said
+
+
+def test_an_accuracy_that_a_flat_law_costs_is_told_by_it(tmp_path, capsys):
+    """Rosenbrock passes the start in Lagrange's form, and misses behind it."""
+    exit_, said = simulated(tmp_path, capsys, TURBULENT, "--formulation", "lagrangian", "--method", "rosenbrock")
+    assert exit_ == 3
+    assert "error E920" in said
+    assert "the law at O has no slope at the start" in said
+    assert "help: --method radau or bdf, or auto" in said
+
+
 def rooted(x):
     return math.copysign(math.sqrt(abs(x)), x)
 
