@@ -28,6 +28,7 @@ from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import Space, nearest
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.rules import bound_values, checks, graph_checks, laws
+from sysdyn.dsl.rules.asked import Asked
 from sysdyn.dsl.rules.claims import exact_claims
 from sysdyn.dsl.rules.floating import floating
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
@@ -202,6 +203,19 @@ def _elaborated(
         reader.command(source, statement, SceneReader.set_parameter)
     elaborator.statements()
     return elaborator, reader
+
+
+def asked(
+    document: Document,
+    model: syntax.Model,
+    scene: syntax.Scene | None,
+    settings: Sequence[tuple[str, str]] = (),
+    levels: Sequence[tuple[str, str]] = (),
+) -> Asked:
+    """What a text without errors asks of its numbers."""
+    with deep(), budget.drawn():
+        elaborator, reader = _elaborated(document, model, scene, Report(), settings, levels)
+        return Asked(elaborator, reader.elements)
 
 
 def listing(
