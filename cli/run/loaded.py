@@ -168,12 +168,12 @@ class Loaded:
         asked, nodes = self._asked
         fine = np.ones(len(values), dtype=bool)
         with ex.fresh(nodes):
-            bounds, others = asked.of(frozenset(key if isinstance(key, str) else str(key[0]) for key in keys))
+            mine = asked.of(frozenset(key if isinstance(key, str) else str(key[0]) for key in keys))
             column = {key: values[:, j] for j, key in enumerate(keys)}
-            if others or not all(isinstance(key, str) for key in keys):
+            if not mine.plain or not all(isinstance(key, str) for key in keys):
                 rows = (dict(zip(keys, row, strict=True)) for row in values.tolist())
                 return np.fromiter(map(asked.holds, rows), dtype=bool, count=len(values))
-            for bound in bounds:
+            for bound in mine.bounds:
                 fine &= np.asarray(bound.compared(column[bound.name], bound.limit))  # type: ignore[arg-type]
         return fine
 

@@ -34,7 +34,7 @@ from sysdyn.values import dataclass
 REFRESH = 10.0
 """Seconds between two versions of the file, at least ten times what writing one takes."""
 
-REFUSED = {"E321", "E322", "E325"}
+REFUSED = {"E313", "E321", "E322", "E325"}
 """Codes by which a text refuses numbers."""
 FORETOLD = 16
 """Runs after the first result after which the time left is said."""

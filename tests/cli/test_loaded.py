@@ -297,3 +297,21 @@ scene s of m { time 0 s to 1 s; trace x[1].q as x }
     with pytest.raises(ModelError) as error:
         model.run(set=settings)
     assert {d.code for d in error.value.diagnostics} == {"E325" if "k" in settings else "E321"}
+
+
+@pytest.mark.parametrize("settings", [{"a": -1.0}, {"c": -1.0}])
+def test_a_dissipator_that_would_give_power_is_refused_of_a_run(tmp_path, settings):
+    (tmp_path / "m.sd").write_text("""model m {
+  param a = 1 ohm
+  param c = 1 V/A^3
+  node x: electrical
+  R: dissipator(e = a*f + c*f^3) x
+  C: potential(e = q/(1 F)) x
+  init C.e = 1 V
+}
+scene s of m { time 0 s to 1 s; trace C.e as v }
+""")
+    model = load(tmp_path / "m.sd")
+    assert model.run(set={"a": 2.0, "c": 0.0})["v"].values[-1] == pytest.approx(np.exp(-0.5), rel=1e-3)
+    with pytest.raises(ModelError, match="E313"):
+        model.run(set=settings)
