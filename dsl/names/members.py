@@ -36,6 +36,7 @@ from sysdyn.dsl.names.symbols import (
 )
 from sysdyn.dsl.tree import syntax
 
+_ELEMENTS = (BranchSymbol, TwoPortSymbol, InstanceSymbol)
 AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
 AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE, "drift": NONE}
 
@@ -150,9 +151,8 @@ class Members(Ports):
         scope = self.scope
         if outer is not None and isinstance(outer.symbol, InstanceSymbol):
             scope = self.entered(outer.symbol, outer, e.span)[0].scope
-        kinds = (BranchSymbol, TwoPortSymbol, InstanceSymbol)
         names = [n for n in (scope.symbols if scope is not self.scope else scope.names()) if n]
-        found = [n for n in names if isinstance(scope.find(n), kinds)]
+        found = [n for n in names if isinstance(scope.find(n), _ELEMENTS)]
         return f"elements that have members: {', '.join(found[:10])}" if found else None
 
     def _all(self, base: Located, symbol: NodeSymbol | BranchSymbol, e: syntax.Member) -> tuple[syntax.Index, ...]:
@@ -228,6 +228,10 @@ class Members(Ports):
             shown = self._shown(e.base)
             through = " + ".join(f"energy_through({shown}.{port})" for port in ports[:4])
             help_ = f"what goes in by its ports: {through}; or of an element inside, {shown}.LABEL.energy"
+        if branch is None and ports and e.name in ("e", "f", "q", "p"):  # several ends have one each
+            shown, inside = self._shown(e.base), [n for n, s in space.scope.symbols.items() if isinstance(s, _ELEMENTS)]
+            help_ = " or ".join(f"{shown}.{port}.{e.name}" for port in ports[:4])
+            help_ += f"; of an element inside, {shown}.{inside[0]}.{e.name}" if inside else ""
         raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{e.name}'{level}", e.span, help=help_)
 
     # -- constraints ---------------------------------------------------------------------------------------

@@ -42,3 +42,16 @@ model m {
 def test_one_finding_with_what_to_write(line, code, help_):
     found = check(MODEL.replace("LINE", line))
     assert [(d.code, d.help) for d in found] == [(code, help_)]
+
+
+def test_a_quantity_of_a_component_of_several_ends_is_that_of_an_end():
+    found = check("""
+from std.fluid import relief_valve
+model m {
+  node p: hydraulic
+  Q: flow(f = 0.2 l/s) ground -> p
+  V: relief_valve(opens = 50 bar, R = 1e9 Pa.s/m^3) a = p, b = ground
+}
+scene s of m { time 0 s to 1 s; trace V.f }
+""")
+    assert [(d.code, d.help) for d in found] == [("E102", "V.a.f or V.b.f; of an element inside, V.seat.f")]
