@@ -10,7 +10,9 @@ model m {
   energy V = 1/2*(4 N/m)*x^2
   init x' = 0 m/s
   discrete n = 0
-  when x < 0 m { n := n + 1 }
+  state count: 1 = 0
+  dynamic count' = 0
+  when x < 0 m { n := n + 1; count := count + 1 }
   expect static: dof == 1
 }
 scene s of m {
@@ -30,6 +32,7 @@ scene s of m {
         ("finally: x == cos(2)*1 m within 1 um", False),
         ("finally: x <= 1 m", False),
         ("finally: n == 1", False),
+        ("finally: count == 1", False),
         ("finally: sign(x) == -1", False),
         ("finally: (if x > 0 m then 1 else 2) == 2", False),
     ],
