@@ -27,6 +27,8 @@ from sysdyn.dsl.names.symbols import (
 )
 from sysdyn.dsl.tree import syntax
 
+_INSIDE = "of one element of it, or of its elements inside: sum(i in 1..n: S[i].R.energy)"
+
 
 class _Port(NamedTuple):
     """`instance.port`: its name, its end and the loop variables of its array, and what is taken in there."""
@@ -54,7 +56,7 @@ class Ports(Quantities):
         at = [ex.substitute(a, change) for a in (*end.at, *change.values())]
         if any(n.op == "index" for n in ex.topological(at)):
             message = "what has gone through the ports of an array of components is not told under a loop yet"
-            raise self.fail("N608", message, e.span, help="of one element of it, or of its elements inside")
+            raise self.fail("N608", message, e.span, help=_INSIDE)
         own = "e" if end.domain.common == "effort" else "f"
         other = ex.substitute(self.node_quantity(end, syntax.Member(e, own, e.span)).node, change)
         power = multiply(end.domain.effort.dimension, end.domain.flow.dimension)
