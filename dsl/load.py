@@ -20,6 +20,7 @@ from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.depth import deep
 from sysdyn.dsl.model.network import Network, Parameter, Scene
 from sysdyn.dsl.model.rewriting import nodes_read, with_common_sizes, with_literal_ranges
+from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import Dimension
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
@@ -27,6 +28,8 @@ from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import Space, nearest
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.rules import bound_values, checks, graph_checks, laws
+from sysdyn.dsl.rules.asked import Asked
+from sysdyn.dsl.rules.claims import exact_claims
 from sysdyn.dsl.rules.floating import floating
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
@@ -157,6 +160,7 @@ def _judged(
     elaborator.quadratures()
     checks.run(elaborator, report, required=required)
     checks.set_valued_results(elaborator, reader.observations, report)
+    exact_claims(elaborator, report)
     _begin(elaborator, read_scene)
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
@@ -199,6 +203,19 @@ def _elaborated(
         reader.command(source, statement, SceneReader.set_parameter)
     elaborator.statements()
     return elaborator, reader
+
+
+def asked(
+    document: Document,
+    model: syntax.Model,
+    scene: syntax.Scene | None,
+    settings: Sequence[tuple[str, str]] = (),
+    levels: Sequence[tuple[str, str]] = (),
+) -> Asked:
+    """What a text without errors asks of its numbers."""
+    with deep(), budget.drawn():
+        elaborator, reader = _elaborated(document, model, scene, Report(), settings, levels)
+        return Asked(elaborator, reader.elements)
 
 
 def listing(
@@ -297,12 +314,16 @@ def _incomplete(report: Report) -> bool:
 def constant(document: Document, text: str, dimension: Dimension, name: str, report: Report) -> float | None:
     """A constant expression of the command line in SI; a bare number is in SI units; None after reporting."""
     source = SourceText(name, f"const value = {text}\n")
+    if not text.strip():
+        report.error("E207", f"{name}: a value is missing", source.place(0, 0))
+        return None
     inner = Report()
     file, problems = parse(source)
     inner.extend(problems)
     items = [i for i in file.items if isinstance(i, syntax.Const)]
     if inner.failed or "\n" in text or len(items) != 1 or len(file.items) != 1:
-        report.extend(inner)
+        unit = common(dimension) if dimension else ""
+        report.extend(replace(d, help=f"one expression: 3 {unit}") if d.code == "E113" else d for d in inner)
         if not inner.failed:
             report.error("E207", f"{name} {text[:40]}: one expression is wanted", source.place(0, 0))
         return None

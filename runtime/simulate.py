@@ -262,7 +262,7 @@ def formed(
     flat = without_slope(written, start.t, *start.for_form(written)) if missing else ()
     if flat:
         remedy = f"{WITH_A_SLOPE}, or index 2 or 3 with bdf or radau"
-        raise NoSuchForm(f"{no_slope(flat)}, and there is no underlying equation: {remedy}")
+        raise NoSuchForm(f"{no_slope(flat)}, and there is no underlying equation: {remedy}", flat)
     if missing:
         still = list(dict.fromkeys(name.rstrip("'") for name in missing if name.endswith("'")))[:3]
         remedy = f"inertia on {', '.join(still)}, constraints that hold it, or " if still else ""
@@ -359,7 +359,8 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     close(runs, achieved, judgement)
     finished, _, writer = runs.done
     if finished.unsettled and not options.events:
-        warnings = (*warnings, f"{finished.unsettled} rows do not meet the equations: they are the integrator's own")
+        some = "1 row does" if finished.unsettled == 1 else f"{finished.unsettled} rows do"
+        warnings = (*warnings, f"{some} not meet the equations: what stands there is the integrator's own")
     estimate = achieved.error_estimate if achieved is not None else None
     lost = tuple(cancelled(runs.quantities.terms(finished.largest), writer.seen(), options.accuracy, estimate))
     below = achieved is not None and achieved.below_round_off

@@ -11,6 +11,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.asked import Request, options_of, rest, stops
 from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.flat_laws import impossible
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.starting import Started, start
 from sysdyn.cli.run.targets import Target
@@ -129,7 +130,7 @@ def arrived(found: Found, request: Request, report: Report) -> tuple[Found | Non
     try:
         system, state = arrival(found.system, found.state, found.started.facts, options)
     except NoSuchForm as error:
-        report.error("E607", str(error), found.prepared.network.place)
+        report.error("E607", impossible(found.prepared, error)[0], found.prepared.network.place)
         return None, None
     except WrongOption as error:
         raise UsageError(str(error)) from error

@@ -60,7 +60,7 @@ class Equilibrium:
         """A few lines for the terminal."""
         lines = [f"{number}  {self._judgement()}"]
         shown = [
-            f"{name} = {value:.9g}"
+            f"{name} = {value + 0.0:.9g}"
             for (name, value), kind in zip(self.values.items(), self.kinds, strict=True)
             if kind in SHOWN and (kind != "f" or value != 0.0)
         ]

@@ -13,11 +13,12 @@ from sysdyn.cli.export.index_parameters import index_parameters
 from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tables
 from sysdyn.cli.export.naming import elements
 from sysdyn.cli.run import targets
+from sysdyn.cli.run.flat_laws import impossible
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.starting import start
 from sysdyn.dsl import load as load_
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.text.diagnostics import ModelError, Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model.failures import NoSuchForm
 from sysdyn.runtime.model.system import System
@@ -50,6 +51,11 @@ class Module:
         key = tuple(sorted((parameters or {}).items()))
         if key not in self._systems:
             prepared, system = self._formed.prepared, self._formed.system
+            sizes = {p.name for p in prepared.network.parameters if p.whole} if prepared.network.branches else set()
+            for name in sizes & {name for name, _ in key}:  # which elements are alike depends on where ranges meet
+                message = f"the size '{name}' is part of the text where elements sit between nodes"
+                help_ = f"a text with another {name}, compiled for itself"
+                raise ModelError([Diagnostic("E805", message, None, help_)])
             arrays = prepared.arrays_of(prepared.compiled.bind(dict(key)))
             made = System(prepared.structure, arrays, prepared.carrier, system.form.name)
             self._systems[key] = made.without(system.left_out) if system.left_out else made
@@ -169,7 +175,7 @@ def compile_model(
         try:
             return Module(choose(prepared, started, None if index == "auto" else index))
         except NoSuchForm as error:
-            report.error("E607", str(error), prepared.network.place)
+            report.error("E607", impossible(prepared, error)[0], prepared.network.place)
             raise ModelError(report.diagnostics) from error
 
 

@@ -88,8 +88,10 @@ def read(folder: Path) -> tuple[Golden, ...]:
             raise Unreadable(f"{path}: version {data['version']!r} is not known: a newer sysdyn wrote it")
         model = Path(os.path.normpath(folder / str(data["model"])))
         return tuple(_entry(folder, model, name, item) for name, item in data["scenes"].items())
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise Unreadable(f"{path}: {type(error).__name__}: {error}") from error
+    except KeyError as error:
+        raise Unreadable(f"{path}: {error} is missing: sysdyn golden record writes it") from error
+    except (TypeError, ValueError, AttributeError) as error:
+        raise Unreadable(f"{path}: {error}") from error
 
 
 def _entry(folder: Path, model: Path, name: str, item: dict[str, Any]) -> Golden:

@@ -94,6 +94,8 @@ def instants_of(
     """--until, --at and --max-wall in s; None, or left out, where they are not given or the report says why not."""
 
     def instant(text: str, name: str) -> float | None:
+        if not text.strip():
+            raise UsageError(f"{name} '{getattr(request, name.strip('-').replace('-', '_'))}': a value is missing")
         return load.constant(document, text, dim.TIME, name, report)
 
     until = None if request.until is None else instant(request.until, "--until")

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.flat_laws import by_element
 from sysdyn.cli.run.prepare import Prepared, place_at
 from sysdyn.dsl.model.network import Parameter
 from sysdyn.dsl.model.units import quantity
@@ -45,7 +46,7 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
         case "implicit":
             report.error("E505", f"the gammas do not determine {', '.join(error.names)} at the start", where)
         case "slope":
-            report.error("E903", f"no start: {no_slope(error.rows)}", where, help=WITH_A_SLOPE)
+            report.error("E903", f"no start: {no_slope(by_element(prepared, error.rows))}", where, help=WITH_A_SLOPE)
         case "nonfinite" if not names:
             message = "the equations are no numbers at the start: products or quotients beyond 1e308?"
             sizes = "look at the sizes of parameters and initial values"

@@ -161,7 +161,9 @@ def _report(outcome: Outcome, e: Expectation, worst: tuple[float, float, float, 
     estimate = outcome.error_estimate
     help_ = None
     size = max(abs(a), abs(b))
-    if estimate and size > 0.0 and off - w < estimate * size:
+    if e.operator == "==" and e.within is None:
+        help_ = f"'==' without 'within' asks for the last bit: within {off:.1g}{unit} would hold"
+    elif estimate and size > 0.0 and off - w < estimate * size:
         wanted = max((off - w) / size / 10.0, 1e-13)
         less = f"this is less than the estimated error of the run ({estimate:.1g})"
         help_ = f"{less}: --accuracy {wanted:.0e} would decide it"

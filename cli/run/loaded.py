@@ -9,12 +9,13 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.asked import Request, check_tolerances, options_of, parameters_of
 from sysdyn.cli.run.in_core import InCore
@@ -25,6 +26,7 @@ from sysdyn.compiler.binding.again import Way, again
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.rules.asked import Asked
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.many.asked import ROWS, NotApplicableError
 from sysdyn.runtime.trace.trace import Trace
@@ -37,6 +39,7 @@ SHORT, LONGER = 1000, 5
 one of them may take there."""
 _ELEMENT = re.compile(r"([^\[\]]+)\[(-?\d+(?:,-?\d+)*)\]")
 
+Floats = NDArray[np.float64]
 Settings = Mapping[str, Any]
 """Names of parameters (`m`, `m[2]`, `M1.R`) and inputs -> numbers in SI units, arrays, or texts of the language."""
 
@@ -136,11 +139,13 @@ class Loaded:
 
     @cached_property
     def sizes(self) -> frozenset[str]:
-        """Sizes that are part of the text, and what they follow from: where events, inequalities or corners stand for
-        each element, or a nonlinear function of a sum, and those of components in arrays.
+        """Sizes that are part of the text, and what they follow from: where elements sit between nodes (which of them
+        are alike depends on where ranges meet), where events, inequalities or corners stand for each element, or a
+        nonlinear function of a sum, and those of components in arrays.
         """
         network = self.first.prepared.network
-        written = network.literal or network.events or network.switches or self.first.prepared.compiled.form.kinks
+        kinks = self.first.prepared.compiled.form.kinks
+        written = network.literal or network.branches or network.events or network.switches or kinks
         found = {p.name for p in network.parameters if p.whole and (written or p.shape)}
         waiting = list(found)
         while waiting:
@@ -149,6 +154,47 @@ class Loaded:
             found |= more
             waiting += more
         return frozenset(found)
+
+    @cached_property
+    def _asked(self) -> tuple[Asked, dict[Any, ex.Node]]:
+        """What the text asks of its numbers, with the space of its expressions."""
+        nodes, request = dict[Any, ex.Node](), self.request
+        with ex.fresh(nodes):
+            model, scene = self.target.model, self.target.scene
+            return load.asked(self.target.document, model, scene, request.settings, request.levels), nodes
+
+    def allowed(self, keys: Sequence[Any], values: Floats) -> NDArray[np.bool_]:
+        """Which rows of numbers [k, keys] the text does not refuse."""
+        asked, nodes = self._asked
+        fine = np.ones(len(values), dtype=bool)
+        with ex.fresh(nodes):
+            mine = asked.of(frozenset(key if isinstance(key, str) else str(key[0]) for key in keys))
+            column = {key: values[:, j] for j, key in enumerate(keys)}
+            if not mine.plain or not all(isinstance(key, str) for key in keys):
+                rows = (dict(zip(keys, row, strict=True)) for row in values.tolist())
+                return np.fromiter(map(asked.holds, rows), dtype=bool, count=len(values))
+            for bound in mine.bounds:
+                fine &= np.asarray(bound.compared(column[bound.name], bound.limit))  # type: ignore[arg-type]
+        return fine
+
+    def _elements(self, name: str, value: Any) -> Iterator[tuple[str, tuple[int, ...], Any]]:
+        """What one setting says: a parameter, the indices of an element of it (() of one number), its value."""
+        if np.ndim(value) == 0:
+            yield name, (), value
+            return
+        evaluate = self.first.prepared.binding.evaluate
+        first = [int(evaluate(low)) for low, _ in self.parameters[name].shape]
+        for at, number in np.ndenumerate(np.asarray(value, dtype=float)):
+            yield name, tuple(f + k for f, k in zip(first, at, strict=False)), number
+
+    def _refused(self, numbers: Mapping[Any, Any]) -> bool:
+        """Whether the text refuses these numbers."""
+        keys, values = list[Any](), list[float]()
+        for key, value in numbers.items():
+            for name, at, number in self._elements(key, value):
+                keys.append((name, *at) if at else name)
+                values.append(float(number))
+        return not self.allowed(keys, np.array([values]))[0]
 
     def _text(self, settings: tuple[tuple[str, str], ...]) -> Compiled:
         """The text under settings that its numbers cannot take."""
@@ -192,14 +238,19 @@ class Loaded:
         compiled = self._text(texts)
         if not numbers:
             return compiled.prepared, compiled
+        if self._refused(numbers):  # the rules say what is wrong with them
+            each = [one for name, value in settings.items() for one in self._elements(name, value)]
+            shown = ((f"{name}[{','.join(map(str, at))}]" if at else name, _text_of(value)) for name, at, value in each)
+            compiled = self._text(tuple(shown))
+            return compiled.prepared, compiled
         try:
             with ex.fresh(compiled.nodes):
                 binding = compiled.bound(numbers)
         except ModelError as error:
             scalar = all(isinstance(value, str) or np.ndim(value) == 0 for value in settings.values())
-            if not scalar or {d.code for d in error.diagnostics} != {"E605"}:
+            if not scalar or not {d.code for d in error.diagnostics} <= {"E605", "E805"}:
                 raise
-            # a value that asks for another form: a mass that is zero
+            # a value that asks for another form: a mass that is zero, an array without an inside
             compiled = self._text(tuple((name, _text_of(value)) for name, value in settings.items()))
             return compiled.prepared, compiled
         return replace(compiled.prepared, binding=binding, cpu_compile_s=0.0), compiled

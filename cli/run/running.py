@@ -14,12 +14,13 @@ from sysdyn.cli.run import lock, targets
 from sysdyn.cli.run.asked import Request, check_tolerances, default_output, options_of, rest, stops
 from sysdyn.cli.run.events import plan, zeno
 from sysdyn.cli.run.expectations import Claim, judge
+from sysdyn.cli.run.flat_laws import impossible
 from sysdyn.cli.run.memory import keep_pages
 from sysdyn.cli.run.module_check import check_module
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.starting import Started, start
 from sysdyn.cli.run.targets import Target
-from sysdyn.cli.run.verdict import differences, stopped, verdict
+from sysdyn.cli.run.verdict import author_place, differences, stopped, verdict
 from sysdyn.compiler.forms.kane import repeats
 from sysdyn.dsl import load
 from sysdyn.dsl.model import budget
@@ -167,7 +168,8 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
             started.system.description, None, prepared.carrier, options, start=started.state, facts=started.facts
         )
     except NoSuchForm as error:
-        report.error("E607", str(error), prepared.network.place)
+        text, laws = impossible(prepared, error)
+        report.error("E607", text, author_place(target, prepared, laws[0]) if laws else prepared.network.place)
         return None
     except WrongOption as error:
         raise UsageError(str(error)) from error
@@ -184,7 +186,7 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
     else:  # what such a run says of the author's claims is not believed
         claims, code = tuple(replace(claim, ok=None) for claim in claims), 3
     if outcome.judgement is not None:
-        verdict(target, prepared, outcome.judgement, report)
+        verdict(target, prepared, started, outcome, report)
         differences(prepared, outcome.cancelled, report)
         zeno(prepared, outcome.events, report)
     return Ran(target, prepared, started, outcome, claims, code, failure)

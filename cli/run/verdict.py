@@ -10,13 +10,14 @@ from collections.abc import Iterable
 
 import numpy as np
 from sysdyn.cli.run.culprit import Culprit, culprit
+from sysdyn.cli.run.flat_laws import by_element
 from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared, place_at
 from sysdyn.cli.run.starting import Started
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
-from sysdyn.runtime.judgement import Cancelled, Judgement, NotMet
+from sysdyn.runtime.judgement import Cancelled, NotMet
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.slopes import WITH_A_SLOPE, no_slope, without_slope
 from sysdyn.runtime.simulate import Outcome
@@ -84,7 +85,7 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     lost = last.dependent(started.state.y) if last is not None and code == "E930" else []
     if lost:
         code, cause = "E931", f"{', '.join(c.name for c in lost)} lose their rank: they depend on each other there"
-    flat = _flat(started, error) if found is None and not lost and code in ("E930", "E931", "E933") else ()
+    flat = _flat(prepared, started, error) if found is None and not lost and code in ("E930", "E931", "E933") else ()
     if flat:
         code, cause = "E931", no_slope(flat)
     where = lost[-1].place if lost else _place(target, prepared, error, found, last)
@@ -115,14 +116,15 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     return text
 
 
-def _flat(started: Started, error: SolverFailure) -> tuple[RowLabel, ...]:
+def _flat(prepared: Prepared, started: Started, error: SolverFailure) -> tuple[RowLabel, ...]:
     """Rows of laws that have no slope at the last good point; none where events are the cause."""
     system = started.system
     if error.state is None or error.cause in (*_OF_EVENTS, "inertia", "memory") or system.unknowns > DENSE:
         return ()
     t, y, yd = error.state
     rest = np.zeros(system.unknowns - y.size)
-    return without_slope(system, t, np.append(y, rest), np.append(np.where(np.isfinite(yd), yd, 0.0), rest))
+    rows = without_slope(system, t, np.append(y, rest), np.append(np.where(np.isfinite(yd), yd, 0.0), rest))
+    return by_element(prepared, rows)
 
 
 def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Report) -> None:
@@ -138,8 +140,10 @@ def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Repo
         report.note("N922", text, place, help=help_)
 
 
-def verdict(target: Target, prepared: Prepared, judgement: Judgement, report: Report) -> None:
+def verdict(target: Target, prepared: Prepared, started: Started, outcome: Outcome, report: Report) -> None:
     """Reports what a run that ended did not meet; W920 where nothing judges it."""
+    judgement = outcome.judgement
+    assert judgement is not None
     scene = prepared.network.scene
     place = scene.place if scene else prepared.network.place
     if not judgement.judged:
@@ -147,12 +151,24 @@ def verdict(target: Target, prepared: Prepared, judgement: Judgement, report: Re
         report.warning("W920", "nothing judges this run", place, help=help_)
     for missed in judgement.not_met:
         if missed.what == "accuracy":
-            _inaccurate(prepared, missed, place, report)
+            flat = _flat_start(prepared, started) if outcome.method == "rosenbrock" else ()
+            _inaccurate(prepared, missed, place, flat, report)
         else:
             _unbalanced(target, prepared, missed, report)
 
 
-def _inaccurate(prepared: Prepared, missed: NotMet, place: Place, report: Report) -> None:
+def _flat_start(prepared: Prepared, started: Started) -> tuple[RowLabel, ...]:
+    """Laws that have no slope at the start."""
+    system, state = started.system, started.state
+    if system.unknowns > DENSE:
+        return ()
+    return by_element(prepared, without_slope(system, state.t, *state.for_form(system)))
+
+
+def _inaccurate(
+    prepared: Prepared, missed: NotMet, place: Place, flat: tuple[RowLabel, ...], report: Report
+) -> None:
+    """E920; flat: laws by whose slopes the method steps, and that have none at the start."""
     where = next((o.place for o in prepared.network.observations if o.name == missed.element), place)
     if missed.undefined:
         text = f"{missed.element} is no number from t = {missed.time:.9g} s on: a function is outside its domain"
@@ -161,7 +177,11 @@ def _inaccurate(prepared: Prepared, missed: NotMet, place: Place, report: Report
     estimate = "nothing estimates its error" if missed.value is None else f"estimated error {missed.value:.1e}"
     since = "" if missed.time is None else f", beyond it from t = {missed.time:.9g} s on"
     text = f"the accuracy asked was not reached: {missed.element}, {estimate}, asked {missed.limit:.1e}{since}"
-    report.error("E920", text, where, help="a looser accuracy, a shorter span, or what stands at the place")
+    help_ = "a looser accuracy, a shorter span, or what stands at the place"
+    if flat:
+        text += f"; {no_slope(flat).replace('this state', 'the start')}, by which rosenbrock steps"
+        help_ = f"--method radau or bdf, or auto; {WITH_A_SLOPE}"
+    report.error("E920", text, where, help=help_)
 
 
 def _unbalanced(target: Target, prepared: Prepared, missed: NotMet, report: Report) -> None:

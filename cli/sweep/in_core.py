@@ -61,6 +61,7 @@ class Cases:
         values = np.array([[case[name] for name in self._names] for case in cases], dtype=np.float64)
         with ex.fresh(self._compiled.nodes):
             p, anchor, good = self._bound(values)
+        good &= self._loaded.allowed(self._keys, values)
         batch = self._core.batch
         found = batch.run(p[good], anchor[good])
         done = found.state == DONE

@@ -26,7 +26,7 @@ from sysdyn.cli.sweep.workers import results as worked
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
-from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.trace.claim import claimed
 from sysdyn.runtime.trace.opening import destination
 from sysdyn.values import dataclass
@@ -34,6 +34,8 @@ from sysdyn.values import dataclass
 REFRESH = 10.0
 """Seconds between two versions of the file, at least ten times what writing one takes."""
 
+REFUSED = {"E313", "E321", "E322", "E325"}
+"""Codes by which a text refuses numbers."""
 FORETOLD = 16
 """Runs after the first result after which the time left is said."""
 
@@ -115,7 +117,11 @@ def sweep(
     """
     runner = runner or Runner(request, keep)
     cases = tuple(study.cases())
-    runner.loaded().bound({n: v for n, v in cases[0].items() if n not in CHOICES and not n.startswith("level ")})
+    try:
+        runner.loaded().bound({n: v for n, v in cases[0].items() if n not in CHOICES and not n.startswith("level ")})
+    except ModelError as error:  # numbers that the text refuses are a run's own failure
+        if not {d.code for d in error.diagnostics} <= REFUSED:
+            raise
     target = runner.loaded().target
     report = Report()
     instants_of(request, target.document, report)

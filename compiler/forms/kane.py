@@ -63,10 +63,12 @@ def _seen(model: EnergyModel, speeds: Speeds) -> EnergyModel:
 
 
 def repeats(form: DescriptorForm) -> bool:
-    """Whether a form of Kane is Lagrange's whatever is read: there is no flow constraint, no speed is unknown."""
+    """Whether a form of Kane is Lagrange's: it leaves no flow constraint's reaction out, no speed is unknown."""
     if not form.formulation.endswith("kane"):
         return False
-    return not any(row.block == "psi" for row in form.rows) and not any(form.is_speed(f) for f in form.families)
+    kept = {f.owner for f in form.families if f.kind == "mu"}
+    left_out = any(row.block == "psi" and row.owner not in kept for row in form.rows)
+    return not left_out and not any(form.is_speed(f) for f in form.families)
 
 
 def constraints(model: EnergyModel) -> dict[str, Entries]:

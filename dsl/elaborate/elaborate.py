@@ -143,12 +143,12 @@ class Elaborator(Instances):
             target = state if found.first is None else ex.sub(state, found.first)
             self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
 
-    def taken(self, path: str, end: End, place: Place) -> ex.Node:
+    def taken(self, space: Space, end: End, place: Place, *, rates: bool) -> ex.Node:
         """What an instance takes in at an end; place: where that is read."""
         try:
-            return conjugate_of(self.parts, path, end)
+            return conjugate_of(self.parts, space, end, rates=rates)
         except NotSaidError as error:
-            message = f"what goes into '{path}' through this port is not told yet: a statement inside {error}"
+            message = f"what goes into '{space.path}' through this port is not told yet: a statement inside {error}"
             related = (Related("this one", error.place),)
             self.report.note("N608", message, place, related=related, help="elements inside, which end at the port")
             raise Failed from None

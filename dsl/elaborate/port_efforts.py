@@ -1,21 +1,23 @@
 """What a component takes in through a port: the sum of what its branches and statements ask of the port's node.
 
-Received: the elaborated parts of a model, the path of an instance, an end; handed on: the effort that a common-flow
-node exerts on the component there, or the flow that goes into it from a common-effort node.
+Received: the elaborated parts of a model, the inside of an instance, an end; handed on: the effort that a common-flow
+node exerts on the component there, or the flow that goes into it from a common-effort node.  Of an array of instances
+both are those of the element that the variables of its loops name.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 
 from sysdyn.dsl.elaborate.parts import NetworkBuilder
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Constraint, Energy, Work
+from sysdyn.dsl.model.network import Constraint, Energy, Loop, Work
 from sysdyn.dsl.model.rewriting import summed
 from sysdyn.dsl.names.reactions import reaction
-from sysdyn.dsl.names.symbols import End
+from sysdyn.dsl.names.symbols import End, Space
 from sysdyn.dsl.text.diagnostics import Place
 
 
@@ -27,24 +29,34 @@ class NotSaidError(Exception):
         self.place = place
 
 
-def conjugate_of(parts: NetworkBuilder, path: str, end: End) -> Node:
+def conjugate_of(parts: NetworkBuilder, space: Space, end: End, *, rates: bool = True) -> Node:
     """The effort (common flow) or flow (common effort) with which an instance takes in power at an end; zero of ground.
 
-    NotSaidError where a statement inside acts on it by an inertia, an impact, or on its effort.
+    rates: accelerations may stand in it.
+    NotSaidError where a statement inside acts on it by an energy of momenta, an impact, or on its effort.
     """
     if end.node is None:
         return ex.const(0.0)
     name, held = end.node.family.name, "e" if end.domain.common == "flow" else "f"
+    around = len(space.loops)
     terms = []
     for branch in parts.branches:
-        if not _inside(branch.name, path):
+        if not _inside(branch.name, branch.loops, space):
             continue
         for terminal, sign in ((branch.plus, 1.0), (branch.minus, -1.0)):
-            if terminal is not None and terminal.node == name and terminal.at == end.at:
-                own = ex.var(branch.name, f"b{held}", *branch.at)
-                terms.append(summed(ex.scale(sign, own), branch.loops))
-    said = [s for owner, statements in parts.owned.items() if _inside(owner, path) for s in statements]
-    along = [b for b in parts.branches if b.on is not None and _inside(b.name, path)]
+            if terminal is not None and terminal.node == name:
+                own = ex.scale(sign, ex.var(branch.name, f"b{held}", *branch.at))
+                terms.append(summed(_where(terminal.at, end.at, own), branch.loops[around:]))
+    said = [s for owner, all_ in parts.owned.items() for s in all_ if _inside(owner, s.loops, space)]
+    along = [b for b in parts.branches if b.on is not None and _inside(b.name, b.loops, space)]
+    if end.node.family.shape and space.scope.symbols.get(end.node.name) is end.node:  # a port that is an array
+        for s in said:
+            if any(name == n.data[0] for root in _roots(s) for n in ex.variables(root) if n.op == "var"):
+                raise NotSaidError("acts on this array of ports", s.place)
+        for b in along:
+            if any(name == n.data[0] for n in ex.variables(b.on or ex.const(0.0)) if n.op == "var"):
+                raise NotSaidError("acts on this array of ports", b.place)
+        return ex.add(*terms)
     if end.domain.common == "effort":
         effort = ex.var(name, "ne", *end.at)
         for s in said:
@@ -52,23 +64,37 @@ def conjugate_of(parts: NetworkBuilder, path: str, end: End) -> Node:
                 raise NotSaidError("acts on its effort", s.place)
         return ex.add(*terms)
     q, f, p = (ex.var(name, f"n{letter}", *end.at) for letter in "qfp")
-    terms += [summed(ex.mul(ex.var(b.name, "be", *b.at), derivative(b.on, q)), b.loops) for b in along if b.on]
+    terms += [summed(ex.mul(ex.var(b.name, "be", *b.at), derivative(b.on, q)), b.loops[around:]) for b in along if b.on]
     jumps = {draft.label: draft.place for draft in parts.drafts if draft.kind in ("phi", "psi", "guarded")}
     for s in said:
         if any({q, f, p} & ex.variables(root) for root in _roots(s)):
-            terms.append(summed(_asked(s, q, f, jumps), s.loops))
+            terms.append(summed(_asked(s, q, f, jumps, rates=rates), s.loops[around:]))
     return ex.add(*terms)
 
 
-def _inside(name: str, path: str) -> bool:
-    return name == path or name.startswith((f"{path}.", f"{path}#"))
+def _where(own: Sequence[Node], at: Sequence[Node], node: Node) -> Node:
+    """The node where an element of a family, of loops inside, is the one asked for; else zero."""
+    for mine, asked in zip(own, at, strict=True):
+        if mine is asked:
+            continue
+        if mine.op == asked.op == "const":
+            return ex.const(0.0)
+        node = ex.conditional(ex.compare("==", mine, asked), node, ex.const(0.0))
+    return node
+
+
+def _inside(name: str, loops: Sequence[Loop], space: Space) -> bool:
+    """Whether what has this name and stands in these loops is of the instance: a label may be declared in several."""
+    path = space.path
+    own = name == path or name.startswith((f"{path}.", f"{path}#"))
+    return own and tuple(loops[: len(space.loops)]) == space.loops
 
 
 def _roots(s: Energy | Work | Constraint) -> Sequence[Node]:
     return (s.on, s.effort) if isinstance(s, Work) else (s.expression,)
 
 
-def _asked(s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Place]) -> Node:
+def _asked(s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Place], *, rates: bool) -> Node:
     """The effort that a statement asks of the node: it is taken from where it acts."""
     if isinstance(s, Work):
         return ex.neg(ex.mul(s.effort, derivative(s.on, q)))
@@ -85,4 +111,7 @@ def _asked(s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Pla
         return derivative(s.expression, q)
     if s.function == "D":
         return derivative(s.expression, f)
-    raise NotSaidError("gives it an inertia", s.place)
+    if s.function == "T*" and rates:  # Lagrange's equation: what gives its momentum a rate
+        with contextlib.suppress(ValueError):
+            return ex.sub(time_derivative(derivative(s.expression, f)), derivative(s.expression, q))
+    raise NotSaidError(f"acts on it by energy {s.function}", s.place)

@@ -45,7 +45,8 @@ class Arithmetic(Context):
         total = None
         for (sign, term), value in zip(e.terms, values, strict=True):
             if not isinstance(value, Vector) or (total is not None and len(value.items) != len(total)):
-                raise self.fail("E203", "an array is added to something of another size", term.span)
+                help_ = "arrays of one size are added; an element of one is a[1]"
+                raise self.fail("E203", "an array is added to something of another size", term.span, help=help_)
             signed = [Typed(ex.neg(v.node) if sign == "-" else v.node, v.dimension) for v in value.items]
             total = signed if total is None else [self.add(a, b, term.span) for a, b in zip(total, signed, strict=True)]
         return Vector(tuple(total or ()))
@@ -111,12 +112,13 @@ class Arithmetic(Context):
         """Two numbers of one dimension compared; conditions and arrays are not (E203)."""
         left, right = self.resolve(e.left), self.resolve(e.right)
         if isinstance(left, Vector) or isinstance(right, Vector):
-            raise self.fail("E203", "arrays are not compared", e.span)
+            raise self.fail("E203", "arrays are not compared", e.span, help="an element of one: a[1] < b[1]")
         if left.truth or right.truth:
             raise self.fail("E203", "a condition is not compared", e.span, help="and, or, not")
         if None not in (left.dimension, right.dimension) and left.dimension != right.dimension:
             message = f"the two operands differ: {dim.show(left.dimension)} {e.op} {dim.show(right.dimension)}"
-            raise self.fail("E203", message, e.span)
+            help_ = self.missing(right.dimension, left.dimension, e.right, e.left)
+            raise self.fail("E203", message, e.span, help=help_)
         return Typed(ex.compare(e.op, left.node, right.node), NONE, truth=True)
 
     def _and(self, e: syntax.And) -> Value:
@@ -133,6 +135,7 @@ class Arithmetic(Context):
         then, other = self.scalar(e.then), self.scalar(e.other)
         if None not in (then.dimension, other.dimension) and then.dimension != other.dimension:
             message = f"the two branches differ: {dim.show(then.dimension)} and {dim.show(other.dimension)}"
-            raise self.fail("E203", message, e.span)
+            help_ = self.missing(other.dimension, then.dimension, e.other, e.then)
+            raise self.fail("E203", message, e.span, help=help_)
         dimension = then.dimension if then.dimension is not None else other.dimension
         return Typed(ex.conditional(test, then.node, other.node), dimension)

@@ -26,6 +26,10 @@ class Calls(Context):
     """Functions, tables, reductions and arrays written as lists."""
 
     def _array(self, e: syntax.Array) -> Value:
+        nested = next((i for i in e.items if isinstance(i, syntax.Array)), None)
+        if nested is not None:
+            help_ = "one row of values: [1, 2, 3]; of several indices one value for all, and --set M[1,2]=3"
+            raise self.fail("E203", "a list stands in a list", nested.span, help=help_)
         return Vector(tuple(self.scalar(i) for i in e.items))
 
     def _reduction(self, e: syntax.Reduction) -> Value:
@@ -142,7 +146,8 @@ class Calls(Context):
                 common = value.dimension
             elif value.dimension is not None and value.dimension != common:
                 message = f"the arguments of {name} differ: {dim.show(common)} and {dim.show(value.dimension)}"
-                raise self.fail("E206", message, where.span)
+                help_ = self.missing(value.dimension, common, where) or f"both in {dim.show(common)}"
+                raise self.fail("E206", message, where.span, help=help_)
         if name == "celsius":
             return Typed(ex.add(values[0].node, ex.const(273.15)), dim.result(name, NONE))
         return Typed(ex.call(name, *(v.node for v in values)), dim.result(name, common))

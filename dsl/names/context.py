@@ -14,13 +14,13 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.affine import not_affine
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Loop
+from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension
 from sysdyn.dsl.names import fitting, habits
 from sysdyn.dsl.names.failures import Failed, Part, SeveralError
 from sysdyn.dsl.names.fitting import Sight
 from sysdyn.dsl.names.symbols import (
     Definition,
-    End,
     InstanceSymbol,
     Scope,
     Space,
@@ -112,7 +112,7 @@ class Context:
         self.laws: dict[str, Any] = {}  # of branches, by family (laws.LawOf)
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
-        self.taken: Callable[[str, End, Place], Node]  # what an instance takes in at an end (elaborate/port_efforts.py)
+        self.taken: Callable[..., Node]  # what an instance takes in at an end (elaborate/port_efforts.py)
         self.constraints: dict[str, list[Constraint]] = {}
         self._quantities: dict[tuple[int, int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number, unit
         self._values: dict[tuple[Definition, bool], Value | None] = {}
@@ -306,7 +306,13 @@ class Context:
         """A condition."""
         value = self.resolve(expression)
         if isinstance(value, Vector) or not value.truth:
-            raise self.fail("E203", "a condition is wanted here: a comparison such as a < b", expression.span)
+            help_ = "compare it"
+            if not isinstance(value, Vector) and value.dimension is not None:
+                text = " ".join(self.source.text[expression.span.start : expression.span.end].split())
+                zero = f"0 {common(value.dimension)}" if value.dimension else "0"
+                help_ = f"{text} > {zero}, or another comparison"
+            message = "a condition is wanted here: a comparison such as a < b"
+            raise self.fail("E203", message, expression.span, help=help_)
         return value.node
 
     def whole_number(self, expression: syntax.Expr, what: str) -> Node:
@@ -344,7 +350,9 @@ class Context:
     def is_number(self, value: Typed, e: syntax.Expr) -> None:
         """Report a condition in the place of a number."""
         if value.truth:
-            raise self.fail("E203", "a condition stands where a number is wanted", e.span)
+            text = " ".join(self.source.text[e.span.start : e.span.end].split())
+            help_ = f"if {text.removeprefix('(').removesuffix(')')} then 1 else 0"
+            raise self.fail("E203", "a condition stands where a number is wanted", e.span, help=help_)
 
     def add(self, a: Typed, b: Typed, span: syntax.Span) -> Typed:
         """The sum of two values of one dimension."""

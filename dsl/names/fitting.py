@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.unit_habits import common
-from sysdyn.dsl.model.units import Dimension, multiply, si_text
+from sysdyn.dsl.model.units import NONE, Dimension, multiply, si_text
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.symbols import ParameterSymbol, Scope, UnknownSymbol
 from sysdyn.dsl.text.source import SourceText
@@ -54,6 +54,9 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
     rates = sorted(filter(None, (_rate(sight, e, factor) for e, factor in pairs)), key=lambda said: said[-2] == "'")
     others = [refitted(sight.scope, e, factor) for e, factor in pairs if factor]
     said = [*rates, *filter(None, others)]
+    if not said and within and want == NONE and have:  # a number is wanted
+        text = sight.written(within[0])
+        said = [f"{text}/(1 {common(have)})"] if len(text) < 40 else []
     return said[0] if said else None
 
 

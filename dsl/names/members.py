@@ -5,23 +5,21 @@ A last name that is no symbol where its path leads (paths.py) is a quantity of w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Constraint, Domain
 from sysdyn.dsl.model.paynter import EFFORT_CLASSES
-from sysdyn.dsl.model.units import NONE, Dimension, multiply
+from sysdyn.dsl.model.units import NONE, Dimension
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Value
 from sysdyn.dsl.names.failures import Failed, NotYetError
 from sysdyn.dsl.names.paths import Located
-from sysdyn.dsl.names.quantities import BRANCH, Quantities, branch_words
+from sysdyn.dsl.names.ports import Ports
+from sysdyn.dsl.names.quantities import BRANCH, branch_words
 from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
-    BundleNode,
     ConstraintSymbol,
     Definition,
     End,
@@ -29,7 +27,6 @@ from sysdyn.dsl.names.symbols import (
     NodeSymbol,
     ParameterSymbol,
     PortSymbol,
-    Symbol,
     TwoPortSymbol,
     Typed,
     UnknownSymbol,
@@ -39,11 +36,12 @@ from sysdyn.dsl.names.symbols import (
 )
 from sysdyn.dsl.tree import syntax
 
+_ELEMENTS = (BranchSymbol, TwoPortSymbol, InstanceSymbol)
 AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "dissipated": dim.ENERGY}
 AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE, "drift": NONE}
 
 
-class Members(Quantities):
+class Members(Ports):
     """Members of what a path leads to."""
 
     # -- elements ------------------------------------------------------------------------------------------
@@ -124,12 +122,15 @@ class Members(Quantities):
                     *symbol.family.prefix,
                     *self.indices(symbol.name, symbol.family.shape, self._all(base, symbol, e)),
                 )
-                return self._changed(self.node_quantity(End(symbol, at, symbol.domain), e), base.change)
+                end = End(symbol, at, symbol.domain)
+                if e.name == ("e" if end.domain.common == "flow" else "f") and self.of_ports(e.base):
+                    return self.taken_in(end, e)
+                return self._changed(self.node_quantity(end, e), base.change)
             case PortSymbol():
                 if base.indices:
                     raise self.index_count(symbol.name, 0, len(base.indices), e.span)
                 if e.name == ("e" if symbol.end.domain.common == "flow" else "f"):
-                    return self._through(symbol.end, e)
+                    return self.taken_in(symbol.end, e)
                 return self._changed(self.node_quantity(symbol.end, e), base.change)
             case BranchSymbol():
                 at = self.indices(symbol.name, symbol.family.shape, self._all(base, symbol, e))
@@ -150,9 +151,8 @@ class Members(Quantities):
         scope = self.scope
         if outer is not None and isinstance(outer.symbol, InstanceSymbol):
             scope = self.entered(outer.symbol, outer, e.span)[0].scope
-        kinds = (BranchSymbol, TwoPortSymbol, InstanceSymbol)
         names = [n for n in (scope.symbols if scope is not self.scope else scope.names()) if n]
-        found = [n for n in names if isinstance(scope.find(n), kinds)]
+        found = [n for n in names if isinstance(scope.find(n), _ELEMENTS)]
         return f"elements that have members: {', '.join(found[:10])}" if found else None
 
     def _all(self, base: Located, symbol: NodeSymbol | BranchSymbol, e: syntax.Member) -> tuple[syntax.Index, ...]:
@@ -201,55 +201,6 @@ class Members(Quantities):
         at = self.indices(symbol.name, branch.family.shape, self._all(base, branch, e))
         return self._changed(self.branch_quantity(branch, at, letter, e), base.change)
 
-    def _through(self, end: End, e: syntax.Member) -> Value:
-        """The effort that a common-flow node exerts on a component at a port, the flow into it from another node."""
-        if not self.said:
-            message = f"'{self._shown(e.base)}' has no member '{e.name}' here: what goes through a port is a result"
-            raise self.fail("E102", message, e.span, help="traces and claims of a scene read it, LABEL.PORT." + e.name)
-        domain, taken = end.domain, self._port(e.base)[2]
-        return Typed(taken(), (domain.effort if domain.common == "flow" else domain.flow).dimension)
-
-    def port_power(self, e: syntax.Expr) -> tuple[str, Callable[[], Node], Dimension]:
-        """Name and power of `instance.port`: what is inside absorbs through it."""
-        name, end, taken = self._port(e)
-        own = "e" if end.domain.common == "effort" else "f"
-        other = self.node_quantity(end, syntax.Member(e, own, e.span)).node
-        power = multiply(end.domain.effort.dimension, end.domain.flow.dimension)
-        return f"{name}.energy", lambda: ex.mul(taken(), other), power
-
-    def _port(self, e: syntax.Expr) -> tuple[str, End, Callable[[], Node]]:
-        """Name and end of `instance.port`, and the effort or flow that is taken in there."""
-        names, owner, base = list[str](), e, None
-        while isinstance(owner, syntax.Member) and not (base and isinstance(base.symbol, InstanceSymbol)):
-            names, owner = [owner.name, *names], owner.base
-            base = self.located(owner)
-        if base is None or not isinstance(base.symbol, InstanceSymbol):
-            raise self.fail("E102", f"'{self._shown(e)}' is no port of a component", e.span, help="LABEL.PORT")
-        space, change = self.entered(base.symbol, base, owner.span)
-        name, port = ".".join(names), space.scope.symbols.get(names[0])
-        for member in names[1:]:
-            port = port.members.get(member) if isinstance(port, BundleNode) else None
-        if isinstance(port, BundleNode):
-            each = ", ".join(f"{self._shown(e)}.{m}" for m in port.members)
-            raise self.fail("E102", f"'{self._shown(e)}' is a bundle of ports", e.span, help=f"one of {each}")
-        if not isinstance(port, PortSymbol):
-            raise self.fail("E407", f"'{self._shown(owner)}' has no port '{name}'", e.span)
-        if change or space.around:
-            message = "what goes through a port of an array of components is not told yet"
-            help_ = "of its elements inside: sum(i in 1..n: S[i].R.energy)"
-            raise self.fail("N608", message, e.span, help=help_)
-        end, place = port.end, self.place(e.span)
-        for other_port in _ports(space.scope.symbols.values()):
-            if other_port is not port and other_port.end.node is end.node is not None and other_port.end.at == end.at:
-                message = f"'{name}' and '{other_port.name}' are at one node: what goes through each is not told yet"
-                raise self.fail("N608", message, e.span, help="a node for each")
-        return f"{space.path}.{name}", end, lambda: self.taken(space.path, end, place)
-
-    def through(self, port: syntax.Expr) -> Typed:
-        """The energy that has gone into a component through one of its ports."""
-        name, node, power = self.port_power(port)
-        return Typed(self.quadrature(name, node, (), power, (), port), multiply(power, dim.TIME))
-
     def _instance(self, symbol: InstanceSymbol, base: Located, e: syntax.Member) -> Value:
         """A member of an instance: a quantity of its branch, or what its component declares."""
         space, change = self.entered(symbol, base, e.base.span)
@@ -277,6 +228,10 @@ class Members(Quantities):
             shown = self._shown(e.base)
             through = " + ".join(f"energy_through({shown}.{port})" for port in ports[:4])
             help_ = f"what goes in by its ports: {through}; or of an element inside, {shown}.LABEL.energy"
+        if branch is None and ports and e.name in ("e", "f", "q", "p"):  # several ends have one each
+            shown, inside = self._shown(e.base), [n for n, s in space.scope.symbols.items() if isinstance(s, _ELEMENTS)]
+            help_ = " or ".join(f"{shown}.{port}.{e.name}" for port in ports[:4])
+            help_ += f"; of an element inside, {shown}.{inside[0]}.{e.name}" if inside else ""
         raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{e.name}'{level}", e.span, help=help_)
 
     # -- constraints ---------------------------------------------------------------------------------------
@@ -338,15 +293,6 @@ class Members(Quantities):
             raise self.fail("E203", "a constant has no displacement", e.args[0].span, help=help_)
         node = reaction(residual, symbol.kind == "phi", target.node, self.multiplier(symbol, at))
         return Typed(node, dim.quotient(dim.ENERGY, target.dimension))
-
-
-def _ports(symbols: Iterable[Symbol]) -> Iterator[PortSymbol]:
-    """The ports among symbols, those of bundles too."""
-    for symbol in symbols:
-        if isinstance(symbol, PortSymbol):
-            yield symbol
-        elif isinstance(symbol, BundleNode):
-            yield from _ports(symbol.members.values())
 
 
 def _root(e: syntax.Expr) -> syntax.Name | None:

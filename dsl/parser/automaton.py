@@ -166,12 +166,12 @@ class Automaton:
             return Word(text, Span(start, end))
         if kind == "<quantity>" and scanner.unit is not None:
             unit = Span(*scanner.unit)
-            number = scanner.text[start : unit.start].rstrip()
+            number = scanner.text[start : scanner.behind if scanner.behind > start else unit.start].rstrip()
             return self.notes.quantity(number, Span(start, end), unit)
         if kind == "<number>":
             if scanner.unit is not None and scanner.unit[1] == end:
                 # a unit grown to a number where no quantity may stand (E114 has been said)
-                text = scanner.text[start : scanner.unit[0]]
+                text = scanner.text[start : scanner.behind if scanner.behind > start else scanner.unit[0]]
             return self.notes.number(text, Span(start, end))
         if kind == "<text>":
             return Text(text[1:-1], Span(start, end))

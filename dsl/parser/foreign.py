@@ -38,6 +38,8 @@ def glued(number: str, unit: str) -> tuple[str, str | None]:
     if re.fullmatch(r"(_[0-9]{3})+", unit):
         whole = number + unit.replace("_", "")
         return f"{whole}: digits stand together", None
+    if number == "0" and re.fullmatch(r"[xX][0-9a-fA-F]+|[bB][01]+|o[0-7]+", unit):
+        return f"{int(number + unit, 0)}: numbers are written in digits of ten", None
     if re.fullmatch(r"[dD][0-9]+", unit):
         return f"{number}e{unit[1:]} for a power of ten, {number} {unit[0]}^{unit[1:]} for one of a unit", None
     right = unit if known(unit.partition(".")[0].partition("/")[0].partition("^")[0]) else respelled(unit)

@@ -72,6 +72,7 @@ class Scanner:
         "_fresh",
         "_lines",
         "_own_line",
+        "behind",
         "brackets",
         "closed",
         "comments",
@@ -99,6 +100,7 @@ class Scanner:
         """The token read last, newlines that were dropped left out."""
         self.unit: tuple[int, int] | None = None
         """Span of the unit of the quantity read last."""
+        self.behind = 0  # where a number ends that something is grown to, before its unit
         self.glued = False
         """Whether the quantity read last lacks the space before its unit."""
         self.fault = ""
@@ -193,6 +195,17 @@ class Scanner:
         self.unit = unit.span(1)
         self.end = unit.end()
         return "<quantity>"
+
+    def unit_behind(self) -> None:
+        """Let the unit that follows the present number, if one does, be its own."""
+        unit = _UNIT.match(self.text, self.end)
+        if unit is not None and self.unit is not None:
+            self.behind, self.unit, self.end = self.unit[0], unit.span(1), unit.end()
+
+    def line_end(self) -> int:
+        """Where the present line ends."""
+        found = self.text.find("\n", self.start)
+        return len(self.text) if found < 0 else found
 
     def _newline(self) -> str:
         """A newline that ends a statement."""

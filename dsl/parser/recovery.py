@@ -28,6 +28,8 @@ _MOST_BRACES = 10
 """Open blocks that are named at the end of a text; more say nothing new."""
 
 _WORD = re.compile(r"[^\W\d]\w*+")
+_TARGET = re.compile(r"[\w.]+(?:\[[^\]\n]*\])?'?[ \t]*+")
+"""What stands before the sign of an assignment."""
 _BLANK = re.compile(r"[ \t]*+")
 _BEHIND = frozenset({"on", "within", "every", "while", "restitution", "to", "as", "->", "{", ":="})
 """Terminals that stand in no bracket, but may stand behind one."""
@@ -101,6 +103,8 @@ class Recovery:
 
         help_, meant = foreign.glued(text[scanner.start : unit[0]], text[unit[0] : unit[1]])
         self._error(("E114", f"{word}: a number and its unit are separated by a space", help_), self._token(), meant)
+        if meant is None:  # what is grown to it is no unit: one may follow
+            scanner.unit_behind()
         return "<quantity>" if self.automaton.accepts("<quantity>") else "<number>"
 
     def _defined(self) -> str:
@@ -156,7 +160,11 @@ class Recovery:
         start = self._statement_start()
         word, after = self._first_word(start)
         bracket = self._open_bracket(kind)
-        if kind == "<fault>" and scanner.fault == "text":
+        if kind == ":=" and _TARGET.fullmatch(scanner.text, start, scanner.start):
+            meant = scanner.text[start : scanner.line_end()].partition(";")[0].rstrip(" \t}")
+            said = "':=' assigns at an event, and this stands in none"
+            self._error(("E113", said, f"when CONDITION {{ {meant} }}, or every 10 ms {{ {meant} }}"), self._token())
+        elif kind == "<fault>" and scanner.fault == "text":
             self._error(("E112", "the text that begins with this '\"' is not closed on its line", '"'), self._token())
         elif word == "table" and text == ")" and automaton.accepts(","):
             row = "a row of a table holds its arguments and the value: one number is no row"

@@ -190,17 +190,31 @@ def _rises(law: Node, own: Node, known: Values) -> bool:
     )
 
 
+def _own(branch: Branch) -> Node | None:
+    """The variable that the law of an element with a sign is over; None where it has none, or several."""
+    if branch.law is None or branch.kind not in ("kinetic", "potential", "dissipator"):
+        return None
+    own = [n for n in ex.variables(branch.law) if n.op == "var" and n.data[0] == branch.name and n.data[1][0] == "b"]
+    return own[0] if len(own) == 1 else None
+
+
+def modulus(branch: Branch) -> Node | None:
+    """The slope of a linear law that must not be negative, a function of parameters; None where it is none."""
+    own = _own(branch)
+    slope = None if own is None or branch.law is None else derivative(branch.law, own)
+    if slope is None or (slope.op == "const" and not slope.data < 0.0):
+        return None
+    moves = slope.op != "param" and any(n.op in ("var", "time", "table") for n in ex.topological([slope]))
+    return None if moves else slope
+
+
 def _sign(branch: Branch, known: Values, report: Report) -> None:
     """E321, E325: the modulus of a linear law, judged with the values bound."""
-    if branch.law is None or branch.kind not in ("kinetic", "potential", "dissipator"):
+    own = _own(branch)
+    if own is None or branch.law is None or _rises(branch.law, own, known):
         return
-    own = [n for n in ex.variables(branch.law) if n.op == "var" and n.data[0] == branch.name and n.data[1][0] == "b"]
-    if len(own) != 1 or _rises(branch.law, own[0], known):
-        return
-    slope = derivative(branch.law, own[0])
-    if slope.op == "const" and not slope.data < 0.0:
-        return
-    if slope.op != "param" and any(n.op in ("var", "time", "table") for n in ex.topological([slope])):
+    slope = modulus(branch)
+    if slope is None:
         return
     found = ((at, known.number(slope, at)) for at in known.cases(slope, branch.loops))
     at, value = next((case for case in found if case[1] < 0.0), ({}, 0.0))

@@ -50,6 +50,14 @@ def passivity(network: Network, known: Values, report: Report) -> None:
             _judge(branch, branch.law, known, laws, report)
 
 
+def active(branch: Branch, known: Values) -> bool:
+    """Whether the rule refuses one dissipator."""
+    report = Report()
+    if branch.law is not None:
+        _judge(branch, branch.law, known, {}, report)
+    return report.failed
+
+
 def _judge(branch: Branch, law: Node, known: Values, laws: _Laws, report: Report) -> None:
     if law.op == "sum" and law.data[0] == 0.0 and len(law.args) == 1 and law.args[0].op == "var":
         return  # 5 ohm*f

@@ -47,7 +47,25 @@ class Succession:
     ) -> tuple[Point, bool]:
         """The consistent point with the constraints that hold from now on, and whether they were sought: what followed
         before is not; NoActiveSetError.  stalled: no time has passed since the last event.
+
+        Where no set fits it is asked once more from the point brought to round-off under what stood: the rows of a
+        draft hold only nearly, and what is left over is taken for a multiplier (a diode that lets go before a
+        capacitor).
         """
+        stood = self.contacts.state()
+        try:
+            return self._after(t, y, yd, touched, stalled=stalled)
+        except NoActiveSetError:
+            self.contacts.become(stood)
+            y, yd, done = self._restart.settler.moved(t, y, yd)
+            if not done:
+                raise
+            return self._after(t, y, yd, touched, stalled=True)
+
+    def _after(
+        self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool
+    ) -> tuple[Point, bool]:
+        """The same from this very point."""
         restart = self._restart
         self._guards(t, y, yd)
         stood = self.contacts.state()

@@ -38,7 +38,14 @@ class WrongOption(Exception):  # noqa: N818
 
 
 class NoSuchForm(Exception):  # noqa: N818
-    """The asked index form or method is impossible for the model (E607); the message says what is possible."""
+    """The asked index form or method is impossible for the model (E607); the message says what is possible.
+
+    rows: of laws in the way.
+    """
+
+    def __init__(self, message: str, rows: tuple[RowLabel, ...] = ()) -> None:
+        super().__init__(message)
+        self.rows = rows
 
 
 class SolverFailure(Exception):  # noqa: N818 (a name of the house)

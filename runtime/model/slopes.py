@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
@@ -34,6 +34,11 @@ def no_slope(rows: Iterable[RowLabel]) -> str:
 
 
 def without_slope(system: System, t: float, y: Floats, yd: Floats) -> tuple[RowLabel, ...]:
+    """Labels of `rows_without_slope`."""
+    return tuple(dict.fromkeys(system.row_label(int(k)) for k in rows_without_slope(system, t, y, yd)))
+
+
+def rows_without_slope(system: System, t: float, y: Floats, yd: Floats) -> Ints:
     """Rows in which the slope by an unknown of which no rate occurs vanishes, or grows without bound, at the point.
 
     y, yd [unknowns] of the system.
@@ -56,4 +61,4 @@ def without_slope(system: System, t: float, y: Floats, yd: Floats) -> tuple[RowL
             seen += beyond
             before = slope
     bent = (falls | rises) & (seen > 1)
-    return tuple(dict.fromkeys(system.row_label(int(k)) for k in row[bent]))
+    return np.unique(row[bent])

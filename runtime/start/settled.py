@@ -264,9 +264,11 @@ class Settler:
 
     def moved(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
         """The same to round-off, though the state must move for it: not within a basis that leaves it where it is."""
-        basis, self.core.contents.basis, self.core.contents.ready = self.core.contents.basis, None, 0
+        core = self.core.contents
+        basis, enough = core.basis, core.enough
+        core.basis, core.enough, core.ready = None, 0.0, 0
         found = self.settle(t, y, yd)
-        self.core.contents.basis, self.core.contents.ready = basis, 0
+        core.basis, core.enough, core.ready = basis, enough, 0
         return found
 
     def held(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:

@@ -9,11 +9,13 @@ are tried in order until the rows hold; the name of the one that found it stays 
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
-from sysdyn.runtime.model.description import Floats, Places
+from sysdyn.runtime.model.description import Floats, Ints, Places
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.patterns import read_only
-from sysdyn.runtime.model.slopes import without_slope
+from sysdyn.runtime.model.slopes import rows_without_slope
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.gauss_newton import (
     OutOfTimeError,
@@ -27,7 +29,7 @@ from sysdyn.runtime.numerics.gauss_newton import (
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
-from sysdyn.runtime.start.strategies import CLOSED, EXACT, HIDDEN, OWN, applicable, first, rescaled
+from sysdyn.runtime.start.strategies import CLOSED, EXACT, HIDDEN, OWN, applicable, around, first, rescaled
 from sysdyn.values import dataclass
 
 BACK = 1e-10
@@ -148,9 +150,10 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
 
 def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution) -> InconsistentStart:
     """Why there is no consistent state: rows in the way, and the fixed values that would have to move."""
-    flat = _flat(starter, t, guess, free) if guess.size <= DENSE else ()
-    if flat:
-        return InconsistentStart("slope", float(best.residual), flat)
+    flat = _flat(starter, t, guess, free)
+    if flat.size:
+        rows = tuple(dict.fromkeys(starter.system.row_label(int(row)) for row in flat))
+        return InconsistentStart("slope", float(best.residual), rows)
     if not np.isfinite(best.residual):
         bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
@@ -181,16 +184,36 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     return InconsistentStart(kind, float((scaled if kind == "stuck" else raw)[order[0]]), rows, candidates)
 
 
-def _flat(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[RowLabel, ...]:
-    """Rows of laws without a slope where the rows as written hold, near the guess; none where these hold nowhere."""
+def _flat(starter: Starter, t: float, guess: Floats, free: Mask) -> Ints:
+    """Rows, of the system, of laws without a slope where the rows as written hold, near the guess; none where these
+    hold nowhere.
+    """
+    if guess.size > DENSE:
+        return np.zeros(0, dtype=np.int64)
     starter.work = Work(EXPLAINED, starter.work.until)
     rows = starter.every & ~starter.groups(*(group for group in HIDDEN if group != "phi_rate"))  # no rate is in these
-    near = _onto(starter, t, guess, guess, rows=rows, free=free)
-    missed = np.abs(starter.residual(t, near)) * starter.row_scale(t, near, starter.scale(t, near))
-    if not (missed[rows] < EXACT).all():
-        return ()
-    y, yd = starter.expand(near)
-    return without_slope(starter.system, t, y, yd)
+    for x in itertools.chain([guess], around(starter, t, guess, free)):
+        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
+        if found.residual < EXACT:
+            near = starter.without_noise(found.x, starter.scale(t, guess))
+            return rows_without_slope(starter.system, t, *starter.expand(near))
+    return np.zeros(0, dtype=np.int64)
+
+
+def _without_rates(starter: Starter, flat: Ints) -> bool:
+    """Asks for no rates of these rows of the system; whether any were asked for.
+
+    Where a law is flat, or infinitely steep, the flow that it determines grows as a root of time: the equations hold,
+    and a rate of it there is none.
+    """
+    before = int(starter.every.sum())
+    first = {(group, family): row for group, family, row in starter.settled.form.groups}
+    for group, family, row in starter.system.form.groups:
+        own = flat[(flat >= row) & (flat < row + starter.system.description.rows[family].size)]
+        rates = first.get((f"{group}_rate", family))
+        if rates is not None:
+            starter.every[rates + own - row] = False
+    return int(starter.every.sum()) < before
 
 
 def consistent_start(
@@ -237,6 +260,9 @@ def _consistent(
         y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
         guess = starter.unknowns(t0, y, np.zeros(y.size))
     best, strategy = _attempt(starter, t0, guess, starter.free)
+    if not strategy and _without_rates(starter, _flat(starter, t0, guess, starter.free)):
+        starter.work = Work(until=until)
+        best, strategy = _attempt(starter, t0, guess, starter.free)
     if not strategy:
         raise _explain(starter, t0, guess, starter.free, best)
     if constants:

@@ -173,15 +173,18 @@ def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
 
 
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """Everything at once from points around, always the same, as long as there is work left: where a guess lies on a
-    singular point.
-    """
+    """Everything at once from points around: where a guess lies on a singular point."""
+    for beside in around(starter, t, x, free):
+        yield rescaled(starter, t, beside, guess, free)
+
+
+def around(starter: Starter, t: float, x: Floats, free: Mask) -> Iterator[Floats]:
+    """Points around, always the same, as long as there is work left."""
     random = np.random.default_rng(20)
     for amplitude in _AMPLITUDES:
         if starter.work.done:
             return
-        shaken = x + np.where(free, amplitude * starter.scale(t, x) * random.standard_normal(x.size), 0.0)
-        yield rescaled(starter, t, shaken, guess, free)
+        yield x + np.where(free, amplitude * starter.scale(t, x) * random.standard_normal(x.size), 0.0)
 
 
 def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:

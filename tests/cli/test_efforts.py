@@ -346,3 +346,152 @@ def test_a_two_port_absorbs_nothing(formulation, tmp_path):
     assert np.abs(got["one"]).max() > 1.0
     assert np.abs(got["T.power"]).max() < 1e-10 * np.abs(got["one"]).max()
     assert np.abs(got["T.energy"]).max() < 1e-4 * np.abs(got["A.energy"]).max()
+
+
+ARRAYS = """
+from std.electrical import resistor, capacitor, voltage
+component pair {
+  param R: ohm
+  port p, n: electrical
+  node m: electrical
+  for i in 1..2 { Rs[i]: resistor(R = i*R) p -> m }
+  C: capacitor(C = 1 mF) m -> n
+  init C.e = 0 V
+}
+component row {
+  port l, r: electrical
+  node v[0..3]: electrical
+  A: resistor(R = 0.1 ohm) l -> v[0]
+  for i in 1..2 { S[i]: pair(R = i*1 ohm) p = v[i-1], n = v[i] }
+  for i in 3..3 { S[i]: pair(R = 7 ohm) p = v[i-1], n = v[i] }
+  B: resistor(R = 0.2 ohm) v[3] -> r
+}
+model m {
+  node a: electrical
+  V: voltage(v = 5 V) a
+  for j in 1..2 { X[j]: row() l = a, r = ground }
+}
+scene s of m {
+  time 0 s to 20 ms
+  trace V.f + sum(j in 1..2: X[j].l.f) as node, X[2].B.f as i
+  trace X[2].S[1].p.f as p1, X[2].S[2].p.f as p2, X[2].S[3].p.f as p3, X[2].S[3].n.f as n3
+  trace energy_through(X[1].l) + energy_through(X[1].r) as whole
+  trace X[1].A.energy + X[1].B.energy + sum(i in 1..3: X[1].S[i].C.energy) as some
+  trace sum(i in 1..3: sum(k in 1..2: X[1].S[i].Rs[k].energy)) as others
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian"])
+def test_ports_of_arrays_of_components_within_each_other(formulation, tmp_path):
+    got = traced(write(tmp_path, ARRAYS), formulation=formulation, output=str(tmp_path / "o.h5"))
+    i = got["i"]
+    assert i.max() > 0.1
+    assert np.abs(got["node"]).max() < 1e-9
+    for name in ("p1", "p2", "p3"):
+        assert got[name] == pytest.approx(i, abs=1e-9)
+    assert got["n3"] == pytest.approx(-i, abs=1e-9)
+    assert got["whole"] == pytest.approx(got["some"] + got["others"], rel=1e-5, abs=1e-12)
+    assert got["whole"][-1] > 0.005
+
+
+def test_arrays_of_ports(tmp_path):
+    """Three sources over a star of resistors: its middle stands at 39/11 V."""
+    text = """
+    from std.electrical import resistor, voltage
+    component star {
+      port p[1..3]: electrical
+      node m: electrical
+      for i in 1..3 { R[i]: resistor(R = i*1 ohm) p[i] -> m }
+    }
+    component cart {
+      port x[1..2]: translation
+      M: kinetic(p = 2 kg*f) x[1]
+      K: potential(e = 5 N/m*q) x[1] -> x[2]
+    }
+    model m {
+      node v[1..3]: electrical
+      node x[1..2]: translation
+      V: voltage(v = 5 V) v[1]
+      W: voltage(v = 3 V) v[2]
+      U: voltage(v = 0 V) v[3]
+      for k in 1..2 { S[k]: star() p = v }
+      C: cart() x = x
+      M: kinetic(p = 2 kg*f) x[2]
+      init x[1].q = 1 m
+    }
+    scene s of m {
+      time 0 s to 20 ms
+      trace S[1].p[1].f as a, sum(k in 1..2: S[k].p[2].f) as b, sum(j in 1..3: S[2].p[j].f) as c
+      trace C.x[1].e as left, C.x[2].e as right, C.K.e as spring, energy_through(C.x[2]) as work, M.energy as gained
+    }
+    """
+    got = traced(write(tmp_path, text), output=str(tmp_path / "o.h5"))
+    middle = 39 / 11
+    assert got["a"] == pytest.approx(5 - middle, rel=1e-9)
+    assert got["b"] == pytest.approx(2 * (3 - middle) / 2, rel=1e-9)
+    assert np.abs(got["c"]).max() < 1e-12
+    assert np.abs(got["left"]).max() < 1e-9  # nothing else is at the first cart
+    assert got["right"] == pytest.approx(-got["spring"], rel=1e-12)
+    assert got["work"] == pytest.approx(-got["gained"], rel=1e-4, abs=1e-9)
+
+
+def test_what_acts_on_an_array_of_ports_by_a_statement_is_refused(tmp_path, capsys):
+    text = """
+    component hook {
+      port x[1..2]: translation
+      energy V = 1/2*(3 N/m)*(x[1].q - x[2].q)^2
+    }
+    model m {
+      node x[1..2]: translation
+      H: hook() x = x
+      for i in 1..2 { M[i]: kinetic(p = 2 kg*f) x[i] }
+      init x[1].q = 1 m
+    }
+    scene s of m { time 0 s to 1 s; trace H.x[1].e }
+    """
+    code, answer = run_json(capsys, "simulate", write(tmp_path, text))
+    assert code == 1
+    assert "acts on this array of ports" in answer["diagnostics"][0]["message"]
+
+
+@pytest.mark.parametrize("formulation", [*PRIMAL, "kane"])
+def test_an_inertia_at_a_port_takes_the_rate_of_its_momentum(formulation, tmp_path):
+    text = """
+    component cart {
+      port x: translation
+      energy T* = 1/2*(2 kg)*(1 + (x.q/(1 m))^2)*x.f^2
+      energy V = 1/2*(3 N/m)*x.q^2
+    }
+    model m {
+      node x: translation
+      C: cart() x
+      K: potential(e = 10 N/m*q) x
+      B: dissipator(e = 1 N.s/m*f) x
+      init x.q = 1 m
+      init x.f = 0 m/s
+    }
+    scene s of m { time 0 s to 2 s; trace C.x.e as port, K.e + B.e as others }
+    """
+    got = traced(write(tmp_path, text), formulation=formulation, output=str(tmp_path / "o.h5"))
+    assert np.abs(got["port"]).max() > 1.0
+    assert got["port"] == pytest.approx(-got["others"], abs=1e-9)
+
+
+def test_two_arrays_of_ports_at_one_array_of_nodes_are_not_told_apart(tmp_path, capsys):
+    text = """
+    component both {
+      port p[1..2], q[1..2]: electrical
+      R: dissipator(e = 2 ohm*f) p[1] -> q[2]
+    }
+    model m {
+      node v[1..2]: electrical
+      V: effort(e = 5 V) v[1]
+      W: effort(e = 3 V) v[2]
+      S: both() p = v, q = v
+    }
+    scene s of m { time 0 s to 1 s; trace S.p[1].f }
+    """
+    code, answer = run_json(capsys, "simulate", write(tmp_path, text))
+    assert code == 1
+    assert "'p' and 'q' are at one node" in answer["diagnostics"][0]["message"]

@@ -111,6 +111,11 @@ def test_what_misses_by_less_than_the_runs_own_error_says_which_accuracy_would_d
     assert told.help.endswith("--accuracy 3e-04 would decide it")
 
 
+def test_an_exact_claim_is_told_what_would_hold():
+    (told,) = expecting("expect finally: x == 4.001", RAMP, estimate=1e-2)[1]
+    assert told.help == "'==' without 'within' asks for the last bit: within 0.001 would hold"
+
+
 # --- runs that disagree -----------------------------------------------------------------------------------------------
 
 

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from sysdyn.api import ModelError, NotMet, SolverFailure, Trace, UsageError, check, load, simulate
+from scipy.linalg import expm
+from sysdyn.api import ModelError, NotMet, SolverFailure, Trace, UsageError, check, compile_model, load, simulate
 
 MODELS = Path(__file__).parents[2] / "models"
 
@@ -218,3 +219,99 @@ def test_functions_of_sums_over_a_size_follow_the_size(tmp_path, formulation):
         found = model.run({"n": n} if n != 3 else {})
         wanted = solve_ivp(rates, (0.0, 3.0), np.append(np.full(n, 0.1), 1.0), rtol=1e-11, atol=1e-12).y[-2:, -1]
         assert [found["last"][-1], found["r"][-1]] == pytest.approx(wanted, rel=1e-6)
+
+
+LADDER = """
+from std.electrical import resistor, capacitor, voltage
+model ladder {
+  param Rr = 1 kohm
+  param n = 3
+  node v[0..n]: electrical
+  V: voltage(v = 1 V) v[0]
+  for i in 1..n {
+    R[i]: resistor(R = Rr) v[i-1] -> v[i]
+    C[i]: capacitor(C = 1 uF) v[i]
+    init C[i].e = 0 V
+  }
+  require Rr < 10 kohm
+}
+scene s of ladder { time 0 s to 1 ms; trace v[n].e as out }
+"""
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8])
+def test_a_ladder_of_another_length_is_that_ladder(tmp_path, n):
+    """Of three sections the middle one is both the second and the last but one: no other length has its rows."""
+    (tmp_path / "m.sd").write_text(LADDER)
+    found = load(tmp_path / "m.sd").run(set={"n": n})["out"].values[-1]
+    a = np.diag([-2.0] * (n - 1) + [-1.0]) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1)
+    source = np.zeros(n)
+    source[0] = 1.0
+    settled = np.linalg.solve(-a, source)
+    assert found == pytest.approx((settled - expm(a) @ settled)[-1], rel=1e-3, abs=1e-7)
+
+
+def test_the_residual_of_a_network_is_that_of_one_size(tmp_path):
+    (tmp_path / "m.sd").write_text(LADDER)
+    module = compile_model(tmp_path / "m.sd")
+    zeros = np.zeros(len(module.manifest["unknowns"]))
+    assert np.isfinite(module.residual(0.0, zeros, zeros, {"Rr": 500.0})).all()
+    with pytest.raises(ModelError, match="the size 'n' is part of the text"):
+        module.residual(0.0, zeros, zeros, {"n": 5.0})
+
+
+@pytest.mark.parametrize(
+    ("settings", "code"),
+    [
+        ({"Rr": -5.0}, "E322"),
+        ({"Rr": 20e3}, "E322"),
+        ({"R[2].R": -1.0}, "E322"),
+        ({"n": 2.5}, "E805"),
+    ],
+)
+def test_numbers_that_a_text_refuses_are_refused_of_a_run(tmp_path, settings, code):
+    (tmp_path / "m.sd").write_text(LADDER)
+    model = load(tmp_path / "m.sd")
+    assert model.run(set={"Rr": 9e3})["out"].values[-1] > 0.0
+    with pytest.raises(ModelError) as error:
+        model.run(set=settings)
+    assert code in {d.code for d in error.value.diagnostics}
+
+
+@pytest.mark.parametrize("settings", [{"k": -2.0}, {"m[2]": -1.0}, {"m": [1.0, 2.0, -3.0]}])
+def test_a_negative_stiffness_or_inertia_is_refused_of_a_run(tmp_path, settings):
+    (tmp_path / "m.sd").write_text("""model m {
+  param k = 4 N/m
+  param m[1..3] = [1 kg, 2 kg, 3 kg]
+  node x[1..3]: translation
+  for i in 1..3 {
+    K[i]: potential(e = 2*k*q) x[i]
+    M[i]: kinetic(p = m[i]*f) x[i]
+    init x[i].q = 1 m
+  }
+}
+scene s of m { time 0 s to 1 s; trace x[1].q as x }
+""")
+    model = load(tmp_path / "m.sd")
+    assert model.run(set={"k": 2.0, "m": [1.0, 2.0, 3.0]})["x"].values[-1] == pytest.approx(np.cos(2.0), rel=1e-3)
+    with pytest.raises(ModelError) as error:
+        model.run(set=settings)
+    assert {d.code for d in error.value.diagnostics} == {"E325" if "k" in settings else "E321"}
+
+
+@pytest.mark.parametrize("settings", [{"a": -1.0}, {"c": -1.0}])
+def test_a_dissipator_that_would_give_power_is_refused_of_a_run(tmp_path, settings):
+    (tmp_path / "m.sd").write_text("""model m {
+  param a = 1 ohm
+  param c = 1 V/A^3
+  node x: electrical
+  R: dissipator(e = a*f + c*f^3) x
+  C: potential(e = q/(1 F)) x
+  init C.e = 1 V
+}
+scene s of m { time 0 s to 1 s; trace C.e as v }
+""")
+    model = load(tmp_path / "m.sd")
+    assert model.run(set={"a": 2.0, "c": 0.0})["v"].values[-1] == pytest.approx(np.exp(-0.5), rel=1e-3)
+    with pytest.raises(ModelError, match="E313"):
+        model.run(set=settings)

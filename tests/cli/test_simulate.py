@@ -181,6 +181,12 @@ def test_until_and_at(tmp_path):
     assert simulate(tmp_path, PENDULUM, "--until", "0.25").time[-1] == 0.25
 
 
+@pytest.mark.parametrize("instants", ["0.1,,0.2", ",", "0.1,", ""])
+def test_an_instant_that_is_missing_is_wrong_usage(tmp_path, instants, capsys):
+    assert run(["simulate", write(tmp_path, PENDULUM), "--at", instants]) == 2
+    assert f"--at '{instants}': a value is missing" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("option", [("--until", "1 m"), ("--until", "x"), ("--at", "1 kg"), ("--max-wall", "2 V")])
 def test_times_with_other_units_are_refused(tmp_path, capsys, option):
     assert run(["simulate", write(tmp_path, PENDULUM), *option]) == 2

@@ -277,3 +277,33 @@ def test_a_text_that_ends_too_soon_says_so(spring, tmp_path, capsys):
     assert {d["code"] for d in found["diagnostics"]} >= {"E112"}
     with pytest.raises(api.ModelError, match="E112"):
         api.load(path)
+
+
+def test_numbers_that_the_text_refuses_fail_alone(tmp_path, capsys, monkeypatch):
+    """The first case among them: the others run, in the core and out of it."""
+    monkeypatch.chdir(tmp_path)
+    Path("m.sd").write_text("""
+from std.electrical import resistor, capacitor, voltage
+model rc {
+  param Rr = 1 kohm
+  param n = 2
+  node v[0..n]: electrical
+  V: voltage(v = 1 V) v[0]
+  for i in 1..n {
+    R[i]: resistor(R = Rr) v[i-1] -> v[i]
+    C[i]: capacitor(C = 1 uF) v[i]
+    init C[i].e = 0 V
+  }
+  require Rr < 10 kohm
+}
+scene s of rc { time 0 s to 1 ms; trace v[n].e as out }
+""")
+    for keep in ("end", "traces"):
+        code = run(["sweep", "m.sd", "--over", "Rr=-1000,500,20000,2000", "--keep", keep, "--json", "-o", f"{keep}.h5"])
+        found = json.loads(capsys.readouterr().out)["result"]
+        assert code == 1
+        assert [(f["run"], f["reason"][:4]) for f in found["failed"]] == [(0, "E322"), (2, "E322")]
+    assert run(["sweep", "m.sd", "--over", "n=1,2,5", "--json", "-o", "n.h5"]) == 0
+    found = json.loads(capsys.readouterr().out)["result"]["end"]["out"]
+    assert found["largest"] == pytest.approx(1 - np.exp(-1), rel=1e-3)
+    assert found["least"] == pytest.approx(0.00211787, rel=1e-3)

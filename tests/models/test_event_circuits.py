@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from model_runs import attempt
+from model_runs import attempt, trace_of
 from sysdyn.api import simulate
 
 W = 100.0 * np.pi
@@ -296,3 +296,31 @@ def test_closed_switches_side_by_side_are_named_with_a_remedy(tmp_path):
     assert found.code == "E931"
     assert "T" in found.message
     assert found.help.startswith("constraints that hold at one time may say the same twice: leave one out")
+
+
+HALF_WAVE = """
+from std.electrical import resistor, capacitor, voltage, diode
+model rectifier {
+  node a, b: electrical
+  Vs: voltage(v = 5 V*sin(2*pi*10 Hz*t)) a -> ground
+  D: diode.complementary() a -> b
+  R: resistor(R = 10 ohm) b -> ground
+  C: capacitor(C = 100 uF) b -> ground
+  init C.e = 0 V
+}
+scene s of rectifier { time 0 s to 0.2 s; trace b.e }
+"""
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7])
+def test_a_diode_before_a_capacitor_lets_go_at_every_accuracy(tmp_path, accuracy, method):
+    """Its current ends while the voltage across it is nothing: what a draft leaves of that is no voltage.  Closed form:
+    the source, from where the current is nothing the capacitor over the resistor.
+    """
+    trace = trace_of(tmp_path, HALF_WAVE, accuracy=accuracy, method=method)
+    w, time = 20 * np.pi, np.mod(trace.time, 0.1)
+    off = (np.pi - np.arctan(w * 10 * 1e-4)) / w
+    falling = 5 * np.sin(w * off) * np.exp(-(time - off) / 1e-3)
+    expected = np.where(time <= off, 5 * np.sin(w * time), falling)
+    assert np.abs(trace["b.e"].values - expected).max() <= 5 * accuracy

@@ -242,6 +242,28 @@ def test_without_flow_constraint_and_quasi_velocity_the_flows_are_the_speeds(cap
     assert [d.code for d in report if d.severity == "error"] == ["E607"]
 
 
+def test_where_every_reaction_is_read_verify_runs_lagrange_alone(tmp_path, capsys):
+    """The rows are Lagrange's then: their agreement would show nothing.  Where none is read, they are Kane's own."""
+    text = """
+    model skate {
+      coord x, y: translation = 0 m
+      coord th: rotation = 0.4 rad
+      energy T* = 1/2*(2 kg)*(x'^2 + y'^2) + 1/2*(0.5 kg.m^2)*th'^2
+      psi edge: x'*sin(th) = y'*cos(th)
+      work 1 N on x
+      init x' = 1 m/s
+      init th' = 0.7 rad/s
+    }
+    scene s of skate { time 0 s to 1 s; trace TRACED }
+    """
+    for traced, alone in (("th, edge.multiplier", True), ("th", False)):
+        (tmp_path / "m.sd").write_text(text.replace("TRACED", traced))
+        assert main(["verify", str(tmp_path / "m.sd")]) == 0
+        said = capsys.readouterr().out
+        assert ("\nkane " not in said) is alone
+        assert ("not in kane: E607 formulation kane: the same rows as Lagrange's" in said) is alone
+
+
 SLED = """
 model sled {
   param m = 2 kg

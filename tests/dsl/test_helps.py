@@ -1,0 +1,57 @@
+"""What is told to write where a number, a condition or an array is not what is wanted there."""
+
+import pytest
+from sysdyn.api import check
+
+MODEL = """
+table f(x: 1) -> 1 linear clamp [ (0, 1), (1, 2) ]
+model m {
+  param a[1..3] = [1 m, 2 m, 3 m]
+  coord x: translation = 1 m
+  energy T* = 1/2*(1 kg)*x'^2
+  discrete k[1..2] = 0
+  LINE
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "code", "help_"),
+    [
+        ("let y = a + 1", "E203", "arrays of one size are added; an element of one is a[1]"),
+        ("let y = a > a", "E203", "an element of one: a[1] < b[1]"),
+        ("let y = (x > 0 m) + 1", "E203", "if x > 0 m then 1 else 0"),
+        ("let y = if x then 1 else 2", "E203", "x > 0 m, or another comparison"),
+        ("let y = if a then 1 else 2", "E203", "compare it"),
+        ("let y = if x > 1 then 1 else 2", "E203", "write '1 m'"),
+        ("let y = if x > 0 m then x else 3", "E203", "write '3 m'"),
+        (
+            "let y = [[1, 2], [3, 4]]",
+            "E203",
+            "one row of values: [1, 2, 3]; of several indices one value for all, and --set M[1,2]=3",
+        ),
+        ("let y = f(x)", "E206", "x/(1 m)"),
+        ("let y = min(x, 3)", "E206", "write '3 m'"),
+        ("let y = min(x, t)", "E206", "both in m"),
+        ("param p = 0x10 kg", "E114", "16: numbers are written in digits of ten"),
+        ("param p = 1_000 kg", "E114", "1000: digits stand together"),
+        ("param p = 1_000 kg/m", "E114", "1000: digits stand together"),
+        ("k[1] := 3; let z = 2", "E113", "when CONDITION { k[1] := 3 }, or every 10 ms { k[1] := 3 }"),
+    ],
+)
+def test_one_finding_with_what_to_write(line, code, help_):
+    found = check(MODEL.replace("LINE", line))
+    assert [(d.code, d.help) for d in found] == [(code, help_)]
+
+
+def test_a_quantity_of_a_component_of_several_ends_is_that_of_an_end():
+    found = check("""
+from std.fluid import relief_valve
+model m {
+  node p: hydraulic
+  Q: flow(f = 0.2 l/s) ground -> p
+  V: relief_valve(opens = 50 bar, R = 1e9 Pa.s/m^3) a = p, b = ground
+}
+scene s of m { time 0 s to 1 s; trace V.f }
+""")
+    assert [(d.code, d.help) for d in found] == [("E102", "V.a.f or V.b.f; of an element inside, V.seat.f")]
