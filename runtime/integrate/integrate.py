@@ -326,6 +326,7 @@ class Integration:
                 before = time.process_time()
                 cross(self, segment)
                 self._put_away()
+                self._spare()
                 self.system.trim(LARGE)
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)

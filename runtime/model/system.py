@@ -204,12 +204,16 @@ class System(Facts):
         """Of the Jacobian."""
         return (self._layout or self._bring_back()).pattern
 
-    def _work(self, entries: int) -> Floats:
-        """Room for the entries of any part, one after the other: all systems of a description have the same."""
+    def _work(self, entries: int) -> Floats | None:
+        """Room for the entries of any part, one after the other: all systems of a description have the same; None of a
+        large one, for which the core finds it for each Jacobian.
+        """
+        if self.unknowns > LARGE:
+            return None
         room = self.description.room
         if not room or room[0].size < entries:
             room[:] = [np.zeros(entries)]
-            for system in self.description.alive.values():
+            for system in (one for one in self.description.alive.values() if one.work is not None):
                 system.work, system._core.v = room[0], lib.pointer(room[0])
         return room[0]
 

@@ -129,7 +129,11 @@ class Solution:
 
 def _numbered(places: Any, used: Mask) -> Any:
     """Places by their numbers among those in use."""
-    return places if used.all() else (np.cumsum(used, dtype=np.int32) - 1)[places]
+    if used.all():
+        return places
+    number = np.cumsum(used, dtype=np.int32)
+    number -= 1
+    return number[places]
 
 
 class _Linear:

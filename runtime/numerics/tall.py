@@ -17,6 +17,7 @@ from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.ordering import tall_order
 from sysdyn.runtime.numerics.points import uniform
+from sysdyn.runtime.numerics.products import pieces
 from sysdyn.values import dataclass
 
 Entries = tuple[Any, Any, Floats]
@@ -70,8 +71,8 @@ class Columns:
 def by_columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> Columns | None:
     """fewer: rows may be fewer than the columns that are used, and empty ones make up for it; else there is none."""
     i, j, v = entries
-    here = v != 0.0
-    if not here.all():
+    if np.count_nonzero(v) < v.size:
+        here = v != 0.0
         i, j, v = i[here], j[here], v[here]
     used = np.zeros(shape[1], dtype=bool)
     used[j] = True
@@ -95,7 +96,12 @@ def by_columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> Colu
 
 def _in_order(i: Any, j: Any) -> bool:
     """Whether entries stand by columns, and by rows in each, as those of a pattern do: they need not be copied."""
-    return bool(((j[1:] > j[:-1]) | ((j[1:] == j[:-1]) & (i[1:] > i[:-1]))).all())
+    for here in pieces(j.size - 1):
+        behind = slice(here.start + 1, min(here.stop + 1, j.size))
+        before = slice(here.start, behind.stop - 1)
+        if not ((j[behind] > j[before]) | ((j[behind] == j[before]) & (i[behind] > i[before]))).all():
+            return False
+    return True
 
 
 def determined(
