@@ -19,6 +19,8 @@ def cross(run: Integration, segment: Segment) -> None:
     """Restarts behind the instant at which the segment before this one ended."""
     n, method = run.system.form.written, run.method.contents
     y, yd = run.method.point()
+    if run.pieces is None:  # nobody asks for what the last step made
+        run.method.rest()
     run.sizes.share(y)
     y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
     if run.pieces is not None:
@@ -38,7 +40,6 @@ def cross(run: Integration, segment: Segment) -> None:
 def _across(run: Integration, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
     """The point behind a jump of the text at t (s); where no state jumps, what is left of the unknowns tells."""
     settlers, forms = run.settlers, run.forms
-    run.method.rest()
     if forms is not None and settlers.whole_form == "settled":
         n = run.system.form.written
         found = still(run.settler, t, (y, yd), settlers.keeps, run.sizes.magnitude[:n])

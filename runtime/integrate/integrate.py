@@ -67,7 +67,7 @@ class Integration:
         alone = origin is None and request.events is None
         system.trim()  # of the run before
         if request.begin is not None:  # nor are the numbers part of this start that its events left
-            system.description.p[:] = request.begin[0]
+            system.description.put(request.begin[0])
             system.description.switches.set(request.begin[1])
         self.origin: Origin | None = origin or Origin(system, start, request.index)
         origin = self.origin

@@ -151,7 +151,12 @@ class _Linear:
         taken = problem.use[problem.rows]
         taken &= problem.free[problem.columns]
         taken &= np.isfinite(values)
-        return values if taken.all() else np.where(taken, values, 0.0)
+        if taken.all():
+            return values
+        np.logical_not(taken, out=taken)
+        values = values if values.flags.writeable else values.copy()
+        values[taken] = 0.0
+        return values
 
     @cached_property
     def row_scale(self) -> Floats:

@@ -130,7 +130,7 @@ def solved(
     more = columns.pattern.rows - columns.rows
     if more:
         aim = np.append(aim, np.zeros(more))
-    for way in (_substituted, _factored if idle is None else _beside(idle[columns.used])):
+    for way in (_substituted, _factored if idle is None else _beside(idle)):
         found = np.zeros(columns.pattern.unknowns)
         failed = way(columns, aim, found)
         if failed == MEMORY:
@@ -160,9 +160,9 @@ def _beside(idle: NDArray[np.bool_]) -> Callable[[Columns, Floats, Floats], int]
     """The same with unknowns that may be left open."""
 
     def factored(columns: Columns, aim: Floats, found: Floats) -> int:
-        along = _generic(idle.size)
-        failed = _factored(columns, aim, found, idle.astype(np.int32), along)  # A along = 0: what it moves is open
-        return failed or int((np.abs(along[~idle]) > OPEN * np.abs(along).max(initial=0.0)).any())
+        own, along = idle[columns.used], _generic(found.size)
+        failed = _factored(columns, aim, found, own.astype(np.int32), along)  # A along = 0: what it moves is open
+        return failed or int((np.abs(along[~own]) > OPEN * np.abs(along).max(initial=0.0)).any())
 
     return factored
 
