@@ -330,6 +330,8 @@ class Integration:
                 self.system.trim(LARGE)
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)
+        if spent:
+            self.method.rest()
         y, yd = self.method.point()
         found = Finished(
             method.t,
@@ -354,9 +356,10 @@ class Integration:
     def _leave_method(self) -> None:
         """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""
         self._work = self.work
-        self.driver.ledgers.close()
+        ledgers = self.driver.ledgers
         for name in ("method", "driver", "told", "linear", "_taken", "settler", "settlers", "projection", "pieces"):
             self.__dict__.pop(name, None)
+        ledgers.close()
         self.system.trim()
 
 
