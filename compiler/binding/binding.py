@@ -39,8 +39,8 @@ SCALAR = ("observe", "audit")  # blocks whose row families are scalars, whatever
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Initial values of one statement: positions in a family of unknowns, fixed or guessed; one value for all of them is
-    held once.
+    """Initial values of one statement: positions in a family of unknowns, fixed or guessed; one value for all of them
+    is held once.
     """
 
     family: int

@@ -49,8 +49,8 @@ def _across(run: Integration, t: float, y: Floats, yd: Floats) -> tuple[Floats, 
 
 
 def go_on(run: Integration, t: float, label: float, point: list[Floats]) -> None:
-    """Restarts at t (s) from a point [unknowns as written], which is taken out, with the row of the instant `label`; the
-    point before it was left (`Driver.leave`).
+    """Restarts at t (s) from a point [unknowns as written], which is taken out, with the row of the instant `label`;
+    the point before it was left (`Driver.leave`).
     """
     n = run.system.form.written
     if run.pieces is None:  # nobody else has its address

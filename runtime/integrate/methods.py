@@ -98,8 +98,8 @@ class Method:
         getattr(lib.core, f"sd_{name}_start")(core, t, lib.pointer(y), lib.pointer(yd), 0.0)
 
     def rest(self) -> None:
-        """Of a large system: until the next start it has no more than its last point, for between pieces of a run the room
-        counts.
+        """Of a large system: until the next start it has no more than its last point, for between pieces of a run the
+        room counts.
         """
         if self.name == "radau" and self._n > LARGE:
             lib.core.sd_radau_rest(self._core)

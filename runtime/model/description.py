@@ -368,8 +368,8 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
 
 
 def _numbers(binding: Mapping[str, Any]) -> Floats:
-    """p of a binding: its own where it stands (of a large model the room counts), else a copy: events write there, and the
-    next run.
+    """The array p of a binding where it stands (of a large model the room counts), else a copy: events write there, and
+    the next run.
     """
     p = np.asarray(binding["p"], dtype=np.float64)
     if not binding.get("stand") or binding.get("alone"):
