@@ -37,13 +37,14 @@ class ModuleFault(Exception):  # noqa: N818 (a fault in sysdyn, exit 4)
 
 def check_module(prepared: Prepared, started: Started, until: float) -> None:
     """Compare every block at the start and nearby, up to `until` [s].  Raises ModuleFault."""
-    p = started.system.description.p
-    standing = p.copy()  # senses of the start; the oracle has what was bound
-    p[:] = prepared.binding.p
+    description = started.system.description
+    written = description.p.flags.writeable
+    standing = description.p.copy() if written else description.p  # senses of the start; the oracle has what was bound
+    description.put(prepared.binding.p)
     try:
         _compare(prepared, started, until)
     finally:
-        p[:] = standing
+        description.put(standing)
 
 
 def _compare(prepared: Prepared, started: Started, until: float) -> None:

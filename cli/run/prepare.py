@@ -56,7 +56,9 @@ class Prepared:
         """The binding as the contract's plain arrays."""
         b = self.binding
         sizes = b.ix.tobytes(), b.shapes, b.row_shapes
-        return {**self.arrays_of(b), "layouts": self.layouts.setdefault(sizes, {}), "alone": self.alone}
+        stand = not (self.network.events or self.network.switches or self.compiled.form.kinks)
+        found = {**self.arrays_of(b), "stand": stand}
+        return {**found, "layouts": self.layouts.setdefault(sizes, {}), "alone": self.alone}
 
     @staticmethod
     def arrays_of(b: Binding) -> dict[str, Any]:

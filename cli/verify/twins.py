@@ -49,7 +49,7 @@ def twins(prepared: Prepared, started: Started, until: float) -> Twins | None:
     system, twin = started.system, System(other.structure, other.arrays, other.carrier)
     # what holds at the start, and the senses of friction, were found with the first carrier
     twin.description.switches.set(system.description.switches.active)
-    twin.description.p[:] = system.description.p
+    twin.description.put(system.description.p)
     y, yd = started.state.for_form(system)
     random = np.random.default_rng(1)
     here, there = np.zeros((POINTS, system.rows)), np.zeros((POINTS, system.rows))

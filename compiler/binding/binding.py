@@ -39,10 +39,12 @@ SCALAR = ("observe", "audit")  # blocks whose row families are scalars, whatever
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Initial values of one statement: positions in a family of unknowns, fixed or guessed."""
+    """Initial values of one statement: positions in a family of unknowns, fixed or guessed; one value for all of them
+    is held once.
+    """
 
     family: int
-    positions: NDArray[np.int64]
+    positions: NDArray[np.int32]
     values: NDArray[np.float64]
     fixed: bool
     label: str
@@ -162,21 +164,23 @@ def _starts(form: DescriptorForm, owners: dict[str, Extents], parameters: Parame
         family = form.families[pin.family]
         *at, values = over(pin.nest, (*pin.at, pin.value), parameters.checked(pin.place))
         box = owners[family.owner]
-        where = _positions(family.owner, box, at, pin.place) if box else np.zeros(len(values), dtype=np.int64)
+        where = _positions(family.owner, box, at, pin.place) if box else np.zeros(len(values), dtype=np.int32)
         parameters.finite(values, pin.place, f"the initial value of {family.name}")
+        if values.size and (values == values[0]).all():
+            values = np.broadcast_to(values[:1].copy(), values.shape)
         line = pin.place.start[0]
         found.append(Start(pin.family, where, values, pin.fixed, family.name, pin.place.file, line, pin.place))
     return tuple(found)
 
 
-def _positions(name: str, box: Extents, at: list[NDArray[np.float64]], place: Place) -> NDArray[np.int64]:
+def _positions(name: str, box: Extents, at: list[NDArray[np.float64]], place: Place) -> NDArray[np.int32]:
     """Positions in a family; an index outside its shape is E805."""
     for values, (first, last) in zip(at, box, strict=True):
         outside = (values < first) | (values > last)
         if np.any(outside):
             k = values[np.argmax(outside)]
             raise ModelError([Diagnostic("E805", f"{name}: index {k:g} outside {first}..{last}", place)])
-    return positions(box, [np.rint(values).astype(np.int64) for values in at])
+    return positions(box, [np.rint(values).astype(np.int64) for values in at]).astype(np.int32)
 
 
 def offsets_of(

@@ -167,7 +167,7 @@ def _initial(form: DescriptorForm, binding: Binding) -> Iterator[_Piece]:
     for pin, start in sorted(pairs, key=lambda pair: pair[0].fixed):
         every = np.arange(start.positions.size)
         formula = Formula("initial_values", pin.nest, pin.value)
-        yield _Piece(formula, "initial", every.size, every, start.positions, pin.family)
+        yield _Piece(formula, "initial", every.size, every, start.positions.astype(np.int64), pin.family)
 
 
 def _constants(

@@ -26,6 +26,11 @@ class Composition:
     direct: tuple[Ints, Ints]
     levels: tuple[tuple[Ints, Ints, Ints], ...]
 
+    def places(self) -> Composition:
+        """Where the entries of T stand, without what their values are made of: of a large system the room counts."""
+        nothing = np.zeros(0, dtype=np.int32)
+        return Composition(self.start, self.source, (nothing, nothing), ())
+
     def values(self, factor: Floats) -> Floats:
         """The entries of T [entries] by the factors of the terms."""
         found = np.zeros(self.source.size)

@@ -79,15 +79,15 @@ class Condensed:
     def __init__(
         self, system: System, found: Sums, terms: Composition, straights: Straights, kept_rows: Ints
     ) -> None:
-        """found: the structure, and the first numbers; terms: as sums of kept unknowns; straights: of found."""
-        self._composition, self._straights = terms, straights
+        """found: the structure; terms: as sums of kept unknowns; straights: of found."""
+        self._straights = straights
         self.whole, self.sums = system, found
         self.kept, self.kept_rows = found.kept, kept_rows
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
         self.paired = False
         self.own_rows: Ints | None = None
         self._keep: list[object] = []
-        columns = self._products()
+        columns = self._products(terms)
         self._lay_out(columns)
         if self.unknowns == self.rows > SMALL and self._pair():
             self._lay_out(columns)
@@ -127,9 +127,9 @@ class Condensed:
         self._keep.append(array)
         return lib.pointer(array)
 
-    def _products(self) -> Ints:
+    def _products(self, terms: Composition) -> Ints:
         """Which entries of the whole matrix add to this one with what factor; the column of each such product."""
-        system, found, terms = self.whole, self.sums, self._composition
+        system, found = self.whole, self.sums
         kept = np.zeros(system.rows, dtype=bool)
         kept[self.kept_rows] = True
         entry = places_of(kept[system.pattern.row])
@@ -166,18 +166,14 @@ class Condensed:
         self._keep.append(made)
         return made, int(first.size)
 
-    def renew(self, found: Sums) -> None:
-        """Takes the numbers of other sums of the same structure."""
-        self.sums = found
+    def renew(self, factors: Floats) -> None:
+        """Takes the numbers of other sums of the same structure: the entries of T."""
         at, term = self._shared
-        self._share[at] = self._composition.values(found.factor)[term]
-        self._straights.renew(found)
+        self._share[at] = factors[term]
 
     def fix(self) -> None:
         """Lets go of what only other numbers would need: `renew` is not asked again."""
-        del self._composition, self._shared
-        found, nothing = self.sums, np.zeros(0, dtype=np.int32)
-        self.sums = Sums(found.place, np.zeros(0), nothing, nothing, np.zeros(0), found.kept, found.unread)
+        del self._shared
 
     def _observed_rates(self) -> bool:
         """Whether what is observed reads rates of eliminated unknowns."""
@@ -378,6 +374,9 @@ class _Condenser:
         self._allowed = np.zeros(0, dtype=bool)
         self._found: Elimination | None = None
         self._forms: Forms | None = None
+        self._numbers: Sums
+        self._terms: Composition
+        self._straights: Straights
         self._last: tuple[Forms | None, bytes] | None = None
         """What came of the last numbers asked, and their digest."""
 
@@ -423,9 +422,11 @@ class _Condenser:
             return self._made(held)
         if self._forms is None:
             self._forms = self._made([found, numbers])
-        elif not numbers.same(self._forms.stepped.sums):
-            self._forms.stepped.renew(numbers)
-            self._forms.settled.renew(numbers)
+        elif not numbers.same(self._numbers):
+            self._numbers, factors = numbers, self._terms.values(numbers.factor)
+            self._straights.renew(numbers)
+            self._forms.stepped.renew(factors)
+            self._forms.settled.renew(factors)
         return self._forms
 
     def _made(self, held: list[Any]) -> Forms | None:
@@ -438,6 +439,13 @@ class _Condenser:
         rows[whole.form.k_row[np.isin(whole.form.k_q, found.unread)]] = False
         del found
         terms, straights = numbers.composed(whole.unknowns), Straights(numbers)
+        straights.renew(numbers)
+        factors = terms.values(numbers.factor)
+        if whole.unknowns > LARGE:
+            straights.fix()
+            terms, numbers = terms.places(), numbers.places()
+        else:
+            self._terms, self._straights, self._numbers = terms, straights, numbers
         kept = settled_rows(whole, self.settled, ~rows, numbers)
         if kept is None:
             return None
@@ -446,7 +454,7 @@ class _Condenser:
         made = {}
         for system in (self.settled, whole):
             form = made[system] = Condensed(system, numbers, terms, straights, rows_of.pop(system))
-            form.renew(numbers)
+            form.renew(factors)
             if whole.unknowns > LARGE:
                 form.fix()
             form.renumber()
@@ -456,8 +464,6 @@ class _Condenser:
                 system.put_away(whole=True)
                 whole.spare()
                 whole.trim()
-        if whole.unknowns > LARGE:
-            straights.fix()
         room = Room(max(form.places for form in made.values()), whole, self.settled)
         for form in made.values():
             form.bind(room)

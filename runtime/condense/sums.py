@@ -37,6 +37,11 @@ class Sums:
         number, later = numbers_of(unknowns, self.kept), numbers_of(unknowns, self.place)
         return composed(self.start, number[self.source], later[self.source])
 
+    def places(self) -> Sums:
+        """What of it is no number, and no term: of a large system the room counts."""
+        nothing, none = np.zeros(0, dtype=np.int32), np.zeros(0)
+        return Sums(self.place, none, nothing, nothing, none, self.kept, self.unread)
+
     def same(self, other: Sums) -> bool:
         """Whether the numbers are those of another one of the same structure, bit for bit."""
         return bool((self.factor == other.factor).all() and (self.constant == other.constant).all())

@@ -33,6 +33,7 @@ def eventful_start(system: System, t0: float, plan: Plan, until: float | None = 
     except InconsistentStart:
         if not system.description.constants:
             raise
+        system.own_numbers()  # the constants are written there
         with suppress(InconsistentStart):
             return _fitting(system, t0, plan, until, constants=True)
         raise

@@ -59,9 +59,11 @@ def _null_place(run: Integration) -> tuple[tuple[str, ...], int]:
         return (), -1
 
 
-def _worst(run: Integration) -> str:
-    """The unknown with the largest weighted correction in the last step."""
+def _worst(run: Integration) -> str | None:
+    """The unknown with the largest weighted correction in the last step; None of a method that rests."""
     method, n = run.method.contents, run.stepped.unknowns
+    if not method.ee:
+        return None
     change = np.abs(lib.reader(method.ee, n) * lib.reader(method.weight, n))
     change = np.where(np.isfinite(change), change, np.inf)
     test = run.told.roles.test

@@ -19,6 +19,8 @@ def cross(run: Integration, segment: Segment) -> None:
     """Restarts behind the instant at which the segment before this one ended."""
     n, method = run.system.form.written, run.method.contents
     y, yd = run.method.point()
+    if run.pieces is None:  # nobody asks for what the last step made
+        run.method.rest()
     run.sizes.share(y)
     y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
     if run.pieces is not None:
@@ -27,8 +29,11 @@ def cross(run: Integration, segment: Segment) -> None:
         found = _across(run, segment.begin, y, yd)
     if found is None:
         raise failure(run, "newton")
+    run.driver.leave(y, yd)
     method.t_end = segment.end
-    go_on(run, segment.begin, segment.label, found, (y, yd))
+    point = [*found]
+    del y, yd, found  # of a large run the room counts
+    go_on(run, segment.begin, segment.label, point)
     run.driver.run.start_kind = 0
 
 
@@ -43,20 +48,23 @@ def _across(run: Integration, t: float, y: Floats, yd: Floats) -> tuple[Floats, 
     return settlers.restart.across(t, y if forms is None else forms.completed(t, y), yd)
 
 
-def go_on(
-    run: Integration, t: float, label: float, point: tuple[Floats, Floats], before: tuple[Floats, Floats]
-) -> None:
-    """Restarts at t (s) from a point [unknowns as written], with the row of the instant `label`."""
+def go_on(run: Integration, t: float, label: float, point: list[Floats]) -> None:
+    """Restarts at t (s) from a point [unknowns as written], which is taken out, with the row of the instant `label`;
+    the point before it was left (`Driver.leave`).
+    """
     n = run.system.form.written
-    if not run.start_rate.flags.writeable:  # the start's own
+    if run.pieces is None:  # nobody else has its address
         run.start_rate = np.zeros(run.system.unknowns)
         run.driver.run.start_rate = lib.pointer(run.start_rate)
     y, run.start_rate[:] = np.zeros(run.system.unknowns), 0.0
-    y[:n], run.start_rate[:n] = point
+    run.start_rate[:n] = point.pop()
+    y[:n] = point.pop()
+    run.method.rest()
     yd = np.where(run.roles.differential, run.start_rate, 0.0)
     run.sizes.begin_to_move(t, y, run.start_rate)
     run.sizes.resolve(t, y, yd, run.roles.state)
     run.sizes.hand_down()
     run.method.begin(y, yd)
-    pointers = (lib.pointer(item) for item in (y, yd, *before))
-    lib.core.sd_run_restart(run.driver.core, t, label, *pointers)
+    lib.core.sd_run_restart(run.driver.core, t, label, lib.pointer(y), lib.pointer(yd))
+    if run.pieces is None:  # the next restart has its own
+        run.start_rate, run.driver.run.start_rate = np.zeros(0), None

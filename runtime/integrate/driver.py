@@ -112,6 +112,10 @@ class Driver:
         blocks = [self.system.description.blocks.get(name, ()) for name in ("observe", "observe_scale")]
         return all(k.reads is not None and not (k.reads & audit) for block in blocks for k in block)
 
+    def leave(self, y: Floats, yd: Floats) -> None:
+        """Notes the powers at y, yd [unknowns as written], the point behind which the run restarts."""
+        lib.core.sd_run_leave(self.core, lib.pointer(y), lib.pointer(yd))
+
     def drain(self, sink: Sink) -> None:
         """Rows so far go to the sink."""
         run = self.run

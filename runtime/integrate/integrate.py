@@ -67,7 +67,7 @@ class Integration:
         alone = origin is None and request.events is None
         system.trim()  # of the run before
         if request.begin is not None:  # nor are the numbers part of this start that its events left
-            system.description.p[:] = request.begin[0]
+            system.description.put(request.begin[0])
             system.description.switches.set(request.begin[1])
         self.origin: Origin | None = origin or Origin(system, start, request.index)
         origin = self.origin
@@ -326,9 +326,12 @@ class Integration:
                 before = time.process_time()
                 cross(self, segment)
                 self._put_away()
+                self._spare()
                 self.system.trim(LARGE)
                 self.cpu += time.process_time() - before
             self._advance(sink, progress, began, segment.end)
+        if spent:
+            self.method.rest()
         y, yd = self.method.point()
         found = Finished(
             method.t,
@@ -353,9 +356,10 @@ class Integration:
     def _leave_method(self) -> None:
         """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""
         self._work = self.work
-        self.driver.ledgers.close()
+        ledgers = self.driver.ledgers
         for name in ("method", "driver", "told", "linear", "_taken", "settler", "settlers", "projection", "pieces"):
             self.__dict__.pop(name, None)
+        ledgers.close()
         self.system.trim()
 
 

@@ -14,7 +14,7 @@ from sysdyn.runtime.integrate.factors import Factorisation, Factors
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import Order
 
 
@@ -96,6 +96,13 @@ class Method:
         name, core = ("expanded", self.expanded) if self.expanded else (self.name, self._core)
         self.begin(y, yd)
         getattr(lib.core, f"sd_{name}_start")(core, t, lib.pointer(y), lib.pointer(yd), 0.0)
+
+    def rest(self) -> None:
+        """Of a large system: until the next start it has no more than its last point, for between pieces of a run the
+        room counts.
+        """
+        if self.name == "radau" and self._n > LARGE:
+            lib.core.sd_radau_rest(self._core)
 
     def begin(self, y: Floats, yd: Floats) -> None:
         """Notes what no step moves of the point that it starts from."""

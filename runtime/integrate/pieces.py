@@ -240,7 +240,8 @@ class Pieces:
         self._bounce(t)
         if misled:
             self._short(t, misled)
-        go_on(self.run, t, t, point, before)
+        self.run.driver.leave(*before)
+        go_on(self.run, t, t, [*point])
         core.start_kind = 0
         self._watch()
 

@@ -76,6 +76,7 @@ class Batch:
             options = replace(options, every=None, at=())
         options = replace(options, output=None, progress=None, watch=None, wall_began=None, cpu_compile=0.0)
         self.options, self.way = options, way
+        way.system.own_numbers()  # the core writes there
         self._alive: list[Any] = []  # what the core has addresses of
         self.runs = Runs(start, self.options, way)
         meters = self.runs.quantities.meters

@@ -173,7 +173,7 @@ class Initial:
     """Initial values of elements of one family: positions [k], values [k] (SI), fixed or guessed."""
 
     family: int
-    positions: NDArray[np.int64]
+    positions: Ints
     values: Floats
     fixed: bool
     label: RowLabel
@@ -195,11 +195,12 @@ def stated(
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A compiled model bound to parameter values.  p [parameters] SI, ix [integers]; layouts: what follows from
-    the structure of the index forms made so far, found once (System.once); branches: places in p of
-    laws that may slide (events/kinks.py); systems: those of runs one after the other that share p, by index form;
-    alive: those that somebody has now, where runs do not share them; room: work of their Jacobians; constants: of
-    integrated constraints, by their family of rows, where they begin in p and how many there are.
+    """A compiled model bound to parameter values.  p [parameters] SI, the binding's own and read-only where no event
+    writes there (`System.own_numbers`); ix [integers]; layouts: what follows from the structure of the index forms
+    made so far, found once (System.once); branches: places in p of laws that may slide (events/kinks.py); systems:
+    those of runs one after the other that share p, by index form; alive: those that somebody has now, where runs do
+    not share them; room: work of their Jacobians; constants: of integrated constraints, by their family of rows, where
+    they begin in p and how many there are.
     """
 
     families: tuple[Family, ...]
@@ -215,6 +216,11 @@ class Description:
     alive: WeakValueDictionary[Any, Any] = field(default_factory=WeakValueDictionary, compare=False)
     room: list[Floats] = field(default_factory=list, compare=False)
     constants: tuple[tuple[int, int, int], ...] = ()
+
+    def put(self, p: Floats) -> None:
+        """Takes these numbers; those of a binding, where nothing writes into them, it has."""
+        if self.p.flags.writeable:
+            self.p[:] = p
 
     def families_of(self, kind: str) -> tuple[int, ...]:
         """Numbers of the families of one kind."""
@@ -306,7 +312,7 @@ def _initial(value: Mapping[str, Any], names: Mapping[str, int]) -> Initial:
     family = value["family"]
     return Initial(
         family=names[family] if isinstance(family, str) else int(family),
-        positions=np.atleast_1d(np.asarray(value["positions"], dtype=np.int64)),
+        positions=np.atleast_1d(np.asarray(value["positions"], dtype=np.int32)),
         values=np.atleast_1d(np.asarray(value["values"], dtype=np.float64)),
         fixed=bool(value["fixed"]),
         label=RowLabel(
@@ -347,7 +353,7 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
         families=own_families,
         rows=own_rows,
         blocks=blocks,
-        p=np.array(binding["p"], dtype=np.float64),  # its own: events write there
+        p=_numbers(binding),
         ix=np.ascontiguousarray(binding["ix"], dtype=np.int32),
         initial=initial,
         switches=Switches(tuple(_switched(item, families, shapes) for item in structure.get("switches", ()))),
@@ -359,6 +365,18 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
     if binding.get("alone"):
         layouts["last"] = found
     return found
+
+
+def _numbers(binding: Mapping[str, Any]) -> Floats:
+    """The array p of a binding where it stands (of a large model the room counts), else a copy: events write there, and
+    the next run.
+    """
+    p = np.asarray(binding["p"], dtype=np.float64)
+    if not binding.get("stand") or binding.get("alone"):
+        return p.copy()
+    p = p[:]
+    p.flags.writeable = False
+    return p
 
 
 def _again(before: Description, binding: Mapping[str, Any]) -> Description:

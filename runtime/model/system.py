@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Callable, Hashable, Mapping
+from dataclasses import replace
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
@@ -71,6 +73,15 @@ class System(Facts):
         found = System.__new__(System)
         found._plan(self.description, self.carrier, index_form, self.left_out)
         return found
+
+    def own_numbers(self) -> None:
+        """From now on its p is its own, which may be written into."""
+        old = self.description
+        if old.p.flags.writeable:
+            return
+        own = replace(old, p=old.p.copy(), alive=WeakValueDictionary(), room=[])
+        self._make(own, self.carrier, self.form.name, self.left_out)
+        own.alive[self.form.name, self.left_out] = self
 
     def _plan(self, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut) -> None:
         self.description, self.carrier, self.left_out = description, carrier, left_out
@@ -204,12 +215,16 @@ class System(Facts):
         """Of the Jacobian."""
         return (self._layout or self._bring_back()).pattern
 
-    def _work(self, entries: int) -> Floats:
-        """Room for the entries of any part, one after the other: all systems of a description have the same."""
+    def _work(self, entries: int) -> Floats | None:
+        """Room for the entries of any part, one after the other: all systems of a description have the same; None of a
+        large one, for which the core finds it for each Jacobian.
+        """
+        if self.unknowns > LARGE:
+            return None
         room = self.description.room
         if not room or room[0].size < entries:
             room[:] = [np.zeros(entries)]
-            for system in self.description.alive.values():
+            for system in (one for one in self.description.alive.values() if one.work is not None):
                 system.work, system._core.v = room[0], lib.pointer(room[0])
         return room[0]
 

@@ -129,7 +129,11 @@ class Solution:
 
 def _numbered(places: Any, used: Mask) -> Any:
     """Places by their numbers among those in use."""
-    return places if used.all() else (np.cumsum(used, dtype=np.int32) - 1)[places]
+    if used.all():
+        return places
+    number = np.cumsum(used, dtype=np.int32)
+    number -= 1
+    return number[places]
 
 
 class _Linear:
@@ -147,7 +151,12 @@ class _Linear:
         taken = problem.use[problem.rows]
         taken &= problem.free[problem.columns]
         taken &= np.isfinite(values)
-        return values if taken.all() else np.where(taken, values, 0.0)
+        if taken.all():
+            return values
+        np.logical_not(taken, out=taken)
+        values = values if values.flags.writeable else values.copy()
+        values[taken] = 0.0
+        return values
 
     @cached_property
     def row_scale(self) -> Floats:
@@ -202,15 +211,16 @@ class _Linear:
             raise MemoryError
         return None if failed else np.where(stands | beside, u + step / self.unit, 0.0)
 
-    def nearest(self, u: Floats, r: Floats, *, beside: bool) -> Floats:
-        """The least u with A u = A u_now - r; beside it, the least step: its round-off is its own.  r is spent."""
+    def nearest(self, x: Floats, r: Floats, *, beside: bool) -> Floats:
+        """The least u with A u = A u_now - r at x; beside it, the least step: its round-off is its own.  r is spent."""
         levels = [level[self.problem.free] for level in self.problem.levels]
         ordered = any(level.any() for level in levels) and max(self.shape) <= DENSE
         if not ordered and max(self.shape) <= SINGULAR_VALUES:
-            only = self.determined(u, r, beside=beside)
+            only = self.determined(self.moved(x), r, beside=beside)
             if only is not None:
                 return only
         held = [self.entries()]
+        u = self.moved(x)
         # what costs nothing stays where it is as far as it may
         stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else 0.0
         aim = add_product(*held[0], u - stays, np.negative(r, out=r))
@@ -280,7 +290,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
         norm, rows = float(np.linalg.norm(scaled)), [scaled[problem.use]]
         del scaled
         try:
-            target = linear.nearest(linear.moved(x), rows.pop(), beside=size < _BESIDE and stale > 1)
+            target = linear.nearest(x, rows.pop(), beside=size < _BESIDE and stale > 1)
         except NotFiniteError:
             break
         problem.spare()
@@ -310,10 +320,9 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
 def stepped(problem: Problem, x: Floats) -> Floats:
     """The point one whole step from x.  NotFiniteError."""
     linear, free = _Linear(problem, x), problem.free
-    u = linear.moved(x)
     r = (problem.residual(x) * linear.row_scale)[problem.use]
     found = x.copy()
-    found[free] = problem.guess[free] + linear.nearest(u, r, beside=False) * linear.unit
+    found[free] = problem.guess[free] + linear.nearest(x, r, beside=False) * linear.unit
     return found
 
 

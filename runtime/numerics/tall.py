@@ -17,6 +17,7 @@ from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.ordering import tall_order
 from sysdyn.runtime.numerics.points import uniform
+from sysdyn.runtime.numerics.products import pieces
 from sysdyn.values import dataclass
 
 Entries = tuple[Any, Any, Floats]
@@ -70,8 +71,8 @@ class Columns:
 def by_columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> Columns | None:
     """fewer: rows may be fewer than the columns that are used, and empty ones make up for it; else there is none."""
     i, j, v = entries
-    here = v != 0.0
-    if not here.all():
+    if np.count_nonzero(v) < v.size:
+        here = v != 0.0
         i, j, v = i[here], j[here], v[here]
     used = np.zeros(shape[1], dtype=bool)
     used[j] = True
@@ -95,7 +96,12 @@ def by_columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> Colu
 
 def _in_order(i: Any, j: Any) -> bool:
     """Whether entries stand by columns, and by rows in each, as those of a pattern do: they need not be copied."""
-    return bool(((j[1:] > j[:-1]) | ((j[1:] == j[:-1]) & (i[1:] > i[:-1]))).all())
+    for here in pieces(j.size - 1):
+        behind = slice(here.start + 1, min(here.stop + 1, j.size))
+        before = slice(here.start, behind.stop - 1)
+        if not ((j[behind] > j[before]) | ((j[behind] == j[before]) & (i[behind] > i[before]))).all():
+            return False
+    return True
 
 
 def determined(
@@ -124,7 +130,7 @@ def solved(
     more = columns.pattern.rows - columns.rows
     if more:
         aim = np.append(aim, np.zeros(more))
-    for way in (_substituted, _factored if idle is None else _beside(idle[columns.used])):
+    for way in (_substituted, _factored if idle is None else _beside(idle)):
         found = np.zeros(columns.pattern.unknowns)
         failed = way(columns, aim, found)
         if failed == MEMORY:
@@ -154,9 +160,9 @@ def _beside(idle: NDArray[np.bool_]) -> Callable[[Columns, Floats, Floats], int]
     """The same with unknowns that may be left open."""
 
     def factored(columns: Columns, aim: Floats, found: Floats) -> int:
-        along = _generic(idle.size)
-        failed = _factored(columns, aim, found, idle.astype(np.int32), along)  # A along = 0: what it moves is open
-        return failed or int((np.abs(along[~idle]) > OPEN * np.abs(along).max(initial=0.0)).any())
+        own, along = idle[columns.used], _generic(found.size)
+        failed = _factored(columns, aim, found, own.astype(np.int32), along)  # A along = 0: what it moves is open
+        return failed or int((np.abs(along[~own]) > OPEN * np.abs(along).max(initial=0.0)).any())
 
     return factored
 

@@ -125,9 +125,9 @@ class Starter:
         if self.summed:
             self.rows, self.columns = np.append(self.rows, self._sums.rows), np.append(self.columns, self._sums.columns)
         self.guess = np.append(self.given.guess, np.zeros(self.rates.size))
-        self.given = replace(self.given, guess=self.guess[: self.n])
         self.free = np.append(~self.given.fixed, np.ones(self.rates.size, dtype=bool))
         self.written = np.append(self.given.written, np.zeros(self.rates.size, dtype=bool))
+        self.given = replace(self.given, guess=self.guess[: self.n], written=self.written[: self.n])
 
     @contextmanager
     def granted(self, share: float = 1.0) -> Iterator[None]:

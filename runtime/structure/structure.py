@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.scales import balanced
@@ -122,8 +122,11 @@ def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...]
     return names, int(np.argmax(np.abs(rows[-1]))) if rows.size else -1
 
 
-def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
-    """Index from the growth of (dF/dy + cj dF/dyd)^-1 b over cj (large models); jy, jyd are spent."""
+def _growth_index(system: System, matrix: list[Floats]) -> int | None:
+    """Index from the growth of (dF/dy + cj dF/dyd)^-1 b over cj (large models); matrix: both [entries], which are taken
+    out and spent.
+    """
+    jyd, jy = matrix.pop(), matrix.pop()
     pattern, order = system.pattern, net_order_of(system)
     columns = pattern.columns_of()
     row, column = sparse_factors(pattern.row, columns, np.abs(jy) + np.abs(jyd), (pattern.rows, pattern.unknowns))
@@ -132,13 +135,15 @@ def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     del columns, row, column
     for values in (jy, jyd):
         values *= scale
-    del scale, values
+    moving = np.flatnonzero(jyd).astype(np.int32)
+    rates = jyd[moving]
+    del scale, values, jyd
     linear = order.linear(pattern)
     if system.unknowns > LARGE:  # the room counts; the factors hold to the pattern at hand
         system.put_away(whole=True)
     try:
         for rate in RATES:
-            index = _growth(linear, (jy, jyd), rate)
+            index = _growth(linear, jy, (moving, rates), rate)
             if index is not None:
                 return index
     finally:
@@ -146,18 +151,18 @@ def _growth_index(system: System, jy: Floats, jyd: Floats) -> int | None:
     return None
 
 
-def _growth(linear: Any, matrix: tuple[Floats, Floats], rate: float) -> int | None:
-    """The index by the growth from cj = rate to ten times that; None where it does not tell.  matrix: dF/dy, dF/dyd
-    [entries], equilibrated.
+def _growth(linear: Any, jy: Floats, jyd: tuple[Ints, Floats], rate: float) -> int | None:
+    """The index by the growth from cj = rate to ten times that; None where it does not tell.  jy: dF/dy [entries], jyd:
+    where dF/dyd is not zero, and what it is there, equilibrated.
 
     The larger cj comes first: there sums of rows lose most, and the pivots that it finds serve the other one.
     """
     sizes, least = [], 1.0
-    jy, jyd = matrix
+    moving, rates = jyd
     values = lib.reader(linear.contents.scaled, jy.size)  # of a large one the room counts
     for cj in (10.0 * rate, rate):
-        np.multiply(jyd, cj, out=values)
-        values += jy
+        values[:] = jy
+        values[moving] += cj * rates
         size, pivot = _inverse(linear, values)
         if not (np.isfinite(size) and size > 0.0):
             return None
@@ -216,11 +221,11 @@ def _small_index(system: System, jy: Floats, jyd: Floats) -> int:
 def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
     """Index of the form as written, and the undetermined unknowns where there is none."""
     y, yd = state.for_form(system)
-    jy, jyd = system.jacobian(state.t, y, yd)
     if system.unknowns == 0:
         return 0, ()
     if system.unknowns > DENSE:
-        return _growth_index(system, jy, jyd), ()
+        return _growth_index(system, list(system.jacobian(state.t, y, yd))), ()
+    jy, jyd = system.jacobian(state.t, y, yd)
     if system.unknowns <= SMALL and system.rows == system.unknowns:
         found = _small_index(system, jy, jyd)
         if found >= 0:
@@ -236,7 +241,7 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
             return index, ()
         undetermined = undetermined or names
     # regular, and entries lie too far apart for ranks
-    index = None if names else _growth_index(system, *looks[-1])
+    index = None if names else _growth_index(system, list(looks[-1]))
     return index, () if index is not None else undetermined
 
 

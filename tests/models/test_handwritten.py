@@ -175,7 +175,7 @@ def test_a_chain_of_scalars_leaves_no_full_matrix():
         system = System(model.manifest(binding), arrays, carrier.load(module_of(model.text)))
         zero = np.zeros(system.unknowns)
         found = condensed(system, 0.0, zero, zero)
-        return found.stepped._composition.source.size
+        return found.stepped._share.size
 
     few, many = terms(100), terms(200)
     assert many < 2.5 * few

@@ -6,6 +6,14 @@ At every row, those at the two sides of an instant among them, against Kirchhoff
 import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
+from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.prepare import prepare
+from sysdyn.dsl import load
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.source import SourceText
+from sysdyn.runtime.events.start import eventful_start
+from sysdyn.runtime.model.system import System
 
 TEXT = """
 model loop {{
@@ -136,3 +144,45 @@ def test_charge_of_a_node_follows_where_loops_say_what_the_text_does_not(tmp_pat
     trace = trace_of(tmp_path, STAR, formulation=formulation)
     for name, volts in (("v0", 1.0), ("v1", 0.25), ("v2", 1.0), ("v3", 0.75)):
         assert np.abs(trace[name].values - volts).max() < 1e-12
+
+
+def test_numbers_of_the_text_stand_while_a_start_finds_others():
+    """The runtime reads the binding's own array, until it has to write there: the charge of n1 is 1.75 C in the text's
+    numbers, 3.75 C in the model's.
+    """
+    with ex.fresh():
+        report = Report()
+        document = load.document(SourceText("m.sd", STAR), report)
+        network = load.network(document, document.models["star"], document.scenes["s"], report)
+        made = prepare(network, report, formulation="lagrangian", backend="numpy")
+        bound = made.binding.p.copy()
+        system = System(made.structure, made.arrays, made.carrier)
+        assert np.shares_memory(system.description.p, made.binding.p)
+        with pytest.raises(ValueError, match="read-only"):
+            system.description.p[0] = 0.0
+        state = eventful_start(system, 0.0, plan(made, system))
+    assert np.array_equal(made.binding.p, bound)
+    ((_, at, number),) = system.description.constants
+    assert number == 1
+    assert abs(bound[at]) == 1.75
+    assert abs(system.description.p[at]) == pytest.approx(1.0 + 2.0 + 3.0 * 0.25, rel=1e-14)
+    assert np.abs(system.residual(0.0, state.y, state.yd)).max() < 1e-12
+
+
+def test_events_write_into_numbers_of_their_own():
+    text = """
+model pulsed {
+  node a: electrical
+  discrete h = 1
+  C: potential(q = 0.2 F*e) a -> ground
+  R: dissipator(e = 2 ohm*h*f) a -> ground
+  every 0.3 s { h := 1.2 - h }
+  init C.e = 1 V
+}
+"""
+    with ex.fresh():
+        report = Report()
+        document = load.document(SourceText("m.sd", text), report)
+        network = load.network(document, document.models["pulsed"], None, report)
+        made = prepare(network, report, formulation="lagrangian", backend="numpy")
+        assert not np.shares_memory(System(made.structure, made.arrays, made.carrier).description.p, made.binding.p)

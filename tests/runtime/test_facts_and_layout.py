@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.many.mass_matrix import mass_matrix
+from sysdyn.runtime.model import system as systems
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.inertia import inertia
 from sysdyn.runtime.model.layout import entries_of, laid_out
@@ -98,3 +99,17 @@ def test_the_mass_matrix_by_its_entries(family):
     np.add.at(full, (found.row, found.column), found.sign * values)
     assert full == pytest.approx(np.array([[2.0, 0.5], [0.5, 2.0]]), rel=1e-14)
     assert full == pytest.approx(inertia(settled, *slopes), rel=1e-14)
+
+
+@pytest.mark.parametrize("index", ["3", "2", "1"])
+def test_a_large_system_has_no_room_for_entries_that_stands_idle(monkeypatch, index):
+    """The core finds it for each Jacobian, of both sides and of one alone; the numbers are those of a small one."""
+    small = system(index)
+    y, yd = (np.random.default_rng(k).normal(size=small.unknowns) for k in (1, 2))
+    monkeypatch.setattr(systems, "LARGE", 0)
+    large = system(index)
+    assert small.work is not None
+    assert large.work is None
+    for k, (one, other) in enumerate(zip(small.jacobian(0.3, y, yd), large.jacobian(0.3, y, yd), strict=True)):
+        assert one.tobytes() == other.tobytes()
+        assert other.tobytes() == large.slopes(0.3, y, yd, rate=bool(k)).tobytes()

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.accuracy.options import Options
+from sysdyn.runtime.integrate import methods
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.carrier import load
@@ -130,3 +131,21 @@ def test_accuracy_is_met(tmp_path, accuracy):
     trace = Trace.open(path)
     at = [int(np.argmin(np.abs(trace.time - t))) for t in INSTANTS]
     assert np.abs(np.asarray(trace["q1"])[at] - Q1).max() < max(accuracy, 1e-10)
+
+
+def test_a_method_that_rests_between_pieces_steps_on_alike(monkeypatch):
+    """What it lets go of at a jump of the text (of large systems) is what the next start makes anew: the same bits."""
+
+    def rows():
+        instants = np.linspace(0.0, 10.0, 41)
+        return run(models.mass_spring(), 10.0, instants=instants, method="radau", rtol=1e-7, stops=np.array([2.5, 7.0]))
+
+    kept, rested, rest = rows(), [], methods.lib.core.sd_radau_rest
+    monkeypatch.setattr(methods, "LARGE", 0)
+    monkeypatch.setattr(methods.lib.core, "sd_radau_rest", lambda radau: (rested.append(radau), rest(radau)))
+    found = rows()
+    assert len(rested) >= 2
+    assert found[0].tobytes() == kept[0].tobytes()
+    assert found[2].statistics == kept[2].statistics
+    instants = found[0][:, 0]
+    assert np.abs(found[1]["q_x"] - oscillation(instants)).max() < 1e-5

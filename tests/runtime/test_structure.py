@@ -38,7 +38,7 @@ def test_index_and_freedom(name):
     assert facts.redundant == 0
     assert facts.undetermined == ()
     # the method for large models agrees
-    assert _growth_index(system, *system.jacobian(0.0, state.y, state.yd)) == index
+    assert _growth_index(system, list(system.jacobian(0.0, state.y, state.yd))) == index
 
 
 def test_redundant_rows_are_named_with_coefficients():

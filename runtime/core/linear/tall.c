@@ -98,10 +98,10 @@ int sd_to_size_one(int32_t rows, int32_t entries, const int32_t *row, double emp
     return 0;
 }
 
-/* pivot [columns] := the places of the entries by which rows determine one unknown after the other, of := the columns of these;
- * 0 where some are left.  room [3 rows] */
+/* of [columns] := the unknowns in the order in which rows determine one after the other, pivot: the bits of the entries by
+ * which they do, one in each column; 0 where some are left.  room [3 rows] */
 static int find_sequence(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
-                         double least, int32_t *pivot, int32_t *of, int32_t *room)
+                         double least, uint64_t *pivot, int32_t *of, int32_t *room)
 {
     int32_t *left = room, *last = left + rows, *stack = last + rows, waiting = 0, found = 0;
     memset(room, 0, 2 * (size_t)rows * sizeof *room);
@@ -124,7 +124,7 @@ static int find_sequence(int32_t rows, int32_t columns, const int32_t *column, c
         }
         if (!(fabs(value[own]) >= least * largest) || !(largest > 0.0))
             continue;
-        pivot[found] = own;
+        pivot[own / 64] |= (uint64_t)1 << own % 64;
         of[found++] = c;
         for (int32_t e = column[c]; e < column[c + 1]; e++) {
             last[row[e]] ^= c;
@@ -138,9 +138,9 @@ static int find_sequence(int32_t rows, int32_t columns, const int32_t *column, c
 int sd_substituted(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
                    double least, const double *b, double *x)
 {
-    int32_t *pivot = malloc((2 * (size_t)columns + 1) * sizeof *pivot), *of = pivot + columns;
-    int32_t *room = malloc((3 * (size_t)rows + 1) * sizeof *room);
-    int failed = !pivot || !room ? 2 : !find_sequence(rows, columns, column, row, value, least, pivot, of, room);
+    uint64_t *pivot = calloc((size_t)column[columns] / 64 + 1, sizeof *pivot);
+    int32_t *of = malloc(((size_t)columns + 1) * sizeof *of), *room = malloc((3 * (size_t)rows + 1) * sizeof *room);
+    int failed = !pivot || !of || !room ? 2 : !find_sequence(rows, columns, column, row, value, least, pivot, of, room);
     free(room);
     double *rest = failed ? NULL : malloc(((size_t)rows + 1) * sizeof *rest);
     failed = failed || rest ? failed : 2;
@@ -148,13 +148,17 @@ int sd_substituted(int32_t rows, int32_t columns, const int32_t *column, const i
     for (int pass = 0; pass <= REFINEMENTS && !failed; pass++) {
         sd_miss(rows, columns, column, row, value, b, x, rest);
         for (int32_t k = 0; k < columns; k++) {
-            double step = rest[row[pivot[k]]] / value[pivot[k]];
+            int32_t own = column[of[k]];
+            while (!(pivot[own / 64] >> own % 64 & 1))
+                own++;
+            double step = rest[row[own]] / value[own];
             x[of[k]] += step;
             for (int32_t e = column[of[k]]; e < column[of[k] + 1]; e++)
                 rest[row[e]] -= value[e] * step;
         }
     }
     free(pivot);
+    free(of);
     free(rest);
     return failed;
 }

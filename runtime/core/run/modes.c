@@ -254,7 +254,8 @@ static void go_on(sd_run *run, double t, const sd_transition *transition)
     for (int32_t i = 0; i < m->unknowns; i++)
         m->restart_d[i] = m->differential[i] ? m->rate[i] : 0.0;
     run->start_kind = SD_TRACE;
-    sd_run_restart(run, t, t, m->restart, m->restart_d, m->before, m->before_d);
+    sd_run_leave(run, m->before, m->before_d);
+    sd_run_restart(run, t, t, m->restart, m->restart_d);
     run->start_kind = 0;
     m->logged++;
     m->left -= transition->entries;

@@ -314,17 +314,24 @@ static int begin(sd_run *run)
     return 0;
 }
 
-void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd, const double *before,
-                    const double *before_d)
+/* into [audited] := the powers at y, yd [written] */
+static void audit_at(sd_run *run, double t, const double *y, const double *yd, double *into)
 {
-    double *old = run->sample, *new = run->end;
     size_t written = (size_t)run->written * sizeof(double);
-    memcpy(run->point, before, written);
-    memcpy(run->point_d, before_d, written);
-    sd_run_audit(run, run->t_to, run->point, run->point_d, old);
     memcpy(run->point, y, written);
     memcpy(run->point_d, yd, written);
-    sd_run_audit(run, t, run->point, run->point_d, new);
+    sd_run_audit(run, t, run->point, run->point_d, into);
+}
+
+void sd_run_leave(sd_run *run, const double *y, const double *yd)
+{
+    audit_at(run, run->t_to, y, yd, run->sample);
+}
+
+void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd)
+{
+    const double *old = run->sample, *new = run->end;
+    audit_at(run, t, y, yd, run->end);
     run->supplied += (new[0] + new[1]) - (old[0] + old[1]);
     if (run->ledgers)
         sd_ledgers_jump(run->ledgers, old, new);

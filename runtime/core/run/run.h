@@ -83,10 +83,10 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
 void sd_run_free(sd_run *run);
 /* values [observed] := what is observed at run->point, point_d */
 void sd_run_quantities(sd_run *run, double t, double *values);
-/* goes on from y, yd [n] at t with the row of the instant `label`; before [written], before_d: the point at the end of the
- * last step */
-void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd, const double *before,
-                    const double *before_d);
+/* notes the powers at y, yd [written], the point at the end of the last step, which a restart leaves */
+void sd_run_leave(sd_run *run, const double *y, const double *yd);
+/* then goes on from y, yd [n] at t with the row of the instant `label` */
+void sd_run_restart(sd_run *run, double t, double label, const double *y, const double *yd);
 /* the last step counts up to `to`, where a row of kind `kind` is written beside those asked for; after SD_EVENT.  1: the
  * rows are full, `sd_run_drain` goes on */
 int sd_run_accept(sd_run *run, double to, int32_t kind);

@@ -226,9 +226,9 @@ static void efforts(const sd_sizing *s, const double *found, const double *row, 
 }
 
 /* found [n]: what is too small beside what balances the rows is taken from these; size [entries], excited [rows]; bearing:
- * where laws are steep, or NULL; kept [n], balanced [n], row [rows]: room */
+ * where laws are steep, or NULL; kept [n], balanced [n]: room */
 static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const double *size, double *excited,
-                          const sd_bearing *bearing, double *found, double *kept, double *balanced, double *row)
+                          const sd_bearing *bearing, double *found, double *kept, double *balanced)
 {
     const sd_balance *b = s->balance;
     int32_t n = b->unknowns;
@@ -249,10 +249,16 @@ static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const doub
         found[k] = whole ? found[k] : balanced[k];
         balanced[k] = kept[k] = carries[k] ? found[k] : 0.0;
     }
+    double *row = malloc(((size_t)b->rows + 1) * sizeof *row);
+    if (!row) {
+        free(small);
+        return -1;
+    }
     memcpy(row, excited, (size_t)b->rows * sizeof *row);
     for (int32_t e = 0; e < b->entries; e++)
         row[b->row[e]] = sd_larger(row[b->row[e]], size[e] * kept[b->column[e]]);
     efforts(s, found, row, excited);
+    free(row);
     failed |= sd_propagate_beside(b, size, small, excited, NULL, bearing, SD_CAPPED, balanced);
     free(small);
     for (int32_t k = 0; k < n; k++)
@@ -322,11 +328,11 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     /* of a large system the room counts: what factors do not need follows them, and what matrices held serves again */
     size_t borne = system->scales > 0 ? 2 * n + rows + entries + SD_LANES : 0, own = spent ? 0 : 2 * entries + 2;
     size_t within = entries >= 2 * n ? 0 : 2 * n;
-    double *memory = calloc(n + (size_t)system->kinematics + rows + own + borne + within + 1, sizeof *memory);
+    double *memory = calloc(n + own + borne + within + 1, sizeof *memory);
     int32_t *carries = calloc(n + 1, sizeof *carries);
-    double *divisor = memory, *least = divisor + n, *row = least + system->kinematics;
-    double *own_jy = spent ? jy : row + rows, *own_jyd = spent ? jyd : own_jy + entries + 1, *size = own_jy;
-    double *kept = within ? row + rows + own + borne : own_jyd, *balanced = kept + n;
+    double *divisor = memory, *behind = divisor + n;
+    double *own_jy = spent ? jy : behind, *own_jyd = spent ? jyd : own_jy + entries + 1, *size = own_jy;
+    double *kept = within ? behind + own + borne : own_jyd, *balanced = kept + n;
     int none = !memory || !carries;
     if (!none) {
         sd_jacobian(system, t0, y, yd, NULL, own_jy, own_jyd);
@@ -342,13 +348,13 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     for (size_t k = 0; k < n; k++)
         moves[k] = !carries[k] ? 0.0 : rate ? moves[k] : *tau * fabs(yd[k]);
     known_sizes(s, system, y, divisor, moves, found, most);
-    flows(system, span, found, least);
     for (size_t e = 0; e < entries; e++) {
         size[e] = fabs(own_jy[e]) + fabs(own_jyd[e]) / *tau;
         size[e] = isfinite(size[e]) ? size[e] : 0.0;
     }
-    sd_bearing bearing = {system, t0, y, yd, row + rows + own};
-    failed |= balanced_sizes(s, carries, size, excited, borne ? &bearing : NULL, found, kept, balanced, row);
+    flows(system, span, found, kept);
+    sd_bearing bearing = {system, t0, y, yd, behind + own};
+    failed |= balanced_sizes(s, carries, size, excited, borne ? &bearing : NULL, found, kept, balanced);
     group_largest(b, found, most);
     for (size_t k = 0; k < n; k++)
         found[k] = found[k] == 0.0 ? most[b->kind[k]] : found[k];

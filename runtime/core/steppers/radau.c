@@ -56,48 +56,75 @@ static void show(const void *self, int32_t s, double *y, double *yd)
     }
 }
 
+/* room for what the steps behind a start make: 0; -1: no memory */
+static int provide_room(sd_radau *radau)
+{
+    const sd_system *system = radau->system;
+    size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(radau->n + 1);
+    double **vectors[] = {&radau->last, &radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->y,
+                          &radau->rate, &radau->ee, &radau->weight, &radau->pull, &radau->terms, &radau->first};
+    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full}; /* the last two: of steep laws */
+    size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep,
+           sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
+    size_t all = number + sets * (size_t)radau->most_stages, pairs = (size_t)(radau->most_stages - 1) / 2;
+    if (radau->work)
+        return 0;
+    radau->work = calloc(all * m + (steep ? 3 : 2) * nnz, sizeof(double));
+    radau->right = calloc(pairs * m + 1, sizeof(double complex));
+    if (!radau->work || !radau->right) {
+        sd_radau_rest(radau);
+        return -1;
+    }
+    double *next = radau->work;
+    for (size_t i = 0; i < number; i++, next += m)
+        *vectors[i] = next;
+    for (size_t i = 0; i < sets; i++)
+        for (int32_t s = 0; s < radau->most_stages; s++, next += m)
+            of_stages[i][s] = next;
+    radau->jy = next;
+    radau->jyd = radau->jy + nnz;
+    radau->g = steep ? radau->jyd + nnz : radau->linear->scaled; /* rows of steep laws are judged by the matrix as it is */
+    for (size_t k = 0; k < pairs; k++)
+        radau->w[k] = radau->right + k * m;
+    return 0;
+}
+
+void sd_radau_rest(sd_radau *radau)
+{
+    free(radau->work);
+    free(radau->right);
+    free(radau->beside);
+    free(radau->point_y);
+    radau->work = radau->ee = radau->weight = radau->point_y = NULL;
+    radau->right = NULL;
+    radau->beside = NULL;
+}
+
 sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const *complex_linear, int32_t stages)
 {
     sd_radau *radau = calloc(1, sizeof *radau);
     if (!radau)
         return NULL;
-    size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(system->unknowns + 1);
-    double **vectors[] = {&radau->phi, &radau->yd, &radau->last, &radau->before, &radau->slope[0], &radau->slope[1],
-                          &radau->slope[2], &radau->y, &radau->rate, &radau->ee, &radau->weight, &radau->pull,
-                          &radau->terms, &radau->first}; /* the last ones: of steep laws */
-    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full};
-    size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep,
-           sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
-    size_t all = number + sets * (size_t)stages, pairs = (size_t)(stages - 1) / 2;
-    radau->memory = calloc(all * m + (steep ? 3 : 2) * nnz, sizeof(double));
+    size_t m = (size_t)sd_whole_lanes(system->unknowns + 1);
+    radau->system = system;
+    radau->linear = linear;
+    radau->n = system->unknowns;
+    radau->stages = sd_radau_methods[0].stages;
+    radau->most_stages = stages;
+    radau->phi = calloc(2 * m, sizeof(double));
     radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
-    radau->right = calloc(pairs * m + 1, sizeof(double complex));
-    if (!radau->memory || !radau->right || !radau->gap) {
+    if (!radau->phi || !radau->gap || provide_room(radau)) {
         sd_radau_free(radau);
         return NULL;
     }
+    radau->yd = radau->phi + m;
     sd_radau_gaps(radau->gap);
-    double *next = radau->memory;
-    for (size_t i = 0; i < number; i++, next += m)
-        *vectors[i] = next;
-    for (size_t i = 0; i < sets; i++)
-        for (int32_t s = 0; s < stages; s++, next += m)
-            of_stages[i][s] = next;
-    radau->jy = next;
-    radau->jyd = radau->jy + nnz;
-    radau->g = steep ? radau->jyd + nnz : linear->scaled; /* rows of steep laws are judged by the matrix as it is */
-    for (size_t k = 0; k < pairs; k++) {
-        radau->w[k] = radau->right + k * m;
+    for (int32_t k = 0; k < (stages - 1) / 2; k++) {
         radau->complex_linear[k] = complex_linear[k];
         if (complex_linear[k])
             sd_linear_z_replayed(complex_linear[k]);
     }
-    radau->system = system;
-    radau->linear = linear;
     sd_linear_replayed(linear);
-    radau->n = system->unknowns;
-    radau->stages = sd_radau_methods[0].stages;
-    radau->most_stages = stages;
     radau->method = radau->used = sd_radau_methods;
     radau->stepper = (sd_stepper){radau, system, radau->n, &radau->t, &radau->t_end, radau->phi, radau->yd,
                                   &radau->taken, step, dense, refine, start, stages, NULL, NULL, NULL, NULL,
@@ -109,14 +136,12 @@ void sd_radau_free(sd_radau *radau)
 {
     if (!radau)
         return;
-    free(radau->memory);
+    sd_radau_rest(radau);
+    free(radau->phi);
     free(radau->powered);
-    free(radau->right);
     free(radau->gap);
-    free(radau->beside);
     free(radau->at_zero);
     free(radau->open);
-    free(radau->point_y);
     sd_radau_free_coupled(radau->coupled);
     free(radau);
 }
@@ -215,6 +240,8 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
         radau->strict[k] = fmax(1.0, fmin(within[k] * pow(radau->rtol, WITHIN), radau->tolerance / FINEST));
     memmove(radau->phi, y, size);
     memmove(radau->yd, yd, size);
+    if (provide_room(radau)) /* which the first step tells */
+        return;
     memcpy(radau->slope[0], radau->yd, size);
     radau->refined[0] = 1; /* a start is settled */
     radau->method = sd_radau_methods;
@@ -384,10 +411,10 @@ int sd_radau_step(sd_radau *radau)
 {
     int singular = 0, iterations = 0, failures = 0, leap = 0, strained = 0;
     double retry = 0.5, error = 0.0;
-    set_weights(radau);
-    radau->cause = radau->newton_weight ? SD_FINE : SD_MEMORY;
+    radau->cause = radau->work && radau->newton_weight ? SD_FINE : SD_MEMORY;
     if (radau->cause)
         return radau->cause;
+    set_weights(radau);
     for (;;) {
         fit_end(radau);
         double left = radau->t_end - radau->t;

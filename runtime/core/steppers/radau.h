@@ -96,7 +96,7 @@ typedef struct sd_radau {
                                                * their sum */
     double *at_zero;          /* [entries] dF/dy where all unknowns are zero, of steep laws; made when first needed */
     char *open;               /* [n] columns that factors left */
-    double *y, *rate, *ee, *weight, *terms, *jy, *jyd, *g, *memory;
+    double *y, *rate, *ee, *weight, *terms, *jy, *jyd, *g, *work; /* work: the memory of all vectors but phi and yd */
     double *newton_weight, *scale, *powered; /* of Newton's norm, of columns; their memory where powers of h count */
     double complex *w[SD_PAIRS], *right; /* right sides and solutions; their memory */
     struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
@@ -113,6 +113,8 @@ typedef struct sd_radau {
 /* stages: at most; complex_linear [(stages - 1) / 2] */
 sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const *complex_linear, int32_t stages);
 void sd_radau_free(sd_radau *radau);
+/* lets go of all that the steps from the next start on make anew: until then it has no more than its last point */
+void sd_radau_rest(sd_radau *radau);
 sd_stepper *sd_radau_stepper(sd_radau *radau);
 void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd, double h);
 int sd_radau_step(sd_radau *radau);

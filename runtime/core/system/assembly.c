@@ -73,19 +73,41 @@ static void add_entries(const sd_call *call, int rate, double t, const double *y
         add_lines(rate ? call->stretches_dyd : call->stretches_dy, rate ? call->lines_dyd : call->lines_dy, v, values);
 }
 
+/* room for the entries of any block: that of the system, or (of a large one) some for now; NULL: no memory */
+static double *room_of(const sd_system *system)
+{
+    int32_t most = 1;
+    for (const sd_call *call = system->call, *end = call + system->calls; call < end && !system->v; call++) {
+        most = call->n_dy > most ? call->n_dy : most;
+        most = call->n_dyd > most ? call->n_dyd : most;
+    }
+    return system->v ? system->v : malloc((size_t)most * sizeof(double));
+}
+
+/* hands it back; where there was none the slopes [entries] are no numbers */
+static void leave_room(const sd_system *system, double *v, double *values)
+{
+    for (int32_t e = 0; e < system->entries && !v; e++)
+        values[e] = NAN;
+    if (!system->v)
+        free(v);
+}
+
 void sd_slopes(const sd_system *system, double t, const double *y, const double *yd, int rate, double *values)
 {
+    double *v = room_of(system);
     memset(values, 0, (size_t)system->entries * sizeof *values);
     for (int32_t i = 0; i < system->kinematics; i++) {
         double scale = system->k_scale ? system->k_scale[i] : 1.0;
         values[rate ? system->k_slot_q[i] : system->k_slot_f[i]] += rate ? scale : -scale;
     }
-    for (int32_t c = 0; c < system->calls; c++)
-        add_entries(&system->call[c], rate, t, y, yd, system->v, values);
+    for (int32_t c = 0; c < system->calls && v; c++)
+        add_entries(&system->call[c], rate, t, y, yd, v, values);
     for (int32_t i = 0; i < system->clear; i++)
         values[system->cleared[i]] = 0.0;
     for (int32_t i = 0; i < system->held; i++)
         values[system->held_slot[i]] = (system->held_rate[i] != 0) == rate ? 1.0 : 0.0;
+    leave_room(system, v, values);
 }
 
 static void evaluate_slopes(const sd_system *system, double t, const double *y, const double *yd, double *jy, double *jyd)
@@ -137,11 +159,13 @@ int32_t sd_jacobian(sd_system *system, double t, const double *y, const double *
 
 static int evaluate_both(const sd_system *system, double t, const double *y, const double *yd, double *values)
 {
+    double *v = room_of(system);
     memset(values, 0, (size_t)system->entries * sizeof *values);
-    for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++) {
-        add_entries(call, 0, t, y, yd, system->v, values);
-        add_entries(call, 1, t, y, yd, system->v, values);
+    for (const sd_call *call = system->call, *end = call + system->calls; call < end && v; call++) {
+        add_entries(call, 0, t, y, yd, v, values);
+        add_entries(call, 1, t, y, yd, v, values);
     }
+    leave_room(system, v, values);
     return sd_finite(system->entries, values);
 }
 

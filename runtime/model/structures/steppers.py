@@ -175,7 +175,7 @@ class Radau(c.Structure):
         *[(name, P) for name in ["first", "pull", "gap"]],
         *[(name, D * POINTS) for name in ["apart", "bend"]],
         *[(name, P) for name in ["at_zero", "open"]],
-        *[(name, P) for name in ["y", "rate", "ee", "weight", "terms", "jy", "jyd", "g", "memory"]],
+        *[(name, P) for name in ["y", "rate", "ee", "weight", "terms", "jy", "jyd", "g", "work"]],
         *[(name, P) for name in ["newton_weight", "scale", "powered"]],
         ("w", P * PAIRS),
         ("right", P),
