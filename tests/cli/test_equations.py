@@ -289,7 +289,7 @@ def test_what_is_printed_is_what_is_compiled(name):
 
 SOLVED = {
     "pendulum": FAMILY, "mass_spring": FAMILY[1:], "two_link_arm": FAMILY[:1], "slider_crank": FAMILY[1:],
-    "knife_edge": FAMILY[:1], "bead_rod": FAMILY[1:],
+    "knife_edge": FAMILY[1:], "bead_rod": FAMILY[:1],
 }  # fmt: skip
 """Formulations; SYSDYN_LONG=1: both of each."""
 

@@ -32,6 +32,7 @@ def off(trace, n):
     return max(np.abs(trace["y0"].values - np.sin(angle)).max(), np.abs(trace["y1"].values - np.cos(angle)).max())
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("n", [1, 2])
 @pytest.mark.parametrize("formulation", PRIMAL)
 @pytest.mark.parametrize(("method", "accuracy"), [("radau", 1e-3), ("radau", 1e-6), ("dopri", 1e-5), ("bdf", 1e-3)])
@@ -74,6 +75,7 @@ scene go of crank {
 """
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", PRIMAL)
 @pytest.mark.parametrize("method", METHODS)
 def test_a_crank_as_long_as_its_rod_does_not_fold(tmp_path, method, formulation):
