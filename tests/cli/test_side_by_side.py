@@ -193,6 +193,8 @@ def test_a_worker_that_is_beginning_beside_is_ended_too(monkeypatch):
         return begin(*said)
 
     resource_tracker.ensure_running()
+    for child in multiprocessing.active_children():  # of tests before: they end by themselves
+        child.join(10.0)
     monkeypatch.setattr(util, "spawnv_passfds", slowly)
     monkeypatch.setattr(crew, "PAYS", 0.0)
     beside = crew.Beside(_hears_of_interruptions, 0, 2)
