@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -93,14 +93,17 @@ def instants_of(
 ) -> tuple[float | None, tuple[float, ...], float | None]:
     """--until, --at and --max-wall in s; None, or left out, where they are not given or the report says why not."""
 
-    def instant(text: str, name: str) -> float | None:
-        if not text.strip():
-            raise UsageError(f"{name} '{getattr(request, name.strip('-').replace('-', '_'))}': a value is missing")
-        return load.constant(document, text, dim.TIME, name, report)
+    def instants(said: str | None, parts: Sequence[str], name: str) -> list[float | None]:
+        if said is not None and not all(text.strip() for text in parts):
+            raise UsageError(f"{name} '{said}': a value is missing")
+        return [load.constant(document, text, dim.TIME, name, report) for text in parts]
 
-    until = None if request.until is None else instant(request.until, "--until")
-    at = [instant(text, "--at") for text in separate(request.at)] if request.at is not None else []
-    wall = None if request.max_wall is None else instant(request.max_wall, "--max-wall")
+    def instant(said: str | None, name: str) -> float | None:
+        return None if said is None else instants(said, [said], name)[0]
+
+    until = instant(request.until, "--until")
+    at = [] if request.at is None else instants(request.at, separate(request.at), "--at")
+    wall = instant(request.max_wall, "--max-wall")
     if wall is not None and not wall > 0.0:
         raise UsageError(f"--max-wall {wall:g} s: it must be positive")
     return until, tuple(t for t in at if t is not None), wall

@@ -29,6 +29,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.rules.asked import Asked
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.many.asked import ROWS, NotApplicableError
+from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
@@ -39,7 +40,6 @@ SHORT, LONGER = 1000, 5
 one of them may take there."""
 _ELEMENT = re.compile(r"([^\[\]]+)\[(-?\d+(?:,-?\d+)*)\]")
 
-Floats = NDArray[np.float64]
 Settings = Mapping[str, Any]
 """Names of parameters (`m`, `m[2]`, `M1.R`) and inputs -> numbers in SI units, arrays, or texts of the language."""
 

@@ -179,7 +179,7 @@ def _inaccurate(
     text = f"the accuracy asked was not reached: {missed.element}, {estimate}, asked {missed.limit:.1e}{since}"
     help_ = "a looser accuracy, a shorter span, or what stands at the place"
     if flat:
-        text += f"; {no_slope(flat).replace('this state', 'the start')}, by which rosenbrock steps"
+        text += f"; {no_slope(flat, 'the start')}, by which rosenbrock steps"
         help_ = f"--method radau or bdf, or auto; {WITH_A_SLOPE}"
     report.error("E920", text, where, help=help_)
 

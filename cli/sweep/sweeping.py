@@ -26,6 +26,7 @@ from sysdyn.cli.sweep.workers import results as worked
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
+from sysdyn.dsl.rules.asked import REFUSED
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.trace.claim import claimed
 from sysdyn.runtime.trace.opening import destination
@@ -34,8 +35,6 @@ from sysdyn.values import dataclass
 REFRESH = 10.0
 """Seconds between two versions of the file, at least ten times what writing one takes."""
 
-REFUSED = {"E313", "E321", "E322", "E325"}
-"""Codes by which a text refuses numbers."""
 FORETOLD = 16
 """Runs after the first result after which the time left is said."""
 

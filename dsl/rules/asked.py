@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
@@ -18,7 +18,10 @@ from sysdyn.dsl.model.network import Branch, ElementSetting, Loop, Parameter
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.rules.graph_checks import modulus
 from sysdyn.dsl.rules.passivity import active
+from sysdyn.values import dataclass
 
+REFUSED = frozenset({"E313", "E321", "E322", "E325"})
+"""Codes by which a text refuses numbers that are not sizes."""
 Key = str | tuple[str | int, ...]
 """A parameter, or (name, index, ...) of an element of one."""
 _COMPARED: dict[str, Callable[[float, float], bool]] = {

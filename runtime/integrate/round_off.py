@@ -71,9 +71,10 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     if not np.isfinite(scaled[2]).all():
         return found
     given = _given(system)
+    said = given > 0.0
     for error in normal(PROBES, system.rows):
         change = of_column * least_norm((system.rows, system.unknowns), scaled, EPS * np.where(size > 0.0, error, 0.0))
-        if (np.abs(change)[given > 0.0] > given[given > 0.0]).any():
+        if (np.abs(change)[said] > given[said]).any():
             return LeftOpen(*map(np.zeros_like, before))
         moved = t, y + change, yd + change / step
         for largest, now, was in zip(found, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):

@@ -26,16 +26,21 @@ WITH_A_SLOPE = "a law with a slope at rest, as of a laminar part (f*hypot(f, f0)
 """What would help."""
 
 
-def no_slope(rows: Iterable[RowLabel]) -> str:
-    """That these laws have no slope, for a reader."""
+def no_slope(rows: Iterable[RowLabel], where: str = "this state") -> str:
+    """That these laws have no slope there, for a reader."""
     names = list(dict.fromkeys(row.label.removesuffix(".law") for row in rows))
     laws = f"the law at {names[0]} has" if len(names) == 1 else f"the laws at {', '.join(names[:3])} have"
-    return f"{laws} no slope at this state (it vanishes, or grows without bound, where nothing flows): no rate follows"
+    return f"{laws} no slope at {where} (it vanishes, or grows without bound, where nothing flows): no rate follows"
 
 
 def without_slope(system: System, t: float, y: Floats, yd: Floats) -> tuple[RowLabel, ...]:
     """Labels of `rows_without_slope`."""
-    return tuple(dict.fromkeys(system.row_label(int(k)) for k in rows_without_slope(system, t, y, yd)))
+    return labels(system, rows_without_slope(system, t, y, yd))
+
+
+def labels(system: System, rows: Ints) -> tuple[RowLabel, ...]:
+    """Labels of rows, each once."""
+    return tuple(dict.fromkeys(system.row_label(int(k)) for k in rows))
 
 
 def rows_without_slope(system: System, t: float, y: Floats, yd: Floats) -> Ints:

@@ -15,7 +15,7 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints, Places
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.patterns import read_only
-from sysdyn.runtime.model.slopes import rows_without_slope
+from sysdyn.runtime.model.slopes import labels, rows_without_slope
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.gauss_newton import (
     OutOfTimeError,
@@ -148,12 +148,14 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Sol
     return best, ""
 
 
-def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution) -> InconsistentStart:
-    """Why there is no consistent state: rows in the way, and the fixed values that would have to move."""
-    flat = _flat(starter, t, guess, free)
+def _explain(
+    starter: Starter, t: float, guess: Floats, free: Mask, best: Solution, flat: Ints
+) -> InconsistentStart:
+    """Why there is no consistent state: rows in the way, and the fixed values that would have to move; flat: of laws
+    without a slope.
+    """
     if flat.size:
-        rows = tuple(dict.fromkeys(starter.system.row_label(int(row)) for row in flat))
-        return InconsistentStart("slope", float(best.residual), rows)
+        return InconsistentStart("slope", float(best.residual), labels(starter.system, flat))
     if not np.isfinite(best.residual):
         bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
@@ -260,11 +262,13 @@ def _consistent(
         y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
         guess = starter.unknowns(t0, y, np.zeros(y.size))
     best, strategy = _attempt(starter, t0, guess, starter.free)
-    if not strategy and _without_rates(starter, _flat(starter, t0, guess, starter.free)):
-        starter.work = Work(until=until)
-        best, strategy = _attempt(starter, t0, guess, starter.free)
     if not strategy:
-        raise _explain(starter, t0, guess, starter.free, best)
+        flat = _flat(starter, t0, guess, starter.free)
+        if _without_rates(starter, flat):
+            starter.work = Work(until=until)
+            best, strategy = _attempt(starter, t0, guess, starter.free)
+        if not strategy:
+            raise _explain(starter, t0, guess, starter.free, best, flat)
     if constants:
         system.description.p[places] += starter.residual(t0, best.x)[integrated]
     starter.spare()

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from sysdyn.api import ModelError, NotMet, SolverFailure, Trace, UsageError, check, compile_model, load, simulate
+from texts import LADDER
 
 MODELS = Path(__file__).parents[2] / "models"
 
@@ -219,24 +220,6 @@ def test_functions_of_sums_over_a_size_follow_the_size(tmp_path, formulation):
         found = model.run({"n": n} if n != 3 else {})
         wanted = solve_ivp(rates, (0.0, 3.0), np.append(np.full(n, 0.1), 1.0), rtol=1e-11, atol=1e-12).y[-2:, -1]
         assert [found["last"][-1], found["r"][-1]] == pytest.approx(wanted, rel=1e-6)
-
-
-LADDER = """
-from std.electrical import resistor, capacitor, voltage
-model ladder {
-  param Rr = 1 kohm
-  param n = 3
-  node v[0..n]: electrical
-  V: voltage(v = 1 V) v[0]
-  for i in 1..n {
-    R[i]: resistor(R = Rr) v[i-1] -> v[i]
-    C[i]: capacitor(C = 1 uF) v[i]
-    init C[i].e = 0 V
-  }
-  require Rr < 10 kohm
-}
-scene s of ladder { time 0 s to 1 ms; trace v[n].e as out }
-"""
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8])

@@ -20,6 +20,7 @@ from sysdyn.cli.sweep.axes import Axis, axis
 from sysdyn.cli.sweep.journal import Journal
 from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.study import study
+from texts import LADDER
 
 SPRING = """
 model spring {
@@ -282,22 +283,7 @@ def test_a_text_that_ends_too_soon_says_so(spring, tmp_path, capsys):
 def test_numbers_that_the_text_refuses_fail_alone(tmp_path, capsys, monkeypatch):
     """The first case among them: the others run, in the core and out of it."""
     monkeypatch.chdir(tmp_path)
-    Path("m.sd").write_text("""
-from std.electrical import resistor, capacitor, voltage
-model rc {
-  param Rr = 1 kohm
-  param n = 2
-  node v[0..n]: electrical
-  V: voltage(v = 1 V) v[0]
-  for i in 1..n {
-    R[i]: resistor(R = Rr) v[i-1] -> v[i]
-    C[i]: capacitor(C = 1 uF) v[i]
-    init C[i].e = 0 V
-  }
-  require Rr < 10 kohm
-}
-scene s of rc { time 0 s to 1 ms; trace v[n].e as out }
-""")
+    Path("m.sd").write_text(LADDER)
     for keep in ("end", "traces"):
         code = run(["sweep", "m.sd", "--over", "Rr=-1000,500,20000,2000", "--keep", keep, "--json", "-o", f"{keep}.h5"])
         found = json.loads(capsys.readouterr().out)["result"]

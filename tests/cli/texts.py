@@ -10,6 +10,23 @@ from sysdyn.cli.main import run
 
 ROOT = Path(__file__).resolve().parents[2]
 
+LADDER = """
+from std.electrical import resistor, capacitor, voltage
+model ladder {
+  param Rr = 1 kohm
+  param n = 3
+  node v[0..n]: electrical
+  V: voltage(v = 1 V) v[0]
+  for i in 1..n {
+    R[i]: resistor(R = Rr) v[i-1] -> v[i]
+    C[i]: capacitor(C = 1 uF) v[i]
+    init C[i].e = 0 V
+  }
+  require Rr < 10 kohm
+}
+scene s of ladder { time 0 s to 1 ms; trace v[n].e as out }
+"""
+
 PENDULUM = """\
 model pendulum {
   param m = 1.13 kg

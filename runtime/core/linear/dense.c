@@ -13,14 +13,6 @@
 #define CERTAIN 1e-12
 #define GENERIC 0.7310585786300049 /* runtime/structure/structure.py */
 
-static double dot(int32_t n, const double *a, const double *b)
-{
-    double sum = 0.0;
-    for (int32_t k = 0; k < n; k++)
-        sum += a[k] * b[k];
-    return sum;
-}
-
 static void rotate(int32_t n, double *a, double *b, double c, double s)
 {
     for (int32_t k = 0; k < n; k++) {
@@ -47,7 +39,7 @@ void sd_orthogonal_rows(int32_t m, int32_t n, double *a, double *v, double *sigm
     }
     double most = 0.0;
     for (int32_t i = 0; i < m; i++) {
-        sigma[i] = dot(n, a + (size_t)i * n, a + (size_t)i * n);
+        sigma[i] = sd_dot(n, a + (size_t)i * n, a + (size_t)i * n);
         most = fmax(most, sigma[i]);
     }
     /* what is left of a row that depends on others is round-off, and orthogonal to nothing */
@@ -57,7 +49,7 @@ void sd_orthogonal_rows(int32_t m, int32_t n, double *a, double *v, double *sigm
         for (int32_t i = 0; i < m; i++)
             for (int32_t j = i + 1; j < m; j++) {
                 double *x = a + (size_t)i * n, *y = a + (size_t)j * n;
-                double xx = dot(n, x, x), yy = dot(n, y, y), xy = dot(n, x, y);
+                double xx = sd_dot(n, x, x), yy = sd_dot(n, y, y), xy = sd_dot(n, x, y);
                 if (xx <= nothing || yy <= nothing || fabs(xy) <= (4.0 + n) * DBL_EPSILON * sqrt(xx * yy))
                     continue;
                 double zeta = (yy - xx) / (2.0 * xy);
@@ -70,7 +62,7 @@ void sd_orthogonal_rows(int32_t m, int32_t n, double *a, double *v, double *sigm
             }
     }
     for (int32_t i = 0; i < m; i++)
-        sigma[i] = sqrt(dot(n, a + (size_t)i * n, a + (size_t)i * n));
+        sigma[i] = sqrt(sd_dot(n, a + (size_t)i * n, a + (size_t)i * n));
 }
 
 static double root(double size)
@@ -187,7 +179,7 @@ static void answer(int32_t m, int32_t n, const double *turned, const double *v, 
         if (!(sigma[i] > floor_))
             continue;
         const double *vector = wide ? turned + (size_t)i * n : v + (size_t)i * n;
-        double share = wide ? dot(m, v + (size_t)i * m, aim) : dot(m, turned + (size_t)i * m, aim);
+        double share = wide ? sd_dot(m, v + (size_t)i * m, aim) : sd_dot(m, turned + (size_t)i * m, aim);
         share = share / sigma[i] / sigma[i];
         for (int32_t j = 0; j < n; j++)
             x[j] += share * vector[j];
@@ -213,7 +205,7 @@ int sd_nearest(int32_t m, int32_t n, const double *a, const double *aim, double 
     double floor_ = least * largest(few, sigma);
     for (int round = 0; round <= REFINED; round++) {
         for (int32_t i = 0; i < m; i++)
-            rest[i] = aim[i] - dot(n, a + (size_t)i * n, x);
+            rest[i] = aim[i] - sd_dot(n, a + (size_t)i * n, x);
         answer(m, n, turned, v, sigma, floor_, rest, x);
     }
     free(memory);

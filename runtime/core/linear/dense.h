@@ -9,6 +9,15 @@
 
 #include <stdint.h>
 
+/* of two vectors [n] */
+static inline double sd_dot(int32_t n, const double *a, const double *b)
+{
+    double sum = 0.0;
+    for (int32_t k = 0; k < n; k++)
+        sum += a[k] * b[k];
+    return sum;
+}
+
 /* Rotates the rows of a [m, n] among each other until they are orthogonal: a := V^T a, v [m, m] := V^T (NULL: not wanted),
  * sigma [m] := lengths of the rows, the singular values of a and, where m > n, zeros. */
 void sd_orthogonal_rows(int32_t m, int32_t n, double *a, double *v, double *sigma);

@@ -3,6 +3,7 @@
  * Towards a position in which constraints lose rank the slopes at a step's start fade in one direction, and beyond it they
  * have turned: Newton's iteration with them fails for every step that reaches the position, and steps that may not reach it
  * shrink for ever.  The equations of all stages together are regular for a step that passes over it. */
+#include "linear/dense.h"
 #include "steppers/radau.h"
 
 #include <math.h>
@@ -91,14 +92,6 @@ static void since(const sd_radau *radau, double *step)
             step[s * radau->n + k] = (radau->z[s][k] - step[s * radau->n + k]) * radau->newton_weight[k];
 }
 
-static double product(int32_t n, const double *a, const double *b)
-{
-    double sum = 0.0;
-    for (int32_t i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
-
 /* Whether two corrections by the factors at hand, from the extrapolated stages on, have one direction: it is all that is wrong
  * with these slopes. */
 static int aligned(sd_radau *radau, sd_coupled *coupled)
@@ -112,8 +105,8 @@ static int aligned(sd_radau *radau, sd_coupled *coupled)
         sd_radau_correct(radau);
         since(radau, steps[m]);
     }
-    double one = product(coupled->all, steps[0], steps[0]), two = product(coupled->all, steps[1], steps[1]);
-    double along = product(coupled->all, steps[0], steps[1]);
+    double one = sd_dot(coupled->all, steps[0], steps[0]), two = sd_dot(coupled->all, steps[1], steps[1]);
+    double along = sd_dot(coupled->all, steps[0], steps[1]);
     return (radau->turned ? fabs(along) : along) >= ALIGNED * sqrt(one * two);
 }
 
@@ -162,7 +155,6 @@ static int correct(sd_radau *radau, sd_coupled *coupled)
             return cause;
         for (int32_t k = 0; k < n; k++)
             coupled->right[i * n + k] = -radau->d[i][k];
-        memcpy(coupled->scale + i * n, radau->scale, (size_t)n * sizeof(double));
     }
     int failed = sd_linear_factor(coupled->linear, coupled->values, coupled->scale);
     if (failed)
@@ -178,11 +170,15 @@ static int correct(sd_radau *radau, sd_coupled *coupled)
 
 int sd_radau_iterate_coupled(sd_radau *radau, int *used)
 {
-    sd_coupled *coupled = radau->n <= LARGEST ? coupled_of(radau) : NULL;
+    if (radau->n > LARGEST)
+        return SD_NEWTON;
+    sd_coupled *coupled = coupled_of(radau);
     if (!coupled)
-        return radau->n <= LARGEST ? SD_MEMORY : SD_NEWTON;
+        return SD_MEMORY;
     if (!aligned(radau, coupled))
         return SD_NEWTON;
+    for (int i = 0; i < coupled->stages; i++)
+        memcpy(coupled->scale + i * radau->n, radau->scale, (size_t)radau->n * sizeof(double));
     double before = INFINITY, tolerance = sd_radau_newton_tolerance(radau);
     sd_radau_extrapolate(radau, radau->h);
     for (int m = 1; m <= ITERATIONS; m++) {

@@ -6,8 +6,8 @@
  * G = dF/dy + cj dF/dyd needs no new evaluation when cj changes.
  *
  * Shapes
- *   y, yd [unknowns]   r [rows]   column [unknowns + 1]   row, jy, jyd [entries]   v [largest list of entries; NULL: found for each Jacobian, as
- *   of a large system, where the room counts]
+ *   y, yd [unknowns]   r [rows]   column [unknowns + 1]   row, jy, jyd [entries]
+ *   v [largest list of entries]           NULL: found for each Jacobian, as of a large system, where the room counts
  *   slot_dy [n_dy], slot_dyd [n_dyd]      place in jy / jyd of each entry of the block's list
  *   k_row, k_q, k_f, k_slot_q, k_slot_f [kinematics]      the rows q' - f and their two entries
  *   k_span [k_spans][4]                the same rows as stretches: number, first row, q and f
