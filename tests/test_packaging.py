@@ -10,8 +10,6 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parents[1]
 SETUP = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
 ROOMS = ("dsl", "compiler", "runtime", "cli", "models")
@@ -41,12 +39,10 @@ def test_sources_of_the_core_are_listed():
     assert set(module["depends"]) == {path for path in core if path.endswith(".h")} | twice
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
+def built(folder):
     """(source distribution, wheel built from it)."""
-    folder = tmp_path_factory.mktemp("dist")
     tree = folder / "tree"
-    tree.mkdir()
+    tree.mkdir(parents=True)
     listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     for name in filter(None, subprocess.run(listed, cwd=ROOT, capture_output=True, check=True).stdout.split(b"\0")):
         path = name.decode()
@@ -59,8 +55,14 @@ def built(tmp_path_factory):
     return next(folder.glob("*.tar.gz")), next(folder.glob("*.whl"))
 
 
-def test_wheel_holds_all_data(built):
-    source, wheel = built
+def test_the_wheel_is_whole_and_works_outside_the_repository(tmp_path):
+    """One build for both."""
+    source, wheel = built(tmp_path / "dist")
+    _holds_all_data(source, wheel)
+    _works_outside_the_repository(wheel, tmp_path)
+
+
+def _holds_all_data(source, wheel):
     with tarfile.open(source) as archive:
         in_source = {name.partition("/")[2] for name in archive.getnames()}
     with zipfile.ZipFile(wheel) as archive:
@@ -77,9 +79,8 @@ def test_wheel_holds_all_data(built):
     assert f"sysdyn/runtime/_core{sysconfig.get_config_var('EXT_SUFFIX')}" in in_wheel
 
 
-def test_wheel_works_outside_the_repository(built, tmp_path):
+def _works_outside_the_repository(wheel, tmp_path):
     """In an environment that sees the installed dependencies, but this sysdyn alone."""
-    _, wheel = built
     place = tmp_path / "site"
     install = [
         sys.executable,

@@ -29,7 +29,7 @@ def test_mutated_models():
 
 
 def test_what_failed_once():
-    files = sorted(KEPT.glob("*.sd"))[:: 1 if LONG else 3]
+    files = sorted(KEPT.glob("*.sd"))[:: 1 if LONG else 6]
     assert files
     code, said = fuzz(*(option for path in files for option in ("--file", path)), "--jobs", 2, within=200)
     assert code == 0, said

@@ -165,7 +165,7 @@ def test_the_balance_is_closed_where_energy_is_lost_and_supplied(form):
 
 
 def test_the_estimate_includes_the_phase(tmp_path):
-    t_end = 200.0 * SWING
+    t_end = 70.0 * SWING
     outcome = simulated(tmp_path, minimal(), t_end, method="energy", accuracy=1e-6)
     trace = Trace.open(tmp_path / "t.h5")
     t, late = np.asarray(trace.time), 1e-9 * t_end  # the time tolerance
