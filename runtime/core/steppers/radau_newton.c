@@ -11,6 +11,7 @@
 #define DAMPED 15          /* with corrections shortened */
 #define WALK 45            /* with whole ones: back down an exponential of all digits, one 1/a each, and a few more */
 #define SLOW 0.99          /* contraction above which Newton gives up */
+#define FADING 0.3         /* a correction over the one before: what is borne and shrinks no faster is round-off */
 #define STAGNANT 0.1       /* of the tolerance: corrections this small that do not shrink are round-off */
 #define LAX 100.0          /* a steep row may be off by as many times Newton's tolerance times the method's */
 #define LEAST_PART 1e-7    /* of a correction that is still tried */
@@ -32,8 +33,9 @@ void sd_radau_leave_below(sd_radau *radau, double null_pivot)
         sd_linear_z_allow(radau->complex_linear[k], null_pivot, radau->linear->idle);
 }
 
-/* Of Newton's corrections, in units of the unknowns' */
-static const double round_off[SD_METHODS] = {10.0, 40.0, 160.0};
+/* Of Newton's corrections, in units of the unknowns': what is borne, and what is aimed at, for errors of this size have one
+ * sign over many steps (van der Pol's phase was off by 2e-8 s at whatever tolerance, now 1e-10) */
+static const double round_off[SD_METHODS] = {10.0, 40.0, 160.0}, aimed_at[SD_METHODS] = {1.0, 3.0, 5.0};
 
 /* the last factors left a column */
 static int columns_left(const sd_radau *radau)
@@ -95,11 +97,16 @@ int sd_radau_iterations(const sd_radau *radau)
     return ITERATIONS + MORE * (radau->method->stages - 3);
 }
 
-/* Of Newton's corrections in its weights; stages of more have larger round-off */
+/* Of Newton's corrections in its weights, with a round-off in units of the unknowns' */
+static double newton_tolerance(const sd_radau *radau, double of_unknowns)
+{
+    return fmax(of_unknowns * DBL_EPSILON / radau->tolerance, fmin(0.03, sqrt(radau->tolerance)));
+}
+
+/* what is borne; stages of more have larger round-off */
 double sd_radau_newton_tolerance(const sd_radau *radau)
 {
-    double least = round_off[radau->method - sd_radau_methods] * DBL_EPSILON / radau->tolerance;
-    return fmax(least, fmin(0.03, sqrt(radau->tolerance)));
+    return newton_tolerance(radau, round_off[radau->method - sd_radau_methods]);
 }
 
 /* the stages are kept in base */
@@ -124,6 +131,7 @@ static double noted_correction(sd_radau *radau)
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
 {
     double tolerance = sd_radau_newton_tolerance(radau);
+    double aim = newton_tolerance(radau, aimed_at[radau->method - sd_radau_methods]);
     double before = 0.0, ratio_before = 0.0, trust = 1.0;
     int patient = full || radau->fixed_h > 0.0;
     *retry = 0.5;
@@ -159,9 +167,10 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
             }
         }
         idle = m > 1 && size <= STAGNANT * tolerance && !(size < SLOW * before);
+        int as_aimed = trust * size <= aim || m == most || (m > 1 && size > FADING * before);
         before = fmax(size, DBL_MIN);
         /* far up an exponential every correction is small */
-        converged = converged || (trust * size <= tolerance && !(full && m == 1));
+        converged = converged || (trust * size <= tolerance && as_aimed && !(full && m == 1));
         if (converged && radau->system->scales == 0)
             return SD_FINE;
         if (full) {
