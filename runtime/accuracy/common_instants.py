@@ -105,23 +105,24 @@ def common(stored: Floats, options: Options) -> Floats:
     return found
 
 
-def beside(instants: Floats, one: Floats, two: Floats, span: float) -> NDArray[np.bool_]:
-    """Which instants lie between those at which two runs have the same event (one, two [s] ascending): each of both is
-    the nearest to the other.  A value on one side of a jump is no error of one on the other.  What the jumps do is
-    compared behind them.  Where both have it at the same instant, as sampled actions are, both values there are those
-    before it.
+def late_by(instants: Floats, one: Floats, two: Floats, span: float) -> Floats:
+    """How far apart (s) two runs have the event (one, two [s] ascending) between which each instant lies [k], 0
+    where there is none: each of both is the nearest to the other.  A value on one side of a jump is no error of one on
+    the other.  What the jumps do is compared behind them.  Where both have it at the same instant, as sampled actions
+    are, both values there are those before it.
     """
     one, two = _grouped(one, span), _grouped(two, span)
     if not (one.size and two.size):
-        return np.zeros(instants.size, dtype=bool)
+        return np.zeros(instants.size)
     own = _nearest(one[:, 0], two[:, 0])
     same = _nearest(two[:, 0], one[:, 0])[own] == np.arange(len(two))
     low, high = np.minimum(one[own, 0], two[:, 0]), np.maximum(one[own, 1], two[:, 1])
     gap = np.diff(two[:, 0], prepend=-np.inf, append=np.inf)
     near = same & (low < high) & (high - low <= APART * np.minimum(gap[:-1], gap[1:]))
-    low, high = low[near] - NEAR * span, high[near] + NEAR * span
-    place = np.searchsorted(low, instants, side="right")
-    return np.asarray(instants <= np.append(-np.inf, high)[place])
+    low, high = low[near], high[near]
+    place = np.searchsorted(low - NEAR * span, instants, side="right")
+    within = instants <= np.append(-np.inf, high + NEAR * span)[place]
+    return np.where(within, np.append(0.0, high - low)[place], 0.0)
 
 
 def _grouped(events: Floats, span: float) -> Floats:

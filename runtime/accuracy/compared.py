@@ -9,9 +9,8 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from sysdyn.runtime.accuracy import pairs
-from sysdyn.runtime.accuracy.common_instants import Instants, Thinned, beside, common
+from sysdyn.runtime.accuracy.common_instants import Instants, Thinned, common, late_by
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.accuracy.pairs import Sampled
 from sysdyn.runtime.accuracy.quantities import Quantities
@@ -66,17 +65,26 @@ class Compared:
         late = self._late(rows, quantities) if instants is not None else 0.0
         open_ = partial(self._open_quantities, finished, quantities)
         sizes, steps = quantities.of_run(finished), finished.statistics.steps
-        found = Sampled(tolerance, values, sizes, steps, noise, open_, self._between(finished), late, there)
+        between = self._between(rows, finished, quantities)
+        found = Sampled(tolerance, values, sizes, steps, noise, open_, between, late, there)
         self.samplings = (*self.samplings[-1:], found)
         return found
 
-    def _between(self, finished: Finished) -> NDArray[np.bool_]:
-        """Instants of comparison between an event of this run and the same one of the run before it."""
+    def _between(self, rows: Floats, finished: Finished, quantities: Quantities) -> Floats | None:
+        """What the compared quantities move by [k, quantities], as fast as at these rows, from an event of this run to
+        the same one of the run before it; infinite at instants that are not between them.  None: no instant is.
+        """
         jumps = np.unique([e.time for e in finished.events]) if finished.events else np.zeros(0)
         last, self.jumps = self.jumps, jumps
         assert self._at is not None
-        span = self.options.t_end - self.options.t_start
-        return beside(self._at, jumps if last is None else last, jumps, span)
+        if last is None or len(rows) != len(self._at):
+            return None
+        late = late_by(self._at, last, jumps, self.options.t_end - self.options.t_start)[:, None]
+        if not late.any():
+            return None
+        rates = np.abs(rows[:, lib.ROW_HEAD + quantities.places + self._observed])
+        moved = np.hstack([late * rates, np.zeros((len(rows), len(quantities.meters)))])
+        return np.where((late > 0.0) & np.isfinite(moved), moved, np.inf)
 
     def _late(self, rows: Floats, quantities: Quantities, *, steps: bool = False) -> Floats:
         """What the compared quantities move by within the time tolerance at these rows [k, quantities]; steps: rows of
@@ -118,7 +126,6 @@ class Compared:
             ratio = pairs.apart(one, two) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
         ratio = np.where((one.own[0] == two.values) | pairs.zero(one, two, target), 0.0, ratio)
-        ratio[two.between] = 0.0
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)
         name, at = names[k], int(beyond[0]) if beyond.size else None

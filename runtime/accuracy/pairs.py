@@ -40,8 +40,9 @@ LARGEST = float(np.finfo(np.float64).max)
 class Sampled:
     """What a run hands to the comparison.  values [instants, quantities] at the instants of the run before it; largest
     [quantities] against which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it
-    is zero; left_open(): the same by the equations, for two runs that share no digit of one; between [instants]:
-    between an event of this run and the same one of the run before it; late [instants, quantities]: what the dense
+    is zero; left_open(): the same by the equations, for two runs that share no digit of one; between [instants,
+    quantities]: what no difference counts more than, between an event of this run and the same one of the run before it
+    (None: no instant is); late [instants, quantities]: what the dense
     output of each value moves by within the time tolerance (TIMING): on a steep front no more is asked; there: values
     and late at instants of its own, for the run behind it (None: those are the same).
     """
@@ -52,7 +53,7 @@ class Sampled:
     steps: int
     noise: Floats | float = 0.0
     left_open: Callable[[], Floats] | None = None
-    between: NDArray[np.bool_] | None = None
+    between: Floats | None = None
     late: Floats | float = 0.0
     there: tuple[Floats, Floats | float] | None = None
 
@@ -65,12 +66,15 @@ class Sampled:
 def apart(coarse: Sampled, fine: Sampled) -> Floats:
     """How far two runs' values are from each other [instants, quantities], within the time tolerance, both ways: what
     one of them has must be between values that the other one takes about there.  At the end, where a quantity grows
-    without bound (x' = x^2 at its pole), its rate allows any difference, but only one of them has been so far.
+    without bound (x' = x^2 at its pole), its rate allows any difference, but only one of them has been so far.  Between
+    the instants of one event in both, a value on one side of a jump is no error of one on the other: what counts is how
+    far it moves meanwhile.
     """
     values, late = coarse.own
     late = np.minimum(np.fmax(np.fmax(late, fine.late), 0.0), LARGEST)  # no number: no time tolerance
     over = np.fmax(_outside(values, fine.values, late), _outside(fine.values, values, late))
-    return np.asarray(np.fmax(over, 0.0 * fine.values * values))
+    over = np.fmax(over, 0.0 * fine.values * values)
+    return over if fine.between is None else np.minimum(over, fine.between)
 
 
 def _outside(values: Floats, others: Floats, late: Floats) -> Floats:
@@ -127,11 +131,10 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     use &= ~zero(coarse, fine, target)
     if not use.any():
         return 0.0, 0.0
-    there = ... if fine.between is None else ~fine.between
     seen = np.maximum(np.abs(before), np.abs(fine.values)).max(axis=0)[use]
     with np.errstate(all="ignore"):
         unlike = (size[use] > UNSEEN * seen) & (np.abs(size - coarse.largest)[use] > ALIKE * size[use])
-        relative = apart(coarse, fine)[there][:, use].max(axis=0, initial=0.0) / size[use]
+        relative = apart(coarse, fine)[:, use].max(axis=0, initial=0.0) / size[use]
     relative = np.where(np.isfinite(relative) & ~unlike, relative, np.inf)
     return float(relative.max()), float((relative / target[use]).max())
 
@@ -148,7 +151,5 @@ def parted(coarse: Sampled, fine: Sampled, target: Floats) -> bool:
         most = np.maximum.accumulate(np.abs(values), axis=0)[:-1]
         now = np.maximum(np.abs(values), np.abs(before))[1:]
         away = apart(coarse, fine)[1:] > np.maximum(PARTED * most, MUCH * now)
-    if fine.between is not None:
-        away[fine.between[1:]] = False
     away &= np.abs(values[0]) > fine.noise
     return bool(away.any()) and bool((away & ~zero(coarse, fine, target)).any())

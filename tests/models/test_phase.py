@@ -8,8 +8,8 @@ VAN_DER_POL = Path(__file__).parents[2] / "models" / "benchmark" / "vdpol.sd"
 
 
 def test_the_phase_of_van_der_pol_is_known_to_nanoseconds():
-    """Radau against rosenbrock where v falls by 1e6 in a second, behind 1600 s of slow motion: it was off by 2e-8 s at any
-    tolerance where Newton's iteration ended at what round-off of its stages may leave.
+    """Radau against rosenbrock where v falls by 1e6 in a second, behind 1600 s of slow motion: it was off by 2e-8 s at
+    any tolerance where Newton's iteration ended at what round-off of its stages may leave.
     """
     model = api.load(VAN_DER_POL)
     of = {"radau": 1e-13, "rosenbrock": 1e-14}

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from sysdyn.runtime.accuracy.common_instants import MANY, MOST, Thinned, beside, common, joined, known
+from sysdyn.runtime.accuracy.common_instants import MANY, MOST, Thinned, common, joined, known, late_by
 from sysdyn.runtime.accuracy.options import Options
+from sysdyn.runtime.accuracy.pairs import Sampled, apart, difference
 from sysdyn.runtime.integrate.ledgers import Balance
 from sysdyn.runtime.integrate.request import COMPARED, TRACE
 from sysdyn.runtime.integrate.round_off import LeftOpen
@@ -55,14 +56,14 @@ def test_beside_a_jump_of_the_text_nothing_is_compared():
     assert common(np.array([5.0, 1.0]), Options(None, 0.0, 10.0)).tolist() == [1.0, 5.0]
 
 
-def test_between_one_event_of_two_runs_nothing_is_compared():
+def test_between_one_event_of_two_runs_a_jump_is_no_difference():
     """The first events are 0.02 apart and 4 from the next: one event.  The second are as far apart as the third is, and
     the third are at the same instant, where both values are those before it.
     """
     one, two = np.array([1.00, 5.0, 6.0]), np.array([1.02, 5.6, 6.0])
     instants = np.array([0.99, 1.01, 1.03, 5.3, 6.0, 7.0])
-    assert beside(instants, one, two, 1.0).tolist() == [False, True, False, False, False, False]
-    assert not beside(instants, one, np.zeros(0), 1.0).any()
+    assert (late_by(instants, one, two, 1.0) > 0.0).tolist() == [False, True, False, False, False, False]
+    assert not late_by(instants, one, np.zeros(0), 1.0).any()
 
 
 def test_a_condition_that_turns_again_at_once_is_one_event():
@@ -70,14 +71,14 @@ def test_a_condition_that_turns_again_at_once_is_one_event():
     instants = np.array([0.2, 0.4, 0.60005, 0.7])
     one, two = np.array([0.3, 0.3 + 1e-9, 0.6]), np.array([0.3, 0.6001])
     for first, second in ((one, two), (two, one)):
-        assert beside(instants, first, second, 1.0).tolist() == [False, False, True, False]
+        assert (late_by(instants, first, second, 1.0) > 0.0).tolist() == [False, False, True, False]
 
 
 def test_events_that_one_run_lacks_leave_the_others_in_their_places():
     instants = np.array([0.10005, 0.3, 0.50005, 0.70005])
     one, two = np.array([0.1, 0.3, 0.5, 0.7]), np.array([0.1001, 0.5001, 0.7001])
-    assert beside(instants, one, two, 1.0).tolist() == [True, False, True, True]
-    assert beside(instants, two, one, 1.0).tolist() == [True, False, True, True]
+    assert (late_by(instants, one, two, 1.0) > 0.0).tolist() == [True, False, True, True]
+    assert (late_by(instants, two, one, 1.0) > 0.0).tolist() == [True, False, True, True]
 
 
 def test_of_two_rows_at_one_instant_the_former_is_kept():
@@ -164,3 +165,14 @@ def test_a_difference_of_large_terms_is_told_where_their_error_is_too_much_of_it
     assert not list(cancelled({"d": 1000.0}, {"d": 0.1}, 2e-2, 1e-6))
     assert not list(cancelled({"d": 1000.0}, {"d": 10.0}, 1e-9, 1e-6))  # one hundredth has not cancelled
     assert not list(cancelled({"d": 1000.0}, {"d": 1e-13}, 1e-4, 1e-6))  # a zero by symmetry
+
+
+def test_what_an_event_is_late_by_counts_where_values_move():
+    """Behind an event that one run has 1e-3 s later x falls by 2 in a second, and y jumps."""
+    late = late_by(np.array([0.2, 0.4, 0.9]), np.array([0.3995]), np.array([0.4005]), 1.0)[:, None]
+    assert late[:, 0] == pytest.approx([0.0, 1e-3, 0.0])
+    moved = np.where(late > 0.0, late * np.array([[2.0, 0.0]]), np.inf)
+    coarse = Sampled(1e-4, np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 1.0]]), np.ones(2), 10)
+    fine = Sampled(1e-6, np.array([[0.0, 0.0], [1.0009, 1.0], [3.0, 1.0]]), np.ones(2), 20, between=moved)
+    assert apart(coarse, fine)[1] == pytest.approx([9e-4, 0.0])
+    assert difference(coarse, fine, np.full(2, 1e-3)) == pytest.approx((9e-4, 0.9))
