@@ -38,6 +38,11 @@ static int large(const sd_radau *radau)
     return radau->n >= SD_LARGE;
 }
 
+int sd_radau_sparing(const sd_radau *radau)
+{
+    return large(radau) && radau->system->scales == 0 && radau->linear->sparse;
+}
+
 typedef struct factoring {
     sd_radau *radau;
     int failed[SD_PAIRS + 1];
@@ -52,6 +57,12 @@ static void factorise_one(void *context, int part)
     int32_t entries = radau->system->entries;
     /* a pivot is small or not beside the unknowns themselves, whatever the step */
     const double *scale = radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->magnitude : radau->scale;
+    if (sd_radau_sparing(radau)) {
+        all->failed[part] = part == 0 ? sd_linear_factor_sum(radau->linear, radau->jy, radau->jyd, method->gamma / radau->h, scale)
+                                      : sd_linear_z_factor_sum(radau->complex_linear[part - 1], radau->jy, radau->jyd,
+                                                               method->lambda[part - 1] / radau->h, scale);
+        return;
+    }
     if (part == 0) {
         double real = method->gamma / radau->h;
         for (int32_t e = 0; e < entries; e++)
@@ -191,6 +202,8 @@ static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, do
 {
     sd_radau_stage(radau, s, y, rate);
     sd_residual(system, radau->t + radau->method->c[s] * radau->h, y, rate, radau->d[s]);
+    for (int32_t i = radau->n; i < sd_whole_lanes(radau->n); i++)
+        radau->d[s][i] = 0.0; /* others have worked there */
 }
 
 /* The later half of the stages, in a system beside the radau's own; the others in that. */
