@@ -15,6 +15,7 @@ from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, magnitudes, noise
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.stretches import Stretches
 from sysdyn.runtime.start.start import ConsistentState
 
 
@@ -25,9 +26,24 @@ class Sizes:
         self.system, self._start, self._request = system, start, request
         self._origin: Origin | None = origin
         found, self.time = origin.sized(request.t_end)
-        self.magnitude: Floats = np.maximum(found, self.least)
-        self.unnamed: NDArray[np.bool_] = system.are("q", "f", "p", "s") & (system.nominal == 0.0)
+        self._magnitude: Floats | Stretches = np.maximum(found, self.least)
         self._own: tuple[Ints, Floats, Floats] | None = None
+
+    @property
+    def magnitude(self) -> Floats:
+        """[unknowns] in SI units."""
+        if isinstance(self._magnitude, Stretches):
+            self._magnitude = self._magnitude.whole
+        return self._magnitude
+
+    def put_away(self) -> None:
+        """Of a large system of which the method has sizes of its own: nobody reads those of all for a while."""
+        self._magnitude = Stretches(self.magnitude)
+
+    @property
+    def unnamed(self) -> NDArray[np.bool_]:
+        """Unknowns with a state's meaning whose size nothing names [unknowns]."""
+        return self.system.are("q", "f", "p", "s") & (self.system.nominal == 0.0)
 
     @cached_property
     def least(self) -> Floats:

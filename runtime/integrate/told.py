@@ -22,7 +22,7 @@ class Told:
     """roles: of what is stepped; kept: the places of these unknowns, None: all."""
 
     def __init__(self, system: System, request: Request, sizes: Sizes, roles: Roles, kept: Ints | None) -> None:
-        self._sizes, self.roles = sizes, roles
+        self._sizes = sizes
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * sizes.magnitude)
         self.atol = atol if atol is None or kept is None else atol[kept]
