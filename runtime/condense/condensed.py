@@ -213,15 +213,14 @@ class Condensed:
         kept[self.kept_rows] = True
         here = kept[form.k_row]
         number = self._number
-        parts = (form.k_row, form.k_q, form.k_f, *(number[slots] for slots in whole.slots[:2]))
-        kept_parts = [np.ascontiguousarray(part[here]) for part in parts]
-        row, q, f, slot_q, slot_f = map(self._hold, kept_parts)
-        spans = stretches(*kept_parts[:3])
+        slot_q, slot_f = (self._hold(np.ascontiguousarray(number[slots][here])) for slots in whole.slots[:2])
+        spans = stretches(*(np.ascontiguousarray(part[here]) for part in (form.k_row, form.k_q, form.k_f)))
         elsewhere = redirected(whole, number, number, self.places)
         self._keep.append(elsewhere)
         made = elsewhere.core
-        made.kinematics = kept_parts[0].size
-        made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
+        made.kinematics = int(here.sum())
+        made.k_row = made.k_q = made.k_f = None  # told by their stretches
+        made.k_slot_q, made.k_slot_f = slot_q, slot_f
         made.k_scale = None
         made.k_span, made.k_spans = self._hold(spans), 0 if self._own.size else len(spans)
         for k, planned in enumerate(form.calls):  # without loops that add to rows that are not kept alone

@@ -129,15 +129,18 @@ class Integration:
 
     def _rest_of_start(self) -> None:
         """Lets go of the start, from which a large run of what is kept is under way: the next run finds it where it is."""
-        if self.system.unknowns > LARGE and self.forms is not None and not self.system.form.scales:
-            if self.start_rate.size:
-                before = time.process_time()
-                lib.core.sd_run_advance(self.driver.core, 0, 0.0)
-                self.cpu += time.process_time() - before
-                self.driver.run.start_rate = None
-                self.y = self.start_rate = np.zeros(0)
-                self.start.put_away()
-            self.sizes.put_away()
+        if self.system.unknowns <= LARGE or self.forms is None or self.system.form.scales:
+            return
+        if self.start_rate.size:
+            before = time.process_time()
+            lib.core.sd_run_advance(self.driver.core, 0, 0.0)
+            self.cpu += time.process_time() - before
+            self.driver.run.start_rate = None
+            self.y = self.start_rate = np.zeros(0)
+            self.start.put_away()
+            for name in ("order", ("order", "net")):  # of the whole matrix, which no step takes
+                self.system.forget_once(name)
+        self.sizes.put_away()
 
     @staticmethod
     def _put_away_of(forms: Forms) -> None:

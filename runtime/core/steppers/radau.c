@@ -2,12 +2,14 @@
 #include "linear/lanes.h"
 #include "steppers/radau.h"
 #include "steppers/threads.h"
+#include "system/condensed.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#define OWN 6              /* vectors that every step hands on to the next one */
 #define FIRST 1e-2         /* of the span: the first step at most */
 #define CREEPS 8           /* steps in a row for which Newton failed at first: towards a square root's zero they would never end */
 #define IDLE 1e-6          /* error of a step that only Newton keeps short */
@@ -57,11 +59,12 @@ static void show(const void *self, int32_t s, double *y, double *yd)
     }
 }
 
-/* Factors work in vectors of which nothing is read while they do: the point of a stage is made anew, the right sides behind the
- * first one are in others then.  0; 2: no memory */
+/* Factors work in vectors of which nothing is read while they do: the point of a stage is made anew, as are rows of the whole
+ * system where that has more; the right sides behind the first one are in others then.  0; 2: no memory */
 static int borrow(sd_radau *radau)
 {
-    int failed = sd_linear_borrow(radau->linear, radau->y, NULL);
+    const sd_condensed *kept = (const sd_condensed *)radau->system->left;
+    int failed = sd_linear_borrow(radau->linear, kept ? kept->r : radau->y, NULL);
     for (int k = 0; k < (radau->most_stages - 1) / 2 && !failed; k++)
         failed = sd_linear_z_borrow(radau->complex_linear[k], (double complex *)radau->d[1 + 2 * k], radau->linear->column_scale);
     return failed;
@@ -72,12 +75,13 @@ static int provide_room(sd_radau *radau)
 {
     const sd_system *system = radau->system;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(radau->n + 1);
-    double **vectors[] = {&radau->last, &radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->y,
-                          &radau->rate, &radau->weight, &radau->ee, &radau->terms, &radau->first};
+    double **vectors[] = {&radau->last, &radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->weight,
+                          &radau->y, &radau->rate, &radau->ee, &radau->terms, &radau->first};
+    const int sparing = sd_radau_sparing(radau), kept = sparing && system->left;
     /* z and kept change places, and either has next to it what no step hands on (`spare`); the last two: of steep laws */
     double **of_stages[] = {radau->z, radau->d, radau->kept, radau->base, radau->full};
-    size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep - sd_radau_sparing(radau),
-           sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
+    size_t steep = system->scales > 0 ? 2 : 0, number = kept ? OWN : sparing ? OWN + 2 : OWN + 3 + steep;
+    size_t sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
     size_t pairs = (size_t)(radau->most_stages - 1) / 2, all = number + sets * (size_t)radau->most_stages + 2 * pairs;
     if (radau->work)
         return 0;
@@ -96,11 +100,15 @@ static int provide_room(sd_radau *radau)
         for (size_t k = 0; k < pairs && of_stages[i] == radau->d; k++, next += 2 * m)
             radau->w[k] = (double complex *)next;
     }
+    if (kept) { /* the point of a stage is made anew behind each solution */
+        radau->y = (double *)radau->w[0];
+        radau->rate = radau->y + m;
+    }
     radau->jy = next;
     radau->jyd = radau->jy + nnz;
-    if (sd_radau_sparing(radau))
+    if (sparing)
         radau->ee = radau->d[0];
-    if (sd_radau_sparing(radau) && borrow(radau)) {
+    if (sparing && borrow(radau)) {
         sd_radau_rest(radau);
         return -1;
     }
@@ -417,7 +425,7 @@ static void project(sd_radau *radau)
     size_t size = (size_t)radau->n * sizeof(double);
     memcpy(radau->y, radau->phi, size);
     memcpy(radau->rate, radau->yd, size);
-    radau->project->lent = spare(radau, &radau->project->lent_room);
+    radau->project->lent = radau->system->left ? NULL : spare(radau, &radau->project->lent_room);
     int failed = sd_settle_point(radau->project, radau->t, radau->y, radau->rate);
     radau->project->lent = NULL;
     if (failed)

@@ -172,6 +172,7 @@ void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
         between_points(radau, t, y, yd);
 }
 
+/* the point that is settled may be room that was lent for it, of which nothing is read from where all unknowns follow from it */
 void sd_radau_refine(sd_radau *radau, sd_settle *settle)
 {
     const double *value[SD_POINTS] = {radau->phi, radau->last, radau->before};
