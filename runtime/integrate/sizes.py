@@ -14,8 +14,8 @@ from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, magnitudes, noise
-from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.stretches import Stretches
+from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.numerics.stretches import Ascents, Stretches, whole_of
 from sysdyn.runtime.start.start import ConsistentState
 
 
@@ -26,8 +26,8 @@ class Sizes:
         self.system, self._start, self._request = system, start, request
         self._origin: Origin | None = origin
         found, self.time = origin.sized(request.t_end)
-        self._magnitude: Floats | Stretches = np.maximum(found, self.least)
-        self._own: tuple[Ints, Floats, Floats] | None = None
+        self._magnitude: Floats | Stretches[np.float64] = np.maximum(found, self.least)
+        self._own: tuple[Ints | Ascents, Floats, Floats] | None = None
 
     @property
     def magnitude(self) -> Floats:
@@ -74,14 +74,15 @@ class Sizes:
         """Magnitude and |y| met of the unknowns that the method steps; kept: their places, None: all."""
         if kept is None:
             return self.magnitude, self.met
-        self._own = kept, self.magnitude[kept], np.zeros(kept.size)
+        held = Ascents(kept) if self.system.unknowns > LARGE else kept
+        self._own = held, self.magnitude[kept], np.zeros(kept.size)
         return self._own[1:]
 
     def share(self, y: Floats) -> None:
         """What a method of fewer unknowns knows of their sizes becomes known of all at a point y."""
         if self._own is None:
             return
-        kept, magnitude, met = self._own
+        kept, magnitude, met = whole_of(self._own[0]), *self._own[1:]
         for sizes in (self.met, self.magnitude):
             np.maximum(sizes, np.abs(y), out=sizes)
         self.magnitude[kept], self.met[kept] = magnitude, met
@@ -89,7 +90,7 @@ class Sizes:
     def hand_down(self) -> None:
         """The magnitudes that the method of fewer unknowns goes by, from those of all."""
         if self._own is not None:
-            self._own[1][:] = self.magnitude[self._own[0]]
+            self._own[1][:] = self.magnitude[whole_of(self._own[0])]
 
     def at(self, y: Floats, *, last: bool = False) -> tuple[Floats, Floats]:
         """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point y.
@@ -97,7 +98,7 @@ class Sizes:
         """
         if self._own is None:
             return self.met, self.magnitude
-        kept, magnitude, met = self._own
+        kept, magnitude, met = whole_of(self._own[0]), *self._own[1:]
         largest = np.maximum(self.met, np.abs(y), out=self.met if last else None)
         largest[kept] = met
         sizes = np.maximum(self.magnitude, largest, out=self.magnitude if last else None)

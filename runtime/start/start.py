@@ -53,8 +53,8 @@ class ConsistentState:
     """
 
     t: float
-    held_y: Floats | Stretches
-    held_yd: Floats | Stretches
+    held_y: Floats | Stretches[np.float64]
+    held_yd: Floats | Stretches[np.float64]
     moved: tuple[tuple[str, float, float, str], ...]
     residual: float
     strategy: str = ""

@@ -387,7 +387,7 @@ int sd_linear_borrow(sd_linear *linear, sd_number *work, double *column_scale)
     return 0;
 }
 
-int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, sd_number c, const double *scale)
+int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale)
 {
     sd_matrix *sum = linear->sum;
     linear->factorisations++;
@@ -396,7 +396,7 @@ int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, sd
     linear->replayed = 0;
     sum->a = a;
     sum->b = b;
-    sum->c = c;
+    sum->c = *c;
     sum->column_scale = scale;
     equilibrate_sum(linear, scale);
     int failed = sparse_factor(linear);

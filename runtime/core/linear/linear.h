@@ -75,7 +75,7 @@ void sd_linear_left(const sd_linear *linear, char *left);
  * (NULL: in room of their own).  0 done, 2 no memory */
 int sd_linear_borrow(sd_linear *linear, sd_number *work, double *column_scale);
 /* as sd_linear_factor, of A + c B: a, b [entries] stay as they are until the next factors; scale [n] */
-int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, sd_number c, const double *scale);
+int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale);
 /* set to 0: the next factorisation chooses its pivots anew, and nothing is known of those before */
 int32_t *sd_linear_pivoted(sd_linear *linear);
 /* small matrices, of which there will be many, are eliminated by a list of operations (elimination.h) where it serves; the

@@ -58,9 +58,10 @@ static void factorise_one(void *context, int part)
     /* a pivot is small or not beside the unknowns themselves, whatever the step */
     const double *scale = radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->magnitude : radau->scale;
     if (sd_radau_sparing(radau)) {
-        all->failed[part] = part == 0 ? sd_linear_factor_sum(radau->linear, radau->jy, radau->jyd, method->gamma / radau->h, scale)
-                                      : sd_linear_z_factor_sum(radau->complex_linear[part - 1], radau->jy, radau->jyd,
-                                                               method->lambda[part - 1] / radau->h, scale);
+        double real = method->gamma / radau->h;
+        double complex both = part ? method->lambda[part - 1] / radau->h : 0.0;
+        all->failed[part] = part ? sd_linear_z_factor_sum(radau->complex_linear[part - 1], radau->jy, radau->jyd, &both, scale)
+                                 : sd_linear_factor_sum(radau->linear, radau->jy, radau->jyd, &real, scale);
         return;
     }
     if (part == 0) {
