@@ -102,7 +102,7 @@ typedef struct sd_radau {
     double complex *w[SD_PAIRS]; /* right sides and solutions */
     struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
     sd_system *other;             /* its system */
-    double *point_y, *point_rate; /* [n] */
+    double *point_y, *point_rate; /* [n]; y of a system with all its unknowns alone */
     struct sd_coupled *coupled;   /* radau_coupled.c: all stages at once; made when first needed */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations, factorisations, taken;

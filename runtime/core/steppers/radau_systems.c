@@ -207,7 +207,8 @@ static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, do
         radau->d[s][i] = 0.0; /* others have worked there */
 }
 
-/* The later half of the stages, in a system beside the radau's own; the others in that. */
+/* The later half of the stages, in a system beside the radau's own; the others in that.  Where all unknowns follow from kept
+ * ones, nobody reads these from where they stand once the rows are made: they stand where those will. */
 static void residual_part(void *context, int part)
 {
     sd_radau *radau = context;
@@ -217,7 +218,7 @@ static void residual_part(void *context, int part)
             residual_of(radau, radau->system, s, radau->y, radau->rate);
     else
         for (int s = half; s < radau->method->stages; s++)
-            residual_of(radau, radau->other, s, radau->point_y, radau->point_rate);
+            residual_of(radau, radau->other, s, radau->system->left ? radau->d[s] : radau->point_y, radau->point_rate);
 }
 
 /* the system and the point that a second thread takes residuals with; 0: there are none */
@@ -227,8 +228,9 @@ static int accompanied(sd_radau *radau)
         return 0;
     if (!radau->beside) {
         radau->beside = sd_beside_new(radau->system);
-        radau->point_y = calloc(2 * (size_t)sd_whole_lanes(radau->n + 1), sizeof(double));
-        radau->point_rate = radau->point_y + sd_whole_lanes(radau->n + 1);
+        size_t m = (size_t)sd_whole_lanes(radau->n + 1), alone = radau->system->left ? 0 : m;
+        radau->point_y = calloc(alone + m, sizeof(double));
+        radau->point_rate = radau->point_y + alone;
     }
     if (!radau->beside || !radau->point_y)
         return 0;
