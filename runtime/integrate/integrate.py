@@ -128,7 +128,7 @@ class Integration:
             self._put_away_of(self.forms)
 
     def _rest_of_start(self) -> None:
-        """Lets go of the start of a large run of what is kept, which is under way; the next run finds it where it is."""
+        """Lets go of the start of a large run of what is kept, under way; the next one finds it where it is."""
         if self.system.unknowns <= LARGE or self.forms is None or self.system.form.scales:
             return
         if self.start_rate.size:

@@ -16,7 +16,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import Order
-from sysdyn.runtime.numerics.stretches import Stretches
+from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 
 
 class Method:
@@ -116,7 +116,7 @@ class Method:
         if self.expanded:
             y, yd = np.empty(self._n), np.empty(self._n)
             unread = self._condensed.unread
-            y[unread], yd[unread] = (getattr(item, "whole", item) for item in self._stays)
+            y[unread], yd[unread] = (whole_of(item) for item in self._stays)
             lib.core.sd_expanded_show(self.expanded, lib.pointer(y), lib.pointer(yd))
             return y, yd
         stepper = self.contents.stepper

@@ -43,7 +43,8 @@ class Sizes:
     @property
     def unnamed(self) -> NDArray[np.bool_]:
         """Unknowns with a state's meaning whose size nothing names [unknowns]."""
-        return self.system.are("q", "f", "p", "s") & (self.system.nominal == 0.0)
+        found: NDArray[np.bool_] = self.system.are("q", "f", "p", "s") & (self.system.nominal == 0.0)
+        return found
 
     @cached_property
     def least(self) -> Floats:

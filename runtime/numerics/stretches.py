@@ -44,6 +44,6 @@ class Ascents:
         return offsets + np.arange(offsets.size, dtype=offsets.dtype)
 
 
-def whole_of(places: NDArray[Any] | Ascents) -> NDArray[Any]:
-    """Places that may be held by their stretches."""
-    return places.whole if isinstance(places, Ascents) else places
+def whole_of(array: NDArray[Any] | Stretches[Any] | Ascents) -> NDArray[Any]:
+    """An array that may be held by its stretches."""
+    return array if isinstance(array, np.ndarray) else array.whole

@@ -27,7 +27,7 @@ from sysdyn.runtime.numerics.gauss_newton import (
     stepped,
 )
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
-from sysdyn.runtime.numerics.stretches import Stretches
+from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 from sysdyn.runtime.start.strategies import CLOSED, EXACT, HIDDEN, OWN, applicable, around, first, rescaled
@@ -63,12 +63,12 @@ class ConsistentState:
     @property
     def y(self) -> Floats:
         """Made where it is held by its stretches."""
-        return self.held_y.whole if isinstance(self.held_y, Stretches) else self.held_y
+        return whole_of(self.held_y)
 
     @property
     def yd(self) -> Floats:
         """As y."""
-        return self.held_yd.whole if isinstance(self.held_yd, Stretches) else self.held_yd
+        return whole_of(self.held_yd)
 
     def put_away(self) -> None:
         """Of a large model: nobody reads the point for a while."""
