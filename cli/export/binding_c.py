@@ -23,7 +23,8 @@ HERE = Path(__file__).parent
 CORE = Path(core.__path__[0])
 ASSEMBLY = ("system/model.h", "linear/lanes.h", "system/assembly.h", "system/assembly.c")
 ALGEBRA = (
-    "linear/number.h", "linear/elimination.h", "linear/machine_code.h", "linear/linear.h", "linear/sparse.h",
+    "linear/number.h", "linear/elimination.h", "linear/machine_code.h", "linear/linear.h", "linear/matrix.h",
+    "linear/sparse.h",
     "system/settle.h", "steppers/stepper.h", "steppers/underlying.h",
     "linear/machine_code.c", "linear/elimination_order.c", "linear/elimination.c", "linear/linear.c",
     "linear/blocks.h", "linear/dense_rest.h", "linear/chains.h", "linear/sparse.c", "steppers/underlying.c",

@@ -27,6 +27,7 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.numerics.ordering import SMALL, Order, any_order, paired_order, with_pairs
+from sysdyn.runtime.numerics.stretches import Ascents, whole_of
 from sysdyn.values import dataclass
 
 LEAST, STEEP = 12, 50
@@ -82,7 +83,10 @@ class Condensed:
         """found: the structure; terms: as sums of kept unknowns; straights: of found."""
         self._straights = straights
         self.whole, self.sums = system, found
-        self.kept, self.kept_rows = found.kept, kept_rows
+        self._kept: Ints | Ascents = found.kept
+        self._kept_rows: Ints | Ascents = kept_rows
+        self._gone: Ints | Ascents = found.place
+        self._unread: Ints | Ascents = found.unread
         self.unknowns, self.rows = int(found.kept.size), int(kept_rows.size)
         self.paired = False
         self.own_rows: Ints | None = None
@@ -120,8 +124,34 @@ class Condensed:
             self.own_rows = own.astype(np.int32)
             return False
         own[left] = open_[found]
-        self.kept_rows, self.paired = self.kept_rows[own], True
+        self._kept_rows, self.paired = self.kept_rows[own], True
         return True
+
+    @property
+    def kept(self) -> Ints:
+        """Places of the kept unknowns in the whole system."""
+        return whole_of(self._kept)
+
+    @property
+    def kept_rows(self) -> Ints:
+        """Places of the kept rows in the whole system."""
+        return whole_of(self._kept_rows)
+
+    @property
+    def gone(self) -> Ints:
+        """Places of the unknowns that are sums of kept ones."""
+        return whole_of(self._gone)
+
+    @property
+    def unread(self) -> Ints:
+        """Places of the unknowns that nothing reads."""
+        return whole_of(self._unread)
+
+    def put_away(self) -> None:
+        """Of a large system, once all is made: nobody reads these places for a while."""
+        del self.sums
+        self._kept, self._kept_rows = Ascents(self.kept), Ascents(self.kept_rows)
+        self._gone, self._unread = Ascents(self.gone), Ascents(self.unread)
 
     def _hold(self, array: Ints | Floats) -> int | None:
         self._keep.append(array)
@@ -181,7 +211,7 @@ class Condensed:
         kernels = [kernel for name in OBSERVING for kernel in blocks.get(name, ())]
         read = {family for kernel in kernels for family in kernel.rates or ()}
         gone = np.zeros(self.whole.unknowns, dtype=bool)
-        gone[self.sums.place] = True
+        gone[self.gone] = True
         return bool(read & self.whole.families_in(gone))
 
     def _own_rows(self) -> Ints:
@@ -213,15 +243,14 @@ class Condensed:
         kept[self.kept_rows] = True
         here = kept[form.k_row]
         number = self._number
-        parts = (form.k_row, form.k_q, form.k_f, *(number[slots] for slots in whole.slots[:2]))
-        kept_parts = [np.ascontiguousarray(part[here]) for part in parts]
-        row, q, f, slot_q, slot_f = map(self._hold, kept_parts)
-        spans = stretches(*kept_parts[:3])
+        slot_q, slot_f = (self._hold(np.ascontiguousarray(number[slots][here])) for slots in whole.slots[:2])
+        spans = stretches(*(np.ascontiguousarray(part[here]) for part in (form.k_row, form.k_q, form.k_f)))
         elsewhere = redirected(whole, number, number, self.places)
         self._keep.append(elsewhere)
         made = elsewhere.core
-        made.kinematics = kept_parts[0].size
-        made.k_row, made.k_q, made.k_f, made.k_slot_q, made.k_slot_f = row, q, f, slot_q, slot_f
+        made.kinematics = int(here.sum())
+        made.k_row = made.k_q = made.k_f = None  # told by their stretches
+        made.k_slot_q, made.k_slot_f = slot_q, slot_f
         made.k_scale = None
         made.k_span, made.k_spans = self._hold(spans), 0 if self._own.size else len(spans)
         for k, planned in enumerate(form.calls):  # without loops that add to rows that are not kept alone
@@ -358,7 +387,7 @@ class Forms:
         runs do not integrate those, and what moves charge at once passes all of a node's.
         """
         whole, still = self.settled.whole, np.zeros(y.size)
-        unread = np.isin(np.arange(y.size), self.settled.sums.unread)
+        unread = np.isin(np.arange(y.size), self.settled.unread)
         row, column = whole.pattern.row, whole.pattern.columns_of()
         entry = np.flatnonzero(unread[column] & whole.of_groups("phi")[row])
         rows, at = np.unique(row[entry], return_inverse=True)
@@ -467,6 +496,8 @@ class _Condenser:
         room = Room(max(form.places for form in made.values()), whole, self.settled)
         for form in made.values():
             form.bind(room)
+            if whole.unknowns > LARGE:
+                form.put_away()
         return Forms(made[whole], made[self.settled])
 
 
@@ -488,7 +519,7 @@ def departures(system: System) -> list[tuple[str, str]]:
     found = condensed(system, 0.0, zero, zero)
     if found is None:
         return []
-    parts = ((found.stepped.sums.place, DEFINED), (found.stepped.sums.unread, UNREAD))
+    parts = ((found.stepped.gone, DEFINED), (found.stepped.unread, UNREAD))
     names = [f.name if not f.elements else f"{f.named(0)} .." for f in system.description.families]
     return [
         (f"{names[k]} ({number} of {system.description.families[k].size})", why)

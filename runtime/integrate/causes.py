@@ -66,7 +66,7 @@ def _worst(run: Integration) -> str | None:
         return None
     change = np.abs(lib.reader(method.ee, n) * lib.reader(method.weight, n))
     change = np.where(np.isfinite(change), change, np.inf)
-    test = run.told.roles.test
+    test = run.told.test
     if (test >= 0).any():
         change[test < 0] = 0.0
     return run.stepped.name(int(np.argmax(change)))

@@ -108,8 +108,9 @@ class Integration:
         self.origin = None
         self.sizes.let_go()
         if self.forms is not None:  # of what is kept the method has its own
-            nothing = np.zeros(0, dtype=np.int8)
-            self.roles = replace(self.roles, test=nothing, power=nothing, common=self.roles.common[:0].copy())
+            few, none = np.zeros(0, dtype=np.int8), np.zeros(0, dtype=np.bool_)
+            common = self.roles.common[:0].copy()
+            self.roles = replace(self.roles, test=few, power=few, smooth=none, idle=none, common=common)
 
     def _spare(self) -> None:
         """Lets go of what a large model found on its way here, and would find again."""
@@ -125,6 +126,21 @@ class Integration:
         if self.system.unknowns > LARGE and self.forms is not None:
             self.system.put_away(whole=True)
             self._put_away_of(self.forms)
+
+    def _rest_of_start(self) -> None:
+        """Lets go of the start of a large run of what is kept, under way; the next one finds it where it is."""
+        if self.system.unknowns <= LARGE or self.forms is None or self.system.form.scales:
+            return
+        if self.start_rate.size:
+            before = time.process_time()
+            lib.core.sd_run_advance(self.driver.core, 0, 0.0)
+            self.cpu += time.process_time() - before
+            self.driver.run.start_rate = None
+            self.y = self.start_rate = np.zeros(0)
+            self.start.put_away()
+            for name in ("order", ("order", "net")):  # of the whole matrix, which no step takes
+                self.system.forget_once(name)
+        self.sizes.put_away()
 
     @staticmethod
     def _put_away_of(forms: Forms) -> None:
@@ -216,6 +232,8 @@ class Integration:
             kept, found = self.forms.stepped.kept, self._kept
         self.told = Told(self.system, self.request, self.sizes, found, kept)
         self.told.tell(self.method)
+        if self.forms is not None and self.system.unknowns > LARGE:
+            del self._kept
         if self.system.form.scales and self.underlying is None:
             self.told.tell_steep(self.method, self.linear)
 
@@ -329,6 +347,7 @@ class Integration:
                 self._spare()
                 self.system.trim(LARGE)
                 self.cpu += time.process_time() - before
+            self._rest_of_start()
             self._advance(sink, progress, began, segment.end)
         if spent:
             self.method.rest()

@@ -13,9 +13,10 @@ from sysdyn.runtime.condense.condensed import Condensed
 from sysdyn.runtime.integrate.factors import Factorisation, Factors
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import Order
+from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 
 
 class Method:
@@ -67,7 +68,7 @@ class Method:
             self.expanded = lib.core.sd_expanded_new(self._stepper(), condensed, self._n)
             if not self.expanded:
                 raise MemoryError
-            self._unread: Ints = system.sums.unread
+            self._condensed = system
 
     @property
     def complex(self) -> tuple[int, ...]:
@@ -107,13 +108,15 @@ class Method:
     def begin(self, y: Floats, yd: Floats) -> None:
         """Notes what no step moves of the point that it starts from."""
         if self.expanded:
-            self._stays = y[self._unread], yd[self._unread]
+            stays = y[self._condensed.unread], yd[self._condensed.unread]
+            self._stays = [Stretches(item) if self._n > LARGE else item for item in stays]
 
     def point(self) -> tuple[Floats, Floats]:
         """y, yd [unknowns] of the last accepted point."""
         if self.expanded:
             y, yd = np.empty(self._n), np.empty(self._n)
-            y[self._unread], yd[self._unread] = self._stays
+            unread = self._condensed.unread
+            y[unread], yd[unread] = (whole_of(item) for item in self._stays)
             lib.core.sd_expanded_show(self.expanded, lib.pointer(y), lib.pointer(yd))
             return y, yd
         stepper = self.contents.stepper

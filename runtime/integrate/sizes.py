@@ -14,7 +14,8 @@ from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, magnitudes, noise
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.numerics.stretches import Ascents, Stretches, whole_of
 from sysdyn.runtime.start.start import ConsistentState
 
 
@@ -25,9 +26,25 @@ class Sizes:
         self.system, self._start, self._request = system, start, request
         self._origin: Origin | None = origin
         found, self.time = origin.sized(request.t_end)
-        self.magnitude: Floats = np.maximum(found, self.least)
-        self.unnamed: NDArray[np.bool_] = system.are("q", "f", "p", "s") & (system.nominal == 0.0)
-        self._own: tuple[Ints, Floats, Floats] | None = None
+        self._magnitude: Floats | Stretches[np.float64] = np.maximum(found, self.least)
+        self._own: tuple[Ints | Ascents, Floats, Floats] | None = None
+
+    @property
+    def magnitude(self) -> Floats:
+        """[unknowns] in SI units."""
+        if isinstance(self._magnitude, Stretches):
+            self._magnitude = self._magnitude.whole
+        return self._magnitude
+
+    def put_away(self) -> None:
+        """Of a large system of which the method has sizes of its own: nobody reads those of all for a while."""
+        self._magnitude = Stretches(self.magnitude)
+
+    @property
+    def unnamed(self) -> NDArray[np.bool_]:
+        """Unknowns with a state's meaning whose size nothing names [unknowns]."""
+        found: NDArray[np.bool_] = self.system.are("q", "f", "p", "s") & (self.system.nominal == 0.0)
+        return found
 
     @cached_property
     def least(self) -> Floats:
@@ -58,14 +75,15 @@ class Sizes:
         """Magnitude and |y| met of the unknowns that the method steps; kept: their places, None: all."""
         if kept is None:
             return self.magnitude, self.met
-        self._own = kept, self.magnitude[kept], np.zeros(kept.size)
+        held = Ascents(kept) if self.system.unknowns > LARGE else kept
+        self._own = held, self.magnitude[kept], np.zeros(kept.size)
         return self._own[1:]
 
     def share(self, y: Floats) -> None:
         """What a method of fewer unknowns knows of their sizes becomes known of all at a point y."""
         if self._own is None:
             return
-        kept, magnitude, met = self._own
+        kept, magnitude, met = whole_of(self._own[0]), *self._own[1:]
         for sizes in (self.met, self.magnitude):
             np.maximum(sizes, np.abs(y), out=sizes)
         self.magnitude[kept], self.met[kept] = magnitude, met
@@ -73,7 +91,7 @@ class Sizes:
     def hand_down(self) -> None:
         """The magnitudes that the method of fewer unknowns goes by, from those of all."""
         if self._own is not None:
-            self._own[1][:] = self.magnitude[self._own[0]]
+            self._own[1][:] = self.magnitude[whole_of(self._own[0])]
 
     def at(self, y: Floats, *, last: bool = False) -> tuple[Floats, Floats]:
         """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point y.
@@ -81,7 +99,7 @@ class Sizes:
         """
         if self._own is None:
             return self.met, self.magnitude
-        kept, magnitude, met = self._own
+        kept, magnitude, met = whole_of(self._own[0]), *self._own[1:]
         largest = np.maximum(self.met, np.abs(y), out=self.met if last else None)
         largest[kept] = met
         sizes = np.maximum(self.magnitude, largest, out=self.magnitude if last else None)

@@ -22,12 +22,12 @@ class Told:
     """roles: of what is stepped; kept: the places of these unknowns, None: all."""
 
     def __init__(self, system: System, request: Request, sizes: Sizes, roles: Roles, kept: Ints | None) -> None:
-        self._sizes, self.roles = sizes, roles
+        self._sizes = sizes
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * sizes.magnitude)
         self.atol = atol if atol is None or kept is None else atol[kept]
         self.magnitude, self.met = sizes.stepped(kept)
-        self.test, self.power, self.smooth = (x.astype(np.int32) for x in (roles.test, roles.power, roles.smooth))
+        self.test, self.power, self.smooth = roles.test, roles.power, roles.smooth.astype(np.int8)
         if kept is not None:  # as where their rates are unknowns too: rows q' = f pull at nothing
             self.smooth[roles.smooth & system.are("q")[kept]] = UNPULLED
         self.idle = roles.idle.astype(np.int32) if system.form.scales else None

@@ -235,12 +235,13 @@ def plan(description: Description, name: str) -> Form:
     at, kind, written, extended = _layout(description, (*own, "audit"))
     unknowns = written
     if "kinematics" not in description.layouts:  # the same in every form
-        description.layouts["kinematics"] = _kinematics(description, at)
-    k_q, k_f, first = description.layouts["kinematics"]
+        made = _kinematics(description, at)
+        description.layouts["kinematics"] = *made, np.arange(made[0].size, dtype=np.int32)
+    k_q, k_f, first, k_rows = description.layouts["kinematics"]
     bare = name in BARE
     if bare:
-        k_q = k_f = np.zeros(0, np.int32)
-    k_rows, number = np.arange(k_q.size, dtype=np.int32), int(k_q.size)
+        k_q = k_f = k_rows = np.zeros(0, np.int32)
+    number = int(k_q.size)
     nu = at.copy()
     tables: dict[str, Ints] = {}
     groups: list[tuple[str, int, int]] = []

@@ -126,9 +126,8 @@ class Settler:
         self.pattern: Pattern
         self._key: tuple[object, ...] = () if condensed is None else condensed.key
         self._sort = settled.once(("sorts", *self._key), self._sorts)
-        self._weight = np.ones(self._moves)
-        self._weight[:n][~state] = FREE**2
-        self._weight[n:] = FREE**2
+        self._state = np.zeros(self._moves, dtype=np.bool_)
+        self._state[:n] = state
         self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
         self.scale = np.concatenate([magnitude, magnitude[self.rates] / time_scale])
         self.linear: Any = None
@@ -207,7 +206,7 @@ class Settler:
         if not self.core:
             raise MemoryError
         core = self.core.contents
-        core.weight = lib.pointer(self._weight)
+        core.state, core.follows = lib.pointer(self._state), FREE**2
         core.rate = lib.pointer(self.rates)
         if self.linear is None:
             self._wanted = lib.PROVIDE(self._provided())

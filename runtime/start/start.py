@@ -27,6 +27,7 @@ from sysdyn.runtime.numerics.gauss_newton import (
     stepped,
 )
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
+from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 from sysdyn.runtime.start.strategies import CLOSED, EXACT, HIDDEN, OWN, applicable, around, first, rescaled
@@ -44,7 +45,7 @@ EXPLAINED = 0.1
 
 @dataclass(frozen=True, slots=True)
 class ConsistentState:
-    """y, yd [unknowns as written] at t; residual: largest scaled row.
+    """held_y, held_yd: y, yd [unknowns as written] at t; residual: largest scaled row.
 
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
     found it; "" of a state that was not sought from guesses.  zeros: where y is what the search left of a zero (None:
@@ -52,19 +53,35 @@ class ConsistentState:
     """
 
     t: float
-    y: Floats
-    yd: Floats
+    held_y: Floats | Stretches[np.float64]
+    held_yd: Floats | Stretches[np.float64]
     moved: tuple[tuple[str, float, float, str], ...]
     residual: float
     strategy: str = ""
     zeros: Mask | None = None
 
+    @property
+    def y(self) -> Floats:
+        """Made where it is held by its stretches."""
+        return whole_of(self.held_y)
+
+    @property
+    def yd(self) -> Floats:
+        """As y."""
+        return whole_of(self.held_yd)
+
+    def put_away(self) -> None:
+        """Of a large model: nobody reads the point for a while."""
+        for name, array in (("held_y", self.y), ("held_yd", self.yd)):
+            object.__setattr__(self, name, Stretches(array))  # the same point
+
     def for_form(self, system: System) -> tuple[Floats, Floats]:
         """y, yd in the layout of an index form: new multipliers are zero.  Read-only where they are the state's own."""
-        if system.unknowns == self.y.size:
-            return read_only(self.y[:]), read_only(self.yd[:])
+        own, own_d = self.y, self.yd
+        if system.unknowns == own.size:
+            return read_only(own[:]), read_only(own_d[:])
         y, yd = np.zeros(system.unknowns), np.zeros(system.unknowns)
-        y[: self.y.size], yd[: self.y.size] = self.y, self.yd
+        y[: own.size], yd[: own.size] = own, own_d
         return y, yd
 
     def without_noise(self, y: Floats) -> Floats:

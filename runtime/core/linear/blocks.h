@@ -140,10 +140,11 @@ static void ascend(int32_t number, int32_t *position, uint64_t *among)
 }
 
 /* the largest entry of a column of the matrix */
-static double column_size(const int32_t *column, const sd_number *value, int32_t c)
+static double column_size(const sd_matrix *matrix, int32_t c)
 {
+    const sd_number *value = sd_column_of(matrix, c);
     double size = 0.0;
-    for (int32_t e = column[c]; e < column[c + 1]; e++)
+    for (int32_t e = 0; e < matrix->column[c + 1] - matrix->column[c]; e++)
         size = sd_size(value[e]) > size ? sd_size(value[e]) : size;
     return size;
 }

@@ -100,12 +100,13 @@ static inline int is_link(const sd_sparse *lu, int32_t k)
 }
 
 /* new values of its column on the pivot that it had: 1: that became unhealthy */
-static int refactor_link(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k)
+static int refactor_link(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
 {
-    int32_t c = lu->order[k], u = lu->u_start[k], l = lu->l_start[k], j = lu->u_row[u];
+    int32_t c = lu->order[k], first = matrix->column[c], number = matrix->column[c + 1] - first, u = lu->u_start[k], l = lu->l_start[k], j = lu->u_row[u];
+    const sd_number *value = sd_column_of(matrix, c);
     sd_number pivot = 0.0, above = 0.0, below = 0.0;
-    for (int32_t e = column[c]; e < column[c + 1]; e++) {
-        int32_t p = lu->place[row[e]];
+    for (int32_t e = 0; e < number; e++) {
+        int32_t p = lu->place[matrix->row[first + e]];
         if (p == k)
             pivot += value[e];
         else if (p == j)
@@ -121,7 +122,7 @@ static int refactor_link(sd_sparse *lu, const int32_t *column, const int32_t *ro
         lu->l_value[l] = below * inverse;
         largest = sd_size(below) > largest ? sd_size(below) : largest;
     }
-    return !keeps_pivot(lu, column, value, k, pivot, largest);
+    return !keeps_pivot(lu, matrix, k, pivot, largest);
 }
 
 static inline sd_number right_side(const sd_sparse *lu, int32_t k, const sd_number *x, const double *row_scale)

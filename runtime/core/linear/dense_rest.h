@@ -72,7 +72,7 @@ static void keep_column(sd_sparse *lu, int32_t k, int32_t i, int32_t m, const sd
 }
 
 /* the columns of the rest [m, m], the first of them the k-th, as factors; row [m], at [rows]: which row stands where */
-static int factor_rest(sd_sparse *lu, const int32_t *column, const sd_number *value, int32_t k, int32_t m, sd_number *rest,
+static int factor_rest(sd_sparse *lu, const sd_matrix *matrix, int32_t k, int32_t m, sd_number *rest,
                        int32_t *row, int32_t *at, double threshold)
 {
     for (int32_t from = 0; from < m; from += PANEL) {
@@ -81,7 +81,7 @@ static int factor_rest(sd_sparse *lu, const int32_t *column, const sd_number *va
             sd_number *w = rest + (size_t)i * m;
             int32_t c = lu->order[k + i], own = lu->own ? lu->own[c] : c;
             lessen_block(lu, k + from, i - from, m - from - 1, w + from);
-            double size = column_size(column, value, c), largest;
+            double size = column_size(matrix, c), largest;
             int32_t best = rest_pivot(w, i, m, lu->paired && lu->place[own] < 0 ? at[own] : -1, threshold, &largest);
             double relative = size > 0.0 ? largest / size : 0.0;
             if (relative < lu->smallest) {
@@ -106,36 +106,36 @@ static int factor_rest(sd_sparse *lu, const int32_t *column, const sd_number *va
 }
 
 /* 1: the k-th column, in which `largest` is left, may keep the pivot that it had */
-static int keeps_pivot(sd_sparse *lu, const int32_t *column, const sd_number *value, int32_t k, sd_number pivot, double largest)
+static int keeps_pivot(sd_sparse *lu, const sd_matrix *matrix, int32_t k, sd_number pivot, double largest)
 {
     double relative = largest > 0.0 ? sd_size(pivot) / largest : 0.0;
-    if (lu->null_pivot > 0.0 && largest < lu->null_pivot * column_size(column, value, lu->order[k])) /* it may be left out now */
+    if (lu->null_pivot > 0.0 && largest < lu->null_pivot * column_size(matrix, lu->order[k])) /* it may be left out now */
         relative = 0.0;
     lu->smallest = relative < lu->smallest ? relative : lu->smallest;
     return relative >= UNHEALTHY && isfinite(sd_size(pivot));
 }
 
 /* the i-th column of the rest, with all before it taken from it, on the pivot that it had; 1: that became unhealthy */
-static int renew_column(sd_sparse *lu, const int32_t *column, const sd_number *value, int32_t k, int32_t i, int32_t m,
+static int renew_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k, int32_t i, int32_t m,
                         const sd_number *w)
 {
     double largest = 0.0;
     for (int32_t p = i; p < m; p++)
         largest = sd_size(w[p]) > largest ? sd_size(w[p]) : largest;
-    if (!keeps_pivot(lu, column, value, k + i, w[i], largest))
+    if (!keeps_pivot(lu, matrix, k + i, w[i], largest))
         return 1;
     keep_column(lu, k, i, m, w);
     return 0;
 }
 
 /* the same on the pivots that these columns had, rows in their order: 0 done, 1 one of them became unhealthy */
-static int refactor_rest(sd_sparse *lu, const int32_t *column, const sd_number *value, int32_t k, int32_t m, sd_number *rest)
+static int refactor_rest(sd_sparse *lu, const sd_matrix *matrix, int32_t k, int32_t m, sd_number *rest)
 {
     for (int32_t from = 0; from < m; from += PANEL) {
         int32_t to = from + PANEL < m ? from + PANEL : m;
         for (int32_t i = from; i < to; i++) {
             lessen_block(lu, k + from, i - from, m - from - 1, rest + (size_t)i * m + from);
-            if (renew_column(lu, column, value, k, i, m, rest + (size_t)i * m))
+            if (renew_column(lu, matrix, k, i, m, rest + (size_t)i * m))
                 return 1;
         }
         for (int32_t j = to; j < m; j++)

@@ -15,6 +15,7 @@ void sd_linear_free(sd_linear *linear)
     if (!linear)
         return;
     free(linear->sparse ? linear->work2 : linear->work);
+    free(linear->sum);
     sd_sparse_free(linear->sparse);
     sd_elimination_free(linear->elimination);
     free(linear->null);
@@ -50,6 +51,7 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
         return NULL;
     }
     linear->column_scale = linear->row_scale + m;
+    linear->own_scale = 1;
     linear->work2 = order ? NULL : linear->work + m;
     return linear;
 }
@@ -83,6 +85,33 @@ static void equilibrate(sd_linear *linear, const sd_number *values, const double
         linear->row_scale[i] = linear->row_scale[i] > 0.0 ? 1.0 / linear->row_scale[i] : 1.0;
     for (int32_t e = 0; e < linear->entries; e++)
         linear->scaled[e] *= linear->row_scale[linear->row[e]];
+}
+
+/* the same of the sum, whose entries are not kept */
+static void equilibrate_sum(sd_linear *linear, const double *scale)
+{
+    const sd_matrix *sum = linear->sum;
+    for (int32_t i = 0; i < linear->n; i++)
+        linear->row_scale[i] = 0.0;
+    for (int32_t j = 0; j < linear->n; j++) {
+        const double s = scale[j];
+        if (linear->own_scale)
+            linear->column_scale[j] = s;
+        for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++) {
+            double size = sd_size(sd_entry_of_sum(sum, e, s));
+            if (size > linear->row_scale[linear->row[e]])
+                linear->row_scale[linear->row[e]] = size;
+        }
+    }
+    for (int32_t i = 0; i < linear->n; i++)
+        linear->row_scale[i] = linear->row_scale[i] > 0.0 ? 1.0 / linear->row_scale[i] : 1.0;
+}
+
+/* the scaled matrix */
+static sd_matrix scaled_matrix(const sd_linear *linear)
+{
+    return linear->sum ? *linear->sum
+                       : (sd_matrix){.column = linear->column, .row = linear->row, .value = linear->scaled};
 }
 
 static void swap_columns(sd_number *a, int32_t n, int32_t j, int32_t k, int32_t *place)
@@ -211,20 +240,24 @@ static int without_pairs(sd_linear *linear)
         return 2;
     sd_sparse_free(linear->sparse);
     linear->sparse = lu;
+    if (linear->lent)
+        sd_sparse_lend(lu, linear->lent);
     linear->work = lu->x;
     linear->otherwise = NULL;
     allow(linear);
-    return sd_sparse_pivot(lu, linear->column, linear->row, linear->scaled);
+    const sd_matrix matrix = scaled_matrix(linear);
+    return sd_sparse_pivot(lu, &matrix);
 }
 
 static int sparse_factor(sd_linear *linear)
 {
     int failed = 1;
+    const sd_matrix matrix = scaled_matrix(linear);
     allow(linear);
     if (linear->sparse->pivoted && linear->sparse->rank == linear->n) /* a column that was left may have a pivot now */
-        failed = sd_sparse_refactor(linear->sparse, linear->column, linear->row, linear->scaled);
+        failed = sd_sparse_refactor(linear->sparse, &matrix);
     if (failed) {
-        failed = sd_sparse_pivot(linear->sparse, linear->column, linear->row, linear->scaled);
+        failed = sd_sparse_pivot(linear->sparse, &matrix);
         if (failed == 3)
             failed = without_pairs(linear);
         linear->pivotings++;
@@ -297,8 +330,10 @@ static int null_vectors(sd_linear *linear)
         int32_t c = linear->dense ? linear->place[k] : linear->sparse->order[k];
         sd_number *v = linear->null + (size_t)found * (size_t)n;
         memset(v, 0, (size_t)n * sizeof *v);
+        const sd_matrix matrix = scaled_matrix(linear);
+        const sd_number *value = sd_column_of(&matrix, c);
         for (int32_t e = linear->column[c]; e < linear->column[c + 1]; e++)
-            v[linear->row[e]] -= linear->scaled[e];
+            v[linear->row[e]] -= *value++;
         scaled_solve(linear, v);
         v[c] = 1.0;
         to_length_one(n, v);
@@ -326,6 +361,49 @@ static void forget(sd_linear *linear)
     if (linear->elimination)
         sd_elimination_forget(linear->elimination);
     linear->pivoted = 1;
+}
+
+int sd_linear_borrow(sd_linear *linear, sd_number *work, double *column_scale)
+{
+    int32_t longest = 0;
+    for (int32_t j = 0; j < linear->n; j++)
+        longest = linear->column[j + 1] - linear->column[j] > longest ? linear->column[j + 1] - linear->column[j] : longest;
+    sd_matrix *sum = linear->sum ? linear->sum : malloc(sizeof *sum + (size_t)longest * sizeof(sd_number));
+    if (!sum)
+        return 2;
+    *sum = (sd_matrix){.column = linear->column, .row = linear->row, .row_scale = linear->row_scale};
+    sum->room = (sd_number *)(sum + 1);
+    linear->sum = sum;
+    free(linear->scaled);
+    linear->scaled = NULL;
+    sd_sparse_lend(linear->sparse, work);
+    linear->work = linear->lent = work;
+    if (column_scale) {
+        double *rows = linear->own_scale ? realloc(linear->row_scale, ((size_t)linear->n + 1) * sizeof *rows) : NULL;
+        sum->row_scale = linear->row_scale = rows ? rows : linear->row_scale;
+        linear->column_scale = column_scale;
+        linear->own_scale = 0;
+    }
+    return 0;
+}
+
+int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale)
+{
+    sd_matrix *sum = linear->sum;
+    linear->factorisations++;
+    if (!linear->pivoted)
+        forget(linear);
+    linear->replayed = 0;
+    sum->a = a;
+    sum->b = b;
+    sum->c = *c;
+    sum->column_scale = scale;
+    equilibrate_sum(linear, scale);
+    int failed = sparse_factor(linear);
+    if (!failed && linear->rank < linear->n)
+        failed = null_vectors(linear);
+    sum->column_scale = linear->column_scale; /* a copy of these, which change */
+    return failed;
 }
 
 /* with exchanges of rows, which small matrices are met to learn of */
@@ -382,9 +460,12 @@ static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
         rest[i] = x[i] *= linear->row_scale[i];
     scaled_solve(linear, x);
     if (linear->smallest < REFINE) {
-        for (int32_t j = 0; j < n; j++)
+        const sd_matrix matrix = scaled_matrix(linear);
+        for (int32_t j = 0; j < n; j++) {
+            const sd_number *value = sd_column_of(&matrix, j);
             for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
-                rest[linear->row[e]] -= linear->scaled[e] * x[j];
+                rest[linear->row[e]] -= *value++ * x[j];
+        }
         scaled_solve(linear, rest);
         for (int32_t i = 0; i < n; i++)
             x[i] += isfinite(sd_size(rest[i])) ? rest[i] : 0.0;

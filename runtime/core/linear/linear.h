@@ -17,6 +17,7 @@
 #include <stdint.h>
 
 typedef struct sd_sparse sd_sparse;
+typedef struct sd_matrix sd_matrix;
 
 /* An order of elimination: columns [n], NULL: dense; paired: row own[c] (NULL: c) pivots in column c wherever its entry will do,
  * and where such factors get longer than `most` entries (0: however long) the columns are taken as in `otherwise` [n], for any
@@ -53,6 +54,9 @@ typedef struct sd_linear {
     int32_t replayed;            /* the last factors are those of `elimination` */
     sd_elimination *elimination; /* NULL: every matrix is pivoted */
     const int32_t *otherwise;    /* of sd_order; NULL: the order stays */
+    sd_matrix *sum;              /* R (A + c B) C instead of `scaled`, of which there is none; NULL: there is */
+    sd_number *lent;             /* [n + 1] work of sparse factors that is the caller's; NULL: it is theirs */
+    int32_t own_scale;           /* 1: column_scale is not the caller's */
 } sd_linear;
 
 /* order: column order for the sparse factorisation, NULL for dense.  NULL without memory. */
@@ -66,6 +70,12 @@ int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *s
 void sd_linear_solve(sd_linear *linear, sd_number *x);
 /* left [n] := 1 for the columns that the last factors left */
 void sd_linear_left(const sd_linear *linear, char *left);
+/* Of sparse ones whose matrices will be A + c B: what follows from these is not kept, and work [n + 1] is room of the caller
+ * which is free whenever they factorise or solve.  column_scale [n]: where the scale of the last factors stands from then on
+ * (NULL: in room of their own).  0 done, 2 no memory */
+int sd_linear_borrow(sd_linear *linear, sd_number *work, double *column_scale);
+/* as sd_linear_factor, of A + c B: a, b [entries] stay as they are until the next factors; scale [n] */
+int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale);
 /* set to 0: the next factorisation chooses its pivots anew, and nothing is known of those before */
 int32_t *sd_linear_pivoted(sd_linear *linear);
 /* small matrices, of which there will be many, are eliminated by a list of operations (elimination.h) where it serves; the

@@ -69,6 +69,10 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_sparse_refactor sd_sparse_z_refactor
 #define sd_sparse_solve sd_sparse_z_solve
 #define sd_sparse_basic sd_sparse_z_basic
+#define sd_sparse_lend sd_sparse_z_lend
+#define sd_linear_borrow sd_linear_z_borrow
+#define sd_linear_factor_sum sd_linear_z_factor_sum
+#define sd_matrix sd_matrix_z
 #else
 
 typedef double sd_number;

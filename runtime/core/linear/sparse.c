@@ -21,12 +21,15 @@ void sd_sparse_free(sd_sparse *lu)
         return;
     leave_chains(lu);
     free(lu->order);
+    free(lu->first);
     free(lu->l_start);
     free(lu->l_row);
     free(lu->u_row);
     free(lu->l_value);
     free(lu->u_value);
     free(lu->inverse);
+    if (!lu->lent)
+        free(lu->x);
     free(lu);
 }
 
@@ -38,18 +41,17 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *order)
     size_t m = (size_t)n, all = (size_t)rows;
     lu->n = n;
     lu->rows = rows;
-    lu->order = calloc(3 * m + all + 2, sizeof(int32_t));
+    lu->inverse = calloc(m + 1, sizeof(sd_number));
+    lu->x = calloc((m > all ? m : all) + 1, sizeof(sd_number));
+    lu->order = calloc(2 * m + all + 1, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
-    lu->inverse = calloc(m + (m > all ? m : all) + 1, sizeof(sd_number));
-    if (!lu->order || !lu->l_start || !lu->inverse) {
+    if (!lu->inverse || !lu->x || !lu->order || !lu->l_start) {
         sd_sparse_free(lu);
         return NULL;
     }
     lu->source = lu->order + m;
-    lu->first = lu->source + m;
-    lu->place = lu->first + m + 1;
+    lu->place = lu->source + m;
     lu->u_start = lu->l_start + m + 1;
-    lu->x = lu->inverse + m;
     memcpy(lu->order, order, m * sizeof *order);
     return lu;
 }
@@ -151,6 +153,14 @@ static void leave(sd_sparse *lu)
     lu->l_room = lu->u_room = 0;
 }
 
+void sd_sparse_lend(sd_sparse *lu, sd_number *x)
+{
+    if (!lu->lent)
+        free(lu->x);
+    lu->x = x;
+    lu->lent = 1;
+}
+
 /* room for factors of which nothing is known but the entries of their matrix */
 static int begin(sd_sparse *lu, int64_t entries)
 {
@@ -172,13 +182,14 @@ static void fit(int64_t taken, int64_t *room, int32_t **rows, sd_number **values
 }
 
 /* x := column c, eliminated with the finished columns behind nu entries of U; how many these are, the rows are stack[top..) */
-static int32_t reduce(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t c,
+static int32_t reduce(sd_sparse *lu, const sd_matrix *matrix, int32_t c,
                       int32_t stamp, int64_t nu, int32_t *top)
 {
-    int32_t reached = 0;
-    *top = reach(lu, column, row, c, stamp);
-    for (int32_t e = column[c]; e < column[c + 1]; e++)
-        lu->x[row[e]] += value[e];
+    int32_t reached = 0, first = matrix->column[c], number = matrix->column[c + 1] - first;
+    *top = reach(lu, matrix->column, matrix->row, c, stamp);
+    const sd_number *value = sd_column_of(matrix, c);
+    for (int32_t e = 0; e < number; e++)
+        lu->x[matrix->row[first + e]] += value[e];
     for (int32_t i = *top; i < lu->rows; i++) {
         int32_t j = lu->place[lu->stack[i]];
         if (j >= 0)
@@ -190,7 +201,7 @@ static int32_t reduce(sd_sparse *lu, const int32_t *column, const int32_t *row, 
 }
 
 /* all from the k-th column on, behind nl and nu entries of the factors: 0 done, 1 singular, 2 memory */
-static int eliminate_rest(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k,
+static int eliminate_rest(sd_sparse *lu, const sd_matrix *matrix, int32_t k,
                           int64_t nl, int64_t nu)
 {
     int32_t n = lu->n, m = n - k, failed = 0;
@@ -211,7 +222,7 @@ static int eliminate_rest(sd_sparse *lu, const int32_t *column, const int32_t *r
             failed = 2;
             break;
         }
-        int32_t top = 0, reached = reduce(lu, column, row, value, c, k + i, nu, &top);
+        int32_t top = 0, reached = reduce(lu, matrix, c, k + i, nu, &top);
         for (int32_t p = top; p < n; p++) {
             int32_t r = lu->stack[p];
             if (lu->place[r] < 0)
@@ -226,7 +237,7 @@ static int eliminate_rest(sd_sparse *lu, const int32_t *column, const int32_t *r
         lu->u_start[k + i + 1] = (int32_t)nu;
     }
     if (!failed)
-        failed = factor_rest(lu, column, value, k, m, rest, own, at, own_threshold(lu, THRESHOLD));
+        failed = factor_rest(lu, matrix, k, m, rest, own, at, own_threshold(lu, THRESHOLD));
     lu->rest = failed ? n : k;
     for (int32_t i = 0; i < m && !failed; i++) {
         lu->first[k + i] = k;
@@ -256,7 +267,7 @@ static void number_rows(sd_sparse *lu)
 }
 
 /* with room for the search */
-static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
+static int pivot_all(sd_sparse *lu, const sd_matrix *matrix)
 {
     int32_t n = lu->n, rows = lu->rows;
     int64_t nl = 0, nu = 0;
@@ -277,7 +288,7 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
             return 3;
         }
         if (dense_from(lu, k, nl + nu)) {
-            int failed = eliminate_rest(lu, column, row, value, k, nl, nu);
+            int failed = eliminate_rest(lu, matrix, k, nl, nu);
             if (!failed)
                 number_rows(lu);
             return failed;
@@ -287,8 +298,8 @@ static int pivot_all(sd_sparse *lu, const int32_t *column, const int32_t *row, c
             return 2;
         lu->l_start[k] = (int32_t)nl;
         lu->u_start[k] = (int32_t)nu;
-        int32_t top = 0, reached = reduce(lu, column, row, value, c, k, nu, &top);
-        double size = column_size(column, value, c);
+        int32_t top = 0, reached = reduce(lu, matrix, c, k, nu, &top);
+        double size = column_size(matrix, c);
         nu += reached;
         double largest;
         int32_t pivot = choose(lu, c, top, &largest);
@@ -353,23 +364,25 @@ static void leave_search(sd_sparse *lu)
     lu->among = NULL;
 }
 
-int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
+int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
 {
     size_t rows = (size_t)lu->rows;
     lu->stack = calloc(4 * rows + 1, sizeof(int32_t)); /* of a large one the room counts: it is not kept */
     lu->block = malloc((rows + 1) * sizeof(sd_number));
     lu->among = calloc((size_t)lu->n / 64 + 1, sizeof(uint64_t));
-    if (!lu->stack || !lu->block || !lu->among) {
+    lu->first = lu->first ? lu->first : malloc(((size_t)lu->n + 1) * sizeof *lu->first);
+    if (!lu->stack || !lu->block || !lu->among || !lu->first) {
         leave_search(lu);
         return 2;
     }
     lu->head = lu->stack + rows;
     lu->mark = lu->head + rows;
     lu->count = lu->mark + rows;
-    for (int32_t e = 0; e < column[lu->n]; e++)
-        lu->count[row[e]]++;
+    const int32_t entries = matrix->column[lu->n];
+    for (int32_t e = 0; e < entries; e++)
+        lu->count[matrix->row[e]]++;
     unsigned before = sd_no_subnormals();
-    int failed = lu->l_room == 0 && begin(lu, column[lu->n]) ? 2 : pivot_all(lu, column, row, value);
+    int failed = lu->l_room == 0 && begin(lu, entries) ? 2 : pivot_all(lu, matrix);
     sd_subnormals(before);
     if (!failed && lu->n > SMALL) {
         fit(lu->l_start[lu->n], &lu->l_room, &lu->l_row, &lu->l_value);
@@ -377,27 +390,32 @@ int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, co
     }
     lu->widest = failed ? 0 : widest_block(lu);
     leave_search(lu);
+    if (!lu->widest && lu->n > SMALL) { /* no columns fill alike */
+        free(lu->first);
+        lu->first = NULL;
+    }
     if (!failed)
         find_chains(lu);
     return failed;
 }
 
 /* x := the k-th column, less the columns before it that stand among the first `number` entries of its column of U */
-static void renewed(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k,
+static void renewed(sd_sparse *lu, const sd_matrix *matrix, int32_t k,
                     int32_t number, sd_number *block)
 {
-    int32_t c = lu->order[k], from = lu->u_start[k];
-    for (int32_t e = column[c]; e < column[c + 1]; e++)
-        lu->x[lu->place[row[e]]] += value[e];
+    int32_t c = lu->order[k], from = lu->u_start[k], first = matrix->column[c], entries = matrix->column[c + 1] - first;
+    const sd_number *value = sd_column_of(matrix, c);
+    for (int32_t e = 0; e < entries; e++)
+        lu->x[lu->place[matrix->row[first + e]]] += value[e];
     apply_columns(lu, number, lu->u_row + from, NULL, lu->u_value + from, lu->x, block);
 }
 
 /* the k-th column on the pivot that it had: 1: that became unhealthy */
-static int refactor_column(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, int32_t k,
+static int refactor_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k,
                            sd_number *block)
 {
     sd_number *x = lu->x;
-    renewed(lu, column, row, value, k, lu->u_start[k + 1] - lu->u_start[k], block);
+    renewed(lu, matrix, k, lu->u_start[k + 1] - lu->u_start[k], block);
     sd_number diagonal = x[k], inverse = 1.0 / diagonal;
     double largest = sd_size(diagonal);
     x[k] = 0.0;
@@ -408,27 +426,27 @@ static int refactor_column(sd_sparse *lu, const int32_t *column, const int32_t *
         lu->l_value[l] = v * inverse;
         largest = sd_size(v) > largest ? sd_size(v) : largest;
     }
-    return !keeps_pivot(lu, column, value, k, diagonal, largest);
+    return !keeps_pivot(lu, matrix, k, diagonal, largest);
 }
 
 /* the columns of the rest, which are full: 1: a pivot became unhealthy, or there is no memory */
-static int renew_rest(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value, sd_number *block)
+static int renew_rest(sd_sparse *lu, const sd_matrix *matrix, sd_number *block)
 {
     int32_t k = lu->rest, m = lu->n - k;
     sd_number *rest = malloc(((size_t)m * (size_t)m + 1) * sizeof *rest);
     if (!rest)
         return 1;
     for (int32_t i = 0; i < m; i++) {
-        renewed(lu, column, row, value, k + i, lu->u_start[k + i + 1] - lu->u_start[k + i] - i, block);
+        renewed(lu, matrix, k + i, lu->u_start[k + i + 1] - lu->u_start[k + i] - i, block);
         memcpy(rest + (size_t)i * m, lu->x + k, (size_t)m * sizeof *rest);
         memset(lu->x + k, 0, (size_t)m * sizeof *rest);
     }
-    int failed = refactor_rest(lu, column, value, k, m, rest);
+    int failed = refactor_rest(lu, matrix, k, m, rest);
     free(rest);
     return failed;
 }
 
-int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value)
+int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 {
     sd_number *block = lu->widest ? malloc((size_t)lu->widest * sizeof *block) : NULL;
     int failed = lu->widest && !block;
@@ -438,10 +456,10 @@ int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row,
     memset(lu->x, 0, ((size_t)lu->n + 1) * sizeof *lu->x);
     unsigned before = sd_no_subnormals();
     for (int32_t k = 0; k < lu->rest && !failed; k++)
-        failed = is_link(lu, k) ? refactor_link(lu, column, row, value, k)
-                                : lu->source[k] >= 0 && refactor_column(lu, column, row, value, k, block);
+        failed = is_link(lu, k) ? refactor_link(lu, matrix, k)
+                                : lu->source[k] >= 0 && refactor_column(lu, matrix, k, block);
     if (!failed && lu->rest < lu->n)
-        failed = renew_rest(lu, column, row, value, block);
+        failed = renew_rest(lu, matrix, block);
     sd_subnormals(before);
     if (failed)
         lu->pivoted = 0;

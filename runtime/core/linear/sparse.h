@@ -5,7 +5,7 @@
 #ifndef SYSDYN_SPARSE_H
 #define SYSDYN_SPARSE_H
 
-#include "linear/number.h"
+#include "linear/matrix.h"
 
 #include <stdint.h>
 
@@ -19,7 +19,7 @@ typedef struct sd_sparse {
     int32_t *order;              /* [n] column of the matrix that is eliminated k-th */
     int32_t *place, *source;     /* [rows] row -> pivot position, n where it has none; [n] pivot position -> row,
                                     -1 of a column that was left out */
-    int32_t *first;              /* [n + 1] of the columns of L that fill alike (blocks.h): the first one */
+    int32_t *first;              /* [n + 1] of the columns of L that fill alike (blocks.h): the first one; NULL: none do */
     int32_t *l_start, *u_start;  /* [n + 1] */
     int32_t *l_row, *u_row;      /* pivot positions; u in the order of elimination, diagonal apart */
     sd_number *l_value, *u_value, *inverse; /* inverse [n]: of the diagonal of U */
@@ -33,6 +33,7 @@ typedef struct sd_sparse {
     int32_t lowers, uppers;
     char *pulled;                /* [n] which substitutions take what a column makes of another position within a chain */
     sd_number *x;                /* [the larger of n and rows, + 1] work, of solutions by these factors too */
+    int lent;                    /* 1: x is the caller's */
     int pivoted;                 /* a valid pattern exists */
     int paired;                  /* row own[c] pivots in column c wherever its entry will do: the order is one of A + A^T;
                                     2: however faint that is, of quasi-definite matrices */
@@ -49,9 +50,11 @@ typedef struct sd_sparse {
 sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *order);
 void sd_sparse_free(sd_sparse *lu);
 /* choose pivots and pattern: 0 done, 1 singular, 2 memory */
-int sd_sparse_pivot(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value);
+int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix);
 /* new values on the old pattern: 0 done, 1 a pivot became unhealthy */
-int sd_sparse_refactor(sd_sparse *lu, const int32_t *column, const int32_t *row, const sd_number *value);
+int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix);
+/* work x from now on in room of the caller [as above] */
+void sd_sparse_lend(sd_sparse *lu, sd_number *x);
 /* x := column_scale * (LU)^-1 (row_scale * x); the scales NULL: ones */
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale);
 /* x [rows] with A^T x = b [n], zero where no pivot is; equations of columns that were left out are not judged; work [n] */

@@ -42,7 +42,7 @@ int sd_determined(int32_t rows, int32_t columns, const int32_t *column, const in
         lu->dropped = ROUND_OFF;
         lu->null_pivot = along ? least : 0.0;
         lu->idle = idle;
-        failed = sd_sparse_pivot(lu, column, row, value);
+        failed = sd_sparse_pivot(lu, &(sd_matrix){.column = column, .row = row, .value = value});
         failed = failed ? failed : !(lu->smallest >= least);
     }
     for (int32_t k = 0; k < columns && !failed && along; k++)

@@ -9,6 +9,7 @@
 
 #include "run/quadratures.h"
 #include "run/watched.h"
+#include "system/condensed.h"
 
 #define POLL 4  /* steps between two looks at the clock */
 #define GROWN 1.1 /* times the largest so far: beyond it the size of a step is not believed as the method left it */
@@ -21,7 +22,10 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
         return NULL;
     size_t n = (size_t)(extended > stepper->n ? extended : stepper->n) + 8, m = (size_t)observed + 8;
     size_t a = (size_t)audited + 8;
-    run->memory = calloc(2 * n + 3 * m + 5 * a, sizeof(double));
+    /* where rows are settled with the kept unknowns alone, points stand where such a system evaluates its own: between what
+     * moves a point and who looks at it nothing is evaluated */
+    const sd_condensed *left = settle ? (const sd_condensed *)settle->system->left : NULL;
+    run->memory = calloc((left ? 0 : 2 * n) + 3 * m + 5 * a, sizeof(double));
     if (!run->memory) {
         free(run);
         return NULL;
@@ -30,9 +34,9 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
     run->settle = settle;
     run->written = written;
     run->observed = observed;
-    run->point = run->memory;
-    run->point_d = run->point + n;
-    run->values = run->point_d + n;
+    run->point = left ? left->y : run->memory;
+    run->point_d = left ? left->yd : run->memory + n;
+    run->values = left ? run->memory : run->point_d + n;
     run->largest = run->values + m;
     run->slope = run->largest + m;
     run->audited = audited;
@@ -53,12 +57,20 @@ void sd_run_free(sd_run *run)
     free(run);
 }
 
+/* points are settled in room of the method's, or no more */
+static void lend(sd_run *run, int room)
+{
+    const sd_stepper *stepper = run->stepper;
+    run->settle->lent = room && stepper->spare ? stepper->spare(stepper->self, &run->settle->lent_room) : NULL;
+}
+
 void sd_run_settle(sd_run *run, double t)
 {
     sd_settle *settle = run->settle;
     const sd_stepper *stepper = run->stepper;
     double moved = 0.0;
     int at_hand = stepper->onto && !run->fresh;
+    lend(run, 1);
     if (at_hand && t == *stepper->t && sd_settle_holds(settle, t, run->point, run->point_d))
         settle->drift = settle->constraints;
     else if (at_hand && !stepper->onto(stepper->self, t, run->point, run->point_d, &moved)
@@ -66,6 +78,7 @@ void sd_run_settle(sd_run *run, double t)
         settle->drift = moved;
     else
         sd_settle_point(settle, t, run->point, run->point_d);
+    lend(run, 0);
 }
 
 /* How far the unknowns of a row within a step lie beyond those of the steps. */
@@ -117,7 +130,9 @@ static void refine(sd_run *run)
     double enough = run->settle->enough;
     if (kinds == SD_COMPARED)
         run->settle->enough = fmax(enough, run->rough);
+    lend(run, 1);
     run->stepper->refine(run->stepper->self, run->settle);
+    lend(run, 0);
     run->settle->enough = enough;
 }
 

@@ -30,7 +30,7 @@ typedef struct sd_bdf {
     const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
     double *magnitude;        /* [n] of the unknowns; grows with max |y| */
     double *met;              /* [n] max |y| */
-    const int32_t *test, *power;
+    const int8_t *test, *power;
     const int32_t *common_from, *common; /* [commons + 1] where each group begins in `common`: its unknowns */
     int32_t commons;          /* groups of unknowns that are states but for what they have in common */
     /* state of the integration */

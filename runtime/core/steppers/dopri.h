@@ -28,7 +28,7 @@ typedef struct sd_dopri {
     const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
     double *magnitude;        /* [n] of the unknowns; grows with max |y| */
     double *met;              /* [n] max |y| */
-    const int32_t *test, *power; /* [n] as in bdf.h */
+    const int8_t *test, *power; /* [n] as in bdf.h */
     double patience;          /* steps still to be taken above which a stiff run is given up */
     double spare;             /* the same of one whose system is faster than its motion; 0: never */
     double opening;           /* over rtol^(1/8): the first step as an earlier run found it fit, 0: chosen; then as this one does */

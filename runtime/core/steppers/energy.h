@@ -39,7 +39,7 @@ typedef struct sd_energy {
     const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
     double *magnitude;        /* [n] of the unknowns; grows with max |y| */
     double *met;              /* [n] max |y| */
-    const int32_t *test, *power; /* [n] as in bdf.h */
+    const int8_t *test, *power; /* [n] as in bdf.h */
     double patience;          /* steps still to be taken above which a run is given up */
     const sd_call *audit;     /* block audit; NULL: there is no energy */
     int32_t audited;          /* its rows */

@@ -25,12 +25,20 @@ static void follow(sd_expanded *expanded)
     expanded->face.node_weight = inner->node_weight;
 }
 
+/* room for a point of what is stepped */
+static double *room_of(const sd_expanded *expanded)
+{
+    size_t numbers;
+    return expanded->z ? expanded->z : expanded->inner->spare(expanded->inner->self, &numbers);
+}
+
 /* the points of the quadrature, one by one: together they would be as long as all the rest */
 static void show(const void *self, int32_t k, double *y, double *yd)
 {
     const sd_expanded *expanded = self;
-    expanded->inner->show(expanded->inner->self, k, expanded->z, expanded->zd);
-    sd_condensed_show(expanded->condensed, expanded->z, expanded->zd, y, yd);
+    double *z = room_of(expanded), *zd = z + expanded->room;
+    expanded->inner->show(expanded->inner->self, k, z, zd);
+    sd_condensed_show(expanded->condensed, z, zd, y, yd);
 }
 
 static int step(void *self)
@@ -45,17 +53,19 @@ static int step(void *self)
 static void dense(const void *self, double t, double *y, double *yd)
 {
     const sd_expanded *expanded = self;
-    expanded->inner->dense(expanded->inner->self, t, expanded->z, expanded->zd);
-    sd_condensed_show(expanded->condensed, expanded->z, expanded->zd, y, yd);
+    double *z = room_of(expanded), *zd = z + expanded->room;
+    expanded->inner->dense(expanded->inner->self, t, z, zd);
+    sd_condensed_show(expanded->condensed, z, zd, y, yd);
 }
 
 static void values(const void *self, double t, double *y)
 {
     const sd_expanded *expanded = self;
     const sd_stepper *inner = expanded->inner;
+    double *z = room_of(expanded);
     if (t != *inner->t)
-        inner->values(inner->self, t, expanded->z);
-    sd_condensed_expand(expanded->condensed, t != *inner->t ? expanded->z : inner->y, y, 0);
+        inner->values(inner->self, t, z);
+    sd_condensed_expand(expanded->condensed, t != *inner->t ? z : inner->y, y, 0);
 }
 
 static void refine(void *self, sd_settle *settle)
@@ -66,6 +76,12 @@ static void refine(void *self, sd_settle *settle)
     settle->seen = NULL;
 }
 
+static double *spare(void *self, size_t *numbers)
+{
+    const sd_expanded *expanded = self;
+    return expanded->inner->spare(expanded->inner->self, numbers);
+}
+
 static void start(void *self, double t, const double *y, const double *yd, double h)
 {
     sd_expanded_start(self, t, y, yd, h);
@@ -74,9 +90,12 @@ static void start(void *self, double t, const double *y, const double *yd, doubl
 void sd_expanded_start(sd_expanded *expanded, double t, const double *y, const double *yd, double h)
 {
     size_t size = (size_t)expanded->face.n * sizeof *y;
-    sd_condensed_gather(expanded->condensed, y, expanded->z);
-    sd_condensed_gather(expanded->condensed, yd, expanded->zd);
-    expanded->inner->start(expanded->inner->self, t, expanded->z, expanded->zd, h);
+    double *z = room_of(expanded);
+    if (!z) /* no memory, which the first step tells */
+        return;
+    sd_condensed_gather(expanded->condensed, y, z);
+    sd_condensed_gather(expanded->condensed, yd, z + expanded->room);
+    expanded->inner->start(expanded->inner->self, t, z, z + expanded->room, h);
     if (expanded->y)
         memmove(expanded->y, y, size);
     expanded->face.y = y;
@@ -88,19 +107,20 @@ void sd_expanded_start(sd_expanded *expanded, double t, const double *y, const d
 sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, int32_t unknowns)
 {
     sd_expanded *expanded = calloc(1, sizeof *expanded);
-    size_t m = (size_t)condensed->unknowns + 8, n = condensed->full->scales > 0 ? (size_t)unknowns + 8 : 0;
+    size_t m = (size_t)condensed->unknowns + 8, numbers = 0;
     if (!expanded)
         return NULL;
-    expanded->memory = calloc(2 * m + n, sizeof(double));
-    if (!expanded->memory) {
+    int own = !inner->spare || !inner->spare(inner->self, &numbers) || numbers < 2 * m;
+    int steep = condensed->full->scales > 0;
+    expanded->z = own ? calloc(2 * m, sizeof(double)) : NULL;
+    expanded->y = steep ? calloc((size_t)unknowns + 8, sizeof(double)) : NULL;
+    if ((own && !expanded->z) || (steep && !expanded->y)) {
         sd_expanded_free(expanded);
         return NULL;
     }
+    expanded->room = m;
     expanded->inner = inner;
     expanded->condensed = condensed;
-    expanded->z = expanded->memory;
-    expanded->zd = expanded->z + m;
-    expanded->y = n ? expanded->zd + m : NULL;
     expanded->face = *inner;
     expanded->face.self = expanded;
     expanded->face.n = unknowns;
@@ -111,6 +131,7 @@ sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, i
     expanded->face.start = start;
     expanded->face.show = inner->show ? show : NULL;
     expanded->face.values = inner->values ? values : NULL;
+    expanded->face.spare = inner->spare ? spare : NULL;
     return expanded;
 }
 
@@ -118,7 +139,8 @@ void sd_expanded_free(sd_expanded *expanded)
 {
     if (!expanded)
         return;
-    free(expanded->memory);
+    free(expanded->z);
+    free(expanded->y);
     free(expanded);
 }
 

@@ -10,7 +10,8 @@ typedef struct sd_expanded {
     sd_stepper face;
     sd_stepper *inner;
     const sd_condensed *condensed;
-    double *z, *zd, *memory;          /* kept ones; their memory */
+    double *z;                        /* [2 room] a point of kept ones; NULL: it stands in what the method has spare */
+    size_t room;
     double *y;                        /* all unknowns of the last point, of steep laws; NULL */
     double *met, *magnitude;          /* [unknowns] of all, which grow with each step as in bdf.h; NULL: they do not */
 } sd_expanded;

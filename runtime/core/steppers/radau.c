@@ -2,12 +2,14 @@
 #include "linear/lanes.h"
 #include "steppers/radau.h"
 #include "steppers/threads.h"
+#include "system/condensed.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#define OWN 6              /* vectors that every step hands on to the next one */
 #define FIRST 1e-2         /* of the span: the first step at most */
 #define CREEPS 8           /* steps in a row for which Newton failed at first: towards a square root's zero they would never end */
 #define IDLE 1e-6          /* error of a step that only Newton keeps short */
@@ -22,6 +24,7 @@
 #define GOOD 0.001         /* contraction up to which the Jacobian is kept for the next step */
 #define KEEP_LOW 1.0       /* a step that would change by no more than this keeps its factors */
 #define KEEP_HIGH 1.2
+#define PULLED 4.0         /* steps resolve what is slower: measured on HIRES, whose rows within steps were 30 times worse */
 #define SINGULAR 6         /* halvings after a singular matrix */
 #define ASTRAY 16.0 /* error of a step that passes over what a steep law does: half of it is tried */
 
@@ -56,47 +59,79 @@ static void show(const void *self, int32_t s, double *y, double *yd)
     }
 }
 
+/* Factors work in vectors of which nothing is read while they do: the point of a stage is made anew, as are rows of the whole
+ * system where that has more; the right sides behind the first one are in others then.  0; 2: no memory */
+static int borrow(sd_radau *radau)
+{
+    const sd_condensed *kept = (const sd_condensed *)radau->system->left;
+    int failed = sd_linear_borrow(radau->linear, kept ? kept->r : radau->y, NULL);
+    for (int k = 0; k < (radau->most_stages - 1) / 2 && !failed; k++)
+        failed = sd_linear_z_borrow(radau->complex_linear[k], (double complex *)radau->d[1 + 2 * k], radau->linear->column_scale);
+    return failed;
+}
+
 /* room for what the steps behind a start make: 0; -1: no memory */
 static int provide_room(sd_radau *radau)
 {
     const sd_system *system = radau->system;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(radau->n + 1);
-    double **vectors[] = {&radau->last, &radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->y,
-                          &radau->rate, &radau->ee, &radau->weight, &radau->pull, &radau->terms, &radau->first};
-    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full}; /* the last two: of steep laws */
-    size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep,
-           sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
-    size_t all = number + sets * (size_t)radau->most_stages, pairs = (size_t)(radau->most_stages - 1) / 2;
+    double **vectors[] = {&radau->last, &radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->weight,
+                          &radau->y, &radau->rate, &radau->ee, &radau->terms, &radau->first};
+    const int sparing = sd_radau_sparing(radau), kept = sparing && system->left;
+    /* z and kept change places, and either has next to it what no step hands on (`spare`); the last two: of steep laws */
+    double **of_stages[] = {radau->z, radau->d, radau->kept, radau->base, radau->full};
+    size_t steep = system->scales > 0 ? 2 : 0, number = kept ? OWN : sparing ? OWN + 2 : OWN + 3 + steep;
+    size_t sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
+    size_t pairs = (size_t)(radau->most_stages - 1) / 2, all = number + sets * (size_t)radau->most_stages + 2 * pairs;
     if (radau->work)
         return 0;
     radau->work = calloc(all * m + (steep ? 3 : 2) * nnz, sizeof(double));
-    radau->right = calloc(pairs * m + 1, sizeof(double complex));
-    if (!radau->work || !radau->right) {
+    radau->led = calloc((size_t)radau->n + 1, sizeof *radau->led);
+    if (!radau->work || !radau->led) {
         sd_radau_rest(radau);
         return -1;
     }
     double *next = radau->work;
     for (size_t i = 0; i < number; i++, next += m)
         *vectors[i] = next;
-    for (size_t i = 0; i < sets; i++)
+    for (size_t i = 0; i < sets; i++) {
         for (int32_t s = 0; s < radau->most_stages; s++, next += m)
             of_stages[i][s] = next;
+        for (size_t k = 0; k < pairs && of_stages[i] == radau->d; k++, next += 2 * m)
+            radau->w[k] = (double complex *)next;
+    }
+    if (kept) { /* the point of a stage is made anew behind each solution */
+        radau->y = (double *)radau->w[0];
+        radau->rate = radau->y + m;
+    }
     radau->jy = next;
     radau->jyd = radau->jy + nnz;
+    if (sparing)
+        radau->ee = radau->d[0];
+    if (sparing && borrow(radau)) {
+        sd_radau_rest(radau);
+        return -1;
+    }
     radau->g = steep ? radau->jyd + nnz : radau->linear->scaled; /* rows of steep laws are judged by the matrix as it is */
-    for (size_t k = 0; k < pairs; k++)
-        radau->w[k] = radau->right + k * m;
     return 0;
+}
+
+/* right sides with what is extrapolated anew before the next step */
+static double *spare(void *self, size_t *numbers)
+{
+    sd_radau *radau = self;
+    *numbers = (size_t)sd_whole_lanes(radau->n + 1) * (size_t)(2 * radau->most_stages + (radau->most_stages - 1));
+    return provide_room(radau) ? NULL : radau->z[0] < radau->d[0] ? radau->z[0] : radau->d[0];
 }
 
 void sd_radau_rest(sd_radau *radau)
 {
     free(radau->work);
-    free(radau->right);
     free(radau->beside);
     free(radau->point_y);
+    free(radau->led);
     radau->work = radau->ee = radau->weight = radau->point_y = NULL;
-    radau->right = NULL;
+    radau->led = NULL;
     radau->beside = NULL;
 }
 
@@ -111,6 +146,12 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     radau->n = system->unknowns;
     radau->stages = sd_radau_methods[0].stages;
     radau->most_stages = stages;
+    for (int32_t k = 0; k < (stages - 1) / 2; k++) {
+        radau->complex_linear[k] = complex_linear[k];
+        if (complex_linear[k])
+            sd_linear_z_replayed(complex_linear[k]);
+    }
+    sd_linear_replayed(linear);
     radau->phi = calloc(2 * m, sizeof(double));
     radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
     if (!radau->phi || !radau->gap || provide_room(radau)) {
@@ -119,16 +160,10 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     }
     radau->yd = radau->phi + m;
     sd_radau_gaps(radau->gap);
-    for (int32_t k = 0; k < (stages - 1) / 2; k++) {
-        radau->complex_linear[k] = complex_linear[k];
-        if (complex_linear[k])
-            sd_linear_z_replayed(complex_linear[k]);
-    }
-    sd_linear_replayed(linear);
     radau->method = radau->used = sd_radau_methods;
     radau->stepper = (sd_stepper){radau, system, radau->n, &radau->t, &radau->t_end, radau->phi, radau->yd,
                                   &radau->taken, step, dense, refine, start, stages, NULL, NULL, NULL, NULL,
-                                  NULL, NULL, NULL, NULL, NULL, 1, show};
+                                  NULL, NULL, NULL, NULL, NULL, 1, show, NULL, NULL, spare};
     return radau;
 }
 
@@ -309,17 +344,16 @@ static void fit_end(sd_radau *radau)
         radau->h = 0.5 * left;
 }
 
-/* how fast each unknown is pulled back by its own row, in steps */
-static void note_pulls(sd_radau *radau)
+/* which unknowns steps follow: how fast each is pulled back by its own row, in steps */
+static void note_led(sd_radau *radau)
 {
     const sd_system *system = radau->system;
     for (int32_t j = 0; j < radau->n; j++) {
-        radau->pull[j] = 0.0;
-        if (radau->smooth[j] == SD_UNPULLED)
-            continue;
-        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+        double pull = 0.0;
+        for (int32_t e = system->column[j]; e < system->column[j + 1] && radau->smooth[j] != SD_UNPULLED; e++)
             if (radau->jyd[e] != 0.0)
-                radau->pull[j] = fmax(radau->pull[j], radau->h * fabs(radau->jy[e] / radau->jyd[e]));
+                pull = fmax(pull, radau->h * fabs(radau->jy[e] / radau->jyd[e]));
+        radau->led[j] = radau->smooth[j] && pull < PULLED;
     }
 }
 
@@ -360,8 +394,8 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
     radau->refined[0] = 0;
     radau->h_before = radau->h_used;
     radau->h_used = h;
-    note_pulls(radau);
-    for (int s = 0; s < method->stages; s++) {
+    note_led(radau);
+    for (int s = 0; s < radau->most_stages; s++) {
         double *swap = radau->kept[s];
         radau->kept[s] = radau->z[s];
         radau->z[s] = swap;
@@ -391,7 +425,10 @@ static void project(sd_radau *radau)
     size_t size = (size_t)radau->n * sizeof(double);
     memcpy(radau->y, radau->phi, size);
     memcpy(radau->rate, radau->yd, size);
-    if (sd_settle_point(radau->project, radau->t, radau->y, radau->rate))
+    radau->project->lent = radau->system->left ? NULL : spare(radau, &radau->project->lent_room);
+    int failed = sd_settle_point(radau->project, radau->t, radau->y, radau->rate);
+    radau->project->lent = NULL;
+    if (failed)
         return;
     memcpy(radau->phi, radau->y, size);
     for (int32_t i = 0; i < radau->n; i++)

@@ -62,7 +62,7 @@ typedef struct sd_radau {
     const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
     double *magnitude;        /* [n] of the unknowns; grows with max |y| */
     double *met;              /* [n] max |y| */
-    const int32_t *test, *power, *smooth;   /* [n] as in bdf.h; smooth: 1 where yd is the derivative,
+    const int8_t *test, *power, *smooth;   /* [n] as in bdf.h; smooth: 1 where yd is the derivative,
                                                * SD_UNPULLED: and is interpolated whatever pulls */
     /* state of the integration */
     double tolerance;         /* 0.1 rtol^(2/3) */
@@ -90,7 +90,8 @@ typedef struct sd_radau {
     double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it; of steep
                                                      * laws alone, like first and terms */
     double *first;            /* [n] d[0] while a correction is tried */
-    double *pull;             /* [n] h |dF/dy| / |dF/dyd| of the row that holds its derivative, in the last step */
+    char *led;                /* [n] 1: in the last step h |dF/dy| / |dF/dyd| of the row that holds its derivative was small:
+                               * steps resolve its motion, and its derivative tells more than the stages alone */
     double (*gap)[SD_STAGES + 1][SD_STAGES + 1]; /* [methods]: sd_radau_gaps */
     double apart[SD_POINTS], bend[SD_POINTS]; /* of each of the last points x_i: the product of all 1 / (x_i - x_j), twice
                                                * their sum */
@@ -98,10 +99,10 @@ typedef struct sd_radau {
     char *open;               /* [n] columns that factors left */
     double *y, *rate, *ee, *weight, *terms, *jy, *jyd, *g, *work; /* work: the memory of all vectors but phi and yd */
     double *newton_weight, *scale, *powered; /* of Newton's norm, of columns; their memory where powers of h count */
-    double complex *w[SD_PAIRS], *right; /* right sides and solutions; their memory */
+    double complex *w[SD_PAIRS]; /* right sides and solutions */
     struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
     sd_system *other;             /* its system */
-    double *point_y, *point_rate; /* [n] */
+    double *point_y, *point_rate; /* [n]; y of a system with all its unknowns alone */
     struct sd_coupled *coupled;   /* radau_coupled.c: all stages at once; made when first needed */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, newton_iterations, factorisations, taken;
@@ -141,6 +142,8 @@ double sd_radau_strictness(const sd_radau *radau, const sd_radau_method *method)
 void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out);
 void sd_radau_stage(sd_radau *radau, int s, double *y, double *rate);
 int sd_radau_factorise(sd_radau *radau, int at_end);
+/* 1: so large that the room of matrices counts, which are then made where they are factorised */
+int sd_radau_sparing(const sd_radau *radau);
 int sd_radau_lean(sd_radau *radau, int where);
 int sd_radau_residuals(sd_radau *radau);
 double sd_radau_correct(sd_radau *radau);

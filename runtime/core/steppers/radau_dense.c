@@ -1,9 +1,8 @@
 /* Values between the ends of a step of Radau IIA, and the guess for the next (see radau.h). */
+#include "linear/lanes.h"
 #include "steppers/radau.h"
 
 #include <string.h>
-
-#define PULLED 4.0 /* steps resolve what is slower: measured on HIRES, whose rows within steps were 30 times worse */
 
 void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1])
 {
@@ -101,12 +100,6 @@ static void lifted(const sd_radau *radau, double x, double *value, double *slope
     by_slope[1] = ld;
 }
 
-/* steps resolve this unknown's motion: its derivative tells more than the stages alone */
-static int led(const sd_radau *radau, int32_t i)
-{
-    return radau->smooth[i] && radau->pull[i] < PULLED;
-}
-
 /* the quintic through values and derivatives at the last three points, for the unknowns that it serves */
 static void between_points(const sd_radau *radau, double t, double *y, double *yd)
 {
@@ -114,7 +107,7 @@ static void between_points(const sd_radau *radau, double t, double *y, double *y
     int points = radau->taken > 1 ? SD_POINTS : 2;
     hermite(radau, t, a, b, ad, bd);
     for (int32_t i = 0; i < radau->n; i++)
-        if (led(radau, i)) {
+        if (radau->led[i]) {
             double base = radau->last[i]; /* differences against one value: no cancellation of large ones */
             double end = radau->phi[i] - base, old = points > 2 ? radau->before[i] - base : 0.0;
             double d0 = radau->slope[0][i], d1 = radau->slope[1][i];
@@ -134,7 +127,7 @@ static void between_stages(const sd_radau *radau, double t, double *y, double *y
     double h = radau->h_used, v[SD_STAGES + 1], d[SD_STAGES + 1], by[2];
     lifted(radau, (t - (radau->t - h)) / h, v, d, by);
     for (int32_t i = 0; i < radau->n; i++)
-        if (led(radau, i)) {
+        if (radau->led[i]) {
             double end = radau->phi[i] - radau->last[i], slope = radau->slope[1][i];
             double sum = v[last + 1] * end, rate = d[last + 1] * end;
             for (int s = 0; s < last; s++) {
@@ -153,7 +146,7 @@ static void of_stages(const sd_radau *radau, double t, double *y, double *yd)
     double h = radau->h_used, v[SD_STAGES + 1], d[SD_STAGES + 1];
     lagrange(radau, method, (t - (radau->t - h)) / h, v, d);
     for (int32_t i = 0; i < radau->n; i++)
-        if (!led(radau, i)) {
+        if (!radau->led[i]) {
             double sum = radau->last[i], rate = 0.0;
             for (int s = 0; s < method->stages; s++) {
                 sum += v[s + 1] * radau->kept[s][i];
@@ -179,6 +172,7 @@ void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
         between_points(radau, t, y, yd);
 }
 
+/* the point that is settled may be room that was lent for it, of which nothing is read from where all unknowns follow from it */
 void sd_radau_refine(sd_radau *radau, sd_settle *settle)
 {
     const double *value[SD_POINTS] = {radau->phi, radau->last, radau->before};
@@ -228,7 +222,7 @@ void sd_radau_extrapolate(sd_radau *radau, double h)
     for (int s = 0; s < radau->method->stages; s++) {
         double v[SD_STAGES + 1], slope[SD_STAGES + 1];
         if (radau->taken == 0) {
-            memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
+            memset(radau->z[s], 0, (size_t)sd_whole_lanes(radau->n) * sizeof(double));
             continue;
         }
         lagrange(radau, used, 1.0 + radau->method->c[s] * h / radau->h_used, v, slope);

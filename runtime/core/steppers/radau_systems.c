@@ -38,6 +38,11 @@ static int large(const sd_radau *radau)
     return radau->n >= SD_LARGE;
 }
 
+int sd_radau_sparing(const sd_radau *radau)
+{
+    return large(radau) && radau->system->scales == 0 && radau->linear->sparse;
+}
+
 typedef struct factoring {
     sd_radau *radau;
     int failed[SD_PAIRS + 1];
@@ -52,6 +57,13 @@ static void factorise_one(void *context, int part)
     int32_t entries = radau->system->entries;
     /* a pivot is small or not beside the unknowns themselves, whatever the step */
     const double *scale = radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->magnitude : radau->scale;
+    if (sd_radau_sparing(radau)) {
+        double real = method->gamma / radau->h;
+        double complex both = part ? method->lambda[part - 1] / radau->h : 0.0;
+        all->failed[part] = part ? sd_linear_z_factor_sum(radau->complex_linear[part - 1], radau->jy, radau->jyd, &both, scale)
+                                 : sd_linear_factor_sum(radau->linear, radau->jy, radau->jyd, &real, scale);
+        return;
+    }
     if (part == 0) {
         double real = method->gamma / radau->h;
         for (int32_t e = 0; e < entries; e++)
@@ -191,9 +203,12 @@ static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, do
 {
     sd_radau_stage(radau, s, y, rate);
     sd_residual(system, radau->t + radau->method->c[s] * radau->h, y, rate, radau->d[s]);
+    for (int32_t i = radau->n; i < sd_whole_lanes(radau->n); i++)
+        radau->d[s][i] = 0.0; /* others have worked there */
 }
 
-/* The later half of the stages, in a system beside the radau's own; the others in that. */
+/* The later half of the stages, in a system beside the radau's own; the others in that.  Where all unknowns follow from kept
+ * ones, nobody reads these from where they stand once the rows are made: they stand where those will. */
 static void residual_part(void *context, int part)
 {
     sd_radau *radau = context;
@@ -203,7 +218,7 @@ static void residual_part(void *context, int part)
             residual_of(radau, radau->system, s, radau->y, radau->rate);
     else
         for (int s = half; s < radau->method->stages; s++)
-            residual_of(radau, radau->other, s, radau->point_y, radau->point_rate);
+            residual_of(radau, radau->other, s, radau->system->left ? radau->d[s] : radau->point_y, radau->point_rate);
 }
 
 /* the system and the point that a second thread takes residuals with; 0: there are none */
@@ -213,8 +228,9 @@ static int accompanied(sd_radau *radau)
         return 0;
     if (!radau->beside) {
         radau->beside = sd_beside_new(radau->system);
-        radau->point_y = calloc(2 * (size_t)sd_whole_lanes(radau->n + 1), sizeof(double));
-        radau->point_rate = radau->point_y + sd_whole_lanes(radau->n + 1);
+        size_t m = (size_t)sd_whole_lanes(radau->n + 1), alone = radau->system->left ? 0 : m;
+        radau->point_y = calloc(alone + m, sizeof(double));
+        radau->point_rate = radau->point_y + alone;
     }
     if (!radau->beside || !radau->point_y)
         return 0;

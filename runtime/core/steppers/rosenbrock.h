@@ -37,7 +37,7 @@ typedef struct sd_rosenbrock {
     const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
     double *magnitude;        /* [n] of the unknowns; grows with max |y| */
     double *met;              /* [n] max |y| */
-    const int32_t *test, *power;   /* [n] as in bdf.h; what is left out there is tested too where power is 0 */
+    const int8_t *test, *power;   /* [n] as in bdf.h; what is left out there is tested too where power is 0 */
     double opening;           /* over rtol^(1/5): the first step as an earlier run found it fit, 0: chosen; then as this one does */
     /* state of the integration */
     double t, h, h_used, h_accepted, error_accepted, h_refused, error_refused;

@@ -57,6 +57,8 @@ typedef struct sd_stepper {
     /* y, yd [n] of `dense` at t moved onto the equations by what the method has at hand: 0, and how far in `moved`
      * (magnitudes); else they are as they were (NULL: it has nothing) */
     int (*onto)(void *self, double t, double *y, double *yd, double *moved);
+    /* room [numbers] that the method does not read between its steps (NULL: it has none now) */
+    double *(*spare)(void *self, size_t *numbers);
 } sd_stepper;
 
 #define SD_ROUND_OFF (10.0 * DBL_EPSILON) /* part of the largest that unknowns have been */

@@ -15,12 +15,12 @@
 #define CLOSE 1e-9      /* scaled residual with which one may live */
 #define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
 #define HELD 1e8        /* weight of the state in a second attempt */
-#define DRAWN 1e-7      /* weight from which an unknown is drawn to where it came from */
 #define LEAST_PIVOT 1e-11 /* part of its column below which a row of the basis follows from the others */
 #define STILL 1e-12     /* move of the state, in magnitudes, that is none */
 #define REFUSALS 3      /* of the basis in a row, behind which it is not tried any more */
 #define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
 #define BEYOND 1e3      /* times the point that was found, from which a magnitude was that of an iterate */
+#define SMALL_POINT 20000 /* unknowns and rates up to which room for slopes is kept */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
 
 enum { NONE, MATRIX, BASIS };
@@ -30,13 +30,11 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
     sd_settle *settle = calloc(1, sizeof *settle);
     if (!settle)
         return NULL;
-    size_t nnz = (size_t)system->entries + 1, m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1;
-    size_t kept = system->left ? (size_t)system->unknowns + 8 : 0;
-    size_t most = linear && (size_t)linear->entries > 2 * m ? (size_t)linear->entries : 2 * m;
-    size_t steep = system->scales > 0 ? n : 0;
-    settle->memory = calloc(2 * nnz + most + 1 + 3 * m + 5 * n + steep + 2 * kept, sizeof(double));
-    if (!settle->memory) {
-        free(settle);
+    size_t m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1, steep = system->scales > 0 ? n : 0;
+    settle->memory = calloc(m + 2 * n + steep, sizeof(double));
+    settle->taken = linear ? calloc((size_t)linear->entries + 1, sizeof(double)) : NULL;
+    if (!settle->memory || (linear && !settle->taken)) {
+        sd_settle_free(settle);
         return NULL;
     }
     settle->system = system;
@@ -45,19 +43,66 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
     settle->rates = rates;
     settle->rows = system->rows;
     settle->hold = 1.0;
-    settle->jy = settle->memory;
-    settle->jyd = settle->jy + nnz;
-    settle->row_scale = settle->jyd + nnz;
-    settle->r = settle->row_scale + m;
-    settle->x = settle->r + m;
-    settle->x0 = settle->x + n;
-    settle->scale = settle->x0 + n;
-    settle->step = settle->scale + n; /* unknowns, rates and rows */
-    settle->met = settle->step + n + m;
+    settle->row_scale = settle->memory;
+    settle->scale = settle->row_scale + m;
+    settle->met = settle->scale + n;
     settle->usual = settle->met + n;
-    settle->matrix = settle->usual + steep;
-    settle->room = settle->matrix + most + 1;
+    settle->matrix = settle->taken;
     return settle;
+}
+
+/* room for one point: lent by the caller, or its own from then on; 0: no memory */
+static int provide_work(sd_settle *settle)
+{
+    const sd_system *system = settle->system;
+    size_t m = (size_t)settle->rows + 1, n = (size_t)(settle->unknowns + settle->rates) + 1;
+    size_t kept = system->left ? (size_t)system->unknowns + 8 : 0, longest = n > 2 * m ? n : 2 * m;
+    size_t all = 2 * m + 2 * n + longest + 2 * kept;
+    double *next = settle->lent && settle->lent_room >= all ? settle->lent : settle->work;
+    if (!next && !(next = settle->work = malloc(all * sizeof *next)))
+        return 0;
+    settle->r = next;
+    settle->x0 = settle->r + m;
+    settle->step = settle->x0 + n; /* unknowns, rates and rows */
+    settle->x = settle->step + n + m; /* within a basis the right side of a step */
+    settle->room = settle->x + longest;
+    if (settle->basis)
+        sd_sparse_lend(settle->basis, settle->x);
+    return 1;
+}
+
+/* room for slopes, and for what a basis takes of them; 0: no memory */
+static int provide_slopes(sd_settle *settle)
+{
+    size_t entries = (size_t)settle->system->entries + 1;
+    size_t basis = settle->basis_column ? (size_t)settle->basis_column[settle->rows] + 1 : 0;
+    if (settle->jy)
+        return 1;
+    if (!(settle->jy = malloc((2 * entries + basis) * sizeof *settle->jy)))
+        return 0;
+    settle->jyd = settle->jy + entries;
+    settle->basis_value = settle->jyd + entries;
+    return 1;
+}
+
+/* of a large one lets go of it: rows of linear laws take new slopes once in many steps */
+static void leave_slopes(sd_settle *settle)
+{
+    if (settle->unknowns + settle->rates <= SMALL_POINT)
+        return;
+    free(settle->jy);
+    settle->jy = settle->jyd = settle->basis_value = NULL;
+}
+
+static inline double weight_of(const sd_settle *settle, int32_t j)
+{
+    return settle->state[j] ? 1.0 : settle->follows;
+}
+
+/* 1 / weight of an unknown or rate; of a state that is to stay where it is 0 */
+static inline double lift(const sd_settle *settle, int32_t j)
+{
+    return settle->state[j] ? !settle->determined : 1.0 / settle->follows;
 }
 
 int sd_settle_take(sd_settle *settle, sd_linear *linear)
@@ -76,7 +121,8 @@ void sd_settle_free(sd_settle *settle)
         return;
     free(settle->taken);
     sd_sparse_free(settle->basis);
-    free(settle->lift);
+    free(settle->jy);
+    free(settle->work);
     free(settle->memory);
     free(settle);
 }
@@ -86,8 +132,7 @@ int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row
 {
     int32_t n = settle->unknowns + settle->rates;
     settle->basis = sd_sparse_new(n, settle->rows, order);
-    settle->lift = calloc((size_t)n + (size_t)column[settle->rows] + 1, sizeof(double));
-    if (!settle->basis || !settle->lift)
+    if (!settle->basis)
         return 2;
     settle->basis->null_pivot = LEAST_PIVOT;
     settle->basis->most = 1000000 + (int64_t)FILL * column[settle->rows];
@@ -95,10 +140,9 @@ int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row
     settle->basis_row = row;
     settle->basis_y = place_y;
     settle->basis_yd = place_yd;
-    settle->basis_value = settle->lift + n;
-    for (int32_t j = 0; j < n; j++)
-        settle->lift[j] = determined && settle->weight[j] >= DRAWN ? 0.0 : 1.0 / settle->weight[j];
     settle->determined = determined;
+    free(settle->jy); /* room for more is wanted */
+    settle->jy = NULL;
     return 0;
 }
 
@@ -128,14 +172,16 @@ static double measure(sd_settle *settle, double t, const double *y, const double
 }
 
 /* Slopes at (t, y, yd) in scaled unknowns, and row scales from the magnitudes of the terms.  met: the point is one of
- * the motion, with which magnitudes grow; an iterate may be anywhere. */
-static void slopes(sd_settle *settle, double t, const double *y, const double *yd, int met)
+ * the motion, with which magnitudes grow; an iterate may be anywhere.  0: no memory. */
+static int slopes(sd_settle *settle, double t, const double *y, const double *yd, int met)
 {
     sd_system *system = settle->system;
     int32_t n = settle->unknowns, rates = settle->rates;
+    settle->ready = NONE;
+    if (!provide_slopes(settle))
+        return 0;
     sd_jacobian(system, t, y, yd, settle->scale, settle->jy, settle->jyd);
     memset(settle->row_scale, 0, (size_t)settle->rows * sizeof(double));
-    settle->ready = NONE;
     for (int32_t j = 0; j < n + rates && met; j++) {
         double size = fabs(j < n ? y[j] : yd[settle->rate[j - n]]);
         if (size > settle->scale[j] && isfinite(size))
@@ -155,6 +201,7 @@ static void slopes(sd_settle *settle, double t, const double *y, const double *y
         settle->row_scale[i] = settle->sort[i] == SD_LEFT_OUT   ? 0.0
                                : settle->row_scale[i] > 0.0 ? 1.0 / settle->row_scale[i]
                                                             : 1.0;
+    return 1;
 }
 
 /* the saddle-point matrix and its factors at (t, y, yd) */
@@ -162,9 +209,8 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
 {
     sd_system *system = settle->system;
     int32_t n = settle->unknowns, rates = settle->rates;
-    if (!settle->linear && settle->provide())
+    if ((!settle->linear && settle->provide()) || !slopes(settle, t, y, yd, 1))
         return 1;
-    slopes(settle, t, y, yd, 1);
     memset(settle->matrix, 0, (size_t)settle->linear->entries * sizeof(double));
     for (int32_t e = 0; e < system->entries; e++) {
         double scale = settle->row_scale[system->row[e]];
@@ -178,8 +224,9 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
             settle->matrix[settle->slot_yd_t[e]] += b;
         }
     }
+    leave_slopes(settle);
     for (int32_t j = 0; j < n + rates; j++)
-        settle->matrix[settle->slot_x[j]] += settle->weight[j] * (settle->weight[j] < DRAWN ? 1.0 : settle->hold);
+        settle->matrix[settle->slot_x[j]] += weight_of(settle, j) * (settle->state[j] ? settle->hold : 1.0);
     for (int32_t i = 0; i < settle->rows; i++)
         settle->matrix[settle->slot_r[i]] -= EPSILON;
     if (sd_first_bad(settle->linear->entries, settle->matrix) >= 0 ||
@@ -193,32 +240,32 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
 static int leaves_open(const sd_settle *settle)
 {
     for (int32_t j = 0; j < settle->unknowns; j++)
-        if (settle->weight[j] < DRAWN && settle->basis->place[j] == settle->rows)
+        if (!settle->state[j] && settle->basis->place[j] == settle->rows)
             return 1;
     return 0;
 }
 
-/* the basis at (t, y, yd) */
-static int choose(sd_settle *settle, double t, const double *y, const double *yd, int met)
+/* the basis from slopes */
+static int choose_from(sd_settle *settle)
 {
     const sd_system *system = settle->system;
     int32_t entries = settle->basis_column[settle->rows];
     double *value = settle->basis_value;
-    slopes(settle, t, y, yd, met);
     memset(value, 0, (size_t)entries * sizeof *value);
     for (int32_t e = 0; e < system->entries; e++) {
         double scale = settle->row_scale[system->row[e]];
         int32_t a = settle->basis_y[e], b = settle->basis_yd[e];
         if (a >= 0)
-            value[a] += settle->jy[e] * scale * settle->lift[settle->basis_row[a]];
+            value[a] += settle->jy[e] * scale * lift(settle, settle->basis_row[a]);
         if (b >= 0)
-            value[b] += settle->jyd[e] * scale * settle->lift[settle->basis_row[b]];
+            value[b] += settle->jyd[e] * scale * lift(settle, settle->basis_row[b]);
     }
     if (sd_first_bad(entries, value) >= 0)
         return 1;
     sd_sparse *lu = settle->basis;
-    if (!lu->pivoted || sd_sparse_refactor(lu, settle->basis_column, settle->basis_row, value)) {
-        int failed = sd_sparse_pivot(lu, settle->basis_column, settle->basis_row, value);
+    const sd_matrix matrix = {.column = settle->basis_column, .row = settle->basis_row, .value = value};
+    if (!lu->pivoted || sd_sparse_refactor(lu, &matrix)) {
+        int failed = sd_sparse_pivot(lu, &matrix);
         if (failed > 1) /* it fills too much */
             settle->refused = REFUSALS;
         if (failed || (settle->determined && leaves_open(settle)))
@@ -228,18 +275,26 @@ static int choose(sd_settle *settle, double t, const double *y, const double *yd
     return 0;
 }
 
+/* the same at (t, y, yd) */
+static int choose(sd_settle *settle, double t, const double *y, const double *yd, int met)
+{
+    int failed = !slopes(settle, t, y, yd, met) || choose_from(settle);
+    leave_slopes(settle);
+    return failed;
+}
+
 /* One Newton step within the basis; the largest moves of all and of the state, in magnitudes. */
 static double move_basic(sd_settle *settle, double *y, double *yd, double *state)
 {
     int32_t n = settle->unknowns, moves = n + settle->rates;
-    double largest = 0.0, *b = settle->matrix; /* the matrix is made anew where it is wanted */
+    double largest = 0.0, *b = settle->x;
     for (int32_t i = 0; i < settle->rows; i++)
         b[i] = -settle->r[i] * settle->row_scale[i];
     sd_sparse_basic(settle->basis, b, settle->step, b + settle->rows);
     for (int32_t j = 0; j < moves; j++) {
-        double move = settle->step[j] *= settle->lift[j];
+        double move = settle->step[j] *= lift(settle, j);
         largest = fmax(largest, fabs(move));
-        if (settle->weight[j] >= DRAWN)
+        if (settle->state[j])
             *state = fmax(*state, fabs(move));
     }
     for (int32_t j = 0; j < n; j++)
@@ -296,10 +351,7 @@ static double move(sd_settle *settle, double *y, double *yd)
     double largest = 0.0;
     for (int32_t j = 0; j < moves; j++) {
         double now = j < n ? y[j] : yd[settle->rate[j - n]];
-        if (settle->weight[j] < DRAWN)
-            settle->step[j] = 0.0;
-        else
-            settle->step[j] = -settle->hold * settle->weight[j] * (now - settle->x0[j]) / settle->scale[j];
+        settle->step[j] = settle->state[j] ? -settle->hold * (now - settle->x0[j]) / settle->scale[j] : 0.0;
     }
     for (int32_t i = 0; i < settle->rows; i++)
         settle->step[moves + i] = -settle->r[i] * settle->row_scale[i];
@@ -366,7 +418,7 @@ static void put_near(const sd_settle *settle, double *y, double *yd)
     int32_t n = settle->unknowns;
     put(settle, settle->x0, y, yd);
     for (int32_t j = 0; j < n + settle->rates; j++)
-        if (settle->weight[j] < DRAWN)
+        if (!settle->state[j])
             *(j < n ? &y[j] : &yd[settle->rate[j - n]]) = settle->met[j];
 }
 
@@ -401,7 +453,9 @@ static int holds(sd_settle *settle, double t, const double *y, const double *yd,
         }
     }
     if (grown) {
-        slopes(settle, t, y, yd, 0);
+        if (!slopes(settle, t, y, yd, 0))
+            return 0;
+        leave_slopes(settle);
         best = measure(settle, t, y, yd);
     }
     return best <= limit || (measure(settle, t, y, yd), settle->own <= limit);
@@ -465,6 +519,8 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
 {
     const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
+    if (!provide_work(settle))
+        return 1;
     if (!condensed)
         return settle_unknowns(settle, t, y, yd);
     double *z = settle->room, *zd = z + settle->unknowns + 8;
@@ -481,7 +537,7 @@ static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
 
 int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd)
 {
-    if (settle->calls == settle->failures || settle->seen || settle->system->left)
+    if (settle->calls == settle->failures || settle->seen || settle->system->left || !provide_work(settle))
         return 0;
     int holds = measure(settle, t, y, yd) <= fmax(FINE, settle->enough);
     if (holds)

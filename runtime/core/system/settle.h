@@ -29,17 +29,22 @@ typedef struct sd_settle {
     const int32_t *slot_y, *slot_y_t;     /* [entries] places of dF/dy in the matrix and its transpose, -1: none */
     const int32_t *slot_yd, *slot_yd_t;   /* [entries] the same of dF/dyd */
     const int32_t *slot_x, *slot_r;       /* [unknowns + rates], [rows] diagonal */
-    const double *weight;            /* [unknowns + rates]: 1 for the state, almost nothing for what follows from it */
+    const char *state;               /* [unknowns + rates] 1: carries the state, which has the weight 1 */
+    double follows;                  /* weight of the others: almost nothing */
     double *scale;                   /* [unknowns + rates] magnitudes */
     const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE; SD_LEFT_OUT */
     const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
     int32_t kinematics;
-    double *jy, *jyd, *matrix, *row_scale, *r, *x, *x0, *step, *memory;
+    double *jy, *jyd;                /* [entries]; of large ones where they are wanted alone, like the matrix of a basis */
+    double *matrix, *row_scale, *r, *x, *x0, *step; /* all but row_scale: of one point alone */
+    double *memory, *work;           /* what is known from point to point; room for one that is nobody's else, or NULL */
+    double *lent;                    /* room of the caller for a point [lent_room], who set it; NULL: none */
+    size_t lent_room;
     double *met, *usual;             /* [unknowns + rates] last point that settled; of steep laws: magnitudes before */
     sd_sparse *basis;                /* of G^T, its rows over the weights: what follows pivots first; or NULL */
     const int32_t *basis_column, *basis_row;      /* its pattern: [rows + 1], unknowns and rates of each row */
     const int32_t *basis_y, *basis_yd;            /* [entries] places of dF/dy, dF/dyd in it, -1: none */
-    double *lift, *basis_value;      /* [unknowns + rates] 1 / weight; [entries of the pattern] */
+    double *basis_value;             /* [entries of the pattern] */
     double hold;                     /* weight of the state; 1 but in a second attempt */
     double enough;                   /* scaled residual with which a draft is content; 0: round-off */
     double slack;                    /* move of the state, in magnitudes, by which a basic solution may differ */
@@ -50,7 +55,7 @@ typedef struct sd_settle {
                                         rate of another; norm of the constraint rows */
     int64_t calls, failures;         /* calls - failures > 0: a point has been met */
     const struct sd_condensed *seen;       /* points are handed over as this system has them; NULL: with all unknowns */
-    double *room;                    /* [2][unknowns] for the kept ones of a point with all of them */
+    double *room;                    /* [2][unknowns] for the kept ones of a point with all of them; of one point alone */
     int (*provide)(void);            /* of large ones: makes `linear` and its places when they are wanted first; 0 done */
     double *taken;                   /* the matrix of such a one */
     double drift;                    /* norm of the constraint rows before the last call moved the point */

@@ -45,4 +45,7 @@ class Linear(c.Structure):
         ("replayed", I),
         ("elimination", P),
         ("otherwise", P),
+        ("sum", P),
+        ("lent", P),
+        ("own_scale", I),
     ]

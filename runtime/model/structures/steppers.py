@@ -33,6 +33,7 @@ class Stepper(c.Structure):
         ("show", P),
         ("values", P),
         ("onto", P),
+        ("spare", P),
     ]
 
 
@@ -41,7 +42,9 @@ class Expanded(c.Structure):
 
     _fields_ = [
         ("face", Stepper),
-        *[(name, P) for name in ["inner", "condensed", "z", "zd", "memory", "y", "met", "magnitude"]],
+        *[(name, P) for name in ["inner", "condensed", "z"]],
+        ("room", c.c_size_t),
+        *[(name, P) for name in ["y", "met", "magnitude"]],
     ]
 
 
@@ -172,13 +175,12 @@ class Radau(c.Structure):
         ("slope", P * POINTS),
         ("refined", I * POINTS),
         *[(name, P * STAGES) for name in ["z", "kept", "d", "base", "full"]],
-        *[(name, P) for name in ["first", "pull", "gap"]],
+        *[(name, P) for name in ["first", "led", "gap"]],
         *[(name, D * POINTS) for name in ["apart", "bend"]],
         *[(name, P) for name in ["at_zero", "open"]],
         *[(name, P) for name in ["y", "rate", "ee", "weight", "terms", "jy", "jyd", "g", "work"]],
         *[(name, P) for name in ["newton_weight", "scale", "powered"]],
         ("w", P * PAIRS),
-        ("right", P),
         *[(name, P) for name in ["beside", "other", "point_y", "point_rate", "coupled"]],
         *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "newton_iterations"]],
         *[(name, L) for name in ["factorisations", "taken"]],
