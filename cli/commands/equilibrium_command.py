@@ -35,14 +35,14 @@ def command(console: Console, tries: int, no_prune: bool, index: str | None, **o
         line.clear()
     if made is None:
         return console.finish(1)
-    found, states = made
+    found, states, why = made
     console.result = {
         "t": found.state.t,
         "formulation": found.prepared.formulation,
         "equilibria": [state.to_json() for state in states],
     }
     if not states:
-        console.complain(NO_REST.format(f" and {tries} points around them", found.state.t), SOLVER)
+        console.complain(NO_REST.format(f" and {tries} points around them", found.state.t) + why, SOLVER)
         return console.finish(SOLVER)
     name, formulation = found.target.name, found.prepared.formulation
     console.say(f"{name}: {formulation}, {len(states)} found, time held at {found.state.t:g} s")

@@ -1,7 +1,7 @@
 """How quantities of traces are laid out over time: panels by unit, curves, names of units.
 
-Quantities of one unit share a panel where none is drowned by the others; where a trace holds derivatives and few
-instants, curves are its cubic Hermite interpolant.
+Quantities of one unit share a panel where none is drowned by the others; where a trace holds derivatives,
+curves are its cubic Hermite interpolant.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ Floats = NDArray[np.float64]
 
 DROWNED = 12.0
 """A curve whose span is this many times smaller than its panel's is a line to the eye: it gets its own panel."""
-SMOOTH = 600
-"""Traces of fewer instants are interpolated: about one point a pixel."""
+SMOOTH = 2000
+"""Points of a curve at least, where it is interpolated: some a pixel."""
 COLOURS = ("#1f5fa8", "#d1495b", "#2f8f6b", "#e09f3e", "#7a4fa3", "#4aa5c4", "#8c5a3c", "#6b7280")
 
 
@@ -64,24 +64,28 @@ def panels_of(traces: Sequence[Trace], names: Sequence[str]) -> list[Panel]:
 
 
 def curve(trace: Trace, name: str) -> tuple[Floats, Floats]:
-    """Instants and values of a curve: those of the trace, or of its Hermite interpolant where it holds few."""
+    """Instants and values of a curve: those of the trace and, where it holds derivatives, of its Hermite interpolant
+    between instants that lie far apart; between the two rows of a jump it is upright.
+    """
     quantity = trace[name]
     time, values, rate = trace.time, quantity.values, quantity.derivative
-    if rate is None or not 2 <= time.size < SMOOTH or not np.all(np.diff(time) > 0.0):
+    if rate is None or time.size < 2 or not np.all(np.diff(time) >= 0.0) or not time[-1] > time[0]:
         return time, values
-    parts = SMOOTH // time.size + 1
-    s = np.arange(parts) / parts
-    h = np.diff(time)[:, None]
-    left, right = values[:-1, None], values[1:, None]
-    inner = (
-        left * (1.0 + 2.0 * s) * (1.0 - s) ** 2
-        + right * s**2 * (3.0 - 2.0 * s)
-        + h * (rate[:-1, None] * s * (1.0 - s) ** 2 + rate[1:, None] * s**2 * (s - 1.0))
-    )
-    # beside a kink the derivative may be no number: a straight line there
-    inner = np.where(np.isfinite(inner), inner, left + (right - left) * s)
-    fine = time[:-1, None] + h * s
-    return np.append(fine.ravel(), time[-1]), np.append(inner.ravel(), values[-1])
+    h = np.diff(time)
+    parts = 1 + (SMOOTH * h / (time[-1] - time[0])).astype(int)
+    piece = np.repeat(np.arange(h.size), parts)
+    s = (np.arange(piece.size) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[piece]
+    left, right = values[piece], values[piece + 1]
+    with np.errstate(all="ignore"):
+        inner = (
+            left * (1.0 + 2.0 * s) * (1.0 - s) ** 2
+            + right * s**2 * (3.0 - 2.0 * s)
+            + h[piece] * (rate[piece] * s * (1.0 - s) ** 2 + rate[piece + 1] * s**2 * (s - 1.0))
+        )
+        # beside a kink the derivative may be no number: a straight line there
+        inner = np.where(np.isfinite(inner), inner, left + (right - left) * s)
+    inner[s == 0.0] = left[s == 0.0]
+    return np.append(time[piece] + h[piece] * s, time[-1]), np.append(inner, values[-1])
 
 
 def styled(panel: Panel, traces: Sequence[tuple[str, Trace]]) -> Iterator[tuple[str, Trace, str, str, int]]:
