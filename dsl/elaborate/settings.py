@@ -144,6 +144,10 @@ class Settings:
         if value.dimension is not None and value.dimension != symbol.dimension:
             message = f"'{symbol.name}' is in {dim.show(symbol.dimension)} but set to {dim.show(value.dimension)}"
             help_ = self.resolver.missing(value.dimension, symbol.dimension, s.value)
+            if help_ is not None and help_.endswith(f": '{symbol.name}'?"):  # itself is no factor of what it is set to
+                factor = dim.quotient(symbol.dimension, value.dimension)
+                text = " ".join(self.resolver.source.text[s.value.span.start : s.value.span.end].split())
+                help_ = None if factor is None else f"({text})*(1 {dim.show(factor)})"
             raise self.resolver.fail("E207", message, s.value.span, help=help_)
         for inner in ex.topological([value.node]):
             if inner.op in ("var", "time"):

@@ -299,3 +299,10 @@ def test_what_cannot_be_is_said_with_a_code(tmp_path, capsys):
     assert "E802" in capsys.readouterr().err
     assert run(["simulate", path, "--method", "dopri", "--index", "2"]) == 1
     assert "E607" in capsys.readouterr().err
+
+
+def test_the_span_is_told_where_a_run_does_not_begin_at_zero(tmp_path, capsys):
+    text = PENDULUM.replace("time 0 s to", "time 0.25 s to")
+    assert text != PENDULUM
+    assert run(["simulate", write(tmp_path, text)]) == 0
+    assert "  0.25 s to 1 s in " in capsys.readouterr().err
