@@ -63,9 +63,9 @@ static int provide_room(sd_radau *radau)
     size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(radau->n + 1);
     double **vectors[] = {&radau->last, &radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->y,
                           &radau->rate, &radau->ee, &radau->weight, &radau->pull, &radau->terms, &radau->first};
-    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full}; /* the last two: of steep laws */
-    size_t steep = system->scales > 0 ? 2 : 0, number = sizeof vectors / sizeof *vectors - 2 + steep,
-           sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
+    double **of_stages[] = {radau->z, radau->kept, radau->d, radau->base, radau->full, radau->moved}; /* three of steep laws */
+    size_t steep = system->scales > 0, number = sizeof vectors / sizeof *vectors - 2 + 2 * steep,
+           sets = sizeof of_stages / sizeof *of_stages - 3 + 3 * steep;
     size_t all = number + sets * (size_t)radau->most_stages, pairs = (size_t)(radau->most_stages - 1) / 2;
     if (radau->work)
         return 0;
