@@ -6,7 +6,8 @@ curves are its cubic Hermite interpolant.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -89,13 +90,28 @@ def curve(trace: Trace, name: str) -> tuple[Floats, Floats]:
 
 
 def styled(panel: Panel, traces: Sequence[tuple[str, Trace]]) -> Iterator[tuple[str, Trace, str, str, int]]:
-    """Curves of a panel: name, trace, label, colour and the number of the trace."""
+    """Curves of a panel: name, trace, label, colour and the number of the dashes, that of the trace; where colours come
+    again dashes go on.
+    """
     single = len(panel.names) == 1
     for j, name in enumerate(panel.names):
         for k, (label, trace) in enumerate(traces):
             if name in trace:
                 shown = name if len(traces) == 1 else label if single else f"{name}, {label}"
-                yield name, trace, shown, COLOURS[(k if single else j) % len(COLOURS)], k
+                colour = k if single else j
+                again = colour // len(COLOURS) * (1 if single else len(traces))
+                yield name, trace, shown, COLOURS[colour % len(COLOURS)], k + again
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Names with numbers in them as numbers count: x[2] before x[10]."""
+    parts = {name: re.split(r"(\d+)", name) for name in names}
+    return sorted(parts, key=lambda name: [(int(p), p) if k % 2 else (0, p) for k, p in enumerate(parts[name])])
+
+
+def shortened(name: str, most: int) -> str:
+    """A name in at most so many characters: its beginning and its end."""
+    return name if len(name) <= most else f"{name[: most - most // 3 - 1]}…{name[-(most // 3) :]}"
 
 
 def time_unit(traces: Sequence[Trace]) -> tuple[float, str]:

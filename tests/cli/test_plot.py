@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.cli.page.panels import curve, panels_of, unit_text
+from sysdyn.cli.page.panels import curve, in_order, panels_of, shortened, styled, unit_text
 from sysdyn.cli.page.sparkline import sparkline
 from sysdyn.runtime.trace.trace import Quantity, Trace
 from texts import PENDULUM, write
@@ -148,6 +148,18 @@ def test_many_quantities():
     from sysdyn.cli.page.picture import picture
 
     assert picture([("made", trace)], trace.names, "png").startswith(b"\x89PNG")
+
+
+def test_many_curves_of_a_panel_can_be_told_apart():
+    trace = made([(f"x[{k}]", "m", np.sin) for k in range(1, 15)])
+    names = in_order(sorted(trace.names))
+    assert names[:3] == ["x[1]", "x[2]", "x[3]"]
+    (panel,) = panels_of([trace], names)
+    for traces in ([("one", trace)], [("one", trace), ("two", trace)]):
+        drawn = [(colour, dashes) for *_, colour, dashes in styled(panel, traces)]
+        assert len(set(drawn)) == len(drawn) == 14 * len(traces)
+    assert shortened("a" * 30 + "b" * 30, 12) == "aaaaaaa…bbbb"
+    assert shortened("short", 12) == "short"
 
 
 def test_curves_are_hermite_interpolants():
