@@ -122,7 +122,8 @@ def _draw(axis: Any, panel: Panel, traces: Sequence[tuple[str, Trace]], scale: f
         axis.set_ylabel(unit)
     if len(curves) > 1:
         lines, labels = zip(*curves, strict=True)
-        axis.legend(lines, labels, loc="upper left", bbox_to_anchor=(1.0, 1.03), fontsize=8.5, ncols=-(-len(curves) // LINES))
+        columns = -(-len(curves) // LINES)
+        axis.legend(lines, labels, loc="upper left", bbox_to_anchor=(1.0, 1.03), fontsize=8.5, ncols=columns)
     axis.margins(x=0.0, y=0.08)
     axis.ticklabel_format(axis="y", scilimits=(-3, 4), useOffset=panel.high - panel.low < 1e-5 * abs(panel.high))
 

@@ -145,7 +145,7 @@ class Settings:
             message = f"'{symbol.name}' is in {dim.show(symbol.dimension)} but set to {dim.show(value.dimension)}"
             help_ = self.resolver.missing(value.dimension, symbol.dimension, s.value)
             if help_ is not None and help_.endswith(f": '{symbol.name}'?"):  # itself is no factor of what it is set to
-                factor = dim.quotient(symbol.dimension, value.dimension)
+                factor = dim.quotient(symbol.dimension or NONE, value.dimension)
                 text = " ".join(self.resolver.source.text[s.value.span.start : s.value.span.end].split())
                 help_ = None if factor is None else f"({text})*(1 {dim.show(factor)})"
             raise self.resolver.fail("E207", message, s.value.span, help=help_)
