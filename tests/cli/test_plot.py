@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sysdyn.cli.main import run
 from sysdyn.cli.page.panels import curve, in_order, panels_of, shortened, styled, unit_text
-from sysdyn.cli.page.sparkline import sparkline
+from sysdyn.cli.page.sparkline import sparkline, told_apart
 from sysdyn.runtime.trace.trace import Quantity, Trace
 from texts import PENDULUM, write
 
@@ -141,6 +141,13 @@ def test_an_empty_trace_can_be_drawn():
     from sysdyn.cli.page.picture import picture
 
     assert picture([("empty", trace)], ["x"], "png").startswith(b"\x89PNG")
+
+
+def test_ends_of_a_range_are_told_apart():
+    assert told_apart(999.998, 1000.0) == ("999.998", "1000")
+    assert told_apart(1e6, 1e6 + 1.0) == ("1000000", "1000001")
+    assert told_apart(2.0, 2.0) == ("2", "2")
+    assert told_apart(0.123456789, 0.2) == ("0.12346", "0.2")
 
 
 def test_many_quantities():
