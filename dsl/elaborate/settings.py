@@ -77,7 +77,9 @@ class Settings:
         self.model.define_input(Definition(name, "input", value, (), unit.dimension, space, place, s.span, shape=shape))
 
     def _bare(self, value: syntax.Expr, dimension: Dimension) -> syntax.Expr:
-        """On the command line a bare number is in SI units."""
+        """On the command line a bare number is in SI units, each of an array too."""
+        if isinstance(value, syntax.Array):
+            return replace(value, items=tuple(self._bare(item, dimension) for item in value.items))
         inner = value.operand if isinstance(value, syntax.Negative) else value
         if self.resolver.source is self.model.source or not isinstance(inner, syntax.Number) or not dimension:
             return value

@@ -318,3 +318,11 @@ def test_an_end_out_of_reach_is_said(tmp_path, monkeypatch, capsys):
     err = capsys.readouterr().err
     assert "at such steps the end of the run is out of reach" in err
     assert "help: an earlier end (--until)" in err
+
+
+def test_bare_numbers_of_an_array_are_in_si_units(tmp_path):
+    """x[i] swings with sqrt(k/m[i]): cos of it at the end, from i cm."""
+    trace = simulate(tmp_path, ARRAY, "--set", "m=[1, 2, 3]", "--accuracy", "1e-8")
+    at = trace.time[-1]
+    assert trace["x[1]"][-1] == pytest.approx(0.01 * np.cos(np.sqrt(2.0) * at), abs=1e-9)
+    assert trace["last"][-1] == pytest.approx(0.03 * np.cos(np.sqrt(2.0 / 3.0) * at), abs=1e-9)
