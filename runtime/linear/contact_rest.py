@@ -36,8 +36,9 @@ class ContactRest:
         self.contacts.active = np.array([system.description.switches.active[c.number] for c in plan.contacts])
         self._frictions = [k for k, c in enumerate(plan.contacts) if c.kind in ("friction", "planar")]
         self._of: dict[tuple[bool, ...], Resting] = {}
+        started = self.contacts.state()
         self._stick()
-        self._begin = self.contacts.state()
+        self._begins = dict.fromkeys((self.contacts.state(), started))  # what rubs on a belt slips at rest
         self.contacts.size(self.problem(first).scale, 1.0)
         self._last: Rest | None = None
 
@@ -69,7 +70,11 @@ class ContactRest:
 
     def found(self, guess: Floats) -> Rest | None:
         """The state of rest that is come to from a guess, its contacts those that fit."""
-        self.contacts.become(self._begin)
+        return next((rest for begin in self._begins if (rest := self._fitting(guess, begin)) is not None), None)
+
+    def _fitting(self, guess: Floats, begin: tuple[float, ...]) -> Rest | None:
+        """The same, from a state of the contacts."""
+        self.contacts.become(begin)
         pivoting = Pivoting(self.contacts, lambda *_: False)
         try:
             pivoting.fit(self.t, guess, np.zeros_like(guess), self._settle)

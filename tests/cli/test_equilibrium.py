@@ -330,3 +330,20 @@ scene s of sampled { time 0 s to 1 s; trace x }
     assert found["stability"] is None
     assert run(["linearize", str(path), "--backend", "numpy"]) == 0
     assert "events do not act: u held" in capsys.readouterr().err
+
+
+def test_a_block_on_a_running_belt_rests_where_it_slips(tmp_path, capsys):
+    """Its spring of 40 N/m holds the 2 N with which the belt rubs; beside it the friction is constant."""
+    text = """model belt {
+  coord x: translation = 0 m
+  energy T* = 1/2*(1 kg)*x'^2
+  energy V = 1/2*(40 N/m)*x^2
+  content D = (2 N)*abs(x' - 0.5 m/s) + 1/2*(1 N.s/m)*x'^2
+  init x' = 0 m/s
+}
+scene s of belt { time 0 s to 1 s; trace x }
+"""
+    (found,) = rests(capsys, write(tmp_path, text), "--tries", "0")
+    assert found["values"]["x"] == pytest.approx(0.05, rel=1e-9)
+    assert found["stability"] == "asymptotically stable"
+    np.testing.assert_allclose(np.array(found["eigenvalues"])[:, 0], -0.5, rtol=1e-9)
