@@ -75,6 +75,7 @@ class Resting:
         families = system.description.families
         owners = np.array([families[int(k)].owner in tangible for k in system.family_of[: self.n]], dtype=bool)
         self.still = (system.kinds[: self.n] == "f") & owners
+        self.loose = quadratures(system, tangible)
         self.use = self._use()
         self.turns = np.array([families[int(k)].unit == "rad" for k in system.family_of[: self.n]], dtype=bool)
         self.turns &= system.kinds[: self.n] == "q"
@@ -110,7 +111,7 @@ class Resting:
         """Rows of rest: as written, the rates of displacement constraints, multipliers of what does not hold."""
         use = self.rows.of_groups("dynamics", "momentum", "phi", "phi_rate", "psi", "gamma", "lambda").copy()
         use[self.rows.held[0]] = True
-        grows = quadratures(self.system, self.tangible) & (self.system.kinds[: self.n] == "s")
+        grows = self.loose & (self.system.kinds[: self.n] == "s")
         for group, family, first in self.rows.form.groups:
             if group == "lambda":
                 owner = self.system.description.rows[family].owner
@@ -209,6 +210,9 @@ class Resting:
 
     def _back(self, y: Floats, problem: Problem, null: Floats, near: Floats) -> Floats:
         """What the rows leave open as it is in `near`."""
+        if self.n > DENSE:  # what nothing depends on is known without
+            back = np.where(self.loose, near, y)
+            return back if (back != y).any() and self._met(back) else y
         if not null.size:
             return y
         away = (y - near) / problem.scale
@@ -238,7 +242,7 @@ class Resting:
     def apart(self, one: Rest, other: Rest) -> bool:
         """Whether two states differ by more than what the first leaves open."""
         problem = self.problem(one.state.y)
-        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
+        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu")) & ~self.loose
         size = np.maximum(np.abs(one.state.y), np.abs(other.state.y))
         size = np.maximum(size, group_maximum(self.system, problem.scale))
         move = ((other.state.y - one.state.y) / size)[told]

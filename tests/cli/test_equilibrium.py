@@ -10,6 +10,7 @@ from sysdyn.cli.main import run
 from sysdyn.cli.progress import SEARCH, ProgressLine
 from sysdyn.cli.run.asked import Request
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.linear import rest
 from texts import ROOT, run_json, write
 
 SEED = ROOT / "models" / "seed"
@@ -347,3 +348,18 @@ scene s of belt { time 0 s to 1 s; trace x }
     assert found["values"]["x"] == pytest.approx(0.05, rel=1e-9)
     assert found["stability"] == "asymptotically stable"
     np.testing.assert_allclose(np.array(found["eigenvalues"])[:, 0], -0.5, rtol=1e-9)
+
+
+def test_what_nothing_depends_on_makes_no_two_rests_of_one_in_large_models_either(tmp_path, capsys, monkeypatch):
+    """b' = a - 1 m/s: wherever b is.  Large models are not asked what their rows leave open."""
+    monkeypatch.setattr(rest, "DENSE", 0)
+    text = """model sums {
+  state a: m/s = 3 m/s
+  state b: m = 2 m
+  dynamic a' = (1 m/s - a)/(1 s)
+  dynamic b' = a - 1 m/s
+}
+scene s of sums { time 0 s to 1 s; trace a }
+"""
+    (found,) = rests(capsys, write(tmp_path, text), "--tries", "5")
+    assert found["values"] == pytest.approx({"a": 1.0, "b": 2.0})
