@@ -15,7 +15,13 @@ from sysdyn.cli.run.asked import Request
 @with_console("equilibrium")
 @click.argument("file")
 @chosen
-@click.option("--tries", type=click.IntRange(min=0), default=40, show_default=True, help="Random points around it.")
+@click.option(
+    "--tries",
+    type=click.IntRange(min=0),
+    default=40,
+    show_default=True,
+    help="Random points around it; none beyond 20000 unknowns.",
+)
 def command(console: Console, tries: int, no_prune: bool, index: str | None, **options: Any) -> int:
     """States of rest of a model of FILE, from its guesses and from random points around them, and their stability.
 

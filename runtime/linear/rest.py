@@ -39,6 +39,8 @@ NEAR = 1e-9
 """Part of a magnitude that is tried as zero."""
 SHARE = 0.05
 """Of the work that a search for a start may take: that of one search for rest."""
+MANY = 20_000
+"""Unknowns up to which random points are tried: far from the guess factors of a line of 80000 took 6 GB."""
 NEAREST, FARTHEST = -1.0, 1.5
 """Powers of ten between which random points lie around the guess, in magnitudes."""
 
@@ -274,8 +276,8 @@ class Equations(Protocol):
 def rests(
     resting: Equations, tries: int, most: int | None = None, advance: Callable[[int], None] | None = None
 ) -> tuple[Rest, ...]:
-    """States of rest from the first guess and from random points, in the order found; most: how many are wanted;
-    advance: told how many points were tried.
+    """States of rest from the first guess and from random points (up to MANY unknowns), in the order found; most: how
+    many are wanted; advance: told how many points were tried.
     """
     kept: list[Rest] = []
     guess = resting.first
@@ -283,7 +285,7 @@ def rests(
     scale = resting.problem(guess).scale
     scale = np.where(resting.turns, np.maximum(scale, 1.0), scale)
     mirrored: list[Floats] = []  # springs and pendulums are often symmetrical
-    for k in range(tries + 1):
+    for k in range(tries + 1 if guess.size <= MANY else 1):
         if most is not None and len(kept) >= most:
             break
         if advance is not None:

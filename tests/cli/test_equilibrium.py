@@ -363,3 +363,10 @@ scene s of sums { time 0 s to 1 s; trace a }
 """
     (found,) = rests(capsys, write(tmp_path, text), "--tries", "5")
     assert found["values"] == pytest.approx({"a": 1.0, "b": 2.0})
+
+
+def test_large_models_are_not_tried_at_random_points(tmp_path, capsys, monkeypatch):
+    path = write(tmp_path, DUFFING)
+    assert len(rests(capsys, path)) == 3
+    monkeypatch.setattr(rest, "MANY", 1)
+    assert len(rests(capsys, path)) == 1
