@@ -41,7 +41,9 @@ MOVING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Linear:
-    """A linearisation at t [s]; moving: a state that is not at rest; energies [modes, stores]: shares of each."""
+    """A linearisation at t [s]; moving: a state whose motion changes the matrices; steady: one that moves and does
+    not; energies [modes, stores]: shares of each.
+    """
 
     t: float
     y: Array
@@ -52,6 +54,7 @@ class Linear:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     moving: bool
+    steady: bool
     stores: tuple[str, ...]
     energies: Array
 
@@ -113,8 +116,10 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     descriptor = _descriptor(form, found, slopes, out, labels)
     pairs = ((i, j) for i in range(len(names)) for j in range(len(labels)))
     transfers = tuple(_transfer(small, i, j) for i, j in pairs)
-    moves = _felt_moves(system, small, found)
-    return Linear(state.t, state.y, descriptor, small, own, transfers, labels, names, moves, stores, energies)
+    moves, steady = _felt_moves(system, small, found)
+    return Linear(
+        state.t, state.y, descriptor, small, own, transfers, labels, names, moves, steady, stores, energies
+    )
 
 
 def _asked(found: Found, names: Sequence[str]) -> list[int]:
@@ -220,8 +225,8 @@ def _reads_ledger(expression: object) -> bool:
     return any(n.op == "var" and n.data[1] == "audit" for n in variables(expression))  # type: ignore[arg-type]
 
 
-def _felt_moves(system: System, small: Reduced, found: Found) -> bool:
-    """Whether the motion changes what the matrices say: not where all that moves goes on steadily."""
+def _felt_moves(system: System, small: Reduced, found: Found) -> tuple[bool, bool]:
+    """Whether the motion changes what the matrices say, and whether there is one that goes on steadily."""
     state = found.state
     yd = state.yd.copy()
     yd[system.form.k_q] = state.y[system.form.k_f]
@@ -229,4 +234,5 @@ def _felt_moves(system: System, small: Reduced, found: Found) -> bool:
     size = np.maximum(np.abs(state.y[small.places]), 1.0)
     rates = np.where(np.abs(rates) > MOVING * size, rates, 0.0)
     changes = small.a @ rates
-    return bool((np.abs(changes) > MOVING * np.maximum(np.abs(small.a) @ np.abs(rates), 1e-300)).any())
+    felt = np.abs(changes) > MOVING * np.maximum(np.abs(small.a) @ np.abs(rates), 1e-300)
+    return bool(felt.any()), bool(rates.any() and not felt.any())

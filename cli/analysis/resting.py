@@ -54,6 +54,7 @@ class Equilibrium:
             "conservative": energy.conservative if energy is not None else None,
             "residual": self.rest.residual,
             "free": list(self.rest.free),
+            "contacts": self.rest.holding,
         }
 
     def to_text(self, number: int) -> str:
@@ -69,6 +70,8 @@ class Equilibrium:
         if self.efforts:
             kept = list(self.efforts.items())[:MOST]
             lines.append(f"   nodes {', '.join(f'{name} = {value:.9g}' for name, value in kept)}")
+        if self.rest.holding:
+            lines.append(f"   {', '.join(f'{name} {how}' for name, how in list(self.rest.holding.items())[:MOST])}")
         if self.rest.free:
             lines.append(f"   left open: {', '.join(self.rest.free[:6])}")
         if self.judged is not None and self.judged.modes:
@@ -93,8 +96,10 @@ class Equilibrium:
 
 def equilibria(
     request: Request, tries: int, report: Report, progress: Progress | None = None
-) -> tuple[Found, tuple[Equilibrium, ...]] | None:
-    """The model and its states of rest; None where the report says why it has none to be asked of."""
+) -> tuple[Found, tuple[Equilibrium, ...], str] | None:
+    """The model and its states of rest, and what is to be said where it has none; None where the report says why it has
+    none to be asked of.
+    """
     began = 0.0
 
     def advance(tried: int) -> None:
@@ -109,8 +114,8 @@ def equilibria(
     made = compiled(request, report, (), of_nodes)
     if made is None:
         return None
-    found, states = resting(*made, tries, advance=advance)
-    return found, tuple(replace(_judged(found, rest), efforts=_efforts(at(found, rest))) for rest in states)
+    found, states, why = resting(*made, tries, advance=advance)
+    return found, tuple(replace(_judged(found, rest), efforts=_efforts(at(found, rest))) for rest in states), why
 
 
 def _efforts(here: Found) -> dict[str, float]:
@@ -130,6 +135,9 @@ def _judged(found: Found, rest: Rest) -> Equilibrium:
     n = system.form.written
     names = dict(zip(system.unknown_names[:n], map(float, rest.state.y), strict=True))
     kinds = tuple(map(str, system.kinds[:n]))
+    sampled = next((e.name for e in found.prepared.network.events if e.period is not None), None)
+    if sampled is not None:
+        return Equilibrium(rest, names, kinds, None, f"eigenvalues do not know what '{sampled}' does")
     try:
         small = linearised(here, ()).reduced
     except NoLinearisation as error:

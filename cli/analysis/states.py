@@ -12,8 +12,10 @@ from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.events.start import eventful_start
-from sysdyn.runtime.linear.rest import Rest, Resting, rests
+from sysdyn.runtime.linear.contact_rest import ContactRest, SampledRest
+from sysdyn.runtime.linear.rest import Equations, Rest, Resting, rests
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart
 from sysdyn.runtime.model.system import System
@@ -35,8 +37,8 @@ def state_of(
     if made is None:
         return None, None
     if rest:
-        found, states = resting(*made, TRIES, most=1)
-        return (found, None) if states else (None, NO_REST.format("", found.state.t))
+        found, states, why = resting(*made, TRIES, most=1)
+        return (found, None) if states else (None, NO_REST.format("", found.state.t) + why)
     found_ = begun(*made, request, report)
     return (found_, None) if found_ is None or request.until is None else arrived(found_, request, report)
 
@@ -47,27 +49,40 @@ def resting(
     tries: int,
     most: int | None = None,
     advance: Callable[[int], None] | None = None,
-) -> tuple[Found, tuple[Rest, ...]]:
-    """The model at its first state of rest, and all of them; the guess where there is none.  advance: see rests."""
+) -> tuple[Found, tuple[Rest, ...], str]:
+    """The model at its first state of rest, and all of them; the guess where there is none, and what is to be said of
+    it.  advance: see rests.
+    """
     scene = prepared.network.scene
     t0 = prepared.binding.evaluate(scene.start) if scene is not None and scene.start is not None else 0.0
     system = System(prepared.structure, prepared.arrays, prepared.carrier)
-    guess = _guess(prepared, system, t0)
+    events = plan(prepared, system)
+    guess = _guess(system, t0, events)
     tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
-    states = rests(Resting(system, tangible, t0, guess), tries, most, advance)
+    equations: Equations = Resting(system, tangible, t0, guess)
+    if events.contacts:
+        equations = ContactRest(system, tangible, t0, guess, events)
+    if events.sampled:
+        equations = SampledRest(equations, system, events.sampled)
+    states = rests(equations, tries, most, advance)
     state = states[0].state if states else ConsistentState(t0, guess, np.zeros_like(guess), (), np.inf)
-    return Found(target, prepared, system, state, prepared.binding), states
+    if states:
+        states[0].stand(system)
+    changed = next(iter(equations.changes), "") if isinstance(equations, SampledRest) else ""
+    why = f"; where every rate is zero {changed}" if changed else ""
+    return Found(target, prepared, system, state, prepared.binding), states, why
 
 
 def at(found: Found, rest: Rest) -> Found:
     """The model at another state of rest."""
+    rest.stand(found.system)
     return replace(found, state=rest.state)
 
 
-def _guess(prepared: Prepared, system: System, t0: float) -> Floats:
+def _guess(system: System, t0: float, events: Plan) -> Floats:
     """The consistent start, which also says what holds of the constraints that hold at times; else what is written."""
     try:
         with np.errstate(all="ignore"):
-            return eventful_start(system, t0, plan(prepared, system)).y
+            return eventful_start(system, t0, events).y
     except (InconsistentStart, NotFiniteError):
         return Starter(system).guess[: system.form.written]

@@ -15,7 +15,13 @@ from sysdyn.cli.run.asked import Request
 @with_console("equilibrium")
 @click.argument("file")
 @chosen
-@click.option("--tries", type=click.IntRange(min=0), default=40, show_default=True, help="Random points around it.")
+@click.option(
+    "--tries",
+    type=click.IntRange(min=0),
+    default=40,
+    show_default=True,
+    help="Random points around it; none beyond 20000 unknowns.",
+)
 def command(console: Console, tries: int, no_prune: bool, index: str | None, **options: Any) -> int:
     """States of rest of a model of FILE, from its guesses and from random points around them, and their stability.
 
@@ -35,14 +41,14 @@ def command(console: Console, tries: int, no_prune: bool, index: str | None, **o
         line.clear()
     if made is None:
         return console.finish(1)
-    found, states = made
+    found, states, why = made
     console.result = {
         "t": found.state.t,
         "formulation": found.prepared.formulation,
         "equilibria": [state.to_json() for state in states],
     }
     if not states:
-        console.complain(NO_REST.format(f" and {tries} points around them", found.state.t), SOLVER)
+        console.complain(NO_REST.format(f" and {tries} points around them", found.state.t) + why, SOLVER)
         return console.finish(SOLVER)
     name, formulation = found.target.name, found.prepared.formulation
     console.say(f"{name}: {formulation}, {len(states)} found, time held at {found.state.t:g} s")

@@ -90,6 +90,8 @@ def command(
             over = answers.locus(request, name, values, rest=equilibrium, found=found)
     console.result = _result(linear, found.prepared.formulation, form)
     console.say(_heading(linear, found.target.name, found.prepared.formulation))
+    if found.prepared.network.discretes:
+        console.say(f"events do not act: {', '.join(sorted(found.prepared.network.discretes)[:6])} held")
     parts = [_table(linear)]
     pictures = any(Path(file).suffix in PICTURES for file in files)
     curves = answers.answers(linear) if kinds or pictures else ()
@@ -163,7 +165,7 @@ def _write(
         console.say(f"{file}: {len(linear.modes)} states, {len(linear.transfers)} transfer functions")
         return
     drawn = (*kinds, "locus") if kinds else ((*KINDS, "poles") if over is None else ("poles",))
-    title = f"{name}, t = {linear.t:g} s" + ("" if linear.moving else ", at rest")
+    title = f"{name}, t = {linear.t:g} s" + ("" if linear.moving else _still(linear))
     data = picture(title, linear, curves, over, drawn, "svg" if kind == ".html" else kind.removeprefix("."))
     if kind == ".html":
         data = page(title, data, _tables(linear, over))
@@ -263,8 +265,12 @@ def _result(linear: Any, formulation: str, index: str) -> dict[str, Any]:
 def _heading(linear: Any, name: str, formulation: str) -> str:
     where = f"{name}: {formulation}, t = {linear.t:g} s"
     if not linear.moving:
-        return f"{where}, at rest"
+        return where + _still(linear)
     return f"{where}, a moving state: the eigenvalues are of this instant, not of the motion"
+
+
+def _still(linear: Any) -> str:
+    return ", in steady motion" if linear.steady else ", at rest"
 
 
 def _table(linear: Any) -> str:

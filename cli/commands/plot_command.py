@@ -98,7 +98,9 @@ def _open(file: str) -> Trace:
 
 def _quantities(traces: list[Trace], wanted: list[str]) -> list[str]:
     """Names that are drawn, as the trace spells them."""
-    known = list(dict.fromkeys(name for trace in traces for name in trace.names))
+    from sysdyn.cli.page.panels import in_order
+
+    known = in_order(dict.fromkeys(name for trace in traces for name in trace.names))
     if not wanted:
         if not known:
             raise UsageError(f"{traces[0].path} has no quantities: name a meter, audit/energy or audit/constraints")

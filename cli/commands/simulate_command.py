@@ -87,9 +87,11 @@ def _summary(ran: Ran) -> str:
     how = (ran.prepared.formulation, method, f"index {form.get(str(o.index), o.index)}", ran.prepared.backend)
     balance = _last(o.samples.energy)  # a draft that an interruption left has none
     audited = f"energy balance {balance:.2e} J, " if math.isfinite(balance) else ""
+    began = ran.started.state.t
+    span = f"{o.reached:g} s" if began == 0.0 else f"{began:.12g} s to {o.reached:.12g} s"
     lines = [
         f"{ran.target.name}: {', '.join(how)}",
-        f"  {o.reached:g} s in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
+        f"  {span} in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
         f"  {audited}constraints {_last(o.samples.constraints):.1e}",
         *(f"  {text}" for text in _conserved(ran)),
         f"  {o.trace}{'' if o.final else ' (not final)'}{'' if o.met or not o.final else ' (not met)'}",

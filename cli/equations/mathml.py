@@ -74,13 +74,19 @@ def number(value: float) -> str:
 
 class Typesetter:
     """Writes expressions of one model.  coordinates: families whose q and f are a name and its rate; switches:
-    those of the model, whose senses and directions are parameters; complementary: coordinates are momenta and efforts.
+    those of the model, whose senses and directions are parameters; elements: of the coordinates those named after an
+    element, of which C1 is no letter; complementary: coordinates are momenta and efforts.
     """
 
     def __init__(
-        self, coordinates: Iterable[str] = (), switches: Iterable[Switch] = (), *, complementary: bool = False
+        self,
+        coordinates: Iterable[str] = (),
+        switches: Iterable[Switch] = (),
+        elements: Iterable[str] = (),
+        *,
+        complementary: bool = False,
     ) -> None:
-        self._coordinates = frozenset(coordinates)
+        self._coordinates, self._elements = frozenset(coordinates), frozenset(elements)
         self._complementary = complementary
         self._slips = {
             name: (_GREEK.get(base, base), switch.label, [f"<mn>{k}</mn>"] if kind == "direction" else [])
@@ -157,7 +163,10 @@ class Typesetter:
         match kind:
             case "q" | "f" if family in self._coordinates:
                 order += kind == "f"
-                return _of("p", family, index, order) if self._complementary else coordinate(family, index, order)
+                if self._complementary:
+                    return _of("p", family, index, order)
+                own = family not in self._elements
+                return coordinate(family, index, order) if own else _of("q", family, index, order)
             case "p":
                 return _of("q" if self._complementary else "p", family, index, order)
             case "kappa" | "mu":

@@ -75,7 +75,8 @@ def page(title: str, content: Content, compiled: CompiledModel) -> str:
     """A page of its own."""
     complementary = compiled.form.formulation.startswith("co_")
     names, switches = (c.name for c in compiled.energies.coordinates), compiled.network.switches
-    types = Typesetter(names, switches, complementary=complementary)
+    elements = (b.name for b in compiled.network.branches)
+    types = Typesetter(names, switches, elements, complementary=complementary)
     parts = (
         functions(content.functions, types, complementary=complementary),
         (f"<span></span><div>{matrix(m, types)}</div>" for m in content.matrices),

@@ -1,7 +1,7 @@
 """One-call functions of an exported model, on NumPy alone; they read `binding.json` beside this file.
 
-All numbers in SI units; p: parameters in the order of binding.json, None: as bound.  values [entries]: a matrix by
-columns on the pattern (sd_colptr, sd_rowind), as scipy.sparse.csc_array((values, rowind, colptr)) takes it.
+All numbers but outputs in SI units; p: parameters in the order of binding.json, None: as bound.  values [entries]: a
+matrix by columns on the pattern (sd_colptr, sd_rowind), as scipy.sparse.csc_array((values, rowind, colptr)) takes it.
 """
 
 import json

@@ -3,14 +3,14 @@
  *     cc -c residual.c binding.c      (C11; then link with -lm)
  *
  * The equations are F(t, y, y') = 0 in the index form that was asked for; names, units and meaning of each unknown, row,
- * parameter and output are in manifest.json and binding.json, in the order of the arrays here.  All numbers are in SI units.
+ * parameter and output are in manifest.json and binding.json, in the order of the arrays here.  All numbers but w are in SI units.
  *
  *   y, yd   [sd_n_unknowns]    unknowns and their time derivatives
  *   p       [sd_n_parameters]  parameters, arrays and tables; begin with a copy of sd_p0
  *   r       [sd_n_unknowns]    residual: as many rows as unknowns
  *   values  [sd_n_entries]     a matrix by columns: the entries of column k stand at sd_colptr[k] .. sd_colptr[k + 1] - 1, in the
  *                            rows sd_rowind[...], ascending
- *   w       [sd_n_outputs]      what the scene traces
+ *   w       [sd_n_outputs]      what the scene traces, in the units that it names (binding.json)
  *
  * Every function returns 0; 1 where a point is none (a root of a negative number, no convergence: take a smaller step); -1
  * where nothing helps (no memory; a parameter on which sizes depend was changed: compile again).

@@ -1,12 +1,13 @@
 """How quantities of traces are laid out over time: panels by unit, curves, names of units.
 
-Quantities of one unit share a panel where none is drowned by the others; where a trace holds derivatives and few
-instants, curves are its cubic Hermite interpolant.
+Quantities of one unit share a panel where none is drowned by the others; where a trace holds derivatives,
+curves are its cubic Hermite interpolant.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,8 +18,8 @@ Floats = NDArray[np.float64]
 
 DROWNED = 12.0
 """A curve whose span is this many times smaller than its panel's is a line to the eye: it gets its own panel."""
-SMOOTH = 600
-"""Traces of fewer instants are interpolated: about one point a pixel."""
+SMOOTH = 2000
+"""Points of a curve at least, where it is interpolated: some a pixel."""
 COLOURS = ("#1f5fa8", "#d1495b", "#2f8f6b", "#e09f3e", "#7a4fa3", "#4aa5c4", "#8c5a3c", "#6b7280")
 
 
@@ -64,34 +65,53 @@ def panels_of(traces: Sequence[Trace], names: Sequence[str]) -> list[Panel]:
 
 
 def curve(trace: Trace, name: str) -> tuple[Floats, Floats]:
-    """Instants and values of a curve: those of the trace, or of its Hermite interpolant where it holds few."""
+    """Instants and values of a curve: those of the trace and, where it holds derivatives, of its Hermite interpolant
+    between instants that lie far apart; between the two rows of a jump it is upright.
+    """
     quantity = trace[name]
     time, values, rate = trace.time, quantity.values, quantity.derivative
-    if rate is None or not 2 <= time.size < SMOOTH or not np.all(np.diff(time) > 0.0):
+    if rate is None or time.size < 2 or not np.all(np.diff(time) >= 0.0) or not time[-1] > time[0]:
         return time, values
-    parts = SMOOTH // time.size + 1
-    s = np.arange(parts) / parts
-    h = np.diff(time)[:, None]
-    left, right = values[:-1, None], values[1:, None]
-    inner = (
-        left * (1.0 + 2.0 * s) * (1.0 - s) ** 2
-        + right * s**2 * (3.0 - 2.0 * s)
-        + h * (rate[:-1, None] * s * (1.0 - s) ** 2 + rate[1:, None] * s**2 * (s - 1.0))
-    )
-    # beside a kink the derivative may be no number: a straight line there
-    inner = np.where(np.isfinite(inner), inner, left + (right - left) * s)
-    fine = time[:-1, None] + h * s
-    return np.append(fine.ravel(), time[-1]), np.append(inner.ravel(), values[-1])
+    h = np.diff(time)
+    parts = 1 + (SMOOTH * h / (time[-1] - time[0])).astype(int)
+    piece = np.repeat(np.arange(h.size), parts)
+    s = (np.arange(piece.size) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[piece]
+    left, right = values[piece], values[piece + 1]
+    with np.errstate(all="ignore"):
+        inner = (
+            left * (1.0 + 2.0 * s) * (1.0 - s) ** 2
+            + right * s**2 * (3.0 - 2.0 * s)
+            + h[piece] * (rate[piece] * s * (1.0 - s) ** 2 + rate[piece + 1] * s**2 * (s - 1.0))
+        )
+        # beside a kink the derivative may be no number: a straight line there
+        inner = np.where(np.isfinite(inner), inner, left + (right - left) * s)
+    inner[s == 0.0] = left[s == 0.0]
+    return np.append(time[piece] + h[piece] * s, time[-1]), np.append(inner, values[-1])
 
 
 def styled(panel: Panel, traces: Sequence[tuple[str, Trace]]) -> Iterator[tuple[str, Trace, str, str, int]]:
-    """Curves of a panel: name, trace, label, colour and the number of the trace."""
+    """Curves of a panel: name, trace, label, colour and the number of the dashes, that of the trace; where colours come
+    again dashes go on.
+    """
     single = len(panel.names) == 1
     for j, name in enumerate(panel.names):
         for k, (label, trace) in enumerate(traces):
             if name in trace:
                 shown = name if len(traces) == 1 else label if single else f"{name}, {label}"
-                yield name, trace, shown, COLOURS[(k if single else j) % len(COLOURS)], k
+                colour = k if single else j
+                again = colour // len(COLOURS) * (1 if single else len(traces))
+                yield name, trace, shown, COLOURS[colour % len(COLOURS)], k + again
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Names with numbers in them as numbers count: x[2] before x[10]."""
+    parts = {name: re.split(r"(\d+)", name) for name in names}
+    return sorted(parts, key=lambda name: [(int(p), p) if k % 2 else (0, p) for k, p in enumerate(parts[name])])
+
+
+def shortened(name: str, most: int) -> str:
+    """A name in at most so many characters: its beginning and its end."""
+    return name if len(name) <= most else f"{name[: most - most // 3 - 1]}…{name[-(most // 3) :]}"
 
 
 def time_unit(traces: Sequence[Trace]) -> tuple[float, str]:

@@ -9,10 +9,14 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from sysdyn.cli.page.panels import Panel, curve, panels_of, styled, time_unit, unit_text
+from sysdyn.cli.page.panels import Panel, curve, panels_of, shortened, styled, time_unit, unit_text
 from sysdyn.dsl.text.render import printable
 from sysdyn.runtime.trace.trace import Trace
 
+MOST = 22
+"""Characters of a name beside an axis; twice as many in a legend."""
+LINES = 10
+"""Of a legend; more stand in columns."""
 STYLES = ("-", "--", ":", "-.")
 STYLE: dict[str, Any] = {
     "axes.edgecolor": "#9aa0a6",
@@ -110,15 +114,16 @@ def _draw(axis: Any, panel: Panel, traces: Sequence[tuple[str, Trace]], scale: f
     for name, trace, label, colour, k in styled(panel, traces):
         time, values = curve(trace, name)
         (line,) = axis.plot(time * scale, values, STYLES[k % len(STYLES)], color=colour)
-        curves.append((line, _legible(label)))
+        curves.append((line, _legible(shortened(label, 2 * MOST))))
     unit = unit_text(panel.unit)
     if len(panel.names) == 1:
-        axis.set_ylabel(", ".join(filter(None, [_legible(panel.names[0]), unit])))
+        axis.set_ylabel(", ".join(filter(None, [_legible(shortened(panel.names[0], MOST)), unit])))
     else:
         axis.set_ylabel(unit)
     if len(curves) > 1:
         lines, labels = zip(*curves, strict=True)
-        axis.legend(lines, labels, loc="upper left", bbox_to_anchor=(1.0, 1.03), fontsize=8.5)
+        columns = -(-len(curves) // LINES)
+        axis.legend(lines, labels, loc="upper left", bbox_to_anchor=(1.0, 1.03), fontsize=8.5, ncols=columns)
     axis.margins(x=0.0, y=0.08)
     axis.ticklabel_format(axis="y", scilimits=(-3, 4), useOffset=panel.high - panel.low < 1e-5 * abs(panel.high))
 

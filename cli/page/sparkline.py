@@ -23,7 +23,7 @@ def summary(traces: Sequence[tuple[str, Trace]], names: Sequence[str], width: in
             if name not in trace:
                 continue
             values = trace[name].values[np.isfinite(trace[name].values)]
-            ends = (f"{values.min():.5g}", f"{values.max():.5g}") if values.size else ("-", "-")
+            ends = told_apart(float(values.min()), float(values.max())) if values.size else ("-", "-")
             shown = name if len(traces) == 1 else f"{name}, {label}"
             rows.append((_plain(shown), _plain(unit_text(trace[name].units)) or "1", *ends))
             curves.append(curve(trace, name))
@@ -32,13 +32,22 @@ def summary(traces: Sequence[tuple[str, Trace]], names: Sequence[str], width: in
     wide = max(width - room - 2, NARROW)
     scale, unit = time_unit([t for _, t in traces])
     low, high = span(traces)
-    over = f"{low * scale:.5g} to {high * scale:.5g} {unit}"
+    over = f"{' to '.join(told_apart(low * scale, high * scale))} {unit}"
     lines = [f"{heads[0].ljust(room)}  {over}"]
     lines += [
         f"{head.ljust(room)}  {sparkline(t, v, low, high, wide)}".rstrip()
         for head, (t, v) in zip(heads[1:], curves, strict=True)
     ]
     return "\n".join(lines)
+
+
+def told_apart(low: float, high: float) -> tuple[str, str]:
+    """Two numbers in five digits, or in as many as show that they differ."""
+    return next(
+        texts
+        for digits in range(5, 18)
+        if len(set(texts := (f"{low:.{digits}g}", f"{high:.{digits}g}"))) > 1 or low == high or digits == 17
+    )
 
 
 def _plain(name: str) -> str:

@@ -44,7 +44,8 @@ class Study:
     def typesetter(self) -> Typesetter:
         """Of the lowered model's expressions."""
         names = (c.name for c in self.prepared.compiled.energies.coordinates)
-        return Typesetter(names, self.network.switches, complementary=self.complementary)
+        elements = (b.name for b in self.network.branches)
+        return Typesetter(names, self.network.switches, elements, complementary=self.complementary)
 
     @property
     def typesetter_of_text(self) -> Typesetter:

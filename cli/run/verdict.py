@@ -31,6 +31,7 @@ _CAUSES = {
     "nonfinite": ("E933", "an equation is not a number"),
     "stiff": ("E930", "the equations are stiff and hold the method to tiny steps: take radau or bdf"),
     "step_too_small": ("E930", "the step size fell below the resolution of time"),
+    "crawl": ("E930", "at such steps the end of the run is out of reach"),
     "max_steps": ("E934", "the limit of steps is reached"),
     "max_wall": ("E934", "the limit of wall time is reached"),
     "max_events": ("E934", "the limit of events is reached"),
@@ -50,7 +51,8 @@ _REMEDIES = {
     "E934": "a higher limit, or a looser --accuracy",
 }
 
-_REMEDIES_OF_EVENTS = {
+_REMEDIES_OF_CAUSES = {
+    "crawl": "an earlier end (--until), another --method, or a looser --accuracy",
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",
     "chatter": "a condition and an action that do not undo each other: hysteresis, or an 'every' in place of a 'when'",
     "complementarity": "constraints that do not ask for opposites: a resistance or a clearance between these elements",
@@ -76,9 +78,8 @@ _RANK = "an earlier end, or lengths with which the mechanism does not reach its 
 def stopped(target: Target, prepared: Prepared, started: Started, error: SolverFailure, report: Report) -> str:
     """Reports where the solver stopped; the sentence of it."""
     code, cause = _CAUSES.get(error.cause, ("E930", error.cause))
-    found = (
-        culprit(prepared, started.system, error) if error.cause in ("nonfinite", "newton", "step_too_small") else None
-    )
+    asked = ("nonfinite", "newton", "step_too_small", "crawl")
+    found = culprit(prepared, started.system, error) if error.cause in asked else None
     if found is not None:
         code, cause = found.code, found.text
     last = None if error.state is None else LastState(prepared, started.system, *error.state[:2])
@@ -104,7 +105,7 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
         text += f"; {why}" if why else ""
     if isinstance(partial, Outcome) and partial.reached > error.time:
         text += "; the trace is that of a coarser run to the end, its error is not known"
-    usual = _REMEDIES_OF_EVENTS.get(error.cause, _REMEDIES[code])
+    usual = _REMEDIES_OF_CAUSES.get(error.cause, _REMEDIES[code])
     usual = "--method radau or bdf, or auto" if linear or flat else usual
     usual += f"; {WITH_A_SLOPE}" if flat else ""
     if error.cause == "singular" and len(started.system.description.switches.places):

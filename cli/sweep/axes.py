@@ -75,6 +75,9 @@ def axis(text: str, evaluate: Evaluate) -> Axis:
         raise UsageError(f"--over '{text}': {forms}")
     if text[cut] == "~":
         return _distribution(name, said, evaluate)
+    drawn = _DRAWN.fullmatch(said)
+    if drawn is not None and drawn[1] in DISTRIBUTIONS:
+        raise UsageError(f"--over {name}={said}: a distribution is written --over '{name}~{said}'")
     if ".." in said and not name.startswith("level "):
         return _grid(name, said, evaluate)
     return listed(name, _parts(said), evaluate)

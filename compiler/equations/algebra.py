@@ -17,6 +17,9 @@ _NAMES = {
     "cosh": "cosh", "tanh": "tanh", "exp": "exp", "ln": "log", "abs": "Abs", "sign": "sign", "atan2": "atan2",
 }  # fmt: skip
 
+PLAIN = 1000
+"""Largest denominator of a number that is reckoned with."""
+
 
 class Algebra:
     """A pair of dictionaries: leaves of ours and symbols of sympy's, which sort as `leaves` (then as they are met):
@@ -45,6 +48,19 @@ class Algebra:
         """A number as the decimal that it is written as."""
         return self.sympy.Rational(repr(value)) if abs(value) < 1e300 else self.sympy.Float(value)
 
+    def factor(self, value: float) -> Any:
+        """A number that stands in a sum or before a product: one of many digits (9.80665) as a symbol of its own, which
+        no common denominator is made of.
+        """
+        exact = self.number(value)
+        if not exact.is_Rational or exact.p in (-1, 1) or exact.q <= PLAIN:
+            return exact
+        size = const(abs(value))
+        if size not in self._symbols:
+            found = self.sympy.Symbol(f"x{len(self._symbols):06d}", positive=True)
+            self._symbols[size], self._nodes[found] = found, size
+        return self._symbols[size] if value > 0.0 else -self._symbols[size]
+
     def object(self, root: Node) -> Any:
         """The sympy object of an expression."""
         sympy = self.sympy
@@ -53,10 +69,10 @@ class Algebra:
             args = [done[a] for a in node.args if a in done]
             match node.op:
                 case "const":
-                    done[node] = self.number(node.data)
+                    done[node] = self.factor(node.data)
                 case "sum":
-                    terms = (self.number(c) * a for c, a in zip(node.data[1], args, strict=True))
-                    done[node] = sympy.Add(self.number(node.data[0]), *terms)
+                    terms = (self.factor(c) * a for c, a in zip(node.data[1], args, strict=True))
+                    done[node] = sympy.Add(self.factor(node.data[0]), *terms)
                 case "mul":
                     done[node] = sympy.Mul(*(a ** self.number(e) for e, a in zip(node.data, args, strict=True)))
                 case "pow":

@@ -68,6 +68,7 @@ class FileScope:
         self.report = report
         self.tables: dict[str, Table] = {}
         self._modules: dict[Path, Scope | None] = {}
+        self._imported: dict[int, Place] = {}  # symbols of other files: where the import that gave them names them
         self.outer = Scope()
         self._declare(prelude(), self.outer)
         self.scope = Scope(self.outer)
@@ -90,9 +91,12 @@ class FileScope:
 
     def _enter(self, symbol: Symbol, scope: Scope) -> None:
         before = scope.symbols.get(symbol.name)
+        if before is symbol:  # imported twice
+            return
         if before is not None:
-            related = (Related("first declared here", before.place),)
-            self.report.error("E106", f"'{symbol.name}' is declared twice", symbol.place, related=related)
+            place, first = (self._imported.get(id(s), s.place) for s in (symbol, before))
+            related = (Related("first declared here", first),)
+            self.report.error("E106", f"'{symbol.name}' is declared twice", place, related=related)
             return
         scope.symbols[symbol.name] = symbol
 
@@ -148,6 +152,7 @@ class FileScope:
             if unit is not None:
                 self.scope.units[word.name] = unit
             elif symbol is not None:
+                self._imported[id(symbol)] = Place(source, word.span)
                 yield symbol
             else:
                 other = exported().get(word.name)

@@ -127,7 +127,8 @@ class Parameters(ElaborationContext):
             self._is_run_constant(item.node, statement)
         if not self.fills(value, shape):
             message = f"'{statement.decl.name}' has {len(items)} values, which do not fit its shape"
-            raise self.resolver.fail("E805", message, self._where(statement))
+            help_ = None if shape or not isinstance(value, Vector) else f"param {statement.decl.name}[1..{len(items)}]"
+            raise self.resolver.fail("E805", message, self._where(statement), help=help_)
         what = "default" if written is statement.value else "argument"
         known = [i.dimension for i in items if i.dimension is not None]
         dimension = unit.dimension if unit is not None else (known[0] if known else NONE)

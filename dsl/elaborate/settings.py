@@ -77,7 +77,9 @@ class Settings:
         self.model.define_input(Definition(name, "input", value, (), unit.dimension, space, place, s.span, shape=shape))
 
     def _bare(self, value: syntax.Expr, dimension: Dimension) -> syntax.Expr:
-        """On the command line a bare number is in SI units."""
+        """On the command line a bare number is in SI units, each of an array too."""
+        if isinstance(value, syntax.Array):
+            return replace(value, items=tuple(self._bare(item, dimension) for item in value.items))
         inner = value.operand if isinstance(value, syntax.Negative) else value
         if self.resolver.source is self.model.source or not isinstance(inner, syntax.Number) or not dimension:
             return value
@@ -144,6 +146,10 @@ class Settings:
         if value.dimension is not None and value.dimension != symbol.dimension:
             message = f"'{symbol.name}' is in {dim.show(symbol.dimension)} but set to {dim.show(value.dimension)}"
             help_ = self.resolver.missing(value.dimension, symbol.dimension, s.value)
+            if help_ is not None and help_.endswith(f": '{symbol.name}'?"):  # itself is no factor of what it is set to
+                factor = dim.quotient(symbol.dimension or NONE, value.dimension)
+                text = " ".join(self.resolver.source.text[s.value.span.start : s.value.span.end].split())
+                help_ = None if factor is None else f"({text})*(1 {dim.show(factor)})"
             raise self.resolver.fail("E207", message, s.value.span, help=help_)
         for inner in ex.topological([value.node]):
             if inner.op in ("var", "time"):

@@ -6,6 +6,7 @@ that begin with '#' are passed over.  It must lie inside the folder of the text 
 
 from __future__ import annotations
 
+import re
 import stat
 from collections.abc import Sequence
 from fractions import Fraction
@@ -19,6 +20,7 @@ from sysdyn.dsl.text.source import real
 from sysdyn.dsl.tree import syntax
 
 MAX_BYTES = 50_000_000
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 Row = tuple[float, ...]
 
 
@@ -105,14 +107,18 @@ def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report
                 raise ValueError
             rows.append(tuple(_scaled(c, u) for c, u in zip(cells, units, strict=True)))
         except (ValueError, ZeroDivisionError, OverflowError):
-            if rows or number > 1:
+            if rows or number > 1 or any(_NUMBER.fullmatch(c) for c in cells):  # else the names of the columns
                 message = f"table {item.name.name}: line {number} of '{item.file}' is not {len(units)} numbers"
-                report.error("E206", message, place)
+                example = ", ".join(("0.5", "1.2e-3", "7")[: len(units)])
+                help_ = f"{len(units)} numbers a line, a comma between them: {example}"
+                report.error("E206", message, place, help=help_)
                 raise Failed from None
     return rows
 
 
 def _scaled(text: str, unit: Unit) -> float:
+    if _NUMBER.fullmatch(text) is None:  # Python takes 1_0 and figures of other scripts too
+        raise ValueError(text)
     value = float(text)
     if value - value != 0.0:
         raise ValueError(text)

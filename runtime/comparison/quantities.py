@@ -293,9 +293,10 @@ def _nonfinite(state: _State, curves: tuple[Curve, Curve], tau: float) -> None:
         inside = (at >= time[0] - tau) & (at <= time[-1] + tau)
         bad = np.flatnonzero(~found & inside)
         if bad.size:
-            value = curves[one].values[rows[bad[0]]]
+            value, other = curves[one].values[rows[bad[0]]], {"reference": "test", "test": "reference"}[which]
             _undefined(state, float(at[bad[0]]), f"the {which} is {value:g} there")
-            state.worst = replace(state.worst, **{which: float(value)})
+            there = float(np.interp(at[bad[0]], time, curves[two].values))
+            state.worst = replace(state.worst, **{which: float(value), other: there})
 
 
 def _kinds(values: Floats) -> Ints:

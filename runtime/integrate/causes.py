@@ -13,7 +13,7 @@ from sysdyn.runtime.structure.structure import DENSE, null_place
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
 
-NEWTON = ("newton", "step_too_small", "error_test", "singular")
+NEWTON = ("newton", "step_too_small", "crawl", "error_test", "singular")
 """Causes behind which the equations themselves may be singular."""
 
 
@@ -35,7 +35,7 @@ def failure(run: Integration, cause: str) -> SolverFailure:
         if names:
             return SolverFailure("singular", method.t, method.h, ", ".join(names[:3]), run.system.row_label(at))
         cause = "newton" if cause == "singular" else cause
-    if cause in ("error_test", "step_too_small", "newton"):
+    if cause in ("error_test", "step_too_small", "crawl", "newton"):
         unknown = _worst(run)
     return SolverFailure(cause, method.t, method.h, unknown, row, smooth=run.work[1])
 

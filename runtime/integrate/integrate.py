@@ -329,7 +329,7 @@ class Integration:
                 break
             if method.steps - marked >= (DRAFT_CRAWL if request.draft else CRAWL):
                 if method.t - at < CREPT * (request.t_end - self.start.t):
-                    raise failure(self, "step_too_small")
+                    raise failure(self, "crawl")
                 marked, at = method.steps, method.t
 
     def run(self, sink: Sink, progress: Progress | None = None, *, spent: bool = True) -> Finished:

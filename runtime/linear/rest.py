@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
-from dataclasses import replace
+from dataclasses import field, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,8 @@ NEAR = 1e-9
 """Part of a magnitude that is tried as zero."""
 SHARE = 0.05
 """Of the work that a search for a start may take: that of one search for rest."""
+MANY = 20_000
+"""Unknowns up to which random points are tried: far from the guess factors of a line of 80000 took 6 GB."""
 NEAREST, FARTHEST = -1.0, 1.5
 """Powers of ten between which random points lie around the guess, in magnitudes."""
 
@@ -45,13 +48,22 @@ NEAREST, FARTHEST = -1.0, 1.5
 @dataclass(frozen=True, slots=True)
 class Rest:
     """A state of rest; residual: largest row relative to its terms; free: unknowns that it leaves open, by name;
-    together: directions in which displacements may move together without changing anything.
+    together: directions in which displacements may move together without changing anything; standing: the parameters
+    and the active set of constraints that hold at times, holding: how each of these stands.
     """
 
     state: ConsistentState
     residual: float
     free: tuple[str, ...]
     together: int = 0
+    standing: tuple[Floats, Mask] | None = None
+    holding: dict[str, str] = field(default_factory=dict)
+
+    def stand(self, system: System) -> None:
+        """The model with what holds here."""
+        if self.standing is not None:
+            system.description.p[:] = self.standing[0]
+            system.description.switches.set(self.standing[1])
 
 
 class Resting:
@@ -65,6 +77,7 @@ class Resting:
         families = system.description.families
         owners = np.array([families[int(k)].owner in tangible for k in system.family_of[: self.n]], dtype=bool)
         self.still = (system.kinds[: self.n] == "f") & owners
+        self.loose = quadratures(system, tangible)
         self.use = self._use()
         self.turns = np.array([families[int(k)].unit == "rad" for k in system.family_of[: self.n]], dtype=bool)
         self.turns &= system.kinds[: self.n] == "q"
@@ -100,7 +113,7 @@ class Resting:
         """Rows of rest: as written, the rates of displacement constraints, multipliers of what does not hold."""
         use = self.rows.of_groups("dynamics", "momentum", "phi", "phi_rate", "psi", "gamma", "lambda").copy()
         use[self.rows.held[0]] = True
-        grows = quadratures(self.system, self.tangible) & (self.system.kinds[: self.n] == "s")
+        grows = self.loose & (self.system.kinds[: self.n] == "s")
         for group, family, first in self.rows.form.groups:
             if group == "lambda":
                 owner = self.system.description.rows[family].owner
@@ -164,8 +177,11 @@ class Resting:
             work=Work(SHARE),
         )
 
-    def found(self, guess: Floats) -> Rest | None:
-        """The state of rest that Newton's method comes to from a guess."""
+    def found(self, guess: Floats, near: Floats | None = None) -> Rest | None:
+        """The state of rest that Newton's method comes to from a guess; what it leaves open is as near as can be to
+        `near`, by itself to what was first guessed.
+        """
+        near = self.first if near is None else near
         guess = guess.copy()
         guess[self.still] = self.along @ (self.along.T @ guess[self.still])
         problem = self.problem(guess)
@@ -179,7 +195,7 @@ class Resting:
             return None
         y = self._clean(own.x, problem)
         null = self._null(y, again) / again.scale[:, None] if self.n <= DENSE else np.zeros((self.n, 0))
-        y = self._back(y, again, null)
+        y = self._back(y, again, null, near)
         state = ConsistentState(self.t, y, self.rates(y), (), own.residual)
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
         largest = np.abs(null).max(axis=1, initial=0.0)
@@ -194,11 +210,14 @@ class Resting:
         clean = np.where(np.abs(y) > NEAR * group_maximum(self.system, problem.scale), y, 0.0)
         return clean if (clean != y).any() and self._met(clean) else y
 
-    def _back(self, y: Floats, problem: Problem, null: Floats) -> Floats:
-        """What the rows leave open as it was first guessed."""
+    def _back(self, y: Floats, problem: Problem, null: Floats, near: Floats) -> Floats:
+        """What the rows leave open as it is in `near`."""
+        if self.n > DENSE:  # what nothing depends on is known without
+            back = np.where(self.loose, near, y)
+            return back if (back != y).any() and self._met(back) else y
         if not null.size:
             return y
-        away = (y - self.first) / problem.scale
+        away = (y - near) / problem.scale
         back = y - problem.scale * (null @ least_squares(null, away))
         return back if self._met(back) else y
 
@@ -225,7 +244,7 @@ class Resting:
     def apart(self, one: Rest, other: Rest) -> bool:
         """Whether two states differ by more than what the first leaves open."""
         problem = self.problem(one.state.y)
-        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
+        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu")) & ~self.loose
         size = np.maximum(np.abs(one.state.y), np.abs(other.state.y))
         size = np.maximum(size, group_maximum(self.system, problem.scale))
         move = ((other.state.y - one.state.y) / size)[told]
@@ -235,11 +254,30 @@ class Resting:
         return bool(np.abs(move).max(initial=0.0) > SAME)
 
 
+class Equations(Protocol):
+    """What states of rest are found of: Resting, or with constraints that hold at times contact_rest.ContactRest."""
+
+    first: Floats
+
+    @property
+    def turns(self) -> Mask:
+        """Displacements that are angles [unknowns]."""
+
+    def problem(self, guess: Floats) -> Problem:
+        """Rest nearest to a guess."""
+
+    def found(self, guess: Floats) -> Rest | None:
+        """The state of rest that is come to from a guess."""
+
+    def apart(self, one: Rest, other: Rest) -> bool:
+        """Whether two states differ by more than what the first leaves open."""
+
+
 def rests(
-    resting: Resting, tries: int, most: int | None = None, advance: Callable[[int], None] | None = None
+    resting: Equations, tries: int, most: int | None = None, advance: Callable[[int], None] | None = None
 ) -> tuple[Rest, ...]:
-    """States of rest from the first guess and from random points, in the order found; most: how many are wanted;
-    advance: told how many points were tried.
+    """States of rest from the first guess and from random points (up to MANY unknowns), in the order found; most: how
+    many are wanted; advance: told how many points were tried.
     """
     kept: list[Rest] = []
     guess = resting.first
@@ -247,7 +285,7 @@ def rests(
     scale = resting.problem(guess).scale
     scale = np.where(resting.turns, np.maximum(scale, 1.0), scale)
     mirrored: list[Floats] = []  # springs and pendulums are often symmetrical
-    for k in range(tries + 1):
+    for k in range(tries + 1 if guess.size <= MANY else 1):
         if most is not None and len(kept) >= most:
             break
         if advance is not None:

@@ -81,17 +81,23 @@ def _coordinate(system: System, place: int) -> tuple[str, int]:
 
 def quadratures(system: System, tangible: AbstractSet[str]) -> Mask:
     """Unknowns that nothing depends on [unknowns as written]: displacements of coordinates that are not tangible,
-    dynamic variables that stand in no row but their own.
+    dynamic variables that stand in no row, not even where it has no slope by them (sign(x), step(x)).
     """
     settled = system.another("settled")
     n = system.form.written
     columns = settled.pattern.columns_of()[settled.structural()[0]]
-    read = np.zeros(settled.unknowns, dtype=bool)
+    read = np.isin(settled.family_of, list(_read_flat(settled)))
     read[columns] = True
     families, kinds = system.description.families, system.kinds[:n]
     owners = np.array([families[int(k)].owner in tangible for k in system.family_of[:n]], dtype=bool)
     found: Mask = ((kinds == "q") & ~owners) | ((kinds == "s") & ~read[:n])
     return found
+
+
+def _read_flat(system: System) -> set[int]:
+    """Families that a loop nest reads and has no slope by."""
+    kernels = [kernel for call in system.form.calls for kernel in system.description.blocks[call.block]]
+    return {k for nest in kernels for k in (nest.reads or frozenset()) - {by.family for _, by in nest.dy}}
 
 
 def moving(system: System, state: ConsistentState) -> bool:

@@ -51,8 +51,8 @@ class NoSuchForm(Exception):  # noqa: N818
 class SolverFailure(Exception):  # noqa: N818 (a name of the house)
     """The integration stopped at `time` [s] with step `step` [s].
 
-    cause: newton, error_test, singular, inertia, nonfinite, step_too_small, stiff, strained, max_steps, max_wall,
-    memory.
+    cause: newton, error_test, singular, inertia, nonfinite, step_too_small, crawl, stiff, strained, max_steps,
+    max_wall, memory.
     unknown: name of the unknown in the way, row: its row; None where the cause has no place; smooth: the bdf took
     nearly all steps at its highest order.
     """

@@ -199,11 +199,18 @@ class Trace:
         """Traced quantities (without the audit)."""
         return tuple(name for name in self._data if not name.startswith("audit."))
 
-    def __getitem__(self, name: str) -> Quantity:
-        return self._data[name.removeprefix("/").replace("audit/", "audit.") if "audit" in name else name]
+    @staticmethod
+    def _key(name: str) -> str:
+        return name.removeprefix("/").replace("audit/", "audit.") if "audit" in name else name
 
-    def __contains__(self, name: str) -> bool:
-        return name in self._data
+    def __getitem__(self, name: str) -> Quantity:
+        return self._data[self._key(name)]
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and self._key(name) in self._data
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
 
     @property
     def final(self) -> bool:

@@ -109,6 +109,7 @@ REST = {
     "conservative": (bool, type(None)),
     "residual": NUMBER,
     "free": list,
+    "contacts": dict,
 }
 LINES = ("functions", "equations", "counted", "multipliers", "senses")
 EQUATIONS = {"formulation": str, "form": str} | dict.fromkeys(LINES, list)

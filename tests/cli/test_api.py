@@ -92,3 +92,12 @@ def test_what_the_module_offers():
     names = {"Diagnostic", "Model", "ModelError", "Module", "NotMet", "SolverFailure", "Sweep", "Trace", "UsageError"}
     names |= {"Equilibrium", "Linearised", "NoState"}
     assert set(api.__all__) == names | {"check", "compile_model", "equilibria", "linearize", "load", "simulate"}
+
+
+def test_a_trace_says_what_it_holds(tmp_path):
+    trace = api.simulate(write(tmp_path, PENDULUM), until=0.1)
+    assert list(trace) == list(trace.names)
+    assert "x" in trace
+    assert "audit/energy" in trace
+    assert "/audit/energy" in trace
+    assert 0 not in trace

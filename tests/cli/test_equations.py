@@ -556,3 +556,27 @@ def test_a_page_sets_senses_and_directions_as_letters(tmp_path, capsys):
     assert "<msub><mi>n</mi><mrow><mi>content of line 8 (1)</mi><mo>,</mo><mn>2</mn></mrow></msub>" in page
     assert "<msub><mi>σ</mi><mi>F sticking</mi></msub>" in page
     assert "direction" not in page
+
+
+CART = """model cart {
+  param M = 2 kg
+  param m = 0.5 kg
+  param l = 0.8 m
+  coord x: translation = 0 m
+  coord th: rotation = 0.7 rad
+  energy T* = 1/2*M*x'^2 + 1/2*m*(x'^2 + 2*l*cos(th)*x'*th' + l^2*th'^2)
+  energy V = -m*g0*l*cos(th)
+}
+"""
+
+
+def test_numbers_of_many_digits_stay_as_they_are_written(tmp_path, capsys):
+    """(M + m) l th'' = ... - (M + m) g sin(th): no common denominator is made of the decimals of g."""
+    path = write(tmp_path, CART)
+    for form in ("underlying", "port_hamiltonian"):
+        assert run(["equations", path, "--form", form, "--formulation", "lagrangian", "--quiet"]) == 0
+        text = capsys.readouterr().out
+        assert "9.80665" in text
+        assert "e-05" not in text
+        assert "20000" not in text
+    assert "-m l sin(th) (f_x f_th - 9.80665)" in text

@@ -10,6 +10,7 @@ from sysdyn.cli.main import run
 from sysdyn.cli.progress import SEARCH, ProgressLine
 from sysdyn.cli.run.asked import Request
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.runtime.linear import rest
 from texts import ROOT, run_json, write
 
 SEED = ROOT / "models" / "seed"
@@ -235,3 +236,137 @@ def test_a_long_search_says_how_far_it_is(tmp_path, monkeypatch):
 def test_a_search_that_takes_long_names_its_own_option(capsys):
     ProgressLine("auto", SEARCH)(0.01, 7200.0)
     assert capsys.readouterr().err == "about 2.0 h of search lie ahead: fewer --tries would shorten it\n"
+
+
+GAP = """model two {
+  param F = 40 N
+  coord x: translation = 0 m
+  coord y: translation = 1 m
+  energy T* = 1/2*(1 kg)*x'^2 + 1/2*(2 kg)*y'^2
+  energy V = 1/2*(10 N/m)*x^2 + 1/2*(20 N/m)*(y - 1 m)^2
+  content D = 1/2*(1 N.s/m)*(x'^2 + y'^2)
+  work F on x
+  phi gap: y - x >= 0 m
+  init x' = 0 m/s
+  init y' = 0 m/s
+}
+scene s of two { time 0 s to 1 s; trace x, y }
+"""
+
+
+def test_a_rest_does_not_pass_through_a_stop(tmp_path, capsys):
+    """Open up to 10 N, where x = F/10; closed both move as one: 30 x = F + 20, mass 3, drag 2, stiffness 30."""
+    (found,) = rests(capsys, write(tmp_path, GAP))
+    assert found["contacts"] == {"gap": "holds"}
+    assert [found["values"][name] for name in ("x", "y")] == pytest.approx([2.0, 2.0], rel=1e-9)
+    values = np.array(found["eigenvalues"])
+    np.testing.assert_allclose(np.sort(values[:, 1]), np.sqrt(10.0 - 1.0 / 9.0) * np.array([-1.0, 1.0]), rtol=1e-9)
+    (found,) = rests(capsys, write(tmp_path, GAP), "--set", "F=4")
+    assert found["contacts"] == {"gap": "free"}
+    assert [found["values"][name] for name in ("x", "y")] == pytest.approx([0.4, 1.0], rel=1e-9)
+
+
+@pytest.mark.parametrize(("friction", "rest"), [("abs(x')", (0.25, 0.0)), ("hypot(x', y')", (0.15, 0.2))])
+def test_a_rest_with_dry_friction_sticks(tmp_path, capsys, friction, rest):
+    """From (0.6, 0.8) m, where the springs of 4 N/m pull with 4 N: nearest within the bound of 1 N."""
+    y = 0.8 if "y" in friction else 0.0
+    text = f"""model m {{
+  coord x: translation = {0.6 if y else 1.0} m
+  coord y: translation = {y} m
+  energy T* = 1/2*(1 kg)*(x'^2 + y'^2)
+  energy V = 1/2*(4 N/m)*(x^2 + y^2)
+  content D = (1 N)*{friction}
+  init x' = 0 m/s
+  init y' = 0 m/s
+}}
+scene s of m {{ time 0 s to 1 s; trace x, y }}
+"""
+    (found,) = rests(capsys, write(tmp_path, text), "--tries", "0")
+    assert list(found["contacts"].values()) == ["sticks"]
+    assert (found["values"]["x"], found["values"]["y"]) == pytest.approx(rest, abs=1e-9)
+    assert "x" in found["free"]
+    assert not any(abs(im) > 1e-9 for _, im in found["eigenvalues"]) or "y" not in friction
+
+
+def test_what_only_a_sign_depends_on_does_not_grow_for_ever(tmp_path, capsys):
+    """x' = 0.3 - sign(x) is never zero; b' = a and z' = step(a) are quadratures."""
+    text = """model relay {
+  state x: 1 = 1
+  dynamic x' = (0.3 - sign(x))/(1 s)
+}
+scene s of relay { time 0 s to 1 s; trace x }
+"""
+    assert rests(capsys, write(tmp_path, text), "--tries", "3", code=3) == []
+    text = """model sums {
+  state a: 1 = 1
+  state b: 1 = 0
+  state z: 1 = 0
+  dynamic a' = (1 - a)/(1 s)
+  dynamic b' = a/(1 s)
+  dynamic z' = step(a - 0.5)/(1 s)
+}
+scene s of sums { time 0 s to 1 s; trace a }
+"""
+    (found,) = rests(capsys, write(tmp_path, text), "--tries", "3")
+    assert found["free"] == ["b", "z"]
+
+
+def test_a_state_that_a_sample_would_change_is_no_rest(tmp_path, capsys):
+    """x' = u - x + 0.5 with u held at 0 would rest at 0.5 m; sampled u = -2 x rests at 1/6 m."""
+    text = """model sampled {
+  param u0 = 0 m/s
+  state x: m = 1 m
+  discrete u: m/s = u0
+  dynamic x' = u - x/(1 s) + 0.5 m/s
+  every 10 ms { u := -2 s^-1*x }
+}
+scene s of sampled { time 0 s to 1 s; trace x }
+"""
+    path = write(tmp_path, text)
+    assert rests(capsys, path, "--tries", "0", code=3) == []
+    assert run(["equilibrium", str(path), "--backend", "numpy", "--tries", "0"]) == 3
+    assert "'every 10 ms' sets u from 0 to -1" in capsys.readouterr().err
+    (found,) = rests(capsys, path, "--tries", "0", "--set", "u0=-1/3*(1 m/s)")
+    assert found["values"]["x"] == pytest.approx(1.0 / 6.0)
+    assert found["stability"] is None
+    assert run(["linearize", str(path), "--backend", "numpy"]) == 0
+    assert "events do not act: u held" in capsys.readouterr().err
+
+
+def test_a_block_on_a_running_belt_rests_where_it_slips(tmp_path, capsys):
+    """Its spring of 40 N/m holds the 2 N with which the belt rubs; beside it the friction is constant."""
+    text = """model belt {
+  coord x: translation = 0 m
+  energy T* = 1/2*(1 kg)*x'^2
+  energy V = 1/2*(40 N/m)*x^2
+  content D = (2 N)*abs(x' - 0.5 m/s) + 1/2*(1 N.s/m)*x'^2
+  init x' = 0 m/s
+}
+scene s of belt { time 0 s to 1 s; trace x }
+"""
+    (found,) = rests(capsys, write(tmp_path, text), "--tries", "0")
+    assert found["values"]["x"] == pytest.approx(0.05, rel=1e-9)
+    assert found["stability"] == "asymptotically stable"
+    np.testing.assert_allclose(np.array(found["eigenvalues"])[:, 0], -0.5, rtol=1e-9)
+
+
+def test_what_nothing_depends_on_makes_no_two_rests_of_one_in_large_models_either(tmp_path, capsys, monkeypatch):
+    """b' = a - 1 m/s: wherever b is.  Large models are not asked what their rows leave open."""
+    monkeypatch.setattr(rest, "DENSE", 0)
+    text = """model sums {
+  state a: m/s = 3 m/s
+  state b: m = 2 m
+  dynamic a' = (1 m/s - a)/(1 s)
+  dynamic b' = a - 1 m/s
+}
+scene s of sums { time 0 s to 1 s; trace a }
+"""
+    (found,) = rests(capsys, write(tmp_path, text), "--tries", "5")
+    assert found["values"] == pytest.approx({"a": 1.0, "b": 2.0})
+
+
+def test_large_models_are_not_tried_at_random_points(tmp_path, capsys, monkeypatch):
+    path = write(tmp_path, DUFFING)
+    assert len(rests(capsys, path)) == 3
+    monkeypatch.setattr(rest, "MANY", 1)
+    assert len(rests(capsys, path)) == 1

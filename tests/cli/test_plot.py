@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.cli.page.panels import curve, panels_of, unit_text
-from sysdyn.cli.page.sparkline import sparkline
+from sysdyn.cli.page.panels import curve, in_order, panels_of, shortened, styled, unit_text
+from sysdyn.cli.page.sparkline import sparkline, told_apart
 from sysdyn.runtime.trace.trace import Quantity, Trace
 from texts import PENDULUM, write
 
@@ -143,11 +143,30 @@ def test_an_empty_trace_can_be_drawn():
     assert picture([("empty", trace)], ["x"], "png").startswith(b"\x89PNG")
 
 
+def test_ends_of_a_range_are_told_apart():
+    assert told_apart(999.998, 1000.0) == ("999.998", "1000")
+    assert told_apart(1e6, 1e6 + 1.0) == ("1000000", "1000001")
+    assert told_apart(2.0, 2.0) == ("2", "2")
+    assert told_apart(0.123456789, 0.2) == ("0.12346", "0.2")
+
+
 def test_many_quantities():
     trace = made([(f"x{k}", f"m{k}", np.sin) for k in range(2, 19)])
     from sysdyn.cli.page.picture import picture
 
     assert picture([("made", trace)], trace.names, "png").startswith(b"\x89PNG")
+
+
+def test_many_curves_of_a_panel_can_be_told_apart():
+    trace = made([(f"x[{k}]", "m", np.sin) for k in range(1, 15)])
+    names = in_order(sorted(trace.names))
+    assert names[:3] == ["x[1]", "x[2]", "x[3]"]
+    (panel,) = panels_of([trace], names)
+    for traces in ([("one", trace)], [("one", trace), ("two", trace)]):
+        drawn = [(colour, dashes) for *_, colour, dashes in styled(panel, traces)]
+        assert len(set(drawn)) == len(drawn) == 14 * len(traces)
+    assert shortened("a" * 30 + "b" * 30, 12) == "aaaaaaa…bbbb"
+    assert shortened("short", 12) == "short"
 
 
 def test_curves_are_hermite_interpolants():
@@ -156,6 +175,19 @@ def test_curves_are_hermite_interpolants():
     fine, values = curve(Trace("cubic.h5", time, {}, {}, data), "x")
     assert fine.size > 500
     np.testing.assert_allclose(values, fine**3, atol=1e-12)
+
+
+def test_curves_between_jumps_are_interpolants_too():
+    """A sine in steps of unequal length, thrown to its negative at 2 s: between the rows of the jump it is upright."""
+    time = np.concatenate([np.linspace(0.0, 0.1, 50), np.arange(0.5, 2.1, 0.5), [2.0], np.arange(2.5, 4.1, 0.5)])
+    sign = np.where(np.arange(time.size) < np.flatnonzero(np.diff(time) == 0.0)[0] + 1, 1.0, -1.0)
+    data = {"x": Quantity("x", sign * np.sin(2.0 * time), "m", None, sign * 2.0 * np.cos(2.0 * time))}
+    fine, values = curve(Trace("thrown.h5", time, {}, {}, data), "x")
+    away = fine != 2.0
+    wanted = np.where(fine < 2.0, 1.0, -1.0) * np.sin(2.0 * fine)
+    np.testing.assert_allclose(values[away], wanted[away], atol=4e-3)  # straight lines: 0.12
+    assert values.max() > 0.998
+    assert np.isin(time, fine).all()
 
 
 @pytest.mark.parametrize(

@@ -297,3 +297,10 @@ def test_elements_of_a_model_with_events_have_their_energies(tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     report(ROOT / "models" / "gallery" / "bouncing_ball.sd", "--scene", "first")
     assert '<rect class="held"' in Path("page.html").read_text(encoding="utf-8")
+
+
+def test_the_charge_of_an_element_is_no_letter_of_its_name():
+    """C1 is q with C1 below, as `sysdyn equations` prints it; a coordinate q1 is its name."""
+    types = Typesetter(["C1", "q1"], (), ["C1"])
+    assert types.unknown("C1", "q", 0) == "<msub><mi>q</mi><mi>C1</mi></msub>"
+    assert types.unknown("q1", "q", 0) == "<msub><mi>q</mi><mn>1</mn></msub>"

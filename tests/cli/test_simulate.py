@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
+from sysdyn.runtime.integrate import integrate
 from sysdyn.runtime.trace.trace import Trace
 from texts import ARRAY, BROKEN, ENDLESS, PENDULUM, process, run_json, write
 
@@ -299,3 +300,29 @@ def test_what_cannot_be_is_said_with_a_code(tmp_path, capsys):
     assert "E802" in capsys.readouterr().err
     assert run(["simulate", path, "--method", "dopri", "--index", "2"]) == 1
     assert "E607" in capsys.readouterr().err
+
+
+def test_the_span_is_told_where_a_run_does_not_begin_at_zero(tmp_path, capsys):
+    text = PENDULUM.replace("time 0 s to", "time 0.25 s to")
+    assert text != PENDULUM
+    assert run(["simulate", write(tmp_path, text)]) == 0
+    assert "  0.25 s to 1 s in " in capsys.readouterr().err
+
+
+def test_an_end_out_of_reach_is_said(tmp_path, monkeypatch, capsys):
+    """A swing of a second can be followed for 1e12 s by nobody: not a matter of the resolution of time."""
+    monkeypatch.setattr(integrate, "CRAWL", 400)
+    monkeypatch.setattr(integrate, "DRAFT_CRAWL", 400)
+    path = write(tmp_path, PENDULUM.replace(" every 10 ms", ""))
+    assert run(["simulate", "-q", path, "--until", "1e12"]) == 3
+    err = capsys.readouterr().err
+    assert "at such steps the end of the run is out of reach" in err
+    assert "help: an earlier end (--until)" in err
+
+
+def test_bare_numbers_of_an_array_are_in_si_units(tmp_path):
+    """x[i] swings with sqrt(k/m[i]): cos of it at the end, from i cm."""
+    trace = simulate(tmp_path, ARRAY, "--set", "m=[1, 2, 3]", "--accuracy", "1e-8")
+    at = trace.time[-1]
+    assert trace["x[1]"][-1] == pytest.approx(0.01 * np.cos(np.sqrt(2.0) * at), abs=1e-9)
+    assert trace["last"][-1] == pytest.approx(0.03 * np.cos(np.sqrt(2.0 / 3.0) * at), abs=1e-9)

@@ -168,3 +168,15 @@ def test_rounded_is_within_half_a_step():
     values = np.random.default_rng(1).standard_normal(1000)
     assert np.max(np.abs(rounded(values, 1e-3) - values)) <= 0.5e-3
     assert np.array_equal(rounded(values, 0.0), values)
+
+
+def test_what_is_no_number_stands_beside_the_number_of_the_other():
+    time = np.linspace(0.0, 1.0, 5)
+    values = np.array([0.0, 1.0, 2.0, np.nan, 4.0])
+    lost, whole = Arrays(time, {"x": values}, {}), Arrays(time, {"x": 4.0 * time}, {})
+    worst = compare(whole, lost, Tolerance()).quantities[0].worst
+    assert worst.reference == 3.0
+    assert np.isnan(worst.test)
+    worst = compare(lost, whole, Tolerance()).quantities[0].worst
+    assert worst.test == 3.0
+    assert np.isnan(worst.reference)

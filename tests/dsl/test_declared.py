@@ -82,6 +82,7 @@ def test_the_unit_of_a_parameter_is_as_it_is_written():
         ("param a = 1; param a = 2", "E106", "'a' is declared twice", "a"),
         ("param a = a + 1", "E105", "circular definition: a -> a", "param a = a + 1"),
         ("param a", "E207", "'a' has neither a unit nor a default", "a"),
+        ("param a = [1, 2]", "E805", "'a' has 2 values, which do not fit its shape", "[1, 2]"),
         ("for i in 1..3 { param a = 2*i }", "E806", "'a' needs its loop variable: a[i]", "a"),
     ],
 )

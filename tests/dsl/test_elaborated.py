@@ -77,6 +77,9 @@ def test_values_come_in_si_units():
     [
         ("x, y\n# measured\n0, 5\n2, 7\n", ((0.0, 2.0),), []),
         ("0, 5\n2, seven\n", None, ["table f: line 2 of 'data.csv' is not 2 numbers"]),
+        ("0, O\n1, 5\n2, 7\n", None, ["table f: line 1 of 'data.csv' is not 2 numbers"]),
+        ("0, 5\n2, 1_0\n", None, ["table f: line 2 of 'data.csv' is not 2 numbers"]),
+        ("+0.,.5\n2e0,-7E-1\n", ((0.0, 2.0),), []),
         ("0, 5\n0, 7\n", None, [f"table f: row 2 {BEHIND}"]),
     ],
 )

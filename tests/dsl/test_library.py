@@ -24,3 +24,18 @@ def test_a_module_is_parsed_once_for_many_values(monkeypatch):
     assert values == [float(k) for k in range(20)]
     assert read == ["std/electrical.sd"]
     assert not list(report)
+
+
+def test_a_name_imported_twice_is_one_and_two_of_one_name_are_told_where_they_are_asked_for(tmp_path):
+    (tmp_path / "one.sd").write_text("const foo = 3\n")
+    (tmp_path / "two.sd").write_text("const foo = 4\n")
+    path = tmp_path / "m.sd"
+
+    def told(*imports):
+        path.write_text("\n".join((*imports, "model m { state s: 1 = 0; dynamic s' = foo/(1 s) }")))
+        report = Report()
+        files.FileScope(parse(SourceText.read(path))[0], report)
+        return [(d.code, d.place.file, d.place.start[0]) for d in report.diagnostics]
+
+    assert told("from one import foo, foo", "from one import foo") == []
+    assert told("from one import foo", "from two import foo") == [("E106", str(path), 2)]

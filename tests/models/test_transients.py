@@ -1,8 +1,10 @@
 """A transient that is over before a picture shows it: the error test sees it, in every formulation and accuracy."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from sysdyn.api import load
+from sysdyn.api import NotMet, load
 
 FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian")
 COILS = """from std.electrical import voltage, resistor, inductor
@@ -42,3 +44,24 @@ def test_a_transient_is_as_exact_as_was_asked(tmp_path, formulation, method, qui
         trace = model.run(accuracy=accuracy, set={"quick": f"{quick} H"})
         exact = current(np.array(trace.time), quick)
         assert np.abs(trace["j"] - exact).max() <= 1.5 * accuracy * np.abs(exact).max()
+
+
+def test_far_up_an_exponential_corrections_of_one_sense_are_no_round_off():
+    """A junction behind 1e11 V conducts and blocks: Newton's corrections far up its law are one thermal voltage each,
+    nothing beside 1e11 V.  While it blocks, C v' = (u - v)/R.  Right, or refused.
+    """
+    size, w, tau = 1e11, 6283.185, 1e-4
+    seed = Path(__file__).resolve().parents[2] / "models" / "seed" / "ebers_moll.sd"
+    model = load(seed, scene="reference", method="radau", accuracy=1e-7)
+    try:
+        trace = model.run({"Em": size}, until=1.6e-3)
+    except NotMet:
+        return
+    t = np.array([1.5e-3, 1.55e-3, 1.6e-3])
+    v = np.interp(t, trace.time, trace["v_e"].values)
+
+    def forced(at):
+        return size * (np.sin(w * at) - w * tau * np.cos(w * at)) / (1.0 + (w * tau) ** 2)
+
+    exact = forced(t) + (v[0] - forced(t[0])) * np.exp(-(t - t[0]) / tau)
+    np.testing.assert_allclose(v, exact, atol=1e-3 * np.abs(exact).max())

@@ -78,10 +78,10 @@ static int provide_room(sd_radau *radau)
     double **vectors[] = {&radau->last, &radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->weight,
                           &radau->y, &radau->rate, &radau->ee, &radau->terms, &radau->first};
     const int sparing = sd_radau_sparing(radau), kept = sparing && system->left;
-    /* z and kept change places, and either has next to it what no step hands on (`spare`); the last two: of steep laws */
-    double **of_stages[] = {radau->z, radau->d, radau->kept, radau->base, radau->full};
-    size_t steep = system->scales > 0 ? 2 : 0, number = kept ? OWN : sparing ? OWN + 2 : OWN + 3 + steep;
-    size_t sets = sizeof of_stages / sizeof *of_stages - 2 + steep;
+    /* z and kept change places, and either has next to it what no step hands on (`spare`); the last three: of steep laws */
+    double **of_stages[] = {radau->z, radau->d, radau->kept, radau->base, radau->full, radau->moved};
+    size_t steep = system->scales > 0, number = kept ? OWN : sparing ? OWN + 2 : OWN + 3 + 2 * steep;
+    size_t sets = sizeof of_stages / sizeof *of_stages - 3 + 3 * steep;
     size_t pairs = (size_t)(radau->most_stages - 1) / 2, all = number + sets * (size_t)radau->most_stages + 2 * pairs;
     if (radau->work)
         return 0;

@@ -88,7 +88,8 @@ typedef struct sd_radau {
     double *z[SD_STAGES], *kept[SD_STAGES];         /* of this step, of the last accepted one */
     double *d[SD_STAGES];                           /* right sides and corrections */
     double *base[SD_STAGES], *full[SD_STAGES];      /* z before a correction that is shortened, and all of it; of steep
-                                                     * laws alone, like first and terms */
+                                                     * laws alone, like moved, first and terms */
+    double *moved[SD_STAGES];                       /* what the correction before this one did to z */
     double *first;            /* [n] d[0] while a correction is tried */
     char *led;                /* [n] 1: in the last step h |dF/dy| / |dF/dyd| of the row that holds its derivative was small:
                                * steps resolve its motion, and its derivative tells more than the stages alone */

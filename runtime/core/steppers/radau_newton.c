@@ -71,10 +71,19 @@ static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
     return 1;
 }
 
+/* What corrections that do not shrink any more leave open of an unknown.  Two of one sense that are as large as each other
+ * are on their way, one 1/a after the other down an exponential, and leave its round-off alone; so does one by itself, of
+ * which nobody knows whether it shrinks. */
+static double left_open(const sd_radau *radau, int s, int32_t i, int before)
+{
+    double now = radau->full[s][i], was = before ? radau->moved[s][i] : now;
+    return sd_open(now * was > 0.0 && fabs(now) > 0.5 * fabs(was) ? 0.0 : now, radau->y[i], radau->met[i]);
+}
+
 /* Every steep row is as small as the last corrections (`full`), which do not shrink any more, let it be by slopes at the
  * stages themselves: where two terms of a law nearly vanish beside unknowns that are large elsewhere, no part of the terms is
- * ever reached.  Where the factors left a column every row is judged. */
-static int rows_at_round_off(sd_radau *radau, double newton_tolerance)
+ * ever reached.  Where the factors left a column every row is judged.  before: `moved` holds the correction before. */
+static int rows_at_round_off(sd_radau *radau, double newton_tolerance, int before)
 {
     int all = columns_left(radau);
     double limit = row_limit(radau, newton_tolerance);
@@ -83,7 +92,7 @@ static int rows_at_round_off(sd_radau *radau, double newton_tolerance)
         sd_radau_stage(radau, s, radau->y, radau->rate);
         sd_jacobian(radau->system, t, radau->y, radau->rate, radau->magnitude, radau->jy, radau->jyd);
         for (int32_t i = 0; i < radau->n; i++)
-            radau->first[i] = sd_open(radau->full[s][i], radau->y[i], radau->met[i]);
+            radau->first[i] = left_open(radau, s, i, before);
         if (sd_first_astray(radau->system, t, radau->y, radau->rate, radau->d[s], limit, radau->jy, radau->jyd,
                             radau->h, radau->first, all, radau->terms) >= 0)
             return 0;
@@ -127,6 +136,14 @@ static double noted_correction(sd_radau *radau)
     return size;
 }
 
+/* what the correction from base has done to the stages is kept in moved */
+static void note_move(sd_radau *radau)
+{
+    for (int s = 0; s < radau->method->stages; s++)
+        for (int32_t i = 0; i < radau->n; i++)
+            radau->moved[s][i] = radau->z[s][i] - radau->base[s][i];
+}
+
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
 {
@@ -140,10 +157,12 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
         int cause = sd_radau_residuals(radau);
         if (cause)
             return cause;
-        if (converged && (rows_hold(radau, tolerance, 0) || (idle && rows_at_round_off(radau, tolerance))))
+        if (converged && (rows_hold(radau, tolerance, 0) || (idle && rows_at_round_off(radau, tolerance, 1))))
             return SD_FINE;
         if (m > most)
             break;
+        if (m > 1 && radau->system->scales > 0)
+            note_move(radau);
         double size = radau->system->scales > 0 ? noted_correction(radau) : sd_radau_correct(radau);
         *used = m;
         if (!isfinite(size))
@@ -236,18 +255,18 @@ static void take_back(sd_radau *radau)
 }
 
 /* The part of a correction that is taken, whose factors leave columns as this way does; 0: none, or `cause` says why; -1:
- * the stages hold, or as well as round-off of unknowns to SD_NOISE lets them, the slopes being those of the point.  known: d
- * holds the residuals. */
-static double walk(sd_radau *radau, size_t way, double tolerance, int known, int *cause)
+ * the stages hold, or as well as round-off of unknowns to SD_NOISE lets them, the slopes being those of the point.  first:
+ * no correction was taken before; else d holds the residuals for the first way. */
+static double walk(sd_radau *radau, size_t way, double tolerance, int first, int *cause)
 {
     double size;
     sd_radau_leave_below(radau, ways[way].null_pivot);
-    *cause = full_correction(radau, known, ways[way].lean, &size);
+    *cause = full_correction(radau, !first && way == 0, ways[way].lean, &size);
     sd_radau_leave_below(radau, SD_LEAST_PIVOT);
     if (*cause)
         return 0.0;
     if (radau->state_size <= tolerance && sd_radau_residuals(radau) == SD_FINE &&
-        (rows_hold(radau, tolerance, 1) || rows_at_round_off(radau, tolerance)))
+        (rows_hold(radau, tolerance, 1) || rows_at_round_off(radau, tolerance, !first)))
         return -1.0;
     if (columns_left(radau) && size <= STAGNANT * tolerance)
         return 0.0; /* what is left of the rows is for the columns that were left */
@@ -272,7 +291,7 @@ int sd_radau_iterate_damped(sd_radau *radau, int *used)
             int cause;
             if (k > 0)
                 take_back(radau);
-            part = walk(radau, k, tolerance, m > 1 && k == 0, &cause);
+            part = walk(radau, k, tolerance, m == 1, &cause);
             if (part < 0.0) {
                 radau->theta = 1.0; /* slopes that lean are of this step alone */
                 return SD_FINE;
@@ -282,6 +301,7 @@ int sd_radau_iterate_damped(sd_radau *radau, int *used)
         }
         if (part == 0.0 || (m >= DAMPED && part < 1.0))
             return *radau->system->stop ? SD_STOPPED : SD_NEWTON;
+        note_move(radau);
     }
     return SD_NEWTON;
 }

@@ -174,7 +174,7 @@ class Radau(c.Structure):
         *[(name, P) for name in ["phi", "yd", "last", "before"]],
         ("slope", P * POINTS),
         ("refined", I * POINTS),
-        *[(name, P * STAGES) for name in ["z", "kept", "d", "base", "full"]],
+        *[(name, P * STAGES) for name in ["z", "kept", "d", "base", "full", "moved"]],
         *[(name, P) for name in ["first", "led", "gap"]],
         *[(name, D * POINTS) for name in ["apart", "bend"]],
         *[(name, P) for name in ["at_zero", "open"]],
