@@ -82,9 +82,8 @@ def test_what_a_method_of_fewer_unknowns_meets_is_shared():
 def compared(coarse, fine, **more):
     """What differs most of runs at 0, 1, 2 s of two quantities of which 1e-3 and 1e-2 are asked."""
     of = Compared(Options(None, 0.0, 2.0), SimpleNamespace(), 2)
-    between = np.zeros(3, dtype=bool)
     of.samplings = tuple(
-        Sampled(tolerance, np.array(values), np.array([1.0, 10.0]), 5, between=between, **more)
+        Sampled(tolerance, np.array(values), np.array([1.0, 10.0]), 5, **more)
         for tolerance, values in ((1e-3, coarse), (1e-4, fine))
     )
     of._at = np.array([0.0, 1.0, 2.0])
