@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.accuracy.common_instants import beside
+from sysdyn.runtime.accuracy.common_instants import late_by
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.trace.trace import Quantity, Trace
@@ -69,7 +69,7 @@ def _common(one: Trace, other: Trace) -> tuple[Floats, Places, Places]:
     """Instants of both traces, and their places in each; none between an event of one and the same of the other."""
     times, here, there = np.intersect1d(one.time, other.time, return_indices=True)
     first, second = (np.unique([event.time for event in trace.events]) for trace in (one, other))
-    use = ~beside(times, first, second, float(np.ptp(times)) if times.size else 0.0)
+    use = late_by(times, first, second, float(np.ptp(times)) if times.size else 0.0) == 0.0
     return times[use], here[use].astype(np.intp), there[use].astype(np.intp)
 
 
