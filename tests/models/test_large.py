@@ -136,7 +136,7 @@ def test_a_section_of_a_large_line_takes_few_bytes_to_the_first_step(tmp_path, m
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallinfo2"), reason="needs glibc's mallinfo2")
 @pytest.mark.parametrize(
     ("model", "sections", "most"),
-    [(LADDER, (25_000, 50_000), 720), (SECTIONS, (55_000, 75_000), 1290)],
+    [(LADDER, (25_000, 50_000), 760), (SECTIONS, (55_000, 75_000), 1400)],
     ids=["ladder", "sections"],
 )
 def test_a_section_of_a_run_holds_few_bytes(tmp_path, model, sections, most):

@@ -11,7 +11,8 @@
 #define ITERATIONS 6
 #define PATIENT 40      /* of the last attempt: an exponential is climbed down a step at a time */
 #define EXACT 4e-15     /* scaled residual that counts as round-off */
-#define FINE 1e-13      /* ... and that with which old factors have done what they can */
+#define FINE 1e-13      /* ... and that with which old factors have done what they can, or twice what fresh ones could, */
+#define COARSE 1e-11    /* but no more than this */
 #define CLOSE 1e-9      /* scaled residual with which one may live */
 #define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
 #define HELD 1e8        /* weight of the state in a second attempt */
@@ -402,7 +403,10 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
             drag = moved;
             take(settle, y, yd, settle->x);
         }
-        if (!isfinite(now) || (now > 0.5 * before && now < (fresh && m > 0 ? CLOSE : FINE) && moved < SMALL))
+        int stays = now > 0.5 * before && moved < SMALL;
+        if (fresh && m > 0 && stays && now < 0.5 * COARSE)
+            settle->floor = fmax(settle->floor, 2.0 * now);
+        if (!isfinite(now) || (stays && now < (fresh && m > 0 ? CLOSE : fmax(FINE, settle->floor))))
             break;
         if (now > CONTRACTS * before && now > fmax(EXACT, settle->enough)) {
             failed = factorise(settle, t, y, yd);

@@ -60,6 +60,7 @@ typedef struct sd_settle {
     double *taken;                   /* the matrix of such a one */
     double drift;                    /* norm of the constraint rows before the last call moved the point */
     double contracted;               /* largest residual beside the one before it, of the steps of the last call */
+    double floor;                    /* residual that fresh factors have left: what old ones leave need not be less */
 } sd_settle;
 
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates);

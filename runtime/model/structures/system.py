@@ -173,6 +173,7 @@ class Settle(c.Structure):
         ("taken", P),
         ("drift", D),
         ("contracted", D),
+        ("floor", D),
     ]
 
 
