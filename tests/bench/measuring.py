@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.asked import Request, options_of, stops
-from sysdyn.cli.run.running import ready
+from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.running import ready, rest
 from sysdyn.cli.run.sizes import sizes
 from sysdyn.cli.run.starting import start
 from sysdyn.dsl.model import expression as ex
@@ -73,7 +74,8 @@ class Bench:
             assert options is not None
             started = start(prepared, options.t_start, report, options.redundancy)
             assert started is not None, [d.message for d in report.diagnostics]
-            options = replace(options, stops=stops(prepared, options, report), watch=None, sampled_at=())
+            jumps = plan(prepared, started.system, rest=rest(options))  # of laws, which a command locates
+            options = replace(options, stops=stops(prepared, options, report), watch=None, sampled_at=(), events=jumps)
         self.prepared, self.started = prepared, started
         self.options = replace(options, sample_steps=False, max_wall=LONGEST_RUN, accuracy_on=())
 
@@ -107,8 +109,8 @@ class Bench:
 
     def _once(self, options: dict[str, object]) -> Outcome:
         asked = replace(self.options, **options)  # type: ignore[arg-type]
-        prepared, started = self.prepared, self.started
-        parts = prepared.structure, prepared.arrays, prepared.carrier
+        started = self.started
+        parts = started.system.description, None, self.prepared.carrier
         return simulate(*parts, asked, start=started.state, facts=started.facts)
 
 

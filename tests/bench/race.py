@@ -5,9 +5,9 @@ The models of models/benchmark, each at its end: the cheapest run whose achieved
 it the cheapest single run with --rtol by any method.  Peers: IDA and CVODE on the residual and the Jacobian that
 `sysdyn compile` writes of the same model (peers/peer.c), over index forms, tolerances by half decades, algebraic
 unknowns in and out of the error test, two constants of Newton's test, two policies of refactoring, dense and KLU, BDF
-and Adams.  Error: largest of the traced quantities at the end, over their larger value at both ends, against our radau
-(dopri where constraints lose rank) near round-off (`reference`: how far that is from our bdf, and from published values
-where there are any).
+and Adams.  Ours locates jumps of laws (tube), as a command does; peers step over them.  Error: largest of the traced
+quantities at the end, over their larger value at both ends, against our radau (dopri where constraints lose rank) near
+round-off (`reference`: how far that is from our bdf, and from published values where there are any).
 Without SUNDIALS (Debian: libsundials-dev, libsuitesparse-dev) it says so and measures ours alone.
 """
 
