@@ -49,7 +49,9 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     if options.index != "auto":
         return replace(way, reason=f"index {way.name} was asked for"), other
     if options.events and not options.events.bends:
-        return replace(way, reason="events"), other
+        steep = options.events.of_laws and bool(way.system.form.scales)
+        first = _reduced(way, written, start, options) if steep else ()
+        return (*_because("events", first), way, other) if first else (replace(way, reason="events"), other)
     if way.system.form.scales:
         return _because("steep laws", _of_steep_laws(way, other, written, start, options))
     system = written.another("0")
@@ -75,10 +77,15 @@ def _of_steep_laws(
 ) -> tuple[Way, ...]:
     iterating = (other, way) if way.system.unknowns <= SMALL else (way, other)
     ways = _without_newton(way, options) + iterating + _differentiated(way, written, options)
+    return _reduced(way, written, start, options) + ways
+
+
+def _reduced(way: Way, written: System, start: ConsistentState, options: Options) -> tuple[Way, ...]:
+    """Rosenbrock at index 1 where steep laws of index 2 do not turn."""
     if way.index != 2 or not FEW < way.system.unknowns <= SMALL:
-        return ways
+        return ()
     reduced = _without_newton(Way("rosenbrock", written.another("1"), 1, "1", reduced=True), options)
-    return ways if not reduced or _turns(written, start, options) else reduced + ways
+    return () if reduced and _turns(written, start, options) else reduced
 
 
 def _turns(system: System, start: ConsistentState, options: Options) -> bool:

@@ -103,7 +103,7 @@ LONG_MOTION = Law(400.0, 1.0, 0.6, 1e-17, ratio=0.03, loosest=1e-5, little=0.1, 
 in common with the run behind it, and is not cheaper."""
 
 
-REDUCED = Law(200.0, 1.0, 0.7, 1e-10, ratio=0.02, loosest=0.01, little=0.2, safety=1.8)
+REDUCED = Law(200.0, 1.0, 0.6, 1e-10, ratio=0.02, loosest=0.01, little=0.2, safety=1.8)
 """Of rosenbrock at index 1 on steep laws whose index is 2: the flows' errors where a law jumps add up (a water tube: 15
 to 100 times the tolerance)."""
 

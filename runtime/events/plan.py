@@ -116,10 +116,14 @@ class Plan:
         return bool(self.whens or self.sampled or self.contacts or self.kinks)
 
     @property
-    def bends(self) -> bool:
+    def of_laws(self) -> bool:
         """Whether laws change their branches, and nothing else happens."""
-        others = self.whens or self.sampled or self.contacts
-        return bool(self.kinks) and not others and not any(kink.jumps for kink in self.kinks)
+        return bool(self.kinks) and not (self.whens or self.sampled or self.contacts)
+
+    @property
+    def bends(self) -> bool:
+        """Whether they do without a jump."""
+        return self.of_laws and not any(kink.jumps for kink in self.kinks)
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,7 @@ def test_what_was_asked_for_is_kept_and_only_another_implicit_method_may_take_ov
     for method, other in (("radau", "bdf"), ("bdf", "radau")):
         assert tried(pendulum, "2v", 2, replace(AUTO, rtol=1e-6), method) == ([f"{method} 2v", f"{other} 2v"], "")
     assert tried(pendulum, "2v", 2, replace(AUTO, index="2v")) == (["radau 2v", "bdf 2v"], "index 2v was asked for")
-    happen = replace(AUTO, events=SimpleNamespace(bends=()))
+    happen = replace(AUTO, events=SimpleNamespace(bends=(), of_laws=()))
     assert tried(pendulum, "2", 2, happen) == (["radau 2", "bdf 2"], "events")
     # kinks of laws, that no event changes, are integrated by the explicit method as well
     assert tried(pendulum, "2", 2, replace(AUTO, events=SimpleNamespace(bends=(1,))))[0][0] == "dopri 0"
