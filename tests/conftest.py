@@ -62,5 +62,4 @@ def pytest_collection_modifyitems(config, items):
         (left if mark and seen[name] % mark.args[0] else kept).append(item)
         seen[name] += 1
     config.hook.pytest_deselected(items=left)
-    # the longest test first: at the end the other processes would wait for it
-    items[:] = sorted(kept, key=lambda item: "test_the_wheel_is_whole" not in item.nodeid)
+    items[:] = sorted(kept, key=lambda item: item.get_closest_marker("first") is None)

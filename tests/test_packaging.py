@@ -10,6 +10,8 @@ import tomllib
 import zipfile
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 SETUP = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
 ROOMS = ("dsl", "compiler", "runtime", "cli", "models")
@@ -55,6 +57,7 @@ def built(folder):
     return next(folder.glob("*.tar.gz")), next(folder.glob("*.whl"))
 
 
+@pytest.mark.first
 def test_the_wheel_is_whole_and_works_outside_the_repository(tmp_path):
     """One build for both."""
     source, wheel = built(tmp_path / "dist")

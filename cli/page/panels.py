@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.comparison.curve import hermite
 from sysdyn.runtime.trace.trace import Trace
 
 Floats = NDArray[np.float64]
@@ -78,11 +79,7 @@ def curve(trace: Trace, name: str) -> tuple[Floats, Floats]:
     s = (np.arange(piece.size) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[piece]
     left, right = values[piece], values[piece + 1]
     with np.errstate(all="ignore"):
-        inner = (
-            left * (1.0 + 2.0 * s) * (1.0 - s) ** 2
-            + right * s**2 * (3.0 - 2.0 * s)
-            + h[piece] * (rate[piece] * s * (1.0 - s) ** 2 + rate[piece + 1] * s**2 * (s - 1.0))
-        )
+        inner, _ = hermite(s, h[piece], left, right, rate[piece], rate[piece + 1])
         # beside a kink the derivative may be no number: a straight line there
         inner = np.where(np.isfinite(inner), inner, left + (right - left) * s)
     inner[s == 0.0] = left[s == 0.0]

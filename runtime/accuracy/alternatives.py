@@ -49,9 +49,9 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     if options.index != "auto":
         return replace(way, reason=f"index {way.name} was asked for"), other
     if options.events and not options.events.bends:
-        steep = options.events.of_laws and bool(way.system.form.scales)
+        steep = options.events.of_laws and way.system.form.scales
         first = _reduced(way, written, start, options) if steep else ()
-        return (*_because("events", first), way, other) if first else (replace(way, reason="events"), other)
+        return _because("events", (*first, way, other))
     if way.system.form.scales:
         return _because("steep laws", _of_steep_laws(way, other, written, start, options))
     system = written.another("0")

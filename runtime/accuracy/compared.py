@@ -82,21 +82,23 @@ class Compared:
         late = late_by(self._at, last, jumps, self.options.t_end - self.options.t_start)[:, None]
         if not late.any():
             return None
-        rates = np.abs(rows[:, lib.ROW_HEAD + quantities.places + self._observed])
-        moved = np.hstack([late * rates, np.zeros((len(rows), len(quantities.meters)))])
+        moved = _with_meters(late * np.abs(self._rates(rows, quantities)), quantities)
         return np.where((late > 0.0) & np.isfinite(moved), moved, np.inf)
+
+    def _rates(self, rows: Floats, quantities: Quantities) -> Floats:
+        """Of the stored quantities at rows [k, columns]."""
+        return rows[:, lib.ROW_HEAD + quantities.places + self._observed]
 
     def _late(self, rows: Floats, quantities: Quantities, *, steps: bool = False) -> Floats:
         """What the compared quantities move by within the time tolerance at these rows [k, quantities]; steps: rows of
         the run's own steps, whose rates are those of the equations.
         """
-        places, options = lib.ROW_HEAD + quantities.places, self.options
+        options, rates = self.options, self._rates(rows, quantities)
         asked = min((a for a in (options.accuracy, *(w for _, w in options.accuracy_on)) if a is not None), default=0.0)
         tau = min(pairs.TIMING, pairs.SHARE * asked) * (options.t_end - options.t_start)
-        rates = rows[:, places + self._observed]
-        late = pairs.lateness(rows[:, 0], rows[:, places], rates, tau) if steps else tau * np.abs(rates)
-        meters = len(quantities.meters)
-        return np.hstack([late, np.zeros((len(rows), meters))]) if meters else late
+        values = rows[:, lib.ROW_HEAD + quantities.places]
+        late = pairs.lateness(rows[:, 0], values, rates, tau) if steps else tau * np.abs(rates)
+        return _with_meters(late, quantities)
 
     def left_open(self, finished: Finished, system: System) -> LeftOpen:
         """Asked of the equations once a run: of its quantities, and of each of its ledgers."""
@@ -138,3 +140,9 @@ def _values(rows: Floats, finished: Finished, quantities: Quantities) -> Floats:
     if finished.beyond > BEYOND:
         rows = np.full_like(rows, np.nan)
     return rows[:, quantities.row]
+
+
+def _with_meters(moved: Floats, quantities: Quantities) -> Floats:
+    """What the compared quantities move by [k, quantities], of what the stored ones do: meters by nothing."""
+    number = len(quantities.meters)
+    return np.hstack([moved, np.zeros((len(moved), number))]) if number else moved

@@ -46,8 +46,8 @@ def bernstein(curve: Curve, cell: Ints, left: Floats, right: Floats) -> Floats:
             if line.any():
                 m0, m1 = np.where(line, secant, m0), np.where(line, secant, m1)
         third = (right - left) / 3.0
-        ya, ma = _hermite((left - t0) / h, h, y0, y1, m0, m1)
-        yb, mb = _hermite((right - t0) / h, h, y0, y1, m0, m1)
+        ya, ma = hermite((left - t0) / h, h, y0, y1, m0, m1)
+        yb, mb = hermite((right - t0) / h, h, y0, y1, m0, m1)
         return np.stack([ya, ya + third * ma, yb - third * mb, yb])
 
 
@@ -66,7 +66,7 @@ def whole_cells(curve: Curve, cell: Ints) -> Floats:
         return np.stack([y0, y0 + a, y1 - b, y1])
 
 
-def _hermite(x: Floats, h: Floats, y0: Floats, y1: Floats, m0: Floats, m1: Floats) -> tuple[Floats, Floats]:
+def hermite(x: Floats, h: Floats, y0: Floats, y1: Floats, m0: Floats, m1: Floats) -> tuple[Floats, Floats]:
     """Value and slope at x (0..1 over the cell); exact at the ends."""
     u = 1.0 - x
     value = u * u * ((1.0 + 2.0 * x) * y0 + x * h * m0) + x * x * ((1.0 + 2.0 * u) * y1 - u * h * m1)

@@ -125,23 +125,21 @@ static void keep(sd_radau *radau)
         memcpy(radau->base[s], radau->z[s], (size_t)radau->n * sizeof(double));
 }
 
+/* change := what the stages have moved by from base */
+static void note_change(const sd_radau *radau, double *const *change)
+{
+    for (int s = 0; s < radau->method->stages; s++)
+        for (int32_t i = 0; i < radau->n; i++)
+            change[s][i] = radau->z[s][i] - radau->base[s][i];
+}
+
 /* a correction of the stages with what it was and from where: full, base */
 static double noted_correction(sd_radau *radau)
 {
     keep(radau);
     double size = sd_radau_correct(radau);
-    for (int s = 0; s < radau->method->stages; s++)
-        for (int32_t i = 0; i < radau->n; i++)
-            radau->full[s][i] = radau->z[s][i] - radau->base[s][i];
+    note_change(radau, radau->full);
     return size;
-}
-
-/* what the correction from base has done to the stages is kept in moved */
-static void note_move(sd_radau *radau)
-{
-    for (int s = 0; s < radau->method->stages; s++)
-        for (int32_t i = 0; i < radau->n; i++)
-            radau->moved[s][i] = radau->z[s][i] - radau->base[s][i];
 }
 
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
@@ -162,7 +160,7 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
         if (m > most)
             break;
         if (m > 1 && radau->system->scales > 0)
-            note_move(radau);
+            note_change(radau, radau->moved);
         double size = radau->system->scales > 0 ? noted_correction(radau) : sd_radau_correct(radau);
         *used = m;
         if (!isfinite(size))
@@ -301,7 +299,7 @@ int sd_radau_iterate_damped(sd_radau *radau, int *used)
         }
         if (part == 0.0 || (m >= DAMPED && part < 1.0))
             return *radau->system->stop ? SD_STOPPED : SD_NEWTON;
-        note_move(radau);
+        note_change(radau, radau->moved);
     }
     return SD_NEWTON;
 }

@@ -95,11 +95,6 @@ static void leave_slopes(sd_settle *settle)
     settle->jy = settle->jyd = settle->basis_value = NULL;
 }
 
-static inline double weight_of(const sd_settle *settle, int32_t j)
-{
-    return settle->state[j] ? 1.0 : settle->follows;
-}
-
 /* 1 / weight of an unknown or rate; of a state that is to stay where it is 0 */
 static inline double lift(const sd_settle *settle, int32_t j)
 {
@@ -227,7 +222,7 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
     }
     leave_slopes(settle);
     for (int32_t j = 0; j < n + rates; j++)
-        settle->matrix[settle->slot_x[j]] += weight_of(settle, j) * (settle->state[j] ? settle->hold : 1.0);
+        settle->matrix[settle->slot_x[j]] += settle->state[j] ? settle->hold : settle->follows;
     for (int32_t i = 0; i < settle->rows; i++)
         settle->matrix[settle->slot_r[i]] -= EPSILON;
     if (sd_first_bad(settle->linear->entries, settle->matrix) >= 0 ||
