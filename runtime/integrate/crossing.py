@@ -9,7 +9,6 @@ from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.segments import Segment
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.start.restart import still
 
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
@@ -26,7 +25,7 @@ def cross(run: Integration, segment: Segment) -> None:
     if run.pieces is not None:
         found: tuple[Floats, Floats] | None = run.pieces.jump(segment, y, yd)
     else:
-        found = _across(run, segment.begin, y, yd)
+        found = run.settlers.across(segment.begin, y, yd)
     if found is None:
         raise failure(run, "newton")
     run.driver.leave(y, yd)
@@ -35,17 +34,6 @@ def cross(run: Integration, segment: Segment) -> None:
     del y, yd, found  # of a large run the room counts
     go_on(run, segment.begin, segment.label, point)
     run.driver.run.start_kind = 0
-
-
-def _across(run: Integration, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
-    """The point behind a jump of the text at t (s); where no state jumps, what is left of the unknowns tells."""
-    settlers, forms = run.settlers, run.forms
-    if forms is not None and settlers.whole_form == "settled":
-        n = run.system.form.written
-        found = still(run.settler, t, (y, yd), settlers.keeps, run.sizes.magnitude[:n])
-        if found is not None:
-            return found
-    return settlers.restart.across(t, y if forms is None else forms.completed(t, y), yd)
 
 
 def go_on(run: Integration, t: float, label: float, point: list[Floats]) -> None:

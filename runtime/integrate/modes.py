@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from sysdyn.runtime.events.handler import Handler, Watched
+from sysdyn.runtime.events.kinks import WORDS
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN
@@ -125,7 +126,7 @@ class Modes:
         core.alikes, core.alike = len(alike), self._array(np.concatenate([*alike, []]), np.int32)
         core.alike_end = self._array(np.cumsum([g.size for g in alike]), np.int32)
         assigned = sum(len(e.assignments) for e in plan.whens) + sum(len(e.assignments) for e in plan.sampled)
-        core.width, core.room = 2 + 2 * ROUNDS * assigned, LOG
+        core.width, core.room = 2 + 2 * max(ROUNDS * assigned, 1), LOG
         self._log = np.zeros((LOG, core.width))
         core.log = lib.pointer(self._log)
 
@@ -146,6 +147,8 @@ class Modes:
         for name in ("p_before", "p_after"):
             setattr(core, name, self._array(np.zeros(core.parameters + 1)))
         core.exact = self._array(np.zeros(core.relations + 1), np.int32)
+        core.turning = self._array(np.zeros(core.kinks + 1), np.int32)
+        core.own.value = self._array(np.zeros(core.places + 1))
         self._room(len(self.handler.plan.sampled) + 16)
 
     def _room(self, watches: int) -> None:
@@ -155,21 +158,31 @@ class Modes:
         self._keep.append(watch)
         self.core.watch = c.addressof(watch)
         self.core.found, self.core.which = self._array(np.zeros(watches)), self._array(np.zeros(watches), np.int32)
+        for name in ("row", "side", "rate"):
+            setattr(self.core.own, name, self._array(np.zeros(watches), np.int32))
 
     # -- between the core and the handler ------------------------------------------------------------------------
 
     def told(self) -> bool:
         """The handler stands where the core does, and knows what has happened; whether anything has."""
         core, handler = self.core, self.handler
-        for row in self._log[: core.logged]:
-            handler.happened += self._told[int(row[1])].at(float(row[0]), row[2:].tolist())
+        for row in self._log[: core.logged].tolist():
+            handler.happened += self._turned(row) if row[1] < 0.0 else self._told[int(row[1])].at(row[0], row[2:])
         some, core.logged = bool(core.logged), 0
-        if core.now >= 0:
-            side, truth, contacts = self._states[core.now]
+        number = core.base if core.now == lib.OWN else core.now
+        if number >= 0:
+            side, truth, contacts = self._states[number]
             handler.side[:], handler.truth = side, list(truth)
             handler.contacts.become(contacts)
             handler.caught_up(core.last)
+        if core.now == lib.OWN:
+            self.stands()
         return some
+
+    def _turned(self, row: Sequence[float]) -> list[Happened]:
+        """The entry of a law whose branch the core turned: time (s), -1 - its number, its branches."""
+        kink = self.handler.plan.kinks[-1 - int(row[1])]
+        return [Happened(row[0], kink.name, kink.element, WORDS[row[2]], WORDS[row[3]])]
 
     def stands(self) -> int:
         """The number of the handler's present mode, which the core is in from now on; -1: one too many."""

@@ -13,7 +13,7 @@ from sysdyn.runtime.integrate.sizes import Sizes
 from sysdyn.runtime.integrate.unknown_roles import Roles
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.start.restart import Restart
+from sysdyn.runtime.start.restart import Restart, still
 from sysdyn.runtime.start.settled import Settler, flows_open
 
 PROJECTED = ("1", "0")
@@ -52,7 +52,7 @@ class Settlers:
             # steep laws magnify what a basis leaves
             slack = SLACK * request.tolerance if sums and not system.form.scales else 0.0
             # the least change shares what is open: flows between contacts, potentials where all laws are faint
-            self.settler.by_basis(slack, determined=request.events is not None)
+            self.settler.by_basis(slack, determined=request.events is not None and forms is None)
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
 
     @cached_property
@@ -61,7 +61,7 @@ class Settlers:
         system = self.system
         if "dynamics_rate" not in system.description.blocks:
             return "settled"
-        if self._request.events is not None:
+        if self._request.events is not None and self._forms is None:
             return "rated"
         if self._point is None:
             return "settled"
@@ -89,6 +89,16 @@ class Settlers:
             settler = self.of(self.whole_form, self.keeps, whole=True)
             settler.by_basis(0.0, determined=True)
         return Restart(settler, self.keeps)
+
+    def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
+        """y, yd [unknowns as written] behind a jump at t (s), of the text or a law; where no state jumps, what is left
+        of the unknowns tells.  None where no point was found.
+        """
+        if self._forms is not None and self.whole_form == "settled":
+            found = still(self.settler, t, (y, yd), self.keeps, self._sizes.magnitude[: self.keeps.size])
+            if found is not None:
+                return found
+        return self.restart.across(t, y if self._forms is None else self._forms.completed(t, y), yd)
 
 
 def steep_balances(system: System) -> bool:

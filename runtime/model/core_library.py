@@ -11,6 +11,7 @@ from sysdyn.runtime import _core  # type: ignore[attr-defined]
 from sysdyn.runtime.model.structures.linear import Linear, Order
 from sysdyn.runtime.model.structures.run import (
     COUNTERS,
+    OWN,
     ROW_HEAD,
     Contact,
     Held,
@@ -65,6 +66,7 @@ __all__ = [
     "CAUSES",
     "COUNTERS",
     "MAX_ORDER",
+    "OWN",
     "PAIRS",
     "PROVIDE",
     "ROWS",

@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
+import pytest
 from sysdyn import api
+from sysdyn.runtime.events.handler import Handler
+from sysdyn.runtime.integrate import pieces
 
 TUBE = Path(__file__).parents[2] / "models" / "benchmark" / "tube.sd"
 
@@ -16,3 +19,23 @@ def test_steep_laws_that_jump_are_rosenbrocks_first():
     for name in trace.names:
         one, two = trace[name].values, other[name].values
         assert abs(one[-1] - two[-1]) <= 1.1e-2 * max(abs(one).max(), abs(two).max()), name
+
+
+@pytest.mark.parametrize("method", ["rosenbrock", "radau", "bdf"])
+def test_the_core_turns_laws_as_the_handler_does(monkeypatch, method):
+    """Events and ends are the same; what the core does the handler is not asked."""
+    model, fired = api.load(TUBE), []
+    fire = Handler.fire
+    monkeypatch.setattr(Handler, "fire", lambda self, *a, **k: fired.append(a[0]) or fire(self, *a, **k))
+    trace = model.run(rtol=1e-6, method=method)
+    assert not fired
+    monkeypatch.setattr(pieces, "serves", lambda plan, run: False)
+    other = model.run(rtol=1e-6, method=method)
+    assert fired
+    assert len(trace.events) == len(other.events) == 10
+    for one, two in zip(trace.events, other.events, strict=True):
+        assert (one.name, one.before, one.after) == (two.name, two.before, two.after)
+        assert abs(one.time - two.time) < 1e-5 * trace.time[-1]
+    for name in trace.names:
+        one, two = trace[name].values, other[name].values
+        assert abs(one[-1] - two[-1]) < 3e-5 * max(abs(one).max(), abs(two).max()), name

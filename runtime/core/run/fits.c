@@ -97,13 +97,18 @@ int sd_mode_fits(const sd_modes *m, const double *before, const double *v)
     return sd_mode_sides_fit(m, mode->relation, before, v);
 }
 
-int sd_mode_ordinary(const sd_modes *m)
+int sd_mode_sized(const sd_modes *m)
 {
-    for (int32_t i = 0; i < m->unknowns; i++) {
-        if (fabs(m->restart[i]) > 2.0 * m->resolved[i])
-            return 0;
+    for (int32_t i = 0; i < m->unknowns; i++)
         if (m->unnamed[i] && m->met[i] <= m->round_off && m->magnitude[i] == m->unknown_size && m->rate[i] != 0.0)
             return 0;
-    }
     return 1;
+}
+
+int sd_mode_ordinary(const sd_modes *m)
+{
+    for (int32_t i = 0; i < m->unknowns; i++)
+        if (fabs(m->restart[i]) > 2.0 * m->resolved[i])
+            return 0;
+    return sd_mode_sized(m);
 }

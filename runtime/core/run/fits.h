@@ -12,7 +12,7 @@ static inline double sd_mode_zero(const sd_modes *m, int32_t row)
 
 static inline const sd_mode *sd_mode_now(const sd_modes *m)
 {
-    return &m->mode[m->now];
+    return m->now == SD_OWN ? &m->own : &m->mode[m->now];
 }
 
 /* Whether the inequalities that a transition turns, which touches none, could not have stayed as they were: what would
@@ -25,7 +25,10 @@ int sd_mode_sides_fit(const sd_modes *m, const double *side, const double *befor
 /* Whether every contact, law and relation is as the present mode says, relations coming from `before`. */
 int sd_mode_fits(const sd_modes *m, const double *before, const double *v);
 
-/* Whether the stepper may go on from the point as the driver restarts: no size shows first here (integrate/sizes.py). */
+/* Whether no size shows first at the point behind an event: nothing begins to move there (integrate/sizes.py). */
+int sd_mode_sized(const sd_modes *m);
+
+/* The same of a point that the state may have been assigned: nor has an unknown grown so that round-off leaves more of it. */
 int sd_mode_ordinary(const sd_modes *m);
 
 #endif

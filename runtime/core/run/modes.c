@@ -5,114 +5,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "run/crossing.h"
 #include "run/fits.h"
-#include "run/run.h"
 
-#define ITERATIONS 60    /* of Ridders' method */
-#define SAME 8.0         /* spacings of t within which two instants are one */
 #define HELD 1e8         /* weight of the state across an event */
 #define ROWS_OF_EVENT 8  /* at most, beside those asked for */
-
-static double spacing(double t)
-{
-    return nextafter(fabs(t), INFINITY) - fabs(t);
-}
-
-/* -- when ------------------------------------------------------------------------------------------------------ */
-
-/* Whether a watch changes between two points; what leaves zero upwards, and still does, has not. */
-static int falls(const sd_modes *m, int32_t k, const double *low, const double *high)
-{
-    const sd_mode *mode = sd_mode_now(m);
-    int32_t row = mode->row[k], rate = mode->rate[k];
-    double side = mode->side[k];
-    int rises = rate >= 0 && side * low[row] <= 0.0 && side * low[rate] > 0.0 && side * high[rate] >= 0.0;
-    return side * high[row] < -sd_mode_zero(m, row) && !rises;
-}
-
-/* Where side*value falls through zero between a (fa) and b (fb); a where it is not above zero there already. */
-static double root(sd_run *run, int32_t row, double side, double a, double fa, double b, double fb)
-{
-    double *values = run->modes->values;
-    if (fa <= 0.0)
-        return a;
-    for (int i = 0; i < ITERATIONS; i++) {
-        double middle = 0.5 * (a + b);
-        if (!(a < middle && middle < b))
-            break;
-        sd_run_observe(run, middle, values);
-        double fm = side * values[row], size = sqrt(fm * fm - fa * fb);
-        double t = size > 0.0 ? middle + (middle - a) * fm / size : middle;
-        if (fm > 0.0)
-            a = middle, fa = fm;
-        else
-            b = middle, fb = fm;
-        if (a < t && t < b) {
-            sd_run_observe(run, t, values);
-            double ft = side * values[row];
-            if (ft > 0.0)
-                a = t, fa = ft;
-            else
-                b = t, fb = ft;
-        }
-        if (b - a <= 2.0 * spacing(fmax(fabs(a), fabs(b))) || fb == 0.0)
-            break;
-    }
-    return b;
-}
-
-/* Where watch k falls through zero between a (low) and b (high); what begins at zero and rises falls from its crest. */
-static double instant(sd_run *run, int32_t k, double a, double b)
-{
-    sd_modes *m = run->modes;
-    int32_t row = sd_mode_now(m)->row[k], rate = sd_mode_now(m)->rate[k];
-    double side = sd_mode_now(m)->side[k], begin = a, value = side * m->low[row];
-    if (value <= 0.0 && rate >= 0 && side * m->low[rate] > 0.0 && side * m->high[rate] < 0.0) {
-        begin = root(run, rate, side, a, side * m->low[rate], b, side * m->high[rate]);
-        sd_run_observe(run, begin, m->values);
-        value = side * m->values[row];
-        if (value <= 0.0)
-            return b;
-    }
-    return root(run, row, side, begin, value, b, side * m->high[row]);
-}
-
-/* The first instant within m->begin..end at which something watched changes, and how many of m->which; 0: none. */
-static int32_t crossing(sd_run *run, double end, double *t)
-{
-    sd_modes *m = run->modes;
-    int32_t watches = sd_mode_now(m)->watches, hits = 0, same = 0;
-    double begin = fmax(m->begin, fmin(run->t_clear, end)), low = begin, high = low;
-    sd_run_observe(run, low, m->low);
-    double stop = begin < run->t_seen && run->t_seen < end ? run->t_seen : end; /* where it has been seen, then all */
-    for (int more = 1; more && !hits; begin = stop, stop = end) {
-        more = stop < end;
-        for (int part = 1; part <= SD_PARTS && !hits; part++) {
-            if (high > low) {
-                memcpy(m->low, m->high, (size_t)m->observed * sizeof(double));
-                low = high;
-            }
-            high = part == SD_PARTS ? stop : begin + (stop - begin) * part / SD_PARTS;
-            sd_run_observe(run, high, m->high);
-            for (int32_t k = 0; k < watches; k++)
-                if (falls(m, k, m->low, m->high))
-                    m->which[hits++] = k;
-        }
-    }
-    if (!hits)
-        return 0;
-    *t = INFINITY;
-    for (int32_t i = 0; i < hits; i++) {
-        m->found[i] = instant(run, m->which[i], low, high);
-        *t = fmin(*t, m->found[i]);
-    }
-    for (int32_t i = 0; i < hits; i++)
-        if (m->found[i] <= *t + SAME * spacing(fmax(fabs(low), fabs(high))))
-            m->which[same++] = m->which[i];
-    return same;
-}
-
-/* -- what ------------------------------------------------------------------------------------------------------ */
 
 /* values [observed] at a point, whose sizes are kept */
 static void look(sd_run *run, double t, const double *y, const double *yd, double *values)
@@ -142,7 +39,7 @@ static void look(sd_run *run, double t, const double *y, const double *yd, doubl
 static void enter(sd_run *run, int32_t number)
 {
     sd_modes *m = run->modes;
-    const sd_mode *mode = &m->mode[number];
+    const sd_mode *mode = number == SD_OWN ? &m->own : &m->mode[number];
     for (int32_t i = 0; i < m->places; i++)
         m->p[m->place[i]] = mode->value[i];
     for (int32_t i = 0; i < m->systems; i++) {
@@ -195,37 +92,131 @@ static int keeps_state(sd_run *run, double t)
     settle->hold = 1.0;
     settle->ready = 0;
     for (int32_t i = 0; i < run->written && !failed; i++)
-        failed = m->state[i] && !(fabs(m->y[i] - m->restart[i]) <= m->still * settle->scale[i]);
+        failed = m->state[i] && !(fabs(m->y[i] - m->restart[i]) <= m->still * m->magnitude[i]);
     return !failed;
 }
 
-/* The point behind a transition at t, from m->before, in m->restart and m->rate; the model is then in its mode.  0: it
- * does not lead there, and nothing has changed. */
-static int lands(sd_run *run, const sd_transition *one, double t)
+/* The point before an event, which is taken across it; the parameters there */
+static void leave(sd_run *run)
 {
     sd_modes *m = run->modes;
-    int32_t from = m->now;
     size_t written = (size_t)run->written * sizeof(double);
     memcpy(m->p_before, m->p, (size_t)m->parameters * sizeof(double));
     memcpy(m->y, m->before, written);
     memcpy(m->yd, m->before_d, written);
+}
+
+/* The point behind an event at t in m->restart and m->rate: 1, where the mode is what its values say; sides: from which its
+ * relations come */
+static int arrives(sd_run *run, const double *sides, double t)
+{
+    sd_modes *m = run->modes;
+    size_t written = (size_t)run->written * sizeof(double);
+    if (!keeps_state(run, t))
+        return 0;
+    memset(m->restart, 0, (size_t)m->unknowns * sizeof(double));
+    memset(m->rate, 0, (size_t)m->unknowns * sizeof(double));
+    memcpy(m->restart, m->y, written);
+    memcpy(m->rate, m->yd, written);
+    look(run, t, m->y, m->yd, m->values);
+    return sd_mode_fits(m, sides, m->values) && sd_mode_sized(m);
+}
+
+/* The point behind a transition at t, from m->before; the model is then in its mode.  0: it does not lead there, and
+ * nothing has changed. */
+static int lands(sd_run *run, const sd_transition *one, double t)
+{
+    sd_modes *m = run->modes;
+    int32_t from = m->now;
+    const sd_mode *before = sd_mode_now(m);
+    leave(run);
     int done = assign(run, one, t);
     enter(run, one->to);
-    done = done && keeps_state(run, t);
-    if (done) {
-        memset(m->restart, 0, (size_t)m->unknowns * sizeof(double));
-        memset(m->rate, 0, (size_t)m->unknowns * sizeof(double));
-        memcpy(m->restart, m->y, written);
-        memcpy(m->rate, m->yd, written);
-        look(run, t, m->y, m->yd, m->values);
-        done = sd_mode_fits(m, one->sides + one->rounds * m->relations, m->values) && sd_mode_ordinary(m) &&
-               sd_mode_decided(m, &m->mode[from], one, m->values);
-    }
+    done = done && arrives(run, one->sides + one->rounds * m->relations, t) && sd_mode_ordinary(m) &&
+           sd_mode_decided(m, before, one, m->values);
     if (!done) {
         memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
         enter(run, from);
     }
     return done;
+}
+
+/* -- laws whose branch turns ------------------------------------------------------------------------------------- */
+
+/* The present mode becomes the core's own, if it is not. */
+static void own(sd_modes *m)
+{
+    const sd_mode *mode = sd_mode_now(m);
+    sd_mode *to = &m->own;
+    if (m->now == SD_OWN)
+        return;
+    memcpy(to->row, mode->row, (size_t)mode->watches * sizeof *to->row);
+    memcpy(to->rate, mode->rate, (size_t)mode->watches * sizeof *to->rate);
+    memcpy(to->side, mode->side, (size_t)mode->watches * sizeof *to->side);
+    memcpy(to->value, mode->value, (size_t)m->places * sizeof *to->value);
+    to->watches = mode->watches;
+    to->first = -1;
+    to->relation = mode->relation;
+    to->holds = mode->holds;
+    to->held = mode->held;
+    m->base = m->now;
+    m->now = SD_OWN;
+}
+
+/* The kinks whose switching functions are the watches that crossed, into m->turning; 0: others crossed too, or a law slides
+ * or is on neither branch. */
+static int32_t kinks_of(const sd_modes *m, int32_t crossed)
+{
+    const sd_mode *mode = sd_mode_now(m);
+    int32_t found = 0;
+    for (int32_t k = 0; k < m->kinks; k++)
+        for (int32_t i = 0; i < crossed; i++)
+            if (mode->row[m->which[i]] == m->kink[k].value && m->p[m->kink[k].branch] == mode->side[m->which[i]]) {
+                m->turning[found++] = k;
+                break;
+            }
+    return found == crossed ? found : 0;
+}
+
+/* The watches that crossed change their sides, and the branches that they are those of. */
+static void turn(sd_run *run, int32_t crossed)
+{
+    sd_modes *m = run->modes;
+    for (int32_t i = 0; i < crossed; i++) {
+        int32_t *side = &m->own.side[m->which[i]];
+        *side = -*side;
+        for (int32_t k = 0; k < m->places; k++)
+            if (m->place[k] == m->kink[m->turning[i]].branch)
+                m->own.value[k] = -m->own.value[k];
+    }
+    enter(run, SD_OWN);
+}
+
+/* The branches of laws that crossed, and nothing else, turn at t, from m->before; the model is then in its mode, and the log
+ * tells.  0: they are not alone, or do not turn, and nothing has changed. */
+static int turns(sd_run *run, double t, int32_t crossed)
+{
+    sd_modes *m = run->modes;
+    int32_t from = m->now;
+    if (m->logged + crossed > m->room || t - m->last <= m->nothing || m->left < crossed || !kinks_of(m, crossed))
+        return 0;
+    leave(run);
+    own(m);
+    turn(run, crossed);
+    if (!arrives(run, m->own.relation, t)) {
+        turn(run, crossed);
+        memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
+        enter(run, from);
+        return 0;
+    }
+    for (int32_t i = 0; i < crossed; i++) {
+        double *row = &m->log[(size_t)(m->logged + i) * (size_t)m->width], branch = m->p[m->kink[m->turning[i]].branch];
+        row[0] = t;
+        row[1] = -1.0 - (double)m->turning[i];
+        row[2] = -branch;
+        row[3] = branch;
+    }
+    return 1;
 }
 
 /* What ends the piece that begins. */
@@ -241,8 +232,8 @@ static void watch(sd_run *run)
     run->watches = mode->watches;
 }
 
-/* On from the point behind a transition. */
-static void go_on(sd_run *run, double t, const sd_transition *transition)
+/* On from the point behind an event, which counts as so many, and is told in so many rows of the log. */
+static void go_on(sd_run *run, double t, int32_t logged, int64_t entries)
 {
     sd_modes *m = run->modes;
     double sample = INFINITY;
@@ -257,8 +248,8 @@ static void go_on(sd_run *run, double t, const sd_transition *transition)
     sd_run_leave(run, m->before, m->before_d);
     sd_run_restart(run, t, t, m->restart, m->restart_d);
     run->start_kind = 0;
-    m->logged++;
-    m->left -= transition->entries;
+    m->logged += logged;
+    m->left -= entries;
     watch(run);
 }
 
@@ -314,7 +305,7 @@ int sd_modes_event(sd_run *run)
     if (stepper->refine)
         stepper->refine(stepper->self, run->settle);
     for (;;) {
-        int32_t crossed = crossing(run, end, &t);
+        int32_t crossed = sd_run_crossing(run, end, &t);
         int room = roomy(run, crossed ? t : end);
         if (*stepper->system->stop || room < 0)
             return SD_EVENT;
@@ -330,22 +321,26 @@ int sd_modes_event(sd_run *run)
         settled(run, t);
         int32_t from = m->now;
         const sd_transition *one = taken(run, t, crossed, 0);
-        if (!one)
+        if (!one && !turns(run, t, crossed))
             return SD_EVENT;
         m->last = t;
-        if (!one->moves) {
+        if (one && !one->moves) {
             m->begin = t;
             continue;
         }
         /* rows of before the event are written with the parameters of before */
         int32_t to = m->now;
         memcpy(m->p_after, m->p, (size_t)m->parameters * sizeof(double));
+        if (one)
+            enter(run, from);
         memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
-        enter(run, from);
+        run->settle->ready = 0;
         sd_run_accept(run, t, SD_TRACE);
+        if (one)
+            enter(run, to);
         memcpy(m->p, m->p_after, (size_t)m->parameters * sizeof(double));
-        enter(run, to);
-        go_on(run, t, one);
+        run->settle->ready = 0;
+        go_on(run, t, one ? 1 : crossed, one ? one->entries : crossed);
         return SD_RUNNING;
     }
 }
@@ -372,6 +367,6 @@ int sd_modes_sample(sd_run *run)
     for (int32_t i = 0; i < due; i++)
         while (m->first + (double)m->next[one->sample[i]] * m->period[one->sample[i]] <= now)
             m->next[one->sample[i]]++;
-    go_on(run, t, one);
+    go_on(run, t, 1, one->entries);
     return SD_RUNNING;
 }

@@ -5,8 +5,8 @@
  * kept as a transition: a mode, what crossed or which samples were due, what was assigned, the mode behind it.  Where
  * the same happens again the transition is taken, and each condition of the mode behind it is looked at as the handler
  * would; where one does not hold nothing has been done, and the handler is asked (Lygeros et al. 2003: modes, guards and
- * resets of hybrid automata).  Instants are located as events/locate.py does, by Ridders' method (1979) on the settled
- * dense output.
+ * resets of hybrid automata).  A law that goes from one branch to the other needs no handler the first time either:
+ * nothing is assigned, and which constraints hold stays.
  */
 #ifndef SYSDYN_MODES_H
 #define SYSDYN_MODES_H
@@ -14,6 +14,8 @@
 #include "system/assembly.h"
 
 struct sd_run;
+
+#define SD_OWN INT32_MAX /* the mode that the core has found by itself */
 
 enum sd_contact_kind { SD_PSI, SD_FRICTION, SD_PHI, SD_GUARDED, SD_FOLLOWS };
 
@@ -31,8 +33,8 @@ typedef struct sd_held {
 
 typedef struct sd_mode {
     int32_t watches, first;           /* first: transition from here, -1: none */
-    const int32_t *row, *side, *rate; /* [watches] of block observe; side 1 or -1; row of the rate or -1 */
-    const double *value;              /* [places] of the parameters that a mode fixes */
+    int32_t *row, *side, *rate;       /* [watches] of block observe; side 1 or -1; row of the rate or -1 */
+    double *value;                    /* [places] of the parameters that a mode fixes */
     const double *relation;           /* [relations] sides */
     const int32_t *holds;             /* [contacts] */
     const sd_held *held;              /* [systems] */
@@ -60,7 +62,9 @@ typedef struct sd_kink {
 typedef struct sd_modes {
     const sd_mode *mode;
     const sd_transition *transition;
-    int32_t now;                      /* the mode, -1: unknown here */
+    sd_mode own;                      /* arrays [watches], [places] of its own; the rest is that of `base` */
+    int32_t base;                     /* the mode of which it differs by branches of laws alone */
+    int32_t now;                      /* the mode, -1: unknown here, SD_OWN: own */
     int32_t parameters, places, relations, contacts, kinks, systems, samples, observed, alikes, unknowns;
     double *p;                        /* [parameters] */
     const int32_t *place;             /* [places] in p */
@@ -89,8 +93,10 @@ typedef struct sd_modes {
     int32_t *exact;                   /* [relations] 1: it crosses now, and is zero to the last bit */
     double *found;                    /* [watches] */
     int32_t *which;                   /* [watches] */
+    int32_t *turning;                 /* [kinks] that turn now */
     sd_watch *watch;                  /* [watches] */
-    double *log;                      /* [room][width] t, transition, before and after of what was assigned */
+    double *log;                      /* [room][width] t, transition, before and after of what was assigned; t, -1 - kink
+                                       * and its branches */
     int64_t left;                     /* events that may still be */
     int32_t width, room, logged, waits; /* waits: an event has no room for its rows yet */
 } sd_modes;

@@ -7,6 +7,8 @@ import ctypes as c
 from sysdyn.runtime.model.structures.c_types import D, I, L, P
 
 ROW_HEAD = 8
+OWN = 2**31 - 1
+"""SD_OWN: the mode that the core has found by itself."""
 
 
 class Record(c.Structure):
@@ -81,7 +83,8 @@ class Modes(c.Structure):
 
     _fields_ = [
         *[(name, P) for name in ["mode", "transition"]],
-        *[(name, I) for name in ["now", "parameters", "places", "relations", "contacts", "kinks"]],
+        ("own", Mode),
+        *[(name, I) for name in ["base", "now", "parameters", "places", "relations", "contacts", "kinks"]],
         *[(name, I) for name in ["systems", "samples", "observed", "alikes", "unknowns"]],
         *[(name, P) for name in ["p", "place", "relation_row", "relation_moves", "contact", "kink", "system"]],
         *[(name, P) for name in ["period", "next"]],
@@ -93,7 +96,7 @@ class Modes(c.Structure):
         *[(name, D) for name in ["unknown_size", "round_off"]],
         *[(name, P) for name in ["rate", "y", "yd", "before", "before_d", "restart", "restart_d"]],
         *[(name, P) for name in ["values", "low", "high", "p_before", "p_after"]],
-        *[(name, P) for name in ["exact", "found", "which", "watch", "log"]],
+        *[(name, P) for name in ["exact", "found", "which", "turning", "watch", "log"]],
         ("left", L),
         *[(name, I) for name in ["width", "room", "logged", "waits"]],
     ]

@@ -1,0 +1,173 @@
+/* Where within a step something watched changes: see crossing.h. */
+#include "run/crossing.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "run/fits.h"
+
+#define ITERATIONS 60    /* of Ridders' method */
+#define SAME 8.0         /* spacings of t within which two instants are one */
+#define FOLLOWED 6       /* points settled from an instant of the dense output as it is */
+#define ENOUGH 1e-3      /* of what counts as zero: what is watched may be past it by */
+
+typedef void look(sd_run *run, double t, double *values);
+
+double sd_spacing(double t)
+{
+    return nextafter(fabs(t), INFINITY) - fabs(t);
+}
+
+/* Whether a watch changes between two points; what leaves zero upwards, and still does, has not. */
+static int falls(const sd_modes *m, int32_t k, const double *low, const double *high)
+{
+    const sd_mode *mode = sd_mode_now(m);
+    int32_t row = mode->row[k], rate = mode->rate[k];
+    double side = mode->side[k];
+    int rises = rate >= 0 && side * low[row] <= 0.0 && side * low[rate] > 0.0 && side * high[rate] >= 0.0;
+    return side * high[row] < -sd_mode_zero(m, row) && !rises;
+}
+
+/* Where side*value falls through zero between a (fa) and b (fb); a where it is not above zero there already. */
+static double root(sd_run *run, look *at, int32_t row, double side, double a, double fa, double b, double fb)
+{
+    double *values = run->modes->values;
+    if (fa <= 0.0)
+        return a;
+    for (int i = 0; i < ITERATIONS; i++) {
+        double middle = 0.5 * (a + b);
+        if (!(a < middle && middle < b))
+            break;
+        at(run, middle, values);
+        double fm = side * values[row], size = sqrt(fm * fm - fa * fb);
+        double t = size > 0.0 ? middle + (middle - a) * fm / size : middle;
+        if (fm > 0.0)
+            a = middle, fa = fm;
+        else
+            b = middle, fb = fm;
+        if (a < t && t < b) {
+            at(run, t, values);
+            double ft = side * values[row];
+            if (ft > 0.0)
+                a = t, fa = ft;
+            else
+                b = t, fb = ft;
+        }
+        if (b - a <= 2.0 * sd_spacing(fmax(fabs(a), fabs(b))) || fb == 0.0)
+            break;
+    }
+    return b;
+}
+
+/* Where watch k falls through zero between a (low) and b (high); what begins at zero and rises falls from its crest. */
+static double instant(sd_run *run, look *at, int32_t k, double a, double b)
+{
+    sd_modes *m = run->modes;
+    int32_t row = sd_mode_now(m)->row[k], rate = sd_mode_now(m)->rate[k];
+    double side = sd_mode_now(m)->side[k], begin = a, value = side * m->low[row];
+    if (value <= 0.0 && rate >= 0 && side * m->low[rate] > 0.0 && side * m->high[rate] < 0.0) {
+        begin = root(run, at, rate, side, a, side * m->low[rate], b, side * m->high[rate]);
+        at(run, begin, m->values);
+        value = side * m->values[row];
+        if (value <= 0.0)
+            return b;
+    }
+    return root(run, at, row, side, begin, value, b, side * m->high[row]);
+}
+
+/* The first part of begin..end in whose end something watched has changed, low..high, and how many of m->which; 0: none.
+ * m->low, m->high: the values there. */
+static int32_t part_of(sd_run *run, look *at, double end, double *low, double *high)
+{
+    sd_modes *m = run->modes;
+    int32_t watches = sd_mode_now(m)->watches, hits = 0;
+    double begin = fmax(m->begin, fmin(run->t_clear, end));
+    *low = *high = begin;
+    at(run, begin, m->low);
+    double stop = begin < run->t_seen && run->t_seen < end ? run->t_seen : end; /* where it has been seen, then all */
+    for (int more = 1; more && !hits; begin = stop, stop = end) {
+        more = stop < end;
+        for (int part = 1; part <= SD_PARTS && !hits; part++) {
+            if (*high > *low) {
+                memcpy(m->low, m->high, (size_t)m->observed * sizeof(double));
+                *low = *high;
+            }
+            *high = part == SD_PARTS ? stop : begin + (stop - begin) * part / SD_PARTS;
+            at(run, *high, m->high);
+            for (int32_t k = 0; k < watches; k++)
+                if (falls(m, k, m->low, m->high))
+                    m->which[hits++] = k;
+        }
+    }
+    return hits;
+}
+
+/* Of the watches m->which, which change within low..high, those that do first, and when. */
+static int32_t first_of(sd_run *run, look *at, int32_t hits, double low, double high, double *t)
+{
+    sd_modes *m = run->modes;
+    int32_t same = 0;
+    *t = INFINITY;
+    for (int32_t i = 0; i < hits; i++) {
+        m->found[i] = instant(run, at, m->which[i], low, high);
+        *t = fmin(*t, m->found[i]);
+    }
+    for (int32_t i = 0; i < hits; i++)
+        if (m->found[i] <= *t + SAME * sd_spacing(fmax(fabs(low), fabs(high))))
+            m->which[same++] = m->which[i];
+    return same;
+}
+
+/* The dense output as it is. */
+static void as_it_is(sd_run *run, double t, double *values)
+{
+    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+    sd_run_quantities(run, t, values);
+}
+
+/* Whether nothing but watch `one` is past zero in values. */
+static int alone(const sd_modes *m, int32_t one, const double *values)
+{
+    const sd_mode *mode = sd_mode_now(m);
+    for (int32_t k = 0; k < mode->watches; k++)
+        if (k != one && mode->side[k] * values[mode->row[k]] < -sd_mode_zero(m, mode->row[k]))
+            return 0;
+    return 1;
+}
+
+/* From where one watch falls through zero on the dense output as it is to where it does on the settled one, nearly always
+ * the same: by secants.  0: that is not found so. */
+static int follow(sd_run *run, int32_t one, double low, double high, double *t)
+{
+    sd_modes *m = run->modes;
+    int32_t row = sd_mode_now(m)->row[one];
+    double side = sd_mode_now(m)->side[one], before = low, value = side * m->low[row], at = *t, slope = -value / (at - low);
+    double enough = ENOUGH * sd_mode_zero(m, row);
+    if (!(value > 0.0 && at > low))
+        return 0;
+    for (int k = 0; k < FOLLOWED && low < at && at <= high; k++) {
+        double last = value;
+        sd_run_observe(run, at, m->values);
+        value = side * m->values[row];
+        if (value <= 0.0 && value >= -enough) {
+            *t = at;
+            return alone(m, one, m->values);
+        }
+        slope = k > 0 ? (value - last) / (at - before) : slope;
+        before = at;
+        at -= (value + 0.5 * enough) / slope;
+        at = at != before ? at : before + copysign(sd_spacing(before), value);
+    }
+    return 0;
+}
+
+int32_t sd_run_crossing(sd_run *run, double end, double *t)
+{
+    double low, high;
+    int32_t hits = part_of(run, as_it_is, end, &low, &high);
+    if (hits && first_of(run, as_it_is, hits, low, high, t) == 1 && follow(run, run->modes->which[0], low, high, t))
+        return 1;
+    hits = part_of(run, sd_run_observe, end, &low, &high);
+    return hits ? first_of(run, sd_run_observe, hits, low, high, t) : 0;
+}
