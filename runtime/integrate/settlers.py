@@ -22,6 +22,9 @@ SLACK = 0.1
 """Of the tolerance: what rows within a step may move of the state, in magnitudes, and need not be the least change,
 where constraints are constant sums: their unknowns are interpolated differently (radau_dense.c).  Of curved ones
 the least change takes out most of the error between steps (a parallelogram by dopri: 25 times)."""
+STILL = 1e-3
+"""Of the tolerance: what a settled state may be off the least change by, in magnitudes.  Where laws are steep the change
+is shared with what follows, and the iteration nears it slowly (a tube of water: six solutions where rows hold after one)."""
 RATED = 5_000
 """Unknowns up to which a point behind a jump is asked for flows that are open.  With the rates of all balances that
 of a larger net is dear to find (a driven grid of 35 x 35: 20 s): its loops of stores are left as rows leave them.
@@ -44,6 +47,9 @@ class Settlers:
         n = system.form.written
         self.keeps: NDArray[np.bool_] = roles.state[:n]
         """Unknowns as written that carry the state."""
+        events = request.events
+        self._switched = events is not None and bool(events) and not events.of_laws
+        """Which constraints hold changes: a law that changes its branch leaves nothing else open."""
         t, y, yd = point
         self._point = (t, y[:n], yd[:n]) if system.unknowns <= RATED else None
         self.settler = self.of("settled" if forms is not None else self.whole_form, self.keeps)
@@ -52,7 +58,8 @@ class Settlers:
             # steep laws magnify what a basis leaves
             slack = SLACK * request.tolerance if sums and not system.form.scales else 0.0
             # the least change shares what is open: flows between contacts, potentials where all laws are faint
-            self.settler.by_basis(slack, determined=request.events is not None and forms is None)
+            self.settler.by_basis(slack, determined=self._switched)
+        self.settler.core.contents.still = STILL * request.tolerance
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
 
     @cached_property
@@ -61,7 +68,7 @@ class Settlers:
         system = self.system
         if "dynamics_rate" not in system.description.blocks:
             return "settled"
-        if self._request.events is not None and self._forms is None:
+        if self._switched:
             return "rated"
         if self._point is None:
             return "settled"

@@ -29,13 +29,14 @@ static int falls(const sd_modes *m, int32_t k, const double *low, const double *
     return side * high[row] < -sd_mode_zero(m, row) && !rises;
 }
 
-/* Where side*value falls through zero between a (fa) and b (fb); a where it is not above zero there already. */
-static double root(sd_run *run, look *at, int32_t row, double side, double a, double fa, double b, double fb)
+/* Where side*value falls through zero between a (fa) and b (fb), by no more than `enough`; a where it is not above zero
+ * there already. */
+static double root(sd_run *run, look *at, int32_t row, double side, double enough, double a, double fa, double b, double fb)
 {
     double *values = run->modes->values;
     if (fa <= 0.0)
         return a;
-    for (int i = 0; i < ITERATIONS; i++) {
+    for (int i = 0; i < ITERATIONS && !(fb <= 0.0 && fb >= -enough); i++) {
         double middle = 0.5 * (a + b);
         if (!(a < middle && middle < b))
             break;
@@ -66,14 +67,15 @@ static double instant(sd_run *run, look *at, int32_t k, double a, double b)
     sd_modes *m = run->modes;
     int32_t row = sd_mode_now(m)->row[k], rate = sd_mode_now(m)->rate[k];
     double side = sd_mode_now(m)->side[k], begin = a, value = side * m->low[row];
+    double enough = at == sd_run_observe ? 0.0 : ENOUGH * sd_mode_zero(m, row);
     if (value <= 0.0 && rate >= 0 && side * m->low[rate] > 0.0 && side * m->high[rate] < 0.0) {
-        begin = root(run, at, rate, side, a, side * m->low[rate], b, side * m->high[rate]);
+        begin = root(run, at, rate, side, 0.0, a, side * m->low[rate], b, side * m->high[rate]);
         at(run, begin, m->values);
         value = side * m->values[row];
         if (value <= 0.0)
             return b;
     }
-    return root(run, at, row, side, begin, value, b, side * m->high[row]);
+    return root(run, at, row, side, enough, begin, value, b, side * m->high[row]);
 }
 
 /* The first part of begin..end in whose end something watched has changed, low..high, and how many of m->which; 0: none.
@@ -169,5 +171,8 @@ int32_t sd_run_crossing(sd_run *run, double end, double *t)
     if (hits && first_of(run, as_it_is, hits, low, high, t) == 1 && follow(run, run->modes->which[0], low, high, t))
         return 1;
     hits = part_of(run, sd_run_observe, end, &low, &high);
-    return hits ? first_of(run, sd_run_observe, hits, low, high, t) : 0;
+    hits = hits ? first_of(run, sd_run_observe, hits, low, high, t) : 0;
+    if (hits)
+        sd_run_observe(run, *t, run->modes->values);
+    return hits;
 }

@@ -81,19 +81,38 @@ static int assign(sd_run *run, const sd_transition *one, double t)
     return 1;
 }
 
-/* m->y, m->yd settled at t with the state held: 1; 0: that fails, or moves the state */
+/* m->y, m->yd settled at t: 1, where no state moves for it */
+static int stays(sd_run *run, double t)
+{
+    sd_modes *m = run->modes;
+    int failed = sd_settle_point(run->settle, t, m->y, m->yd);
+    for (int32_t i = 0; i < run->written && !failed; i++)
+        failed = m->state[i] && !(fabs(m->y[i] - m->restart[i]) <= m->still * m->magnitude[i]);
+    return !failed;
+}
+
+/* The same with the state held: 1; 0: that fails, or moves the state.  Where constraints stay as they are a basis that moves
+ * no state is enough. */
 static int keeps_state(sd_run *run, double t)
 {
     sd_modes *m = run->modes;
     sd_settle *settle = run->settle;
-    memcpy(m->restart, m->y, (size_t)run->written * sizeof(double));
+    size_t written = (size_t)run->written * sizeof(double);
+    double slack = settle->slack;
+    memcpy(m->restart, m->y, written);
+    memcpy(m->restart_d, m->yd, written);
+    settle->slack = 0.0;
+    int done = settle->basis && !settle->determined && stays(run, t);
+    settle->slack = slack;
+    if (done)
+        return 1;
+    memcpy(m->y, m->restart, written);
+    memcpy(m->yd, m->restart_d, written);
     settle->hold = HELD;
-    int failed = sd_settle_point(settle, t, m->y, m->yd);
+    done = stays(run, t);
     settle->hold = 1.0;
     settle->ready = 0;
-    for (int32_t i = 0; i < run->written && !failed; i++)
-        failed = m->state[i] && !(fabs(m->y[i] - m->restart[i]) <= m->still * m->magnitude[i]);
-    return !failed;
+    return done;
 }
 
 /* The point before an event, which is taken across it; the parameters there */
@@ -317,8 +336,8 @@ int sd_modes_event(sd_run *run)
             watch(run);
             return SD_RUNNING;
         }
-        stepper->dense(stepper->self, t, m->before, m->before_d);
-        settled(run, t);
+        memcpy(m->before, run->point, (size_t)run->written * sizeof(double));
+        memcpy(m->before_d, run->point_d, (size_t)run->written * sizeof(double));
         int32_t from = m->now;
         const sd_transition *one = taken(run, t, crossed, 0);
         if (!one && !turns(run, t, crossed))

@@ -339,12 +339,13 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
     return 0;
 }
 
-/* One Gauss-Newton step of x = (y, chosen yd); the largest move, in magnitudes.  The state is drawn to where it came
- * from, what follows from it only held where it is: so in the end it exerts no pull. */
-static double move(sd_settle *settle, double *y, double *yd)
+/* One Gauss-Newton step of x = (y, chosen yd); the largest moves of all and of the state, in magnitudes.  The state is drawn
+ * to where it came from, what follows from it only held where it is: so in the end it exerts no pull. */
+static double move(sd_settle *settle, double *y, double *yd, double *state)
 {
     int32_t n = settle->unknowns, moves = n + settle->rates;
     double largest = 0.0;
+    *state = 0.0;
     for (int32_t j = 0; j < moves; j++) {
         double now = j < n ? y[j] : yd[settle->rate[j - n]];
         settle->step[j] = settle->state[j] ? -settle->hold * (now - settle->x0[j]) / settle->scale[j] : 0.0;
@@ -356,8 +357,11 @@ static double move(sd_settle *settle, double *y, double *yd)
         y[j] += settle->step[j] * settle->scale[j];
     for (int32_t k = 0; k < settle->rates; k++)
         yd[settle->rate[k]] += settle->step[n + k] * settle->scale[n + k];
-    for (int32_t j = 0; j < moves; j++)
+    for (int32_t j = 0; j < moves; j++) {
         largest = fmax(largest, fabs(settle->step[j]));
+        if (settle->state[j])
+            *state = fmax(*state, fabs(settle->step[j]));
+    }
     return largest;
 }
 
@@ -381,14 +385,14 @@ static void put(const sd_settle *settle, const double *x, double *y, double *yd)
 static void iterate(sd_settle *settle, double t, double *y, double *yd, int most, double *best)
 {
     int fresh = settle->ready != MATRIX, failed = fresh && factorise(settle, t, y, yd);
-    double moved = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
+    double moved = 0.0, pulled = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
     *best = before;
     settle->drift = settle->constraints;
     take(settle, y, yd, settle->x);
     for (int m = 0; m < most && !failed && !*settle->system->stop; m++) {
-        if (moved < SMALL && before <= fmax(EXACT, settle->enough))
+        if ((moved < SMALL || pulled < settle->still) && before <= fmax(EXACT, settle->enough))
             break;
-        moved = move(settle, y, yd);
+        moved = move(settle, y, yd, &pulled);
         double now = measure(settle, t, y, yd);
         if (!(now <= CLOSE))
             settle->contracted = fmax(settle->contracted, before > 0.0 && isfinite(now) ? now / before : INFINITY);
@@ -463,14 +467,14 @@ static int holds(sd_settle *settle, double t, const double *y, const double *yd,
 /* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */
 static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 {
-    double best;
+    double best, limit = fmax(CLOSE, settle->enough);
     settle->calls++;
     settle->contracted = 0.0;
     take(settle, y, yd, settle->x0);
     const size_t steep = settle->system->scales > 0 ? (size_t)(settle->unknowns + settle->rates) * sizeof(double) : 0;
     memcpy(settle->usual, settle->scale, steep);
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && settle->refused < REFUSALS) {
-        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, fmax(CLOSE, settle->enough))) {
+        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, limit)) {
             take(settle, y, yd, settle->met);
             finish(settle, t, y, yd, 1, 1);
             return 0;
@@ -480,7 +484,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     int plain = settle->hold == 1.0; /* else factors are of another weight, and serve once */
     settle->ready = plain ? settle->ready : NONE;
     iterate(settle, t, y, yd, ITERATIONS, &best);
-    if (best > CLOSE) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
+    if (best > limit) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
         put(settle, settle->x0, y, yd);
         settle->hold = HELD;
         settle->ready = 0;
@@ -490,9 +494,9 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     }
     settle->ready = plain ? settle->ready : NONE;
     int done = 0;
-    if (best <= CLOSE) {
+    if (best <= limit) {
         put(settle, settle->x, y, yd);
-        done = holds(settle, t, y, yd, best, CLOSE);
+        done = holds(settle, t, y, yd, best, limit);
     }
     if (!done && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
         if (steep) {
@@ -504,7 +508,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     }
     /* the best point met, or the given one; a rate may have no bound */
     put(settle, settle->x, y, yd);
-    done = done || holds(settle, t, y, yd, best, CLOSE);
+    done = done || holds(settle, t, y, yd, best, limit);
     if (done)
         take(settle, y, yd, settle->met);
     else

@@ -159,6 +159,7 @@ class Settle(c.Structure):
         ("hold", D),
         ("enough", D),
         ("slack", D),
+        ("still", D),
         ("ready", I),
         ("refused", I),
         ("determined", I),
