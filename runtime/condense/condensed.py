@@ -506,7 +506,7 @@ def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:
     rest does not follow from what is kept alone.  The next call for the system may take the structures of this one.
     """
     least = STEEP if system.form.scales else LEAST
-    if system.unknowns < least or system.form.name not in ("3", "2v") or system.left_out or system._may_hold[0].size:
+    if system.unknowns < least or system.form.name != "3" or system.left_out or system._may_hold[0].size:
         return None
     if not system.once("steady", lambda: steady(system.description)):
         return None

@@ -21,11 +21,12 @@ def cross(run: Integration, segment: Segment) -> None:
     if run.pieces is None:  # nobody asks for what the last step made
         run.method.rest()
     run.sizes.share(y)
-    y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
-    if run.pieces is not None:
-        found: tuple[Floats, Floats] | None = run.pieces.jump(segment, y, yd)
-    else:
-        found = run.settlers.across(segment.begin, y, yd)
+    with run.settler.exactly():
+        y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
+        if run.pieces is not None:
+            found: tuple[Floats, Floats] | None = run.pieces.jump(segment, y, yd)
+        else:
+            found = run.settlers.across(segment.begin, y, yd)
     if found is None:
         raise failure(run, "newton")
     run.driver.leave(y, yd)

@@ -161,8 +161,7 @@ class Integration:
     def _condensed(self) -> Forms | None:
         """The forms without what constant sums define; None where all unknowns are integrated."""
         request = self.request
-        whole = bool(request.events and not request.events.of_laws)
-        whole |= request.least_norm or request.fixed_step is not None
+        whole = request.switched or request.least_norm or request.fixed_step is not None
         if whole or not request.condense or request.method in ON_UNDERLYING:
             return None
         if self.system.unknowns > LARGE:

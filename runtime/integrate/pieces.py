@@ -175,9 +175,10 @@ class Pieces:
             t, which = found
             if self._by_round_off(which):
                 continue
-            before = self._point(t)
-            which += self._met(t, before, which)
-            point = self._fire(t, before, [], which)
+            with run.settler.exactly():
+                before = self._point(t)
+                which += self._met(t, before, which)
+                point = self._fire(t, before, [], which)
             if point is not None:
                 self._accept(t, TRACE, sink, which)
                 self._go_on(t, point, before, misled=end - core.t_from if self.handler.stands(which) else 0.0)
@@ -258,9 +259,10 @@ class Pieces:
         if due:
             n = run.system.form.written
             y, yd = run.method.point()
-            y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
-            self.handler.before = self.handler.now()
-            point = self._fire(method.t, (y, yd), due, self._met(method.t, (y, yd)))
+            with run.settler.exactly():
+                y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
+                self.handler.before = self.handler.now()
+                point = self._fire(method.t, (y, yd), due, self._met(method.t, (y, yd)))
             run.driver.drain(sink)
             self.aim(end)
             if point is not None:

@@ -80,6 +80,13 @@ class Request:
         """What the error test compares with: radau's estimate is of a lower order (core/steppers/radau.h)."""
         return 0.1 * self.rtol ** (2.0 / 3.0) if self.method == "radau" else self.rtol
 
+    @property
+    def switched(self) -> bool:
+        """Whether which constraints hold changes, or something is assigned; laws that change their branches alone leave
+        constant sums as they are.
+        """
+        return bool(self.events and not self.events.of_laws)
+
 
 @dataclass(frozen=True, slots=True)
 class Statistics:

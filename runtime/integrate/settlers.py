@@ -23,8 +23,9 @@ SLACK = 0.1
 where constraints are constant sums: their unknowns are interpolated differently (radau_dense.c).  Of curved ones
 the least change takes out most of the error between steps (a parallelogram by dopri: 25 times)."""
 STILL = 1e-3
-"""Of the tolerance: what a settled state may be off the least change by, in magnitudes.  Where laws are steep the change
-is shared with what follows, and the iteration nears it slowly (a tube of water: six solutions where rows hold after one)."""
+"""Of the tolerance: what a settled state may be off the least change by, in magnitudes.  Where laws are steep what
+follows shares the change, and the iteration nears it slowly (a tube of water: six solutions where rows hold after one).
+"""
 RATED = 5_000
 """Unknowns up to which a point behind a jump is asked for flows that are open.  With the rates of all balances that
 of a larger net is dear to find (a driven grid of 35 x 35: 20 s): its loops of stores are left as rows leave them.
@@ -47,9 +48,6 @@ class Settlers:
         n = system.form.written
         self.keeps: NDArray[np.bool_] = roles.state[:n]
         """Unknowns as written that carry the state."""
-        events = request.events
-        self._switched = events is not None and bool(events) and not events.of_laws
-        """Which constraints hold changes: a law that changes its branch leaves nothing else open."""
         t, y, yd = point
         self._point = (t, y[:n], yd[:n]) if system.unknowns <= RATED else None
         self.settler = self.of("settled" if forms is not None else self.whole_form, self.keeps)
@@ -58,7 +56,8 @@ class Settlers:
             # steep laws magnify what a basis leaves
             slack = SLACK * request.tolerance if sums and not system.form.scales else 0.0
             # the least change shares what is open: flows between contacts, potentials where all laws are faint
-            self.settler.by_basis(slack, determined=self._switched)
+            flat = bool(request.events) and forms is None and self.whole_form == "rated"
+            self.settler.by_basis(slack, determined=request.switched or flat)
         self.settler.core.contents.still = STILL * request.tolerance
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
 
@@ -68,11 +67,13 @@ class Settlers:
         system = self.system
         if "dynamics_rate" not in system.description.blocks:
             return "settled"
-        if self._switched:
+        turning = bool(self._request.events)
+        if self._request.switched:
             return "rated"
         if self._point is None:
-            return "settled"
-        return "rated" if flows_open(system.another("settled"), *self._point, self.keeps) else "settled"
+            return "rated" if turning else "settled"
+        settled = system.another("settled")
+        return "rated" if flows_open(settled, *self._point, self.keeps, turning=turning) else "settled"
 
     def of(self, name: str, state: NDArray[np.bool_], *, whole: bool = False) -> Settler:
         """Of the rows of a form; whole: with every unknown, whatever leaves the runs."""

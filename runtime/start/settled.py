@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import ctypes as c
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.condense.condensed import Condensed
+from sysdyn.runtime.condense.elimination import affine
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.layout import entries_of
@@ -78,16 +80,25 @@ def inertial_rates(settled: System) -> NDArray[np.bool_]:
     return mask
 
 
-def flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_]) -> bool:
+def flows_open(
+    settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_], *, turning: bool = False
+) -> bool:
     """Whether settled rows leave a flow open that carries no state [unknowns]: in loops of stores it follows from the
-    rate of their balance (form "rated").  Asked once of a text, at a point y, yd [unknowns as written].
+    rate of their balance (form "rated").  Asked once of a text, at a point y, yd [unknowns as written].  turning: laws
+    may be flat elsewhere (a damper with a dead zone), and are asked for no flow.
     """
-    return settled.once("flows open", lambda: _flows_open(settled, t, y, yd, state))
+    return settled.once(("flows open", turning), lambda: _flows_open(settled, t, y, yd, state, turning))
 
 
-def _flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_]) -> bool:
+def _flows_open(
+    settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_], turning: bool
+) -> bool:
     (jy, jyd), pattern, rates = settled.jacobian(t, y, yd), settled.pattern, rates_of(settled)
     n, columns = settled.unknowns, pattern.columns_of()
+    if turning:
+        laws = settled.of_groups("dynamics", "gamma", "gamma_rate") & ~affine(settled)
+        flows = (settled.kinds == "f") & ~state
+        jy = np.where(laws[pattern.row] & flows[columns], 0.0, jy)
     moved = columns_of_rates(n, rates, columns)
     free, rated = ~state[columns], moved >= 0
     i = np.concatenate([pattern.row[free], pattern.row[rated]])
@@ -269,6 +280,16 @@ class Settler:
         found = self.settle(t, y, yd)
         core.basis, core.enough, core.ready = basis, enough, 0
         return found
+
+    @contextmanager
+    def exactly(self) -> Iterator[None]:
+        """Points settle to round-off meanwhile, in a draft too: behind a jump what is left over moves the state."""
+        core = self.core.contents
+        enough, core.enough = core.enough, 0.0
+        try:
+            yield
+        finally:
+            core.enough = enough
 
     def held(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
         """The same with the state where it is: of large ones within a basis that moves none of it, if there is one."""

@@ -313,14 +313,13 @@ static int settled(sd_run *run, double t)
     return sd_settle_point(run->settle, t, m->before, m->before_d);
 }
 
-int sd_modes_event(sd_run *run)
+/* What changes within the last step, whose points count to round-off (what is left over of one that holds nearly would be a
+ * state that jumps); enough: for rows. */
+static int event(sd_run *run, double enough)
 {
     sd_modes *m = run->modes;
     const sd_stepper *stepper = run->stepper;
     double end = *stepper->t, t = end;
-    m->waits = 0;
-    if (m->now < 0)
-        return SD_EVENT;
     if (stepper->refine)
         stepper->refine(stepper->self, run->settle);
     for (;;) {
@@ -332,6 +331,7 @@ int sd_modes_event(sd_run *run)
         if (!room)
             return SD_FULL;
         if (!crossed) {
+            run->settle->enough = enough;
             sd_run_accept(run, end, 0);
             watch(run);
             return SD_RUNNING;
@@ -354,6 +354,7 @@ int sd_modes_event(sd_run *run)
             enter(run, from);
         memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
         run->settle->ready = 0;
+        run->settle->enough = enough;
         sd_run_accept(run, t, SD_TRACE);
         if (one)
             enter(run, to);
@@ -362,6 +363,18 @@ int sd_modes_event(sd_run *run)
         go_on(run, t, one ? 1 : crossed, one ? one->entries : crossed);
         return SD_RUNNING;
     }
+}
+
+int sd_modes_event(sd_run *run)
+{
+    double enough = run->settle->enough;
+    run->modes->waits = 0;
+    if (run->modes->now < 0)
+        return SD_EVENT;
+    run->settle->enough = 0.0;
+    int state = event(run, enough);
+    run->settle->enough = enough;
+    return state;
 }
 
 int sd_modes_sample(sd_run *run)
@@ -378,8 +391,11 @@ int sd_modes_sample(sd_run *run)
         return SD_FULL;
     memcpy(m->before, run->stepper->y, (size_t)m->unknowns * sizeof(double));
     memcpy(m->before_d, run->stepper->yd, (size_t)m->unknowns * sizeof(double));
+    double enough = run->settle->enough;
+    run->settle->enough = 0.0;
     settled(run, t);
     const sd_transition *one = taken(run, t, 0, due);
+    run->settle->enough = enough;
     if (!one)
         return SD_FINISHED;
     m->last = t;
