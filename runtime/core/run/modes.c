@@ -212,12 +212,13 @@ static void turn(sd_run *run, int32_t crossed)
 }
 
 /* The branches of laws that crossed, and nothing else, turn at t, from m->before; the model is then in its mode, and the log
- * tells.  0: they are not alone, or do not turn, and nothing has changed. */
+ * tells.  0: they are not alone, or do not turn, and nothing has changed; where constraints hold at times they may leave
+ * something open, which the handler knows. */
 static int turns(sd_run *run, double t, int32_t crossed)
 {
     sd_modes *m = run->modes;
     int32_t from = m->now;
-    if (m->logged + crossed > m->room || t - m->last <= m->nothing || m->left < crossed || !kinks_of(m, crossed))
+    if (m->contacts || m->logged + crossed > m->room || t - m->last <= m->nothing || m->left < crossed || !kinks_of(m, crossed))
         return 0;
     leave(run);
     own(m);
