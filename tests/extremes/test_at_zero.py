@@ -139,3 +139,33 @@ def test_bridge_that_starts_without_voltage(tmp_path, formulation, accuracy):
     for name, exact, use in (("v", v, slice(None)), ("i", i, slice(None)), ("d", np.maximum(i, 0.0), first)):
         error = np.abs(np.asarray(run.trace[name]) - exact)[use]
         assert error.max() <= accuracy * np.abs(exact).max()
+
+
+STEP = """
+model step_of_force {
+  node a: electrical
+  V: effort(e = 1 V*step(t - 0.5 s) + 1 V*step(t - 0.53 s)) a -> ground
+  R: dissipator(e = 2 ohm*f) a -> ground
+  L: kinetic(p = 1 H*f) a -> ground
+  discrete n = 0
+  when L.f > EVENT { n := 1 }
+  init L.f = 0 A
+}
+
+scene run of step_of_force {
+  time 0 s to 1 s
+  trace R.f as i, L.f as l every 0.1 s
+}
+"""
+
+
+@pytest.mark.parametrize("event", ["0.45 A", "9 A"])
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+def test_a_row_where_the_text_jumps_stands_twice(tmp_path, method, event):
+    """Of two jumps one lies at an instant of the trace; what does not jump there has two equal values."""
+    run = ran(tmp_path, STEP.replace("EVENT", event), method=method)
+    assert run.met
+    near = np.abs(run.trace.time - 0.5) < 1e-9
+    assert np.allclose(np.asarray(run.trace["i"])[near], [0.0, 0.5], atol=1e-9)
+    assert np.ptp(np.asarray(run.trace["l"])[near]) < 1e-9
+    assert np.count_nonzero(np.abs(run.trace.time - 0.3) < 1e-9) == 1
