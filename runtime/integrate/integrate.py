@@ -341,7 +341,7 @@ class Integration:
         y, yd = self.method.point()
         before = self.sizes.at(y)[1].copy()
         self.sizes.share(y)
-        self.sizes.resolve(self.method.contents.t, y, yd, self.roles.state)
+        self.sizes.resolve_by_rows(self.method.contents.t, y, yd, self.roles.state)
         self.sizes.hand_down()
         if not (self.sizes.at(y)[1] > 2.0 * before).any():
             return False
