@@ -76,9 +76,7 @@ def open_unknowns(system: System, t: float, y: Floats, yd: Floats, step: float) 
     return found
 
 
-def _changes(
-    system: System, point: tuple[float, Floats, Floats], met: Floats, step: float
-) -> Iterator[Floats]:
+def _changes(system: System, point: tuple[float, Floats, Floats], met: Floats, step: float) -> Iterator[Floats]:
     """Changes of the unknowns [unknowns] by which rows at a point (t, y, yd) are off by their round-off; met
     [unknowns]: how large each counts in a row.
     """
