@@ -58,7 +58,7 @@ def _implicit(form: DescriptorForm, program: Program, binding: Binding) -> list[
 def _constraints(
     form: DescriptorForm, program: Program, binding: Binding, at_times: frozenset[str]
 ) -> list[Diagnostic]:
-    """E517: no block of constraints larger than its set of coordinates."""
+    """E511, E517: no block of constraints larger than its set of coordinates."""
     sizes = {
         k: _size(binding.row_shapes[k])
         for k, r in enumerate(form.rows)
@@ -79,6 +79,9 @@ def _constraints(
     rows, coordinates = _reached(alone, matched, pairs)
     of = sorted({form.families[k].owner for k, _ in coordinates})
     labels = sorted({form.rows[k].label for k, _ in rows})
+    if not of:
+        message = f"{', '.join(labels)} contains no coordinate: what it names is one, or is given, and cancels"
+        return [Diagnostic("E511", message, form.rows[alone[0]].place, "delete it")]
     message = (
         f"more constraints than coordinates in block {{{', '.join(of)}}}: "
         f"{len(coordinates)} freedoms, {len(rows)} constraints ({', '.join(labels)})"

@@ -6,6 +6,8 @@ iterations of its loops and scattered by the shapes of a binding.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.binding.binding import Binding
@@ -15,7 +17,19 @@ from sysdyn.compiler.model.interpret import Value, over
 from sysdyn.compiler.model.parameters import Extents, positions
 from sysdyn.compiler.model.terms import has_reduction
 from sysdyn.dsl.model.calculus import derivative
-from sysdyn.dsl.model.expression import Node, is_const, topological, variables
+from sysdyn.dsl.model.expression import (
+    Node,
+    call,
+    const,
+    index,
+    is_const,
+    mul,
+    rebuild,
+    substitute,
+    topological,
+    topological_unbound,
+    variables,
+)
 
 Array = NDArray[np.float64]
 Point = tuple[float, Array, Array]  # t, y, yd
@@ -87,6 +101,7 @@ class Oracle:
         """(v, rows, columns) of dy (order 0) or dyd (order 1) in the order of the contract."""
         found: list[tuple[Array, Array, Array]] = []
         for kernel in self._kernels(block):
+            kernel = self._written_out(kernel)
             parts = [self._entry(kernel, k, column, (t, y, yd)) for k, column in _columns(kernel, order)]
             if parts:
                 found.append(tuple(np.stack(p, axis=1).ravel() for p in zip(*parts, strict=True)))  # type: ignore[arg-type]
@@ -106,6 +121,27 @@ class Oracle:
         place = self.at[family] + self._position(self.binding.shapes[family], at[cut:])
         shape = values.shape
         return values, np.broadcast_to(row, shape).astype(float), np.broadcast_to(place, shape).astype(float)
+
+    def _written_out(self, kernel: Kernel) -> Kernel:
+        """The kernel with each min, max and product over a range written out: only of sums there are slopes."""
+        rows = tuple(replace(s, expression=self._elements(s.expression)) for s in kernel.rows)
+        return kernel if rows == kernel.rows else replace(kernel, rows=rows)
+
+    def _elements(self, root: Node) -> Node:
+        done: dict[Node, Node] = {}
+        for node in topological_unbound([root]):
+            args = tuple(done.get(a, a) for a in node.args)
+            done[node] = rebuild(node, args)
+            if node.op != "reduce":
+                continue
+            bounds, body, name = node.args[:2], self._elements(node.args[2]), index(node.data[1])
+            done[node] = rebuild(node, (*args[:2], body))
+            if node.data[0] == "sum" or any(n.op == "index" for n in topological(bounds)):
+                continue
+            first, last = (round(float(v[0])) for v in over((), bounds, self.binding.parameters.lookup))
+            parts = [substitute(body, {name: const(float(k))}) for k in range(first, last + 1)]
+            done[node] = mul(*parts) if node.data[0] == "prod" else call(node.data[0], *parts)
+        return done[root]
 
     def _kernels(self, name: str) -> tuple[Kernel, ...]:
         block = self.form.block(name)

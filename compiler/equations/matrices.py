@@ -28,6 +28,8 @@ from sysdyn.values import dataclass
 
 LARGEST = 12
 """Rates and multipliers that are solved for in symbols."""
+FACTORED = 300
+"""Operations of a term that is factored."""
 LONGEST = 2000
 """Operations of an entry of the solution: twice those of the longest of the book's systems (parallelogram, 1117)."""
 MOVING = 3
@@ -235,9 +237,13 @@ def _readable(value: Any) -> Any:
 
 
 def _divided(sympy: Any, value: Any, pivot: Any) -> Any:
-    """Each term of a value divided."""
+    """Each term of a value divided, and factored where that takes no minutes."""
+    if value == 0:
+        return value
     parts = [term / pivot for term in sympy.Add.make_args(value)]
-    return sympy.Add(*(part if part.is_Symbol else sympy.factor(part) for part in parts)) if value != 0 else value
+    return sympy.Add(
+        *(part if part.is_Symbol or part.count_ops() > FACTORED else sympy.factor(part) for part in parts)
+    )
 
 
 def _simple(sympy: Any, value: Any) -> Any:

@@ -34,6 +34,8 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Related, Report, Sour
 from sysdyn.dsl.tree import syntax
 
 LIBRARY = Path(__file__).parents[1] / "std"
+MODULES = 8
+"""Names of modules that a message lists."""
 
 
 @cache
@@ -176,10 +178,12 @@ class FileScope:
                 self.report.error("E801", f"module '{'.'.join(names)}' imports itself", place)
             return found
         if not path.is_file():
-            modules = [p.stem for p in folder.glob("*.sd") if p.stem != "prelude"]
+            modules = sorted(p.stem for p in folder.glob("*.sd") if p.stem != "prelude")
             near = nearest(names[-1], modules)
-            head = "std." if inside else ""
-            help_ = f"nearest module: '{head}{near}'" if near else f"there are {', '.join(sorted(modules)) or 'none'}"
+            head, listed = "std." if inside else "", ", ".join(modules[:MODULES]) + ", ..." * (len(modules) > MODULES)
+            if not inside and (LIBRARY / f"{names[-1]}.sd").is_file():
+                head, near = "std.", names[-1]
+            help_ = f"nearest module: '{head}{near}'" if near else f"there are {listed or 'none'}"
             self.report.error("E103", f"there is no module '{'.'.join(names)}'", place, help=help_)
             return None
         self._modules[path] = None

@@ -136,7 +136,8 @@ class Calls(Context):
                 values.append(self.one_number(value, arg.value))
         if (count == -1 and not values) or (count >= 0 and len(values) != count):
             wants = "at least one argument" if count == -1 else f"{count} argument{'s' * (count != 1)}"
-            raise self.fail("E206", f"{name} takes {wants}, {len(values)} given", e.span)
+            shape = f"{name}({', '.join('xyz'[:count]) if count > 0 else 'x, y, ...'})"
+            raise self.fail("E206", f"{name} takes {wants}, {len(values)} given", e.span, help=shape)
         common: Dimension | None = None
         for k, value in enumerate(values):
             where = e.args[min(k, len(e.args) - 1)].value

@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.unit_habits import common
-from sysdyn.dsl.model.units import NONE, Dimension, multiply, si_text
+from sysdyn.dsl.model.units import NONE, Dimension, known, multiply, si_text
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.symbols import ParameterSymbol, Scope, UnknownSymbol
 from sysdyn.dsl.text.source import SourceText
@@ -114,7 +114,16 @@ def in_unit(number: syntax.Expr, wanted: Dimension) -> str:
     text = f"{'-' if inner is not number else ''}{inner.text}"
     if common(wanted) == "K":
         return f"celsius({text}), or '{text} K' where kelvins are meant"
-    return f"write '{text} {common(wanted)}'" if wanted else f"write '{text}', a number"
+    return f"write '{text} {_prefixed(inner, common(wanted))}'" if wanted else f"write '{text}', a number"
+
+
+def _prefixed(number: syntax.Number | syntax.Quantity, unit: str) -> str:
+    """A unit with the prefix that the quantity was written with, where it bears one: uF of `1 uH`."""
+    names = [factor.name for factor in number.unit.factors] if isinstance(number, syntax.Quantity) else []
+    alone = names[0] if len(names) == 1 else ""
+    whole, base = (known(name) for name in (alone, alone[1:]))
+    prefixed = bool(whole and base and whole[0] == base[0] and whole[1] != base[1] and known(alone[0] + unit))
+    return alone[0] + unit if prefixed else unit
 
 
 def refitted(scope: Scope, expression: syntax.Expr, factor: Dimension) -> str | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Callable
 
 from sysdyn.dsl.model.unit_habits import chained, common
@@ -90,6 +92,12 @@ def name(word: str, text: str, offset: int, moves: Callable[[str], bool]) -> Rem
         if quantity is not None:
             said = f"{quantity.right}: a unit is written without spaces, its factors are joined by dots"
             return Remedy(said, quantity.right, (quantity.start, quantity.end))
+    power = re.match(r"^(.*?)([\u00b2\u00b3\u00b9\u2070-\u2079]+)$", word)
+    fraction = unicodedata.normalize("NFKC", word).replace("\u2044", "/")
+    if power is not None and power[1]:
+        return Remedy(f"{power[1]}^{unicodedata.normalize('NFKC', power[2])}")
+    if "/" in fraction:
+        return Remedy(fraction)
     right = _NAMES.get(word)
     return None if right is None else Remedy(right, None if right == "g0" else right)
 

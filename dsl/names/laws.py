@@ -53,6 +53,8 @@ def law_of(
     node = _in_dimension(context, branch, side, value, wanted)
     own = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == branch.family.name}
     others = sorted(set(own) - {side})
+    if wanted in (None, "dissipator") and _memristive(side, own, node):
+        return LawOf("dissipator", side, node)
     if side in own or len(others) > 1:
         names = ", ".join((side, *others))
         raise context.fail(
@@ -76,6 +78,16 @@ def law_of(
         message = f"'{branch.name}' is a {wanted}, but its law relates {side} to its own {others[0]}"
         raise context.fail("E323", message, span, help=f"{kind}({side} = ...)")
     return LawOf(kind, side, node)
+
+
+def _memristive(side: str, own: dict[str, Node], law: Node) -> bool:
+    """Whether a law of effort and flow is modulated by its own displacement, and stores nothing: one is zero where the
+    other is, wherever that stands.
+    """
+    if side not in "ef" or set(own) != {*"efq"} - {side}:
+        return False
+    (other,) = set(own) - {"q"}
+    return own["q"] not in ex.variables(ex.substitute(law, {own[other]: ex.const(0.0)}))
 
 
 def _in_dimension(context: Context, branch: BranchSymbol, side: str, value: syntax.Expr, wanted: str | None) -> Node:
@@ -127,7 +139,7 @@ def _off_diagram(context: Context, side: str, other: str, span: syntax.Span) -> 
     """E302: the two variables are no edge of the diagram; what to write instead."""
     pair = frozenset((side, other))
     if pair == frozenset("pq"):
-        help_ = "write it as a dissipator e = M(s)*f with M = dp/dq, and s the state of dynamic s' = label.f"
+        help_ = "write it as a dissipator e = M(q)*f with M = dp/dq"
         return context.fail("E302", "p-q is the diagonal of the diagram: a memristive law", span, help=help_)
     requirement = "p' = e" if pair == frozenset("pe") else "q' = f"
     message = (

@@ -101,6 +101,7 @@ _SIGNS = {
     "\u2018": "' (the straight apostrophe)",
     "\u201c": '" (the straight quotation mark)',
     "\u201d": '" (the straight quotation mark)',
+    "\u2032": "' (the straight apostrophe)",
     "\u2212": "- (the hyphen of the keyboard)",
     "\u2013": "- (the hyphen of the keyboard)",
     "\u00b7": "* between factors, . between units",
@@ -134,6 +135,11 @@ _ASSIGNED = re.compile(r"=\s*([\w.]+\(.*->[^#]*)")
 _DECLARED = re.compile(r"(\w+)\s*\((.*?)\)\s*([\w\[\]]+\s*->\s*[\w\[\]]+)?\s*;?\s*(?:#.*)?$")
 """A label behind its component: name, parameters, nodes."""
 
+_EXPRESSIONS = frozenset(
+    {"energy", "content", "work", "let", "law", "phi", "psi", "gamma", "dynamic", "output", "const"}
+)
+"""Statements that end with an expression."""
+
 Complaint = tuple[str, str, str | None]
 """Code, message, help."""
 
@@ -152,7 +158,8 @@ def character(sign: str) -> Complaint:
     """A character that begins no token."""
     name = unicodedata.name(sign, "a control character").lower()
     shown = f"'{sign}'" if sign.isprintable() and sign != "\u00a0" else "a character"
-    return "E113", f"{shown} (U+{ord(sign):04X}, {name}) has no meaning here", _SIGNS.get(sign)
+    unseen = "delete it: editors do not show it" if unicodedata.category(sign) in ("Cc", "Cf") else None
+    return "E113", f"{shown} (U+{ord(sign):04X}, {name}) has no meaning here", _SIGNS.get(sign, unseen)
 
 
 def first_token(text: str, kind: str, body: str) -> Complaint:
@@ -279,6 +286,8 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
     shape = _SHAPES.get(word)
     if text == "," and word in ("param", "state", "let", "input", "output", "const", "discrete"):
         shape = f"one name a statement: {_SHAPES.get(word, word + ' on = false')}"
+    if kind == "<name>" and word in _EXPRESSIONS and "*" in accepted:
+        shape = f"factors are joined by '*': ... * {text}"
     if word == "trace" and text == "in":
         shape = "the unit stands before the name: trace x in mm as pos"
     return "E113", said, _hint(kind, text, line, accepted) or shape
@@ -320,6 +329,8 @@ def _listed(accepted: Collection[str]) -> str:
 def _hint(kind: str, text: str, line: str, accepted: Collection[str]) -> str | None:
     """The text to write for a slip that is easily named."""
     before = line[-1:]
+    if text in (")", "]") and text not in accepted:
+        return f"one '{'(' if text == ')' else '['}' more before it, or delete it"
     if text == "*" and before == "*":
         return "a power is written a^b"
     if text == "(" and "on" in accepted:

@@ -63,16 +63,16 @@ def _first(
 
 def _instant(dense: Dense, watch: Watch, low: tuple[float, Floats], high: tuple[float, Floats]) -> float:
     """Where a watch falls through zero; what begins at zero and rises (a bounce lower than the tolerance) falls from
-    its crest.
+    its crest, or, where that is round-off too, through its tolerance.
     """
-    row, side, _, rate, level, _ = watch
+    row, side, small, rate, level, _ = watch
     begin, value = low[0], side * float(low[1][row]) - level
     if value <= 0.0 and rate >= 0 and side * float(low[1][rate]) > 0.0 > side * float(high[1][rate]):
         lower, upper = ((at, side * float(values[rate])) for at, values in (low, high))
         begin = _root(dense, rate, side, lower, upper)
         value = side * float(dense(begin)[row]) - level
         if value <= 0.0:
-            return high[0]
+            value, level = value + small, level - small
     return _root(dense, row, side, (begin, value), (high[0], side * float(high[1][row]) - level), level)
 
 

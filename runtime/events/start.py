@@ -8,7 +8,7 @@ import numpy as np
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.observer import Observer
-from sysdyn.runtime.events.pivoting import NoActiveSetError
+from sysdyn.runtime.events.pivoting import NoActiveSetError, Settle
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart
@@ -16,6 +16,10 @@ from sysdyn.runtime.model.scales import magnitudes
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 
+AHEAD = (1e-8, 1e-5)
+"""Of the time in which the unknowns change: how far ahead a tie between active sets is looked at, where sources alone
+have moved.
+"""
 SPAN = 1.0
 """s: in which what starts at rest may come to its magnitude."""
 
@@ -63,8 +67,36 @@ def _fitting(system: System, t0: float, plan: Plan, until: float | None, *, cons
         contacts.size(*magnitudes(system, t, t + SPAN, y, yd))
         return y, yd, np.zeros_like(zeros)
 
+    determined = Determined(contacts)
     try:
-        y, _ = Determined(contacts).fit(t0, zeros, zeros, settle)
+        y, yd = determined.fit(t0, zeros, zeros, settle)
     except NoActiveSetError as error:
         raise errors[-1] if errors else InconsistentStart("stuck", float("inf"), names=error.names) from error
+    if _tied(contacts, contacts.observer(t0, y, yd)):
+        y = _ahead(contacts, determined, t0, settle, y)
     return next(state for state in reversed(found) if state.y is y)
+
+
+def _tied(contacts: Contacts, values: Floats) -> bool:
+    """Whether some ideal diode or valve may hold or not at the start: nothing flows through it, nothing holds it."""
+    zero = contacts.observer.zero
+    return any(
+        c.kind == "psi" and all(abs(values[row]) <= zero(row) for row in (c.value, c.rate, c.multiplier))
+        for c in contacts.contacts
+    )
+
+
+def _ahead(contacts: Contacts, determined: Determined, t0: float, settle: Settle, y: Floats) -> Floats:
+    """The point at t0 with the active set that fits these initial values a little later, where it fits at t0 too; y
+    where none does.
+    """
+    stood, zeros, time = contacts.state(), np.zeros_like(y), contacts.time
+    for later in AHEAD:
+        with suppress(NoActiveSetError):
+            determined.fit(t0 + later * time, zeros, zeros, settle)
+            point = settle(t0, zeros, zeros) if contacts.state() != stood else None
+            if point is not None and contacts.fits(t0, zeros, point) and not determined.leaves(t0, *point[:2]):
+                return point[0]
+        contacts.become(stood)
+    point = settle(t0, zeros, zeros)  # constants of the start are those of t0
+    return y if point is None else point[0]

@@ -161,8 +161,10 @@ class Succession:
     def _later(self, t: float, time: float, point: Point, stood: tuple[float, ...]) -> Point | None:
         """The point at t with the active set that fits `time` (s) later; None where that is the one that stood."""
         y, yd = point
+        found = self._restart.struck(t + time, y + time * yd, yd)
+        mean = yd if found is None else 0.5 * (yd + found[1])  # a flow that begins at rest moves by time^2 alone
         try:
-            self.determined.fit(t + time, y + time * yd, yd, self._restart.struck)
+            self.determined.fit(t + time, y + time * mean, yd, self._restart.struck)
         except NoActiveSetError:
             return None
         found = self._restart.struck(t, y, yd) if self.contacts.state() != stood else None

@@ -6,12 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from sysdyn.runtime.integrate.causes import failure
+from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.integrate.segments import Segment
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
+
+JUMP = 1e-9
+"""Of the largest value of a quantity: what it differs by less across an instant is no jump."""
 
 
 def cross(run: Integration, segment: Segment) -> None:
@@ -23,18 +27,35 @@ def cross(run: Integration, segment: Segment) -> None:
     run.sizes.share(y)
     with run.settler.exactly():
         y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
+        before = run.system.observe(method.t, y, yd) if run.driver.asks(segment.label) else None
         if run.pieces is not None:
             found: tuple[Floats, Floats] | None = run.pieces.jump(segment, y, yd)
         else:
             found = run.settlers.across(segment.begin, y, yd)
     if found is None:
         raise failure(run, "newton")
+    if before is not None and _jumps(run, before, run.system.observe(segment.begin, *found)):
+        _row_before(run)
     run.driver.leave(y, yd)
     method.t_end = segment.end
     point = [*found]
     del y, yd, found  # of a large run the room counts
     go_on(run, segment.begin, segment.label, point)
     run.driver.run.start_kind = 0
+
+
+def _jumps(run: Integration, before: Floats, behind: Floats) -> bool:
+    """Whether observed values [observed] differ by more than the run's tolerance of their largest."""
+    size = np.maximum(run.driver.largest()[: before.size], np.maximum(np.abs(before), np.abs(behind)))
+    return bool((np.abs(behind - before) > max(run.request.rtol, JUMP) * size).any())
+
+
+def _row_before(run: Integration) -> None:
+    """The row of the end of the last step; events that happen where the text jumps have written theirs."""
+    if run.pieces is None:
+        lib.core.sd_run_row(run.driver.core, TRACE)
+    elif not run.driver.run.start_kind:
+        run.pieces.row_before()
 
 
 def go_on(run: Integration, t: float, label: float, point: list[Floats]) -> None:

@@ -112,6 +112,13 @@ class Driver:
         blocks = [self.system.description.blocks.get(name, ()) for name in ("observe", "observe_scale")]
         return all(k.reads is not None and not (k.reads & audit) for block in blocks for k in block)
 
+    def asks(self, t: float) -> bool:
+        """Whether the next instant at which the trace wants a row is t (s), and not every step has one."""
+        run = self.run
+        if run.every_step or run.next >= run.instants or self._instants[run.next] > t:
+            return False
+        return bool(self._kinds[run.next] & TRACE)
+
     def leave(self, y: Floats, yd: Floats) -> None:
         """Notes the powers at y, yd [unknowns as written], the point behind which the run restarts."""
         lib.core.sd_run_leave(self.core, lib.pointer(y), lib.pointer(yd))

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from sysdyn.runtime.condense.condensed import Condensed, Forms, condensed
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.integrate.causes import failure, placed
+from sysdyn.runtime.integrate.causes import NEWTON, failure, placed
 from sysdyn.runtime.integrate.crossing import cross
 from sysdyn.runtime.integrate.driver import Driver, Sink
 from sysdyn.runtime.integrate.methods import Method
@@ -306,6 +306,8 @@ class Integration:
             if progress is not None:
                 progress(method.t)
             if state == 3:
+                if lib.CAUSES[method.cause] in NEWTON and self._resolved():
+                    continue
                 raise placed(self, lib.CAUSES[method.cause])
             if request.max_steps is not None and method.steps >= request.max_steps and method.t < request.t_end:
                 raise failure(self, "max_steps")
@@ -331,6 +333,22 @@ class Integration:
                 if method.t - at < CREPT * (request.t_end - self.start.t):
                     raise failure(self, "crawl")
                 marked, at = method.steps, method.t
+
+    def _resolved(self) -> bool:
+        """Whether a step failed by what round-off leaves of unknowns that are still zero where the terms of their rows
+        have grown; then their magnitudes have too, and the method begins anew at the last accepted point.
+        """
+        if self.system.unknowns > LARGE:
+            return False
+        y, yd = self.method.point()
+        before = self.sizes.at(y)[1].copy()
+        self.sizes.share(y)
+        self.sizes.resolve_by_rows(self.method.contents.t, y, yd, self.roles.state)
+        self.sizes.hand_down()
+        if not (self.sizes.at(y)[1] > 2.0 * before).any():
+            return False
+        self.method.start(self.method.contents.t, y, yd)
+        return True
 
     def run(self, sink: Sink, progress: Progress | None = None, *, spent: bool = True) -> Finished:
         """To the end, or SolverFailure; rows go to `sink` in any case, the time reached [s] to `progress`.  spent:

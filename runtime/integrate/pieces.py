@@ -280,13 +280,13 @@ class Pieces:
         point = found or handler.anew(t, y, yd)
         handler.happened[events:] = [replace(h, time=segment.label) for h in handler.happened[events:]]
         if len(handler.happened) > events:
-            self._row_before()
+            self.row_before()
         self.run.driver.run.start_kind = TRACE if due or len(handler.happened) > events else 0
         self._bounce(t)
         self._watch()
         return point
 
-    def _row_before(self) -> None:
+    def row_before(self) -> None:
         """The row of the end of the last step, with the parameters of before, where it has none in the trace."""
         core, after = self.run.driver.run, self.handler.now()
         if core.every_step or core.end_kind & TRACE:

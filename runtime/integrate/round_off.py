@@ -7,11 +7,12 @@ What is zero counts in a row as the largest of its kind and unit would: beside t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints, stated
-from sysdyn.runtime.model.scales import alike, group_maxima
+from sysdyn.runtime.model.scales import alike, group_maxima, group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.least_change import least_norm
@@ -52,6 +53,34 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     k_q, k_f = system.form.k_q, system.form.k_f
     # faster than that it was in shorter steps, which are over
     met[k_f] = np.minimum(met[k_f], np.maximum(2.0 * met[k_q] / step, np.abs(y[k_f])))
+    before = system.observe(t, y, yd), system.ledgers(t, y, yd)
+    found = LeftOpen(*map(np.zeros_like, before))
+    given = _given(system)
+    said = given > 0.0
+    for change in _changes(system, (t, y, yd), met, step):
+        if (np.abs(change)[said] > given[said]).any():
+            return LeftOpen(*map(np.zeros_like, before))
+        moved = t, y + change, yd + change / step
+        for largest, now, was in zip(found, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
+            np.fmax(largest, MARGIN * np.abs(now - was), out=largest)
+    return found
+
+
+def open_unknowns(system: System, t: float, y: Floats, yd: Floats, step: float) -> Floats:
+    """What round-off leaves open of each unknown [unknowns] at a point, in steps of `step` (s); zero where the Jacobian
+    says nothing.
+    """
+    found = np.zeros(system.unknowns)
+    for change in _changes(system, (t, y, yd), group_maximum(system, np.abs(y)), step):
+        np.fmax(found, np.abs(change), out=found)
+    return found
+
+
+def _changes(system: System, point: tuple[float, Floats, Floats], met: Floats, step: float) -> Iterator[Floats]:
+    """Changes of the unknowns [unknowns] by which rows at a point (t, y, yd) are off by their round-off; met
+    [unknowns]: how large each counts in a row.
+    """
+    t, y, yd = point
     rows, columns = system.pattern.row, system.pattern.columns_of()
     jy, jyd = system.jacobian(t, y, yd)
     with np.errstate(all="ignore"):
@@ -59,27 +88,18 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
         of_step = jy + jyd / step
     size = np.zeros(system.rows)
     np.maximum.at(size, rows, terms)
-    before = system.observe(t, y, yd), system.ledgers(t, y, yd)
-    found = LeftOpen(*map(np.zeros_like, before))
     if not (np.isfinite(of_step).all() and np.isfinite(size).all()):
-        return found
+        return
     size = _eliminated(system, (rows, columns, of_step), size)
     # in magnitudes: what an elimination leaves of the largest unknown is no change of one that is small by its unit
     of_row, of_column = np.where(size > 0.0, size, 1.0), np.where(met > 0.0, met, 1.0)
     with np.errstate(all="ignore"):
         scaled = rows, columns, of_step * of_column[columns] / of_row[rows]
     if not np.isfinite(scaled[2]).all():
-        return found
-    given = _given(system)
-    said = given > 0.0
+        return
     for error in normal(PROBES, system.rows):
-        change = of_column * least_norm((system.rows, system.unknowns), scaled, EPS * np.where(size > 0.0, error, 0.0))
-        if (np.abs(change)[said] > given[said]).any():
-            return LeftOpen(*map(np.zeros_like, before))
-        moved = t, y + change, yd + change / step
-        for largest, now, was in zip(found, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
-            np.fmax(largest, MARGIN * np.abs(now - was), out=largest)
-    return found
+        least = least_norm((system.rows, system.unknowns), scaled, EPS * np.where(size > 0.0, error, 0.0))
+        yield of_column * least
 
 
 def _given(system: System) -> Floats:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
 from sysdyn.runtime.integrate.request import Request
+from sysdyn.runtime.integrate.round_off import open_unknowns
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, magnitudes, noise
 from sysdyn.runtime.model.system import LARGE, System
@@ -122,6 +123,12 @@ class Sizes:
             return
         np.maximum(self.resolved, np.abs(y), out=self.resolved)
         jy = self.system.slopes(t, y, yd, rate=False)
-        open_ = np.where(carries, 0.0, noise(self.system, y, jy, self.time))
+        self._at_least(np.where(carries, 0.0, noise(self.system, y, jy, self.time)))
+
+    def resolve_by_rows(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
+        """The same of all that the rows determine, by the inverse of their Jacobian: where steps fail by it."""
+        self._at_least(np.where(carries, 0.0, open_unknowns(self.system, t, y, yd, self.time)))
+
+    def _at_least(self, open_: Floats) -> None:
         least = UNRESOLVED * open_ / max(self._request.rtol, 1e-15)
         np.maximum(self.magnitude, least, out=self.magnitude)

@@ -580,3 +580,32 @@ def test_numbers_of_many_digits_stay_as_they_are_written(tmp_path, capsys):
         assert "e-05" not in text
         assert "20000" not in text
     assert "-m l sin(th) (f_x f_th - 9.80665)" in text
+
+
+FOUR_BAR = """
+model four_bar {
+  param a = 0.1 m
+  param b = 0.3 m
+  param c = 0.25 m
+  param d = 0.32 m
+  coord x1, y1, x2, y2: translation ~ 0.2 m
+  coord al: rotation = 20 deg
+  energy T* = 1/2*(0.5 kg)*(x1'^2 + y1'^2) + 1/2*(0.8 kg)*(x2'^2 + y2'^2) + 1/2*(0.01 kg.m^2)*al'^2
+  work 1.2 N.m on al
+  phi cx: x1 = a*cos(al)
+  phi cy: y1 = a*sin(al)
+  phi coupler: (x2 - x1)^2 + (y2 - y1)^2 = b^2
+  phi rocker: (x2 - d)^2 + y2^2 = c^2
+}
+"""
+
+
+def test_long_terms_are_not_factored(tmp_path, monkeypatch, capsys):
+    """A solution longer than anyone reads is refused; factors of one of its terms alone took minutes."""
+    import sympy
+
+    factor, longest = sympy.factor, []
+    monkeypatch.setattr(sympy, "factor", lambda value: longest.append(value.count_ops()) or factor(value))
+    assert run(["equations", write(tmp_path, FOUR_BAR), "--form", "underlying"]) == 1
+    assert "more than 2000 operations" in capsys.readouterr().err
+    assert max(longest) <= matrices.FACTORED

@@ -528,3 +528,30 @@ def test_python_control_says_the_same(model, outputs, tmp_path):
             by_poles = ours.gain * np.prod(s - np.asarray(ours.zeros)) / np.prod(s - np.asarray(ours.poles))
             assert single(s) == pytest.approx(by_poles, rel=CLOSE)
         assert single.dcgain() == pytest.approx(found.transfers[k].static, rel=CLOSE, abs=1e-12)
+
+
+EXTREMES = """
+model extremes {
+  param n = 3
+  state s[1..3]: 1 = [1, 2, 3]
+  for i in 1..n { dynamic s[i]' = -i*s[i]/(1 s) }
+  let low = min(i in 1..n: s[i])
+  let high = max(i in 1..n: s[i]^2)
+  let all = prod(i in 1..n: s[i])
+  let most = sum(i in 1..n: max(j in 1..n: i*s[j]))
+}
+
+scene run of extremes {
+  time 0 s to 1 s
+  trace low, high, all, most
+}
+"""
+
+
+def test_extremes_and_products_over_a_range_have_slopes(tmp_path, capsys):
+    found = linear(capsys, write(tmp_path, EXTREMES), "--scene", "run")
+    slopes = dict(zip(found["outputs"], np.array(found["C"]), strict=True))
+    expected = {"low": [1.0, 0.0, 0.0], "high": [0.0, 0.0, 6.0], "all": [6.0, 3.0, 2.0], "most": [0.0, 0.0, 6.0]}
+    assert found["states"] == ["s[1]", "s[2]", "s[3]"]
+    for name, row in expected.items():
+        assert np.abs(slopes[name] - row).max() <= CLOSE

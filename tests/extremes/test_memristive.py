@@ -1,0 +1,52 @@
+"""A dissipator whose law reads its own displacement: (R + k q^2) q' = v has the integral R q + k q^3/3 = int v dt."""
+
+import numpy as np
+import pytest
+from running import ran
+
+LAWS = ("e = (100 ohm + k*q^2)*f", "f = e/(100 ohm + k*q^2)")
+MODEL = """
+component memristor {
+  param k: ohm/C^2
+  branch: electrical
+  law LAW
+}
+
+model ladder {
+  param n = 2
+  node s[1..n]: electrical
+  for i in 1..n {
+    V[i]: effort(e = i*1 V*sin(3 rad/s*t)) s[i] -> ground
+    M[i]: memristor(k = 5e6 ohm/C^2) s[i] -> ground
+  }
+}
+
+scene run of ladder {
+  time 0 s to 4 s
+  trace M[1..n].q as q, M[1..n].f as i every 20 ms
+}
+"""
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+def test_closed_form(tmp_path, law, formulation):
+    run = ran(tmp_path, MODEL.replace("LAW", law), formulation=formulation, accuracy=1e-6)
+    assert run.met
+    time = np.asarray(run.trace.time)
+    for k in (1, 2):
+        linkage = k * (1.0 - np.cos(3.0 * time)) / 3.0
+        charge = np.array([_charge(value) for value in linkage])
+        current = k * np.sin(3.0 * time) / (100.0 + 5e6 * charge**2)
+        for name, exact in ((f"q[{k}]", charge), (f"i[{k}]", current)):
+            assert np.abs(np.asarray(run.trace[name]) - exact).max() <= 1e-6 * np.abs(exact).max()
+
+
+def _charge(linkage):
+    roots = np.roots([5e6 / 3.0, 0.0, 100.0, -linkage])
+    return roots[np.abs(roots.imag) < 1e-12].real[0]
+
+
+@pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
+def test_complementary_forms_know_no_displacement_of_it(tmp_path, formulation):
+    assert ran(tmp_path, MODEL.replace("LAW", LAWS[0]), formulation=formulation).refused == "E602"
