@@ -69,6 +69,11 @@ class Room:
         """Rows or entries of a matrix."""
         return np.zeros(max(self._entries, *(system.rows for system in self._systems)) + 1)
 
+    def rest(self) -> None:
+        """Lets go of it all: who has its addresses binds it anew before anything is evaluated."""
+        for name in ("y", "yd", "slope"):
+            self.__dict__.pop(name, None)
+
 
 class Condensed:
     """The kept unknowns and rows of a system; what Method and Settler ask of a System, with places of its own.
@@ -313,7 +318,7 @@ class Condensed:
 
     def bind(self, room: Room) -> None:
         """Says where the whole system is evaluated: once it is known how much room all forms need."""
-        self._room, condensed = room, self.condensed
+        condensed = self.condensed
         condensed.y, condensed.yd = lib.pointer(room.y), lib.pointer(room.yd)
         condensed.r = condensed.slope = lib.pointer(room.slope)
         lib.core.sd_condensed_bind(c.byref(condensed), c.byref(self.core))
@@ -369,6 +374,12 @@ class Forms:
 
     stepped: Condensed
     settled: Condensed
+    room: Room
+
+    def bind(self) -> None:
+        """Says where the whole systems are evaluated."""
+        self.stepped.bind(self.room)
+        self.settled.bind(self.room)
 
     def order(self) -> Order:
         """Elimination order of the stepped form's matrices [kept], found once."""
@@ -422,7 +433,10 @@ class _Condenser:
         asked = digest.digest()
         if self._last is None or self._last[1] != asked:
             self._last = self._renewed(t, y, yd), asked
-        return self._last[0]
+        found = self._last[0]
+        if found is not None:
+            found.bind()
+        return found
 
     def _renewed(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         whole = self.whole
@@ -493,12 +507,11 @@ class _Condenser:
                 system.put_away(whole=True)
                 whole.spare()
                 whole.trim()
-        room = Room(max(form.places for form in made.values()), whole, self.settled)
         for form in made.values():
-            form.bind(room)
             if whole.unknowns > LARGE:
                 form.put_away()
-        return Forms(made[whole], made[self.settled])
+        room = Room(max(form.places for form in made.values()), whole, self.settled)
+        return Forms(made[whole], made[self.settled], room)
 
 
 def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 def cross(run: Integration, segment: Segment) -> None:
     """Restarts behind the instant at which the segment before this one ended."""
     n, method = run.system.form.written, run.method.contents
-    y, yd = run.method.point()
     if run.pieces is None:  # nobody asks for what the last step made
         run.method.rest()
+    y, yd = run.method.point()
     run.sizes.share(y)
     y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
     if run.pieces is not None:
@@ -30,6 +30,7 @@ def cross(run: Integration, segment: Segment) -> None:
     if found is None:
         raise failure(run, "newton")
     run.driver.leave(y, yd)
+    run.settlers.rest()
     method.t_end = segment.end
     point = [*found]
     del y, yd, found  # of a large run the room counts

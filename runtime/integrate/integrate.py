@@ -379,6 +379,8 @@ class Integration:
         for name in ("method", "driver", "told", "linear", "_taken", "settler", "settlers", "projection", "pieces"):
             self.__dict__.pop(name, None)
         ledgers.close()
+        if self.forms is not None:
+            self.forms.room.rest()
         self.system.trim()
 
 

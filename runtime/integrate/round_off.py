@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints, stated
 from sysdyn.runtime.model.scales import alike, group_maxima
 from sysdyn.runtime.model.system import System
@@ -48,38 +49,57 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     nothing, or that nothing at all is known: not even what the text gives some unknown at the start (where constraints
     lose rank their multipliers were so large, in steps that are over).
     """
+    y, yd = last[:2]
+    before = system.observe(t, y, yd), system.ledgers(t, y, yd)
+    found = LeftOpen(*map(np.zeros_like, before))
+    scaled = _scaled(system, t, last, step)
+    if scaled is None:
+        return found
+    entries, of_column, counts = scaled
+    given = _given(system)
+    said = given > 0.0
+    for probe in range(PROBES):
+        error = EPS * np.where(counts, normal(system.rows, behind=probe * system.rows), 0.0)
+        change = of_column * least_norm((system.rows, system.unknowns), entries, error)
+        if (np.abs(change)[said] > given[said]).any():
+            return LeftOpen(*map(np.zeros_like, before))
+        moved = t, y + change, yd + change / step
+        for largest, now, was in zip(found, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
+            np.fmax(largest, MARGIN * np.abs(now - was), out=largest)
+        del error, change, moved  # of a large system the room counts
+    return found
+
+
+def _scaled(
+    system: System, t: float, last: tuple[Floats, Floats, Floats], step: float
+) -> tuple[tuple[Ints, Ints, Floats], Floats, NDArray[np.bool_]] | None:
+    """The Jacobian of a step by its entries, in magnitudes of unknowns and terms of rows; the magnitudes [unknowns]; rows
+    [rows] that have terms.  None where there are numbers that are none.
+    """
     y, yd, met = *last[:2], last[2][alike(system)]
     k_q, k_f = system.form.k_q, system.form.k_f
     # faster than that it was in shorter steps, which are over
     met[k_f] = np.minimum(met[k_f], np.maximum(2.0 * met[k_q] / step, np.abs(y[k_f])))
     rows, columns = system.pattern.row, system.pattern.columns_of()
     jy, jyd = system.jacobian(t, y, yd)
-    with np.errstate(all="ignore"):
-        terms = np.abs(jy) * met[columns] + np.abs(jyd) * np.maximum(np.abs(yd), met / step)[columns]
-        of_step = jy + jyd / step
     size = np.zeros(system.rows)
-    np.maximum.at(size, rows, terms)
-    before = system.observe(t, y, yd), system.ledgers(t, y, yd)
-    found = LeftOpen(*map(np.zeros_like, before))
-    if not (np.isfinite(of_step).all() and np.isfinite(size).all()):
-        return found
-    size = _eliminated(system, (rows, columns, of_step), size)
+    with np.errstate(all="ignore"):
+        terms = np.abs(jy) * met[columns]
+        terms += np.abs(jyd) * np.maximum(np.abs(yd), met / step)[columns]
+        np.maximum.at(size, rows, terms)
+        jyd /= step
+        jy += jyd
+    values = jy
+    del terms, jy, jyd  # of a large system the room counts, here and below
+    if not (np.isfinite(values).all() and np.isfinite(size).all()):
+        return None
+    size = _eliminated(system, (rows, columns, values), size)
     # in magnitudes: what an elimination leaves of the largest unknown is no change of one that is small by its unit
     of_row, of_column = np.where(size > 0.0, size, 1.0), np.where(met > 0.0, met, 1.0)
     with np.errstate(all="ignore"):
-        scaled = rows, columns, of_step * of_column[columns] / of_row[rows]
-    if not np.isfinite(scaled[2]).all():
-        return found
-    given = _given(system)
-    said = given > 0.0
-    for error in normal(PROBES, system.rows):
-        change = of_column * least_norm((system.rows, system.unknowns), scaled, EPS * np.where(size > 0.0, error, 0.0))
-        if (np.abs(change)[said] > given[said]).any():
-            return LeftOpen(*map(np.zeros_like, before))
-        moved = t, y + change, yd + change / step
-        for largest, now, was in zip(found, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
-            np.fmax(largest, MARGIN * np.abs(now - was), out=largest)
-    return found
+        values *= of_column[columns]
+        values /= of_row[rows]
+    return ((rows, columns, values), of_column, size > 0.0) if np.isfinite(values).all() else None
 
 
 def _given(system: System) -> Floats:

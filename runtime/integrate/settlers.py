@@ -90,6 +90,12 @@ class Settlers:
             settler.by_basis(0.0, determined=True)
         return Restart(settler, self.keeps)
 
+    def rest(self) -> None:
+        """Of a large system: lets go of the room in which points behind a jump were settled."""
+        self.settler.rest()
+        if "restart" in self.__dict__:
+            self.restart.settler.rest()
+
 
 def steep_balances(system: System) -> bool:
     """Whether laws of balances are so steep that the rows have scales of their own."""

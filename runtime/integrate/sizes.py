@@ -58,9 +58,9 @@ class Sizes:
         return np.zeros(self.system.unknowns)
 
     @cached_property
-    def resolved(self) -> Floats:
-        """|y| of which is known what round-off leaves open [unknowns]."""
-        return np.zeros(self.system.unknowns)
+    def resolved(self) -> Floats | NDArray[np.float32]:
+        """|y| of which is known what round-off leaves open [unknowns], roughly."""
+        return np.zeros(self.system.unknowns, dtype=np.float32 if self.system.unknowns > LARGE else np.float64)
 
     def let_go(self) -> None:
         """Of what the start knows: found again if asked."""
@@ -120,7 +120,7 @@ class Sizes:
         """
         if (np.abs(y) <= 2.0 * self.resolved).all():
             return
-        np.maximum(self.resolved, np.abs(y), out=self.resolved)
+        np.maximum(self.resolved, np.abs(y), out=self.resolved, casting="same_kind")
         jy = self.system.slopes(t, y, yd, rate=False)
         open_ = np.where(carries, 0.0, noise(self.system, y, jy, self.time))
         least = UNRESOLVED * open_ / max(self._request.rtol, 1e-15)

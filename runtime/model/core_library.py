@@ -186,6 +186,7 @@ def _load() -> Any:
         "sd_expanded_free": (None, [_P]),
         "sd_expanded_stepper": (_P, [_P]),
         "sd_expanded_start": (None, [_P, _D, _P, _P, _D]),
+        "sd_settle_rest": (None, [_P]),
         "sd_settle_free": (None, [_P]),
         "sd_settle_point": (c.c_int, [_P, _D, _P, _P]),
         "sd_least_norm_new": (c.POINTER(LeastNorm), [_P, _P, _I, _I]),
