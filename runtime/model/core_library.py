@@ -141,6 +141,7 @@ def _load() -> Any:
         "sd_first_bad": (c.c_int32, [_I, _P]),
         "sd_jacobian": (c.c_int32, [_P, _D, _P, _P, _P, _P, _P]),
         "sd_linear_new": (c.POINTER(Linear), [_I, _P, _P, _P]),
+        "sd_linear_rest": (None, [_P]),
         "sd_linear_ordered": (c.POINTER(Linear), [_I, _P, _P, _P]),
         "sd_linear_free": (None, [_P]),
         "sd_linear_factor": (c.c_int, [_P, _P, _P]),

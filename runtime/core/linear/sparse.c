@@ -13,7 +13,7 @@
                           * twice their solutions are as good (those of 4650 masses at random: a fifth of the time) */
 #define ROOM 2          /* entries of a factor for each of the matrix: room for them */
 #define SMALL 10000     /* columns up to which room that was not taken is kept for the next pivoting */
-#define NARROW 4        /* entries of both factors a column up to which they are a line's */
+#define NARROW 4        /* entries of both factors a column, or rows that it touches, up to which they are a line's */
 
 void sd_sparse_free(sd_sparse *lu)
 {
@@ -118,15 +118,16 @@ static double own_threshold(const sd_sparse *lu, double threshold)
     return lu->paired > 1 && threshold > FAINT_PIVOT ? FAINT_PIVOT : threshold;
 }
 
-/* whether the own row of column c pivots there, whose largest entry is known */
-static int takes_own(const sd_sparse *lu, const sd_matrix *matrix, int32_t c, int32_t own, double threshold, double largest)
+/* whether the own row of column c pivots there, which touches rows stack[top..) and whose largest entry is known */
+static int takes_own(const sd_sparse *lu, const sd_matrix *matrix, int32_t c, int32_t own, int32_t top, double threshold,
+                     double largest)
 {
     double size = sd_size(lu->x[own]), before = 0.0;
     if (!lu->paired || lu->place[own] >= 0 || !(largest > 0.0))
         return 0;
     if (size >= own_threshold(lu, threshold) * largest)
         return 1;
-    if (!is_long(lu) || size < GROWN * largest)
+    if (!is_long(lu) || lu->rows - top > NARROW || size < GROWN * largest)
         return 0;
     const sd_number *value = sd_column_of(matrix, c);
     for (int32_t e = matrix->column[c]; e < matrix->column[c + 1]; e++, value++)
@@ -145,7 +146,7 @@ static int32_t choose(const sd_sparse *lu, const sd_matrix *matrix, int32_t c, i
     /* what is left below a part of its column must be what the matrix lacks */
     double threshold = lu->idle && lu->null_pivot > SD_LEAST_PIVOT ? 1.0 : THRESHOLD;
     int32_t own = lu->own ? lu->own[c] : c;
-    if (takes_own(lu, matrix, c, own, threshold, *largest))
+    if (takes_own(lu, matrix, c, own, top, threshold, *largest))
         return own;
     for (int32_t i = top; i < lu->rows && *largest > 0.0; i++) {
         int32_t r = lu->stack[i];
