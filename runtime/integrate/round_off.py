@@ -73,8 +73,8 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
 def _scaled(
     system: System, t: float, last: tuple[Floats, Floats, Floats], step: float
 ) -> tuple[tuple[Ints, Ints, Floats], Floats, NDArray[np.bool_]] | None:
-    """The Jacobian of a step by its entries, in magnitudes of unknowns and terms of rows; the magnitudes [unknowns]; rows
-    [rows] that have terms.  None where there are numbers that are none.
+    """The Jacobian of a step by its entries, in magnitudes of unknowns and terms of rows; these magnitudes [unknowns];
+    which rows have terms [rows].  None where there are numbers that are none.
     """
     y, yd, met = *last[:2], last[2][alike(system)]
     k_q, k_f = system.form.k_q, system.form.k_f
