@@ -27,7 +27,7 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.numerics.ordering import SMALL, Order, any_order, paired_order, with_pairs
-from sysdyn.runtime.numerics.stretches import Ascents, whole_of
+from sysdyn.runtime.numerics.stretches import Ascents, Stretches, whole_of
 from sysdyn.values import dataclass
 
 LEAST, STEEP = 12, 50
@@ -151,6 +151,15 @@ class Condensed:
     def unread(self) -> Ints:
         """Places of the unknowns that nothing reads."""
         return whole_of(self._unread)
+
+    def expanded(self, kept: Floats, stays: Floats | Stretches[Any], *, rate: bool = False) -> Floats:
+        """Every unknown [unknowns of the whole] of a point, or the rate of each, by those of what is kept and of what
+        nothing reads.
+        """
+        found = np.empty(self.whole.unknowns)
+        found[self.unread] = whole_of(stays)
+        lib.core.sd_condensed_expand(c.byref(self.condensed), lib.pointer(kept), lib.pointer(found), int(rate))
+        return found
 
     def put_away(self) -> None:
         """Of a large system, once all is made: nobody reads these places for a while."""

@@ -351,7 +351,7 @@ class Integration:
             self._advance(sink, progress, began, segment.end)
         if spent:
             self.method.rest()
-        y, yd = self.method.point()
+        last = self.method.last()
         found = Finished(
             method.t,
             self.statistics(),
@@ -367,10 +367,10 @@ class Integration:
         if spent and self.system.unknowns > LARGE:
             del method
             self._leave_method()
-        met, magnitude = self.sizes.at(y, last=True)
+        met, magnitude = self.sizes.at(last()[0], last=True)
         magnitude, met = self.confirmed(met, magnitude), group_maxima(self.system, met)
         self._spare()
-        return replace(found, magnitude=magnitude, last=(y, yd, met))
+        return replace(found, magnitude=magnitude, last=(last, met))
 
     def _leave_method(self) -> None:
         """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""
