@@ -60,7 +60,8 @@ class Sizes:
     @cached_property
     def resolved(self) -> Floats | NDArray[np.float32]:
         """|y| of which is known what round-off leaves open [unknowns], roughly."""
-        return np.zeros(self.system.unknowns, dtype=np.float32 if self.system.unknowns > LARGE else np.float64)
+        number = self.system.unknowns
+        return np.zeros(number, dtype=np.float32) if number > LARGE else np.zeros(number)
 
     def let_go(self) -> None:
         """Of what the start knows: found again if asked."""
