@@ -151,8 +151,8 @@ def test_a_section_of_a_run_holds_few_bytes(tmp_path, model, sections, most):
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallinfo2"), reason="needs glibc's mallinfo2")
 @pytest.mark.one_in(3)
 def test_between_two_pieces_of_a_run_a_section_holds_few_bytes(tmp_path):
-    """Where the matrix of all unknowns is looked at behind a jump of the text: 1940 of a line by radau today; 2400 where
-    factors kept their numbers and the settling its room; 2870 to 3380 where both had more of their own, 3785 where the
+    """Where the matrix of all unknowns is looked at behind a jump of the text: 1940 of a line by radau today; 2400
+    where factors kept their numbers and the settling its room; 2870 to 3380 where both had more of their own, 3785 where the
     method kept the vectors that its next start makes anew, and the points on both sides were held.
     """
     options = "--method", "radau", "--accuracy", "0.1"
@@ -189,8 +189,8 @@ run(sys.argv[1:])
 
 
 def test_what_round_off_leaves_open_takes_few_bytes_a_section(tmp_path):
-    """Of arrays and objects of Python, between two runs: 1251 of a ladder today; 1924 where each part of the Jacobian was
-    held beside what it goes into, and all errors that are tried at once.
+    """Of arrays and objects of Python, between two runs: 1251 of a ladder today; 1924 where each part of the Jacobian
+    was held beside what it goes into, and all errors that are tried at once.
     """
     assert _bytes(OPENED, tmp_path, *LADDER, "--accuracy", "0.1", sections=(21_000, 30_000)) < 1300
 
