@@ -152,8 +152,8 @@ def test_a_section_of_a_run_holds_few_bytes(tmp_path, model, sections, most):
 @pytest.mark.one_in(3)
 def test_between_two_pieces_of_a_run_a_section_holds_few_bytes(tmp_path):
     """Where the matrix of all unknowns is looked at behind a jump of the text: 1940 of a line by radau today; 2400
-    where factors kept their numbers and the settling its room; 2870 to 3380 where both had more of their own, 3785 where the
-    method kept the vectors that its next start makes anew, and the points on both sides were held.
+    where factors kept their numbers and the settling its room; 2870 to 3380 where both had more of their own, 3785
+    where the method kept the vectors that its next start makes anew, and the points on both sides were held.
     """
     options = "--method", "radau", "--accuracy", "0.1"
     assert _bytes(CROSSED, tmp_path, LINE, *options, sections=(27_000, 33_000)) < 2300
