@@ -105,7 +105,8 @@ class Compared:
         if self._opened is None or self._opened[0] is not finished:
             assert finished.last is not None
             step = (finished.reached - self.options.t_start) / max(finished.statistics.steps, 1)
-            self._opened = finished, left_open(system, finished.reached, finished.last, step)
+            point, met = finished.last
+            self._opened = finished, left_open(system, finished.reached, (*point(), met), step)
         return self._opened[1]
 
     def _open_quantities(self, finished: Finished, quantities: Quantities) -> Floats:

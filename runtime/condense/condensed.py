@@ -27,7 +27,7 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.numerics.ordering import SMALL, Order, any_order, paired_order, with_pairs
-from sysdyn.runtime.numerics.stretches import Ascents, whole_of
+from sysdyn.runtime.numerics.stretches import Ascents, Stretches, whole_of
 from sysdyn.values import dataclass
 
 LEAST, STEEP = 12, 50
@@ -68,6 +68,11 @@ class Room:
     def slope(self) -> Floats:
         """Rows or entries of a matrix."""
         return np.zeros(max(self._entries, *(system.rows for system in self._systems)) + 1)
+
+    def rest(self) -> None:
+        """Lets go of it all: who has its addresses binds it anew before anything is evaluated."""
+        for name in ("y", "yd", "slope"):
+            self.__dict__.pop(name, None)
 
 
 class Condensed:
@@ -146,6 +151,15 @@ class Condensed:
     def unread(self) -> Ints:
         """Places of the unknowns that nothing reads."""
         return whole_of(self._unread)
+
+    def expanded(self, kept: Floats, stays: Floats | Stretches[Any], *, rate: bool = False) -> Floats:
+        """Every unknown [unknowns of the whole] of a point, or the rate of each, by those of what is kept and of what
+        nothing reads.
+        """
+        found = np.empty(self.whole.unknowns)
+        found[self.unread] = whole_of(stays)
+        lib.core.sd_condensed_expand(c.byref(self.condensed), lib.pointer(kept), lib.pointer(found), int(rate))
+        return found
 
     def put_away(self) -> None:
         """Of a large system, once all is made: nobody reads these places for a while."""
@@ -313,7 +327,7 @@ class Condensed:
 
     def bind(self, room: Room) -> None:
         """Says where the whole system is evaluated: once it is known how much room all forms need."""
-        self._room, condensed = room, self.condensed
+        condensed = self.condensed
         condensed.y, condensed.yd = lib.pointer(room.y), lib.pointer(room.yd)
         condensed.r = condensed.slope = lib.pointer(room.slope)
         lib.core.sd_condensed_bind(c.byref(condensed), c.byref(self.core))
@@ -369,6 +383,12 @@ class Forms:
 
     stepped: Condensed
     settled: Condensed
+    room: Room
+
+    def bind(self) -> None:
+        """Says where the whole systems are evaluated."""
+        self.stepped.bind(self.room)
+        self.settled.bind(self.room)
 
     def order(self) -> Order:
         """Elimination order of the stepped form's matrices [kept], found once."""
@@ -422,7 +442,10 @@ class _Condenser:
         asked = digest.digest()
         if self._last is None or self._last[1] != asked:
             self._last = self._renewed(t, y, yd), asked
-        return self._last[0]
+        found = self._last[0]
+        if found is not None:
+            found.bind()
+        return found
 
     def _renewed(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         whole = self.whole
@@ -493,12 +516,11 @@ class _Condenser:
                 system.put_away(whole=True)
                 whole.spare()
                 whole.trim()
-        room = Room(max(form.places for form in made.values()), whole, self.settled)
         for form in made.values():
-            form.bind(room)
             if whole.unknowns > LARGE:
                 form.put_away()
-        return Forms(made[whole], made[self.settled])
+        room = Room(max(form.places for form in made.values()), whole, self.settled)
+        return Forms(made[whole], made[self.settled], room)
 
 
 def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:

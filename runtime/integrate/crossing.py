@@ -21,9 +21,9 @@ JUMP = 1e-9
 def cross(run: Integration, segment: Segment) -> None:
     """Restarts behind the instant at which the segment before this one ended."""
     n, method = run.system.form.written, run.method.contents
-    y, yd = run.method.point()
     if run.pieces is None:  # nobody asks for what the last step made
         run.method.rest()
+    y, yd = run.method.point()
     run.sizes.share(y)
     with run.settler.exactly():
         y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
@@ -37,6 +37,7 @@ def cross(run: Integration, segment: Segment) -> None:
     if before is not None and _jumps(run, before, run.system.observe(segment.begin, *found)):
         _row_before(run)
     run.driver.leave(y, yd)
+    run.settlers.rest()
     method.t_end = segment.end
     point = [*found]
     del y, yd, found  # of a large run the room counts

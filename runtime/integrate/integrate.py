@@ -369,7 +369,7 @@ class Integration:
             self._advance(sink, progress, began, segment.end)
         if spent:
             self.method.rest()
-        y, yd = self.method.point()
+        last = self.method.last()
         found = Finished(
             method.t,
             self.statistics(),
@@ -385,10 +385,10 @@ class Integration:
         if spent and self.system.unknowns > LARGE:
             del method
             self._leave_method()
-        met, magnitude = self.sizes.at(y, last=True)
+        met, magnitude = self.sizes.at(last()[0], last=True)
         magnitude, met = self.confirmed(met, magnitude), group_maxima(self.system, met)
         self._spare()
-        return replace(found, magnitude=magnitude, last=(y, yd, met))
+        return replace(found, magnitude=magnitude, last=(last, met))
 
     def _leave_method(self) -> None:
         """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""
@@ -397,6 +397,8 @@ class Integration:
         for name in ("method", "driver", "told", "linear", "_taken", "settler", "settlers", "projection", "pieces"):
             self.__dict__.pop(name, None)
         ledgers.close()
+        if self.forms is not None:
+            self.forms.room.rest()
         self.system.trim()
 
 

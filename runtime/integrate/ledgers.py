@@ -6,12 +6,14 @@ import ctypes as c
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Ints, RowFamily
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.system import System
 from sysdyn.values import dataclass
 
+Signs = NDArray[np.int8]
 HEAD, ROWS = 4, 4
 """Rows of block audit before the ledgers', and of each ledger."""
 
@@ -46,14 +48,14 @@ class Balance:
         return next((t for t, value in self.risen if not value <= limit), None)
 
 
-def _kept(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[RowFamily], Ints, Ints]:
+def _kept(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[RowFamily], Ints, Signs]:
     """Label, unit and first element of each ledger; rows of the elements; of each its ledger, if it is an inertia."""
     description = system.description
     heads = [description.rows[k] for k in description.rows_of("audit")][HEAD::ROWS]
     families = [description.rows[k] for k in description.rows_of("ledger")]
     sizes = [row.size for row in families]
     of = np.repeat([*(int(row.kind.split()[0]) for row in families), 0], [*sizes, 1]).astype(np.int32)
-    inertia = np.repeat([*("inertia" in row.kind for row in families), False], [*sizes, 1]).astype(np.int32)
+    inertia = np.repeat([*("inertia" in row.kind for row in families), False], [*sizes, 1]).astype(np.int8)
     return [(row.label, row.unit, row.at(0)) for row in heads], families, of, inertia
 
 
@@ -110,7 +112,7 @@ class Ledgers:
         self._stored = self.stored
         nothing = np.zeros(0)
         self._arrays |= {"most": nothing, "value": nothing, "before": nothing}
-        self._of = self._inertia = np.zeros(0, dtype=np.int32)
+        self._of, self._inertia = np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int8)
 
     def balances(self) -> tuple[Balance, ...]:
         """What came of each ledger."""

@@ -6,9 +6,9 @@ The fields that both structures have under one name (t, h, steps, cause, ...) ar
 from __future__ import annotations
 
 import ctypes as c
+from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from sysdyn.runtime.condense.condensed import Condensed
 from sysdyn.runtime.integrate.factors import Factorisation, Factors
 from sysdyn.runtime.integrate.underlying import Underlying
@@ -16,7 +16,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import Order
-from sysdyn.runtime.numerics.stretches import Stretches, whole_of
+from sysdyn.runtime.numerics.stretches import Stretches
 
 
 class Method:
@@ -113,14 +113,23 @@ class Method:
 
     def point(self) -> tuple[Floats, Floats]:
         """y, yd [unknowns] of the last accepted point."""
-        if self.expanded:
-            y, yd = np.empty(self._n), np.empty(self._n)
-            unread = self._condensed.unread
-            y[unread], yd[unread] = (whole_of(item) for item in self._stays)
-            lib.core.sd_expanded_show(self.expanded, lib.pointer(y), lib.pointer(yd))
-            return y, yd
-        stepper = self.contents.stepper
-        return lib.reader(stepper.y, self._n).copy(), lib.reader(stepper.yd, self._n).copy()
+        return self.last()()
+
+    def last(self) -> Callable[[], tuple[Floats, Floats]]:
+        """What gives this point whenever it is asked for: of a large system it holds what is stepped or stays."""
+        stepper, number = self.contents.stepper, self._condensed.unknowns if self.expanded else self._n
+        y, yd = (lib.reader(item, number).copy() for item in (stepper.y, stepper.yd))
+        if not self.expanded:
+            return lambda: (y, yd)
+        condensed, (stays, still) = self._condensed, self._stays
+
+        def expanded() -> tuple[Floats, Floats]:
+            return condensed.expanded(y, stays), condensed.expanded(yd, still, rate=True)
+
+        if self._n > LARGE:
+            return expanded
+        found = expanded()  # before the numbers of another run are put there
+        return lambda: found
 
     def __del__(self) -> None:
         if getattr(self, "expanded", None):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.plan import Happened, Plan
@@ -109,8 +111,8 @@ class Finished:
 
     magnitude [kinds and units]: the largest, as the run confirmed it; largest [observed]: of the values and of the
     terms of their expressions; cpu [s]; ledgers: what came of them is read of the run that is kept; beyond: the largest
-    unknown of a row within a step, in magnitudes that it has at steps; last: y and yd at its end [unknowns], the
-    largest |y| of each kind and unit; opening: for the next run's request.
+    unknown of a row within a step, in magnitudes that it has at steps; last: what gives y and yd at its end
+    [unknowns], the largest |y| of each kind and unit; opening: for the next run's request.
     """
 
     reached: float
@@ -122,7 +124,7 @@ class Finished:
     ledgers: Ledgers | None = None
     events: tuple[Happened, ...] = ()
     beyond: float = 0.0
-    last: tuple[Floats, Floats, Floats] | None = None
+    last: tuple[Callable[[], tuple[Floats, Floats]], Floats] | None = None
     opening: float = 0.0
 
     @property

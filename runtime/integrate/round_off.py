@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints, stated
 from sysdyn.runtime.model.scales import alike, group_maxima, group_maximum
 from sysdyn.runtime.model.system import System
@@ -63,6 +64,7 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
         moved = t, y + change, yd + change / step
         for largest, now, was in zip(found, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
             np.fmax(largest, MARGIN * np.abs(now - was), out=largest)
+        del change, moved  # of a large system the room counts
     return found
 
 
@@ -80,26 +82,45 @@ def _changes(system: System, point: tuple[float, Floats, Floats], met: Floats, s
     """Changes of the unknowns [unknowns] by which rows at a point (t, y, yd) are off by their round-off; met
     [unknowns]: how large each counts in a row.
     """
+    scaled = _scaled(system, point, met, step)
+    if scaled is None:
+        return
+    entries, of_column, counts = scaled
+    for probe in range(PROBES):
+        error = EPS * np.where(counts, normal(system.rows, behind=probe * system.rows), 0.0)
+        change = of_column * least_norm((system.rows, system.unknowns), entries, error)
+        del error
+        yield change
+        del change
+
+
+def _scaled(
+    system: System, point: tuple[float, Floats, Floats], met: Floats, step: float
+) -> tuple[tuple[Ints, Ints, Floats], Floats, NDArray[np.bool_]] | None:
+    """The Jacobian of a step by its entries, in magnitudes of unknowns and terms of rows; these magnitudes [unknowns];
+    which rows have terms [rows].  None where there are numbers that are none.
+    """
     t, y, yd = point
     rows, columns = system.pattern.row, system.pattern.columns_of()
     jy, jyd = system.jacobian(t, y, yd)
-    with np.errstate(all="ignore"):
-        terms = np.abs(jy) * met[columns] + np.abs(jyd) * np.maximum(np.abs(yd), met / step)[columns]
-        of_step = jy + jyd / step
     size = np.zeros(system.rows)
-    np.maximum.at(size, rows, terms)
-    if not (np.isfinite(of_step).all() and np.isfinite(size).all()):
-        return
-    size = _eliminated(system, (rows, columns, of_step), size)
+    with np.errstate(all="ignore"):
+        terms = np.abs(jy) * met[columns]
+        terms += np.abs(jyd) * np.maximum(np.abs(yd), met / step)[columns]
+        np.maximum.at(size, rows, terms)
+        jyd /= step
+        jy += jyd
+    values = jy
+    del terms, jy, jyd  # of a large system the room counts, here and below
+    if not (np.isfinite(values).all() and np.isfinite(size).all()):
+        return None
+    size = _eliminated(system, (rows, columns, values), size)
     # in magnitudes: what an elimination leaves of the largest unknown is no change of one that is small by its unit
     of_row, of_column = np.where(size > 0.0, size, 1.0), np.where(met > 0.0, met, 1.0)
     with np.errstate(all="ignore"):
-        scaled = rows, columns, of_step * of_column[columns] / of_row[rows]
-    if not np.isfinite(scaled[2]).all():
-        return
-    for error in normal(PROBES, system.rows):
-        least = least_norm((system.rows, system.unknowns), scaled, EPS * np.where(size > 0.0, error, 0.0))
-        yield of_column * least
+        values *= of_column[columns]
+        values /= of_row[rows]
+    return ((rows, columns, values), of_column, size > 0.0) if np.isfinite(values).all() else None
 
 
 def _given(system: System) -> Floats:

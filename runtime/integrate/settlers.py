@@ -108,6 +108,12 @@ class Settlers:
                 return found
         return self.restart.across(t, y if self._forms is None else self._forms.completed(t, y), yd)
 
+    def rest(self) -> None:
+        """Of a large system: lets go of the room in which points behind a jump were settled."""
+        self.settler.rest()
+        if "restart" in self.__dict__:
+            self.restart.settler.rest()
+
 
 def steep_balances(system: System) -> bool:
     """Whether laws of balances are so steep that the rows have scales of their own."""

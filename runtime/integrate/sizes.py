@@ -59,9 +59,10 @@ class Sizes:
         return np.zeros(self.system.unknowns)
 
     @cached_property
-    def resolved(self) -> Floats:
-        """|y| of which is known what round-off leaves open [unknowns]."""
-        return np.zeros(self.system.unknowns)
+    def resolved(self) -> Floats | NDArray[np.float32]:
+        """|y| of which is known what round-off leaves open [unknowns], roughly."""
+        number = self.system.unknowns
+        return np.zeros(number, dtype=np.float32) if number > LARGE else np.zeros(number)
 
     def let_go(self) -> None:
         """Of what the start knows: found again if asked."""
@@ -121,7 +122,7 @@ class Sizes:
         """
         if (np.abs(y) <= 2.0 * self.resolved).all():
             return
-        np.maximum(self.resolved, np.abs(y), out=self.resolved)
+        np.maximum(self.resolved, np.abs(y), out=self.resolved, casting="same_kind")
         jy = self.system.slopes(t, y, yd, rate=False)
         self._at_least(np.where(carries, 0.0, noise(self.system, y, jy, self.time)))
 

@@ -57,8 +57,17 @@ class Order:
     @cached_property
     def core(self) -> lib.Order:
         """As the core has it."""
-        arrays = map(lib.pointer, (self.columns, self.own, self.otherwise))
+        arrays = map(lib.pointer, (self.columns, self.own, self.otherwise, self.position))
         return lib.Order(*arrays, self.most, self.paired + self.faint)
+
+    @cached_property
+    def position(self) -> Ints | None:
+        """Of each column in the order [unknowns], where factors that pivot as it says have none of their own."""
+        if not self.paired or self.own is not None or self.columns is None:
+            return None
+        found = np.empty_like(self.columns)
+        found[self.columns] = np.arange(found.size, dtype=found.dtype)
+        return found
 
     @property
     def address(self) -> int:

@@ -33,10 +33,10 @@ def uniform(number: int, which: int = 0, behind: int = 0) -> NDArray[np.float64]
     return found
 
 
-def normal(*shape: int) -> NDArray[Any]:
-    """Numbers [shape] as from the normal distribution (Box and Muller, 1958)."""
+def normal(*shape: int, behind: int = 0) -> NDArray[Any]:
+    """Numbers [shape] as from the normal distribution (Box and Muller, 1958); behind: so many that come before them."""
     number = int(np.prod(shape))
-    radius, angle = uniform(number), uniform(number, 1)
+    radius, angle = uniform(number, 0, behind), uniform(number, 1, behind)
     np.log1p(np.negative(radius, out=radius), out=radius)
     radius *= -2.0
     np.sqrt(radius, out=radius)

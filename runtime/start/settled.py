@@ -255,6 +255,10 @@ class Settler:
             raise MemoryError
         self.core.contents.slack = slack
 
+    def rest(self) -> None:
+        """Of a large system: lets go of the room for a point."""
+        lib.core.sd_settle_rest(self.core)
+
     @property
     def address(self) -> int:
         """Of the core's structure."""

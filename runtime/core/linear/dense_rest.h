@@ -9,6 +9,9 @@
 #include <math.h>
 #include <string.h>
 
+#define LONG 100000     /* columns of a line from which the room for its factors counts: */
+#define GROWN 1e-6      /* a column's own row pivots though its entry is that small, where elimination has only added to it
+                         * (inductances and capacitances: two entries a column are left, not three) */
 #define UNHEALTHY 1e-3  /* refactorised pivots below this part of their column are chosen anew */
 #define PANEL 32        /* columns that are applied to all behind them together */
 #define REST_LEAST 64   /* columns of a rest that is worth it */
@@ -106,13 +109,18 @@ static int factor_rest(sd_sparse *lu, const sd_matrix *matrix, int32_t k, int32_
 }
 
 /* 1: the k-th column, in which `largest` is left, may keep the pivot that it had */
+static inline int is_long(const sd_sparse *lu)
+{
+    return lu->paired && lu->n > LONG;
+}
+
 static int keeps_pivot(sd_sparse *lu, const sd_matrix *matrix, int32_t k, sd_number pivot, double largest)
 {
     double relative = largest > 0.0 ? sd_size(pivot) / largest : 0.0;
     if (lu->null_pivot > 0.0 && largest < lu->null_pivot * column_size(matrix, lu->order[k])) /* it may be left out now */
         relative = 0.0;
     lu->smallest = relative < lu->smallest ? relative : lu->smallest;
-    return relative >= UNHEALTHY && isfinite(sd_size(pivot));
+    return relative >= (lu->lowers && is_long(lu) ? GROWN : UNHEALTHY) && isfinite(sd_size(pivot));
 }
 
 /* the i-th column of the rest, with all before it taken from it, on the pivot that it had; 1: that became unhealthy */

@@ -62,6 +62,7 @@ sd_linear *sd_linear_ordered(int32_t n, const int32_t *column, const int32_t *ro
     if (linear && linear->sparse && order->paired) {
         linear->sparse->paired = order->paired;
         linear->sparse->own = order->own;
+        linear->sparse->position = order->own ? NULL : order->position;
         linear->sparse->most = order->most;
         linear->otherwise = order->otherwise;
     }
@@ -385,6 +386,12 @@ int sd_linear_borrow(sd_linear *linear, sd_number *work, double *column_scale)
         linear->own_scale = 0;
     }
     return 0;
+}
+
+void sd_linear_rest(sd_linear *linear)
+{
+    if (linear->sparse)
+        sd_sparse_rest(linear->sparse);
 }
 
 int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale)

@@ -20,11 +20,12 @@ typedef struct sd_sparse sd_sparse;
 typedef struct sd_matrix sd_matrix;
 
 /* An order of elimination: columns [n], NULL: dense; paired: row own[c] (NULL: c) pivots in column c wherever its entry will do,
+ * (position [n]: the place of each column in the order, NULL: not known)
  * and where such factors get longer than `most` entries (0: however long) the columns are taken as in `otherwise` [n], for any
  * pivots.  2: of matrices that are quasi-definite (Vanderbei, SIAM J. Optim. 5, 1995) that row pivots however faint it is, and
  * the caller refines what it solves.  Arrays of the caller. */
 typedef struct sd_order {
-    const int32_t *columns, *own, *otherwise;
+    const int32_t *columns, *own, *otherwise, *position;
     int64_t most;
     int32_t paired;
 } sd_order;
@@ -76,6 +77,8 @@ void sd_linear_left(const sd_linear *linear, char *left);
 int sd_linear_borrow(sd_linear *linear, sd_number *work, double *column_scale);
 /* as sd_linear_factor, of A + c B: a, b [entries] stay as they are until the next factors; scale [n] */
 int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale);
+/* lets go of the numbers of sparse factors: nothing is solved before the next ones */
+void sd_linear_rest(sd_linear *linear);
 /* set to 0: the next factorisation chooses its pivots anew, and nothing is known of those before */
 int32_t *sd_linear_pivoted(sd_linear *linear);
 /* small matrices, of which there will be many, are eliminated by a list of operations (elimination.h) where it serves; the

@@ -13,14 +13,14 @@
                           * twice their solutions are as good (those of 4650 masses at random: a fifth of the time) */
 #define ROOM 2          /* entries of a factor for each of the matrix: room for them */
 #define SMALL 10000     /* columns up to which room that was not taken is kept for the next pivoting */
-#define NARROW 4        /* entries of both factors a column up to which they are a line's */
+#define NARROW 4        /* entries of both factors a column, or rows that it touches, up to which they are a line's */
 
 void sd_sparse_free(sd_sparse *lu)
 {
     if (!lu)
         return;
     leave_chains(lu);
-    free(lu->order);
+    free(lu->pivots);
     free(lu->first);
     free(lu->l_start);
     free(lu->l_row);
@@ -43,16 +43,13 @@ sd_sparse *sd_sparse_new(int32_t rows, int32_t n, const int32_t *order)
     lu->rows = rows;
     lu->inverse = calloc(m + 1, sizeof(sd_number));
     lu->x = calloc((m > all ? m : all) + 1, sizeof(sd_number));
-    lu->order = calloc(2 * m + all + 1, sizeof(int32_t));
     lu->l_start = calloc(2 * m + 2, sizeof(int32_t));
-    if (!lu->inverse || !lu->x || !lu->order || !lu->l_start) {
+    if (!lu->inverse || !lu->x || !lu->l_start) {
         sd_sparse_free(lu);
         return NULL;
     }
-    lu->source = lu->order + m;
-    lu->place = lu->source + m;
     lu->u_start = lu->l_start + m + 1;
-    memcpy(lu->order, order, m * sizeof *order);
+    lu->order = order;
     return lu;
 }
 
@@ -121,8 +118,25 @@ static double own_threshold(const sd_sparse *lu, double threshold)
     return lu->paired > 1 && threshold > FAINT_PIVOT ? FAINT_PIVOT : threshold;
 }
 
+/* whether the own row of column c pivots there, which touches rows stack[top..) and whose largest entry is known */
+static int takes_own(const sd_sparse *lu, const sd_matrix *matrix, int32_t c, int32_t own, int32_t top, double threshold,
+                     double largest)
+{
+    double size = sd_size(lu->x[own]), before = 0.0;
+    if (!lu->paired || lu->place[own] >= 0 || !(largest > 0.0))
+        return 0;
+    if (size >= own_threshold(lu, threshold) * largest)
+        return 1;
+    if (!is_long(lu) || lu->rows - top > NARROW || size < GROWN * largest)
+        return 0;
+    const sd_number *value = sd_column_of(matrix, c);
+    for (int32_t e = matrix->column[c]; e < matrix->column[c + 1]; e++, value++)
+        before = matrix->row[e] == own ? sd_size(*value) : before;
+    return size >= before;
+}
+
 /* the row that pivots in column c: the sparsest among those whose entry is near the largest; -1 where all are zero */
-static int32_t choose(const sd_sparse *lu, int32_t c, int32_t top, double *largest)
+static int32_t choose(const sd_sparse *lu, const sd_matrix *matrix, int32_t c, int32_t top, double *largest)
 {
     int32_t best = -1;
     *largest = 0.0;
@@ -132,7 +146,7 @@ static int32_t choose(const sd_sparse *lu, int32_t c, int32_t top, double *large
     /* what is left below a part of its column must be what the matrix lacks */
     double threshold = lu->idle && lu->null_pivot > SD_LEAST_PIVOT ? 1.0 : THRESHOLD;
     int32_t own = lu->own ? lu->own[c] : c;
-    if (lu->paired && lu->place[own] < 0 && *largest > 0.0 && sd_size(lu->x[own]) >= own_threshold(lu, threshold) * *largest)
+    if (takes_own(lu, matrix, c, own, top, threshold, *largest))
         return own;
     for (int32_t i = top; i < lu->rows && *largest > 0.0; i++) {
         int32_t r = lu->stack[i];
@@ -159,6 +173,26 @@ void sd_sparse_lend(sd_sparse *lu, sd_number *x)
         free(lu->x);
     lu->x = x;
     lu->lent = 1;
+}
+
+void sd_sparse_rest(sd_sparse *lu)
+{
+    free(lu->l_value), free(lu->u_value), free(lu->inverse);
+    lu->l_value = lu->u_value = lu->inverse = NULL;
+}
+
+/* the numbers of factors that have rested; 0: no memory */
+static int provide_numbers(sd_sparse *lu)
+{
+    if (lu->inverse)
+        return 1;
+    lu->inverse = calloc((size_t)lu->n + 1, sizeof *lu->inverse);
+    lu->l_value = malloc(((size_t)lu->l_room + 1) * sizeof *lu->l_value);
+    lu->u_value = malloc(((size_t)lu->u_room + 1) * sizeof *lu->u_value);
+    if (lu->inverse && lu->l_value && lu->u_value)
+        return 1;
+    sd_sparse_rest(lu);
+    return 0;
 }
 
 /* room for factors of which nothing is known but the entries of their matrix */
@@ -302,7 +336,7 @@ static int pivot_all(sd_sparse *lu, const sd_matrix *matrix)
         double size = column_size(matrix, c);
         nu += reached;
         double largest;
-        int32_t pivot = choose(lu, c, top, &largest);
+        int32_t pivot = choose(lu, matrix, c, top, &largest);
         double relative = size > 0.0 ? largest / size : 0.0;
         if (relative < lu->null_pivot && (!lu->idle || lu->idle[c])) { /* it follows from the others */
             lu->rank--;
@@ -355,6 +389,27 @@ static int pivot_all(sd_sparse *lu, const sd_matrix *matrix)
     return 0;
 }
 
+/* room for the pivots that are to be chosen; 0: no memory */
+static int provide_pivots(sd_sparse *lu)
+{
+    if (!lu->pivots)
+        lu->pivots = calloc((size_t)lu->n + (size_t)lu->rows + 1, sizeof *lu->pivots);
+    lu->source = lu->pivots;
+    lu->place = lu->pivots ? lu->pivots + lu->n : NULL;
+    return lu->pivots != NULL;
+}
+
+/* lets go of it where each row pivots in its own column: the order says so, too */
+static void leave_pivots(sd_sparse *lu)
+{
+    if (!lu->position || lu->rank < lu->n || memcmp(lu->source, lu->order, (size_t)lu->n * sizeof *lu->order) != 0)
+        return;
+    lu->source = (int32_t *)lu->order; /* which nobody writes until pivots are chosen anew */
+    lu->place = (int32_t *)lu->position;
+    free(lu->pivots);
+    lu->pivots = NULL;
+}
+
 /* lets go of what pivoting alone needs */
 static void leave_search(sd_sparse *lu)
 {
@@ -371,7 +426,7 @@ int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
     lu->block = malloc((rows + 1) * sizeof(sd_number));
     lu->among = calloc((size_t)lu->n / 64 + 1, sizeof(uint64_t));
     lu->first = lu->first ? lu->first : malloc(((size_t)lu->n + 1) * sizeof *lu->first);
-    if (!lu->stack || !lu->block || !lu->among || !lu->first) {
+    if (!lu->stack || !lu->block || !lu->among || !lu->first || !provide_pivots(lu) || !provide_numbers(lu)) {
         leave_search(lu);
         return 2;
     }
@@ -394,8 +449,10 @@ int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
         free(lu->first);
         lu->first = NULL;
     }
-    if (!failed)
+    if (!failed) {
+        leave_pivots(lu);
         find_chains(lu);
+    }
     return failed;
 }
 
@@ -449,9 +506,11 @@ static int renew_rest(sd_sparse *lu, const sd_matrix *matrix, sd_number *block)
 int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 {
     sd_number *block = lu->widest ? malloc((size_t)lu->widest * sizeof *block) : NULL;
-    int failed = lu->widest && !block;
-    if (failed)
+    if ((lu->widest && !block) || !provide_numbers(lu)) {
+        free(block);
         return 1;
+    }
+    int failed = 0;
     lu->smallest = 1.0;
     memset(lu->x, 0, ((size_t)lu->n + 1) * sizeof *lu->x);
     unsigned before = sd_no_subnormals();

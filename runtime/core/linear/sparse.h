@@ -16,9 +16,11 @@ typedef struct sd_chain {
 
 typedef struct sd_sparse {
     int32_t n, rows;             /* columns; rows, as many or more */
-    int32_t *order;              /* [n] column of the matrix that is eliminated k-th */
+    const int32_t *order;        /* [n] column of the matrix that is eliminated k-th; of the caller */
+    const int32_t *position;     /* [n] column -> k, of the caller; NULL: not known */
     int32_t *place, *source;     /* [rows] row -> pivot position, n where it has none; [n] pivot position -> row,
-                                    -1 of a column that was left out */
+                                    -1 of a column that was left out; those of the caller where each row pivots in its column */
+    int32_t *pivots;             /* [n + rows] source and place where they are its own; NULL: they are the caller's */
     int32_t *first;              /* [n + 1] of the columns of L that fill alike (blocks.h): the first one; NULL: none do */
     int32_t *l_start, *u_start;  /* [n + 1] */
     int32_t *l_row, *u_row;      /* pivot positions; u in the order of elimination, diagonal apart */
@@ -55,6 +57,8 @@ int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix);
 int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix);
 /* work x from now on in room of the caller [as above] */
 void sd_sparse_lend(sd_sparse *lu, sd_number *x);
+/* lets go of the numbers of the factors until they are made anew; their pattern stays */
+void sd_sparse_rest(sd_sparse *lu);
 /* x := column_scale * (LU)^-1 (row_scale * x); the scales NULL: ones */
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale);
 /* x [rows] with A^T x = b [n], zero where no pivot is; equations of columns that were left out are not judged; work [n] */

@@ -54,12 +54,12 @@ static void keep(sd_ledgers *ledgers, int32_t k, double t, double value)
 }
 
 /* the element of a ledger whose content changed most since the last point */
-static int32_t changed(const sd_ledgers *ledgers, int32_t k)
+static int32_t changed(const sd_ledgers *ledgers, const double *value, int32_t k)
 {
     int32_t found = -1;
     double most = 0.0;
     for (int32_t i = 0; i < ledgers->elements; i++) {
-        double change = fabs(ledgers->value[i] - ledgers->before[i]);
+        double change = fabs(value[i] - ledgers->before[i]);
         if (ledgers->of[i] == k && !(change <= most)) {
             most = change;
             found = i;
@@ -70,7 +70,7 @@ static int32_t changed(const sd_ledgers *ledgers, int32_t k)
 
 /* most := the largest magnitude so far of each element; whether the sign of any says something of an inertia */
 static SD_WIDE int32_t note_most(int32_t elements, const double *restrict value, double *restrict most,
-                                 const int32_t *restrict inertia)
+                                 const int8_t *restrict inertia)
 {
     int32_t any = SD_NO_INERTIA;
     for (int32_t i = 0; i < elements; i++) {
@@ -82,23 +82,24 @@ static SD_WIDE int32_t note_most(int32_t elements, const double *restrict value,
 }
 
 /* a modulus may be negative from the start: what was positive must not become so */
-static void note_signs(sd_ledgers *ledgers)
+static void note_signs(sd_ledgers *ledgers, const double *value)
 {
     for (int32_t i = 0; i < ledgers->elements; i++) {
-        if (ledgers->inertia[i] == SD_INERTIA && ledgers->value[i] > NEGATIVE * ledgers->most[i])
+        if (ledgers->inertia[i] == SD_INERTIA && value[i] > NEGATIVE * ledgers->most[i])
             ledgers->inertia[i] = SD_POSITIVE;
-        if (ledgers->inertia[i] == SD_POSITIVE && ledgers->value[i] < -NEGATIVE * ledgers->most[i] && ledgers->lost < 0)
+        if (ledgers->inertia[i] == SD_POSITIVE && value[i] < -NEGATIVE * ledgers->most[i] && ledgers->lost < 0)
             ledgers->lost = i;
     }
 }
 
-void sd_ledgers_note(sd_ledgers *ledgers, double t, const double *y, const double *yd, const double *audit)
+void sd_ledgers_note(sd_ledgers *ledgers, double t, const double *y, const double *yd, const double *audit, double *room)
 {
+    double *value = room ? room : ledgers->value;
     if (ledgers->contents) {
-        memset(ledgers->value, 0, (size_t)ledgers->elements * sizeof(double));
-        ledgers->contents->rows(&ledgers->contents->frame, t, y, yd, ledgers->value);
-        if (note_most(ledgers->elements, ledgers->value, ledgers->most, ledgers->inertia))
-            note_signs(ledgers);
+        memset(value, 0, (size_t)ledgers->elements * sizeof(double));
+        ledgers->contents->rows(&ledgers->contents->frame, t, y, yd, value);
+        if (note_most(ledgers->elements, value, ledgers->most, ledgers->inertia))
+            note_signs(ledgers, value);
     }
     for (int32_t k = 0; k < ledgers->count; k++) {
         double now = rows_of(audit, k)[0];
@@ -111,7 +112,7 @@ void sd_ledgers_note(sd_ledgers *ledgers, double t, const double *y, const doubl
         double change = fabs(balance - ledgers->balance[k]);
         if (!(change <= ledgers->largest[k])) {
             ledgers->largest[k] = change;
-            ledgers->element[k] = changed(ledgers, k);
+            ledgers->element[k] = changed(ledgers, value, k);
         }
         ledgers->balance[k] = balance;
         if (!(fabs(balance) <= RISE * ledgers->highest[k])) {
@@ -121,5 +122,5 @@ void sd_ledgers_note(sd_ledgers *ledgers, double t, const double *y, const doubl
     }
     ledgers->begun = 1;
     if (ledgers->contents)
-        memcpy(ledgers->before, ledgers->value, (size_t)ledgers->elements * sizeof(double));
+        memcpy(ledgers->before, value, (size_t)ledgers->elements * sizeof(double));
 }

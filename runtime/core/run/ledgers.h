@@ -28,7 +28,7 @@ typedef struct sd_ledgers {
     int32_t count, elements;
     const sd_call *contents;       /* block ledger; NULL: no element stores */
     const int32_t *of;             /* [elements] ledger of each */
-    int32_t *inertia;              /* [elements] sd_inertia: what its sign says of an inertia */
+    int8_t *inertia;               /* [elements] sd_inertia: what its sign says of an inertia */
     /* results */
     double *gross;                 /* [count] int of the magnitudes of both powers, and what impulses brought */
     double *most;                  /* [elements] largest magnitude stored */
@@ -39,15 +39,15 @@ typedef struct sd_ledgers {
     /* the last accepted point */
     double *stored, *balance, *highest;   /* [count] */
     double *dissipated, *supplied;        /* [count] integrals */
-    double *value, *before;               /* [elements] */
+    double *value, *before;               /* [elements] what each stores; value: work, where there is no other room */
     int32_t begun;
     int32_t lost;                  /* an element whose inertia became negative; -1: none */
 } sd_ledgers;
 
 /* adds integrals of the rows of block audit over a step */
 void sd_ledgers_add(sd_ledgers *ledgers, const double *integral);
-/* an accepted point: rows of block audit there */
-void sd_ledgers_note(sd_ledgers *ledgers, double t, const double *y, const double *yd, const double *audit);
+/* an accepted point: rows of block audit there; room [elements]: of the caller, or NULL */
+void sd_ledgers_note(sd_ledgers *ledgers, double t, const double *y, const double *yd, const double *audit, double *room);
 /* frees the records */
 void sd_ledgers_clear(sd_ledgers *ledgers);
 /* what contents gained at a jump was supplied: rows of block audit before and after */

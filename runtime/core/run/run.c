@@ -64,6 +64,14 @@ static void lend(sd_run *run, int room)
     run->settle->lent = room && stepper->spare ? stepper->spare(stepper->self, &run->settle->lent_room) : NULL;
 }
 
+/* where there is any for what elements store */
+static double *room_of_contents(const sd_run *run)
+{
+    size_t numbers = 0;
+    double *room = run->stepper->spare ? run->stepper->spare(run->stepper->self, &numbers) : NULL;
+    return numbers >= (size_t)run->ledgers->elements ? room : NULL;
+}
+
 void sd_run_settle(sd_run *run, double t)
 {
     sd_settle *settle = run->settle;
@@ -313,7 +321,7 @@ static void rows_of_start(sd_run *run, double label)
     }
     sd_run_audit(run, t, run->point, run->point_d, run->after);
     if (run->ledgers)
-        sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after);
+        sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after, room_of_contents(run));
     run->t_from = run->t_to = t;
     run->fresh = 0;
 }
@@ -387,7 +395,7 @@ static void measure(sd_run *run, double from, double t)
     }
     if (run->ledgers) {
         sd_ledgers_add(run->ledgers, run->integral);
-        sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after);
+        sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after, room_of_contents(run));
     }
     /* powers at the start of the next step are kept apart until the rows of this one are written */
     run->pending = 1;

@@ -5,12 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-void sd_expanded_show(const sd_expanded *expanded, double *y, double *yd)
-{
-    sd_condensed_expand(expanded->condensed, expanded->inner->y, y, 0);
-    sd_condensed_expand(expanded->condensed, expanded->inner->yd, yd, 1);
-}
-
 /* what is looked at after each step: magnitudes, the points of the quadrature */
 static void follow(sd_expanded *expanded)
 {

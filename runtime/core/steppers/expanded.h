@@ -19,8 +19,6 @@ typedef struct sd_expanded {
 /* unknowns: of the full system; NULL without memory */
 sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, int32_t unknowns);
 void sd_expanded_free(sd_expanded *expanded);
-/* y, yd := all unknowns of the last point; what is neither kept nor eliminated stays as it is */
-void sd_expanded_show(const sd_expanded *expanded, double *y, double *yd);
 sd_stepper *sd_expanded_stepper(sd_expanded *expanded);
 /* y is read until the first step: the face has no other before it, and no yd */
 void sd_expanded_start(sd_expanded *expanded, double t, const double *y, const double *yd, double h);

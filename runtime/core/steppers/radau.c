@@ -70,6 +70,18 @@ static int borrow(sd_radau *radau)
     return failed;
 }
 
+/* lets go of the room */
+static void leave_room(sd_radau *radau)
+{
+    free(radau->work);
+    free(radau->beside);
+    free(radau->point_y);
+    free(radau->led);
+    radau->work = radau->ee = radau->weight = radau->point_y = NULL;
+    radau->led = NULL;
+    radau->beside = NULL;
+}
+
 /* room for what the steps behind a start make: 0; -1: no memory */
 static int provide_room(sd_radau *radau)
 {
@@ -88,7 +100,7 @@ static int provide_room(sd_radau *radau)
     radau->work = calloc(all * m + (steep ? 3 : 2) * nnz, sizeof(double));
     radau->led = calloc((size_t)radau->n + 1, sizeof *radau->led);
     if (!radau->work || !radau->led) {
-        sd_radau_rest(radau);
+        leave_room(radau);
         return -1;
     }
     double *next = radau->work;
@@ -109,7 +121,7 @@ static int provide_room(sd_radau *radau)
     if (sparing)
         radau->ee = radau->d[0];
     if (sparing && borrow(radau)) {
-        sd_radau_rest(radau);
+        leave_room(radau);
         return -1;
     }
     radau->g = steep ? radau->jyd + nnz : radau->linear->scaled; /* rows of steep laws are judged by the matrix as it is */
@@ -126,13 +138,12 @@ static double *spare(void *self, size_t *numbers)
 
 void sd_radau_rest(sd_radau *radau)
 {
-    free(radau->work);
-    free(radau->beside);
-    free(radau->point_y);
-    free(radau->led);
-    radau->work = radau->ee = radau->weight = radau->point_y = NULL;
-    radau->led = NULL;
-    radau->beside = NULL;
+    leave_room(radau);
+    radau->ready = 0;
+    sd_linear_rest(radau->linear);
+    for (int k = 0; k < (radau->most_stages - 1) / 2; k++)
+        if (radau->complex_linear[k])
+            sd_linear_z_rest(radau->complex_linear[k]);
 }
 
 sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const *complex_linear, int32_t stages)
@@ -171,7 +182,7 @@ void sd_radau_free(sd_radau *radau)
 {
     if (!radau)
         return;
-    sd_radau_rest(radau);
+    leave_room(radau);
     free(radau->phi);
     free(radau->powered);
     free(radau->gap);

@@ -101,8 +101,8 @@ typedef struct sd_radau {
     double *y, *rate, *ee, *weight, *terms, *jy, *jyd, *g, *work; /* work: the memory of all vectors but phi and yd */
     double *newton_weight, *scale, *powered; /* of Newton's norm, of columns; their memory where powers of h count */
     double complex *w[SD_PAIRS]; /* right sides and solutions */
-    struct sd_beside *beside; /* condensed.h: for a second thread, with a point of its own; made when first needed */
-    sd_system *other;             /* its system */
+    struct sd_beside *beside; /* condensed.h: for two threads; made when first needed */
+    sd_system *twice[2];          /* their systems */
     double *point_y, *point_rate; /* [n]; y of a system with all its unknowns alone */
     struct sd_coupled *coupled;   /* radau_coupled.c: all stages at once; made when first needed */
     /* what happened */

@@ -207,7 +207,7 @@ static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, do
         radau->d[s][i] = 0.0; /* others have worked there */
 }
 
-/* The later half of the stages, in a system beside the radau's own; the others in that.  Where all unknowns follow from kept
+/* The earlier half of the stages, or the later one.  Where all unknowns follow from kept
  * ones, nobody reads these from where they stand once the rows are made: they stand where those will. */
 static void residual_part(void *context, int part)
 {
@@ -215,13 +215,13 @@ static void residual_part(void *context, int part)
     int half = (radau->method->stages + 1) / 2;
     if (part == 0)
         for (int s = 0; s < half; s++)
-            residual_of(radau, radau->system, s, radau->y, radau->rate);
+            residual_of(radau, radau->twice[0], s, radau->y, radau->rate);
     else
         for (int s = half; s < radau->method->stages; s++)
-            residual_of(radau, radau->other, s, radau->system->left ? radau->d[s] : radau->point_y, radau->point_rate);
+            residual_of(radau, radau->twice[1], s, radau->system->left ? radau->d[s] : radau->point_y, radau->point_rate);
 }
 
-/* the system and the point that a second thread takes residuals with; 0: there are none */
+/* the systems and the point that two threads take residuals with; 0: there are none */
 static int accompanied(sd_radau *radau)
 {
     if (!large(radau) || !radau->system->together || sd_threads() < 2)
@@ -234,7 +234,7 @@ static int accompanied(sd_radau *radau)
     }
     if (!radau->beside || !radau->point_y)
         return 0;
-    radau->other = sd_beside_as(radau->beside, radau->system);
+    sd_beside_as(radau->beside, radau->system, radau->twice);
     return 1;
 }
 

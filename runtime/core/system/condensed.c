@@ -193,10 +193,10 @@ void sd_condensed_bind(sd_condensed *condensed, sd_system *system)
 }
 
 struct sd_beside {
-    sd_system system, full;
-    sd_condensed condensed;
-    double *y, *yd, *r;
-    double memory[];
+    sd_system system[2], full[2];
+    sd_condensed condensed[2];
+    double *yd[2], *r;
+    double memory[]; /* of which only what blocks read and write takes room */
 };
 
 sd_beside *sd_beside_new(const sd_system *system)
@@ -206,24 +206,28 @@ sd_beside *sd_beside_new(const sd_system *system)
     sd_beside *beside = calloc(1, sizeof *beside + (2 * n + rows) * sizeof(double));
     if (!beside)
         return NULL;
-    beside->y = beside->memory;
-    beside->yd = beside->y + n;
-    beside->r = beside->yd + n;
+    beside->yd[0] = beside->memory;
+    beside->yd[1] = beside->yd[0] + n;
+    beside->r = beside->yd[1] + n;
     return beside;
 }
 
-sd_system *sd_beside_as(sd_beside *beside, const sd_system *system)
+void sd_beside_as(sd_beside *beside, const sd_system *system, sd_system *twice[2])
 {
-    beside->system = *system;
-    if (system->left) {
-        beside->condensed = *(const sd_condensed *)system->left;
-        beside->full = *beside->condensed.full;
-        beside->condensed.full = &beside->full;
-        beside->condensed.y = beside->y;
-        beside->condensed.yd = beside->yd;
-        beside->condensed.r = beside->r;
-        beside->condensed.slope = NULL;
-        beside->system.left = &beside->condensed.left;
+    for (int k = 0; k < 2; k++) {
+        twice[k] = &beside->system[k];
+        *twice[k] = *system;
+        if (!system->left)
+            continue;
+        const sd_condensed *given = (const sd_condensed *)system->left;
+        sd_condensed *condensed = &beside->condensed[k];
+        *condensed = *given;
+        beside->full[k] = *given->full;
+        condensed->full = &beside->full[k];
+        condensed->y = k ? given->yd : given->y;
+        condensed->yd = beside->yd[k];
+        condensed->r = k ? beside->r : given->r;
+        condensed->slope = NULL;
+        twice[k]->left = &condensed->left;
     }
-    return &beside->system;
 }

@@ -58,12 +58,12 @@ typedef struct sd_condensed {
 /* the functions of assembly.h read `system` through it */
 void sd_condensed_bind(sd_condensed *condensed, sd_system *system);
 
-/* A system beside `system`, with work arrays of its own: another thread may ask it for residuals at the same time, after
- * sd_beside_as.  free() lets go of it; NULL: no memory. */
+/* `system` twice, for two threads that ask for residuals at the same time.  Of a condensed one each has rates of its own,
+ * of which blocks read few; the second has its point where rates else stand.  free() lets go of it; NULL: no memory. */
 typedef struct sd_beside sd_beside;
 sd_beside *sd_beside_new(const sd_system *system);
-/* what the system is now (its held rows change) */
-sd_system *sd_beside_as(sd_beside *beside, const sd_system *system);
+/* of what the system is now (its held rows change) */
+void sd_beside_as(sd_beside *beside, const sd_system *system, sd_system *twice[2]);
 
 /* all unknowns x of the full system from kept values z; rate: x and z are derivatives.  What is neither kept nor
  * eliminated stays as it is */

@@ -142,6 +142,14 @@ int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row
     return 0;
 }
 
+void sd_settle_rest(sd_settle *settle)
+{
+    if (settle->unknowns + settle->rates <= SMALL_POINT)
+        return;
+    free(settle->work);
+    settle->work = NULL;
+}
+
 int *sd_settle_pivoted(sd_settle *settle)
 {
     return settle->basis ? &settle->basis->pivoted : NULL;

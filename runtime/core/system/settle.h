@@ -73,6 +73,8 @@ int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row
                     const int32_t *place_y, const int32_t *place_yd, int32_t determined);
 /* whether a pattern of the basis exists; NULL without one */
 int *sd_settle_pivoted(sd_settle *settle);
+/* of a large one lets go of the room for a point, which it has where nobody lent any */
+void sd_settle_rest(sd_settle *settle);
 void sd_settle_free(sd_settle *settle);
 /* y, yd [unknowns] moved in place; 0 done, 1 it did not converge (they are unchanged) */
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd);

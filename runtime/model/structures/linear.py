@@ -10,7 +10,7 @@ from sysdyn.runtime.model.structures.c_types import D, I, L, P
 class Order(c.Structure):
     """sd_order."""
 
-    _fields_ = [*[(name, P) for name in ["columns", "own", "otherwise"]], ("most", L), ("paired", I)]
+    _fields_ = [*[(name, P) for name in ["columns", "own", "otherwise", "position"]], ("most", L), ("paired", I)]
 
 
 class Linear(c.Structure):
