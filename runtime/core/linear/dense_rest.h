@@ -108,12 +108,12 @@ static int factor_rest(sd_sparse *lu, const sd_matrix *matrix, int32_t k, int32_
     return 0;
 }
 
-/* 1: the k-th column, in which `largest` is left, may keep the pivot that it had */
 static inline int is_long(const sd_sparse *lu)
 {
     return lu->paired && lu->n > LONG;
 }
 
+/* 1: the k-th column, in which `largest` is left, may keep the pivot that it had */
 static int keeps_pivot(sd_sparse *lu, const sd_matrix *matrix, int32_t k, sd_number pivot, double largest)
 {
     double relative = largest > 0.0 ? sd_size(pivot) / largest : 0.0;
