@@ -249,7 +249,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
                                 row + SD_ROW_HEAD + run->observed);
     find_sizes(run, t, row + SD_ROW_HEAD);
     note_sizes(run);
-    run->t_row = label;
+    if ((int32_t)kind & SD_COMPARED)
+        run->t_row = label;
     run->rows++;
     run->rows_written++;
     if (compared)

@@ -58,7 +58,7 @@ typedef struct sd_run {
     int32_t sampled;                               /* point and sample are of the end of the last step */
     double stored, dissipated, supplied;           /* T + V at the start; integrals up to the last accepted step */
     double step_dissipated, step_supplied;         /* integrals up to the start of the last step */
-    double t_from, t_row;                          /* t_row: instant of the last row */
+    double t_from, t_row;                          /* t_row: instant of the last row that is compared */
     double *power, *after, *sample, *integral, *end;   /* [audited] at the start and the end of the last step; of one
                                                         * sample; integrals over the step; of a row */
     double *point, *point_d, *values, *largest, *slope, *memory; /* point: of a sample or a row; largest [observed]: of observe_scale;
