@@ -1,7 +1,6 @@
 /* Where within a step something watched changes: see crossing.h. */
 #include "run/crossing.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -14,7 +13,7 @@
 
 typedef void look(sd_run *run, double t, double *values);
 
-double sd_spacing(double t)
+static double spacing(double t)
 {
     return nextafter(fabs(t), INFINITY) - fabs(t);
 }
@@ -55,7 +54,7 @@ static double root(sd_run *run, look *at, int32_t row, double side, double enoug
             else
                 b = t, fb = ft;
         }
-        if (b - a <= 2.0 * sd_spacing(fmax(fabs(a), fabs(b))) || fb == 0.0)
+        if (b - a <= 2.0 * spacing(fmax(fabs(a), fabs(b))) || fb == 0.0)
             break;
     }
     return b;
@@ -116,16 +115,9 @@ static int32_t first_of(sd_run *run, look *at, int32_t hits, double low, double 
         *t = fmin(*t, m->found[i]);
     }
     for (int32_t i = 0; i < hits; i++)
-        if (m->found[i] <= *t + SAME * sd_spacing(fmax(fabs(low), fabs(high))))
+        if (m->found[i] <= *t + SAME * spacing(fmax(fabs(low), fabs(high))))
             m->which[same++] = m->which[i];
     return same;
-}
-
-/* The dense output as it is. */
-static void as_it_is(sd_run *run, double t, double *values)
-{
-    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
-    sd_run_quantities(run, t, values);
 }
 
 /* Whether nothing but watch `one` is past zero in values. */
@@ -159,7 +151,7 @@ static int follow(sd_run *run, int32_t one, double low, double high, double *t)
         slope = k > 0 ? (value - last) / (at - before) : slope;
         before = at;
         at -= (value + 0.5 * enough) / slope;
-        at = at != before ? at : before + copysign(sd_spacing(before), value);
+        at = at != before ? at : before + copysign(spacing(before), value);
     }
     return 0;
 }
@@ -167,8 +159,8 @@ static int follow(sd_run *run, int32_t one, double low, double high, double *t)
 int32_t sd_run_crossing(sd_run *run, double end, double *t)
 {
     double low, high;
-    int32_t hits = part_of(run, as_it_is, end, &low, &high);
-    if (hits && first_of(run, as_it_is, hits, low, high, t) == 1 && follow(run, run->modes->which[0], low, high, t))
+    int32_t hits = part_of(run, sd_run_look, end, &low, &high);
+    if (hits && first_of(run, sd_run_look, hits, low, high, t) == 1 && follow(run, run->modes->which[0], low, high, t))
         return 1;
     hits = part_of(run, sd_run_observe, end, &low, &high);
     hits = hits ? first_of(run, sd_run_observe, hits, low, high, t) : 0;

@@ -9,7 +9,4 @@
  * point of the run is the settled one there. */
 int32_t sd_run_crossing(sd_run *run, double end, double *t);
 
-/* of t and the next number */
-double sd_spacing(double t);
-
 #endif

@@ -1,7 +1,6 @@
 /* Transitions between modes that are known: see modes.h. */
 #include "run/modes.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 

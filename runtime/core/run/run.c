@@ -364,6 +364,12 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
     rows_of_start(run, label);
 }
 
+void sd_run_look(sd_run *run, double t, double *values)
+{
+    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
+    sd_run_quantities(run, t, values);
+}
+
 void sd_run_observe(sd_run *run, double t, double *values)
 {
     run->stepper->dense(run->stepper->self, t, run->point, run->point_d);

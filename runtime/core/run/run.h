@@ -96,7 +96,8 @@ void sd_run_row(sd_run *run, int32_t kind);
 /* run->point, point_d at t within the last step moved onto the equations: by what the method has at hand, where that does; the
  * end of a step may be there */
 void sd_run_settle(sd_run *run, double t);
-/* values [observed] of block observe at t within the last step, settled */
+/* values [observed] of block observe at t within the last step, on the dense output as it is; settled */
+void sd_run_look(sd_run *run, double t, double *values);
 void sd_run_observe(sd_run *run, double t, double *values);
 /* steps until `steps` more are taken, `seconds` are over, the rows are full, the end, a failure, or a step within which
  * something watched changes (SD_EVENT: the step is not counted yet, see sd_run_accept) */

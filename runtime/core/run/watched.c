@@ -13,13 +13,6 @@
 #define IN_THE_MIDDLE(k, a, b, c) ((2.0 - (a)) / ((k) - (a)) * ((2.0 - (b)) / ((k) - (b))) * ((2.0 - (c)) / ((k) - (c))))
 #define FAINT 1e-9    /* of the largest value of what is watched: what it is off by unseen */
 
-/* values [observed] of the dense output as it is, at t */
-static void look(sd_run *run, double t, double *values)
-{
-    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
-    sd_run_quantities(run, t, values);
-}
-
 /* The parabola through three points: its rise from the first to the second, and half of its second derivative. */
 static double parabola(const double *x, const double *value, double *bend)
 {
@@ -87,14 +80,14 @@ static int scan(sd_run *run, double begin, double end, int parts, int *fell)
 {
     size_t row = (size_t)run->observed;
     int more = 0;
-    look(run, begin, run->looked);
+    sd_run_look(run, begin, run->looked);
     run->t_seen = begin;
     *fell = 0;
     for (int part = 1; part <= parts && !*fell; part++) {
         int k = (part - 1) % SD_PARTS + 1;
         double *values = run->looked + (size_t)k * row;
         double t = part == parts ? end : begin + (end - begin) * (part + (part % 2 ? SHIFT : 0.0)) / parts;
-        look(run, t, values);
+        sd_run_look(run, t, values);
         run->t_clear = run->t_seen;
         run->t_seen = t;
         *fell = fallen(run, values);
