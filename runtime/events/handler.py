@@ -8,7 +8,7 @@ which begin every run as they were bound.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Sequence, Set
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,6 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.restart import Restart
-from sysdyn.runtime.start.settled import Settler
 from sysdyn.values import dataclass
 
 __all__ = ["Handler", "Point", "Watched"]
@@ -58,7 +57,7 @@ class Watched:
 
 
 class Handler:
-    """Events of one run.  system: as the stepper sees it."""
+    """Events of one run.  system: as the stepper sees it; restart: consistent points of it."""
 
     def __init__(
         self, plan: Plan, system: System, span: tuple[float, float], begin: Standing, rtol: float = 0.0
@@ -70,8 +69,6 @@ class Handler:
         self.determined = Determined(self.contacts)
         self.succession = Succession(plan, self.contacts, self.determined)
         self.kinks = Kinks(plan.kinks, self.observer, self.p)
-        self._settler: Settler | None = None
-        self._across: Callable[[float, Floats, Floats], Point | None]
         self.side = np.ones(len(plan.relations))
         self.truth = [False] * len(plan.whens)
         self.bounces: dict[int, Bounce] = {}
@@ -83,12 +80,14 @@ class Handler:
         self.back(begin)
         self.before = self.now()
 
-    def settle_by(self, settler: Settler, restart: Restart | Callable[[float, Floats, Floats], Point | None]) -> None:
-        """settler: of the run's points; restart: finds points behind an instant, where contacts are told too."""
-        self._settler = settler
-        if isinstance(restart, Restart):
-            self.succession.restart, restart = restart, restart.across
-        self._across = restart
+    @property
+    def restart(self) -> Restart | None:
+        """Consistent points of the run; told once it has any."""
+        return self.succession.restart
+
+    @restart.setter
+    def restart(self, restart: Restart | None) -> None:
+        self.succession.restart = restart
 
     # -- what stands ---------------------------------------------------------------------------------------------
 
@@ -100,8 +99,8 @@ class Handler:
         """These stand again."""
         self.p[:] = standing[0]
         self.contacts.take(standing[1])
-        if self._settler is not None:
-            self._settler.core.contents.ready = 0
+        if self.restart is not None:
+            self.restart.settler.core.contents.ready = 0
 
     def caught_up(self, t: float) -> None:
         """The core has been in charge, until an event at t (s)."""
@@ -309,8 +308,9 @@ class Handler:
         self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()
     ) -> Point:
         """The consistent point with the constraints that hold from now on; SolverFailure where there is none."""
+        assert self.restart is not None
         if not self.plan.contacts:
-            found = self._across(t, y, yd)
+            found = self.restart.across(t, y, yd)
             if found is None:
                 raise SolverFailure("newton", t, 0.0)
             self._renew(t, *found)
@@ -376,8 +376,7 @@ class Handler:
             self.happened.append(Happened(t, name, element, ", ".join(said), ", ".join(now)))
         self.kinks.anew()
         if any(a.kind == "flow" for _, assignments in events for a in assignments):
-            restart = self.succession.restart
-            settled = restart.instant.system if restart is not None else self.system
+            settled = self.restart.instant.system if self.restart else self.system
             y = with_momenta(settled, t, y, yd)
         return y
 

@@ -129,7 +129,7 @@ class Integration:
 
     def _rest_of_start(self) -> None:
         """Lets go of the start of a large run of what is kept, under way; the next one finds it where it is."""
-        if self.system.unknowns <= LARGE or self.forms is None or self.system.form.scales or self.pieces is not None:
+        if self.system.unknowns <= LARGE or self.forms is None or self.system.form.scales:
             return
         if self.start_rate.size:
             before = time.process_time()
@@ -161,7 +161,7 @@ class Integration:
     def _condensed(self) -> Forms | None:
         """The forms without what constant sums define; None where all unknowns are integrated."""
         request = self.request
-        whole = request.switched or request.least_norm or request.fixed_step is not None
+        whole = request.events is not None or request.least_norm or request.fixed_step is not None
         if whole or not request.condense or request.method in ON_UNDERLYING:
             return None
         if self.system.unknowns > LARGE:

@@ -50,7 +50,7 @@ class Pieces:
         start = run.start
         assert run.request.begin is not None
         self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin, run.request.rtol)
-        self.handler.settle_by(run.settler, run.settlers.restart if run.forms is None else run.settlers.across)
+        self.handler.restart = run.settlers.restart
         self.handler.contacts.size(run.sizes.magnitude, run.sizes.time)
         self._longest, self._landing, self._end = run.method.contents.h_max, np.inf, run.segments[0].end
         n = run.system.form.written

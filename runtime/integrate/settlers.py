@@ -56,10 +56,11 @@ class Settlers:
             # steep laws magnify what a basis leaves
             slack = SLACK * request.tolerance if sums and not system.form.scales else 0.0
             # the least change shares what is open: flows between contacts, potentials where all laws are faint
-            flat = bool(request.events) and forms is None and self.whole_form == "rated"
+            flat = bool(request.events) and self.whole_form == "rated"
             self.settler.by_basis(slack, determined=request.switched or flat)
-        self.settler.core.contents.still = STILL * request.tolerance
-        self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
+        # where constraints come and go what is left of a zero counts; steep laws magnify what is left of their rows
+        self.settler.core.contents.still = 0.0 if request.switched else STILL * request.tolerance
+        self.settler.core.contents.enough = 0.0 if system.form.scales or not request.draft else request.settled_to
 
     @cached_property
     def whole_form(self) -> str:

@@ -130,7 +130,8 @@ scene s of m { time 0 s to 10 s; trace R.f }
 
 def test_an_accuracy_that_a_flat_law_costs_is_told_by_it(tmp_path, capsys):
     """Rosenbrock passes the start in Lagrange's form, and misses behind it."""
-    exit_, said = simulated(tmp_path, capsys, TURBULENT, "--formulation", "lagrangian", "--method", "rosenbrock")
+    asked = "--formulation", "lagrangian", "--method", "rosenbrock", "--accuracy", "1e-5"
+    exit_, said = simulated(tmp_path, capsys, TURBULENT, *asked)
     assert exit_ == 3
     assert "error E920" in said
     assert "the law at O has no slope at the start" in said

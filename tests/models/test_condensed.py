@@ -7,7 +7,6 @@ import pytest
 from model_runs import FOUR, trace_of
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
-from scipy.optimize import brentq
 from sysdyn.api import load, simulate
 from sysdyn.cli.main import run
 from sysdyn.runtime.condense import condensed as condensing
@@ -296,61 +295,3 @@ def test_charge_jumps_where_resistors_have_passed_charge_that_nothing_reads(tmp_
         assert trace[name].values[4] == pytest.approx(before[k], abs=1e-8)  # the instant of the jump stands twice
         assert trace[name].values[5] - before[k] == pytest.approx(4.0 / 3.0 if k == 0 else 0.0, abs=1e-8)
         assert trace[name].values[8] == pytest.approx(after[k], abs=2e-8)
-
-
-BENT = LADDER.replace("  source:", "  lamp: dissipator(e = %s) v[n/2] -> ground\n  source:").replace(
-    "0 s to 1 s", "0 s to 3 s"
-)
-BEND = "(if f > 0.1 A then 2 ohm*f - 0.1 V else 1 ohm*f)"
-
-
-def bent_ladder(span):
-    """Voltages of the ladder with a bent resistor at its middle, at the end of the span, and the instants at which the
-    bend is passed: pieces of exponentials.
-    """
-    c, r = _capacitors(), (1.0 + np.arange(1, N + 1) / N) / N
-    flow = np.diag(1.0 / r) @ (np.eye(N, k=-1) - np.eye(N))
-    line, middle = (np.eye(N) - np.eye(N, k=1)) @ flow, N // 2 - 1
-
-    def matrix(above):
-        whole = np.zeros((N + 3, N + 3))  # voltages, sin, cos, 1
-        whole[:N, :N], whole[0, N] = line, 1.0 / r[0]
-        whole[middle, middle] -= 0.5 if above else 1.0
-        whole[middle, N + 2] = -0.05 if above else 0.0
-        whole[:N] /= c[:, None]
-        whole[N, N + 1], whole[N + 1, N] = 5.0, -5.0
-        return whole
-
-    point, t, instants = np.zeros(N + 3), 0.0, []
-    point[N + 1 :], step = 1.0, span / 300
-    while span - t > 1e-12:
-        above = len(instants) % 2 == 1
-        now = matrix(above)
-
-        def beyond(time, now=now, here=point, sign=-1.0 if above else 1.0):
-            return sign * ((expm(now * time) @ here)[middle] - 0.1)
-
-        length = min(step, span - t)
-        if beyond(length) > 0.0 and beyond(1e-9) < 0.0:
-            length = brentq(beyond, 1e-9, length, xtol=1e-14)
-            instants.append(t + length)
-        point, t = expm(now * length) @ point, t + length
-    return point[N - 1], point[middle], instants
-
-
-@pytest.mark.parametrize("method", ["bdf", "radau"])
-def test_a_line_with_a_bend_meets_its_pieces_with_what_is_left(tmp_path, monkeypatch, method):
-    """Laws that change their branches change no constant sum."""
-    met = []
-
-    def watched(system, t, y, yd):
-        met.append(condensing.condensed(system, t, y, yd))
-        return met[-1]
-
-    monkeypatch.setattr(integrate, "condensed", watched)
-    trace = trace_of(tmp_path, BENT % BEND, formulation="lagrangian", method=method)
-    end, middle, instants = bent_ladder(3.0)
-    assert met[-1].stepped.unknowns < 1.2 * N
-    assert trace["end"].values[-1] == pytest.approx(end, abs=3e-7 * trace["end"].nominal)
-    assert trace["middle"].values[-1] == pytest.approx(middle, abs=3e-7 * trace["middle"].nominal)
-    assert [e.time for e in trace.events] == pytest.approx(instants, abs=3e-7)

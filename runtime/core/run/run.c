@@ -79,7 +79,7 @@ void sd_run_settle(sd_run *run, double t)
     double moved = 0.0;
     int at_hand = stepper->onto && !run->fresh;
     lend(run, 1);
-    if ((run->fresh || (at_hand && t == *stepper->t)) && sd_settle_holds(settle, t, run->point, run->point_d))
+    if (at_hand && t == *stepper->t && sd_settle_holds(settle, t, run->point, run->point_d))
         settle->drift = settle->constraints;
     else if (at_hand && !stepper->onto(stepper->self, t, run->point, run->point_d, &moved)
              && sd_settle_holds(settle, t, run->point, run->point_d))

@@ -475,14 +475,14 @@ static int holds(sd_settle *settle, double t, const double *y, const double *yd,
 /* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */
 static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 {
-    double best, limit = fmax(CLOSE, settle->enough);
+    double best;
     settle->calls++;
     settle->contracted = 0.0;
     take(settle, y, yd, settle->x0);
     const size_t steep = settle->system->scales > 0 ? (size_t)(settle->unknowns + settle->rates) * sizeof(double) : 0;
     memcpy(settle->usual, settle->scale, steep);
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && settle->refused < REFUSALS) {
-        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, limit)) {
+        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, fmax(CLOSE, settle->enough))) {
             take(settle, y, yd, settle->met);
             finish(settle, t, y, yd, 1, 1);
             return 0;
@@ -492,7 +492,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     int plain = settle->hold == 1.0; /* else factors are of another weight, and serve once */
     settle->ready = plain ? settle->ready : NONE;
     iterate(settle, t, y, yd, ITERATIONS, &best);
-    if (best > limit) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
+    if (best > CLOSE) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
         put(settle, settle->x0, y, yd);
         settle->hold = HELD;
         settle->ready = 0;
@@ -502,9 +502,9 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     }
     settle->ready = plain ? settle->ready : NONE;
     int done = 0;
-    if (best <= limit) {
+    if (best <= CLOSE) {
         put(settle, settle->x, y, yd);
-        done = holds(settle, t, y, yd, best, limit);
+        done = holds(settle, t, y, yd, best, CLOSE);
     }
     if (!done && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
         if (steep) {
@@ -516,7 +516,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     }
     /* the best point met, or the given one; a rate may have no bound */
     put(settle, settle->x, y, yd);
-    done = done || holds(settle, t, y, yd, best, limit);
+    done = done || holds(settle, t, y, yd, best, CLOSE);
     if (done)
         take(settle, y, yd, settle->met);
     else
