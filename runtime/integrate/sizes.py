@@ -60,9 +60,10 @@ class Sizes:
 
     @cached_property
     def resolved(self) -> Floats | NDArray[np.float32]:
-        """|y| of which is known what round-off leaves open [unknowns], roughly."""
+        """|y| of which is known what round-off leaves open [unknowns], roughly where the core does not read it too."""
         number = self.system.unknowns
-        return np.zeros(number, dtype=np.float32) if number > LARGE else np.zeros(number)
+        rough = number > LARGE and not self._request.events  # (core/run/modes.h)
+        return np.zeros(number, dtype=np.float32) if rough else np.zeros(number)
 
     def let_go(self) -> None:
         """Of what the start knows: found again if asked."""
