@@ -7,6 +7,8 @@ from collections import Counter
 
 import pytest
 
+GOLDEN = 0.6180339887498949
+
 
 @pytest.fixture(autouse=True, scope="session")
 def _one_cache(tmp_path_factory):
@@ -53,13 +55,16 @@ def effort():
 
 
 def pytest_collection_modifyitems(config, items):
-    """Of a test that is marked one_in(n) every n-th case runs; all of them with SYSDYN_LONG=1, or where it is named."""
+    """With SYSDYN_LONG=1, or where a test is named, all; else not what is marked long, and of what is marked one_in(n)
+    one case in n: by multiples of the golden ratio, which leave no value of one of several parameters out.
+    """
     if os.environ.get("SYSDYN_LONG") or any("::" in argument for argument in config.args):
         return
     seen, kept, left = Counter(), [], []
     for item in items:
         mark, name = item.get_closest_marker("one_in"), item.nodeid.partition("[")[0]
-        (left if mark and seen[name] % mark.args[0] else kept).append(item)
+        out = mark is not None and seen[name] * GOLDEN % 1.0 >= 1.0 / mark.args[0]
+        (left if out or item.get_closest_marker("long") else kept).append(item)
         seen[name] += 1
     config.hook.pytest_deselected(items=left)
     items[:] = sorted(kept, key=lambda item: item.get_closest_marker("first") is None)

@@ -85,6 +85,7 @@ model diode {
 
 
 @pytest.mark.parametrize("formulation", [*PRIMAL, "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
 def test_the_operating_point_of_a_diode(formulation, tmp_path, capsys):
     (found,) = rests(capsys, write(tmp_path, DIODE), "--formulation", formulation)
     current = lambda v: 1e-12 * (np.exp(v / 0.02585) - 1.0)  # noqa: E731

@@ -82,6 +82,7 @@ scene s of m {{ time 0 s to 10 s; trace C.e }}
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("source", ["flow(f = 1 l/s) ground -> a", "valve(Cr = 1e9 Pa.s^2/m^6) p -> a"])
+@pytest.mark.one_in(2)
 def test_an_empty_vessel_over_a_valve_fills(tmp_path, capsys, source, formulation):
     """What the valve passes at no pressure has no rate; the pressure of the vessel has."""
     supplied = "node p: hydraulic; P: effort(e = 1 bar) p" if "p ->" in source else ""

@@ -114,12 +114,14 @@ def test_all_is_well(project, capsys):
     assert {"structure: dof", "structure: equations", "meter: energy", "v"} <= names
 
 
+@pytest.mark.long
 def test_other_methods_and_backends_are_no_alarm(project):
     assert run(["golden", "check", "--method", "bdf", "--method", "radau"]) == 0
     assert run(["golden", "check", "-q", "spring", "--backend", "c", "--backend", "numpy"]) == 0
 
 
 @pytest.mark.parametrize("build", ["cc -O0", "cc -O3 -march=native -ffp-contract=fast", "clang", "tcc"])
+@pytest.mark.one_in(2)
 def test_another_compilers_build_is_no_alarm(project, capsys, monkeypatch, build):
     """The goldens were recorded with the flags of compiler/build.py; a wrapper's own come last and win."""
     name, *flags = build.split()

@@ -47,6 +47,7 @@ SAME = ("pendulum", "dc_motor", "bouncing_ball", "diode_circuit", "co_circuit", 
 
 
 @pytest.mark.parametrize("name", [f"seed/{name}" for name in SAME])
+@pytest.mark.one_in(2)
 def test_runs_equal_those_of_the_command_to_the_last_bit(name, tmp_path):
     """Runs on their own: with an option that the others do not have (tests/cli/test_in_core.py looks at those)."""
     file = MODELS / f"{name}.sd"

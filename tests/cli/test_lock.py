@@ -61,6 +61,7 @@ def test_the_api_honours_it(tmp_path):
         (["--accuracy", "1e-5"], ("hamiltonian", "1", "bdf"), "formulation hamiltonian"),
     ],
 )
+@pytest.mark.one_in(2)
 def test_the_command_line_wins(tmp_path, arguments, how, part):
     *found, text = ran(locked(tmp_path), *arguments)
     assert tuple(found) == how
@@ -104,6 +105,7 @@ def test_the_scene_wins(tmp_path, statement, how):
         (lambda lock: lock.replace("\n[files]", "\nfiles = 3\n[other]"), "cannot be read"),
     ],
 )
+@pytest.mark.one_in(2)
 def test_a_stale_lock_is_ignored_and_said_so_even_quietly(tmp_path, capsys, change, said):
     file = locked(tmp_path, change=change)
     capsys.readouterr()

@@ -199,6 +199,7 @@ def test_what_a_scene_does_not_need_is_left_out_of_the_text(tmp_path, capsys):
     capsys.readouterr()
 
 
+@pytest.mark.long
 def test_a_finer_accuracy_keeps_more(tmp_path, capsys):
     file = write(tmp_path, DRIVE)
     kept = []

@@ -218,6 +218,7 @@ def test_a_netlist_goes_to_standard_output_by_its_name(tmp_path, monkeypatch, ca
 
 
 @pytest.mark.parametrize("command", [["verify"], ["trade", "--accuracy", "1e-2"]], ids=["verify", "trade"])
+@pytest.mark.one_in(2)
 def test_processes_side_by_side_read_standard_input_too(command):
     run_ = [*command, "-", "--until", "0.2", "--no-timings", "--json"]
     found = [process(*run_, "--jobs", n, input=PENDULUM) for n in ("1", "2")]

@@ -47,6 +47,7 @@ def test_a_fault_is_raised_in_its_turn(jobs):
     made.close()
 
 
+@pytest.mark.long
 def test_an_item_that_kills_its_process_costs_its_own_answer():
     one, two, three = crew.each(later_first, [2, 14, 3], 2)
     assert (one[0], two, three[0]) == (4, crew.Lost("signal 9"), 9)
@@ -81,6 +82,7 @@ def test_one_item_goes_beside_what_takes_long(monkeypatch):
         assert beside.answer() is None, "before it began"
 
 
+@pytest.mark.long
 def test_a_reference_made_beside_the_other_changes_nothing(tmp_path, capsys, monkeypatch):
     file = tmp_path / "pendulum.sd"
     file.write_text(PENDULUM)
@@ -96,6 +98,7 @@ def test_a_reference_made_beside_the_other_changes_nothing(tmp_path, capsys, mon
 
 
 @pytest.mark.parametrize("command", ["verify", "record"])
+@pytest.mark.one_in(2)
 def test_commands_that_choose_processes_say_what_one_says(tmp_path, capsys, monkeypatch, command):
     Path("pendulum.sd").write_text(PENDULUM)
     asked = {"verify": ["verify"], "record": ["golden", "record", "--folder", "{}"]}[command]

@@ -145,6 +145,7 @@ def poisoned(request, keep, chunk):
 
 
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.long
 def test_dask_workers_killed_at_random_lose_nothing(fall, cluster):
     from sysdyn.cli.sweep.on_dask import results
 
@@ -171,6 +172,7 @@ def test_dask_workers_killed_at_random_lose_nothing(fall, cluster):
 
 
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.long
 def test_a_poison_run_on_dask_is_named_after_three_deaths(fall, cluster):
     from sysdyn.cli.sweep.on_dask import results
 

@@ -124,6 +124,7 @@ BOOK = ["dc_motor", "fluid_tank", *(["nonlinear_spring", "thermal_two_node", "lc
 
 
 @pytest.mark.parametrize("name", BOOK)
+@pytest.mark.one_in(2)
 def test_stated_errors_are_those_of_the_book(tmp_path, references, name):
     entry = references[name]
     file = at_the_instants_of_the_book(name, entry, tmp_path)
@@ -146,6 +147,7 @@ SEARCHED += [("dc_motor", "lagrangian"), ("diode_circuit", "co_lagrangian")] if 
 
 
 @pytest.mark.parametrize(("name", "formulation"), SEARCHED)
+@pytest.mark.long
 def test_the_search_finds_what_the_full_product_does(tmp_path, name, formulation):
     """Twelve models in all formulations: tests/bench/trades.py."""
     request = Request(str(SEED / f"{name}.sd"), scene="reference", formulation=formulation)
@@ -187,6 +189,7 @@ def test_the_object_and_the_command_that_uses_the_choice(tmp_path, capsys):
     assert trace.parameters["l"][0] == 2.0
 
 
+@pytest.mark.long
 def test_two_trades_are_equal_but_for_seconds(tmp_path, capsys):
     file = write(tmp_path, PENDULUM)
     one, two = (run_json(capsys, "trade", str(file), "--no-timings")[1]["result"] for _ in range(2))
@@ -247,6 +250,7 @@ def test_runs_that_are_not_met_are_kept_and_never_chosen():
     assert frontier(runs) == (runs[1], runs[2])
 
 
+@pytest.mark.long
 def test_a_chaotic_scene_counts_errors_as_far_as_its_finest_runs_agree(tmp_path, capsys):
     code, found = run_json(capsys, "trade", str(write(tmp_path, LORENZ)), "--accuracy", "1e-3")
     known = found["result"]["reference"]
@@ -257,6 +261,7 @@ def test_a_chaotic_scene_counts_errors_as_far_as_its_finest_runs_agree(tmp_path,
 
 
 @pytest.mark.parametrize(("accuracy", "levels"), [(1e-1, {"plain"}), (1e-4, {"full"})])
+@pytest.mark.one_in(2)
 def test_the_accuracy_chooses_the_level(tmp_path, capsys, accuracy, levels):
     """The cheap one where it will do; both against the full model."""
     file = write(tmp_path, LEVELS)

@@ -174,7 +174,7 @@ COSTLY = (
 
 
 @pytest.mark.parametrize(("file", "scene"), list(scenes()))
-@pytest.mark.one_in(17)
+@pytest.mark.one_in(34)
 def test_every_scene_agrees(file, scene, capsys):
     if (file, scene) in COSTLY and not LONG:
         pytest.skip("SYSDYN_LONG=1 verifies it")
@@ -304,6 +304,7 @@ def test_a_solver_that_stops_is_exit_3_with_time_and_run(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.one_in(2)
 def test_a_chaotic_model_is_compared_up_to_its_horizon(tmp_path, method, capsys):
     path = write(tmp_path, LORENZ)
     assert run(["verify", path, "--method", method]) == 0

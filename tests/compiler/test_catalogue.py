@@ -69,6 +69,7 @@ def known_rates(oracle, values, k):
     return t, y, yd
 
 
+@pytest.mark.one_in(2)
 def test_residual_on_the_solution(case):
     compiled, values, name = case
     if name == WITHOUT_VALUES:
@@ -83,6 +84,7 @@ def test_residual_on_the_solution(case):
             assert np.all(np.abs(r) <= 1e-12 * np.maximum(scale, 1e-2)), block
 
 
+@pytest.mark.one_in(2)
 def test_energy_balance_is_an_identity(case):
     """d(T + V)/dt + dissipated - supplied = 0 at each state of the solution."""
     compiled, values, name = case
@@ -145,6 +147,7 @@ def test_carriers_agree_with_the_oracle(case, tmp_path):
                         close(carrier.entries(block, part, t, y, yd), v)
 
 
+@pytest.mark.one_in(2)
 def test_entries_are_the_rows_derivatives(case):
     """Richardson-extrapolated central differences of the rows against the entries, scattered by the pattern."""
     compiled, _, _ = case

@@ -41,7 +41,7 @@ def values(model):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("text", [mixed(24), power_grid(24), stages(12)], ids=["mixed", "power_grid", "stages"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_loops_through_tables_compute_the_same_numbers(text, formulation, monkeypatch):
     for limit, few in (("ALIKE", 4), ("TERMS", 8), ("LARGE", 1)):
         monkeypatch.setattr(emit_c_rolled, limit, few)
@@ -62,6 +62,7 @@ def test_loops_that_share_a_function_compute_the_same_numbers(monkeypatch):
         assert shared[name].tobytes() == plain.tobytes(), name
 
 
+@pytest.mark.long
 def test_what_the_c_compiler_sees_hardly_grows_with_what_is_written_out():
     """Statements of C a bus, without tables: 150 where each row has its own."""
     few, many = (re.sub(r"= \{[^}]*\};", "", compiled(power_grid(n)).text).count(";") for n in (300, 600))

@@ -148,6 +148,7 @@ def test_long_lines_are_broken_where_the_language_allows():
     assert len(once.split("\n")) > 15
 
 
+@pytest.mark.long
 def test_huge_and_deep_expressions_are_written():
     check_round_trip("const a = " + " +\n".join(["x"] * 50_000))
     check_round_trip("const a = " + "(" * 190 + "x" + ")" * 190)

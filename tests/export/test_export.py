@@ -109,7 +109,7 @@ def formed_of(model, index, backend, scene, settings):
 @C
 @pytest.mark.parametrize("backend", ["c", "numpy"])
 @pytest.mark.parametrize("model", EVERY if LONG else SLICE)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_outside_is_inside_to_the_last_bit(tmp_path, model, backend):
     for index in ("auto", *FORMS) if LONG else ("auto", "1"):
         same(model, tmp_path / index, index, backend)
@@ -117,6 +117,7 @@ def test_outside_is_inside_to_the_last_bit(tmp_path, model, backend):
 
 @C
 @pytest.mark.parametrize("backend", ["c", "numpy"])
+@pytest.mark.one_in(2)
 def test_arrays_of_ten_thousand(tmp_path, backend):
     same("gallery/transmission_line", tmp_path, "auto", backend, ["--set=n=10000"])
 
@@ -152,6 +153,7 @@ def test_index_forms_by_name(tmp_path):
 
 @C
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_index_0_is_the_underlying_equation(tmp_path, formulation):
     """A pendulum: f' = -g (q - ...) by hand; the Jacobian by differences; the Python beside the C."""
     options = ("--scene", "reference", "--index", "0", "--formulation", formulation)

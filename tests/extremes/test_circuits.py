@@ -87,7 +87,7 @@ def test_rows_between_steps_are_as_accurate_as_steps(tmp_path, number, formulati
 @pytest.mark.parametrize(
     ("number", "formulation"), [(1, "hamiltonian"), (2, "co_lagrangian"), (4, "lagrangian"), (8, "lagrangian")]
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_bridges_whose_sources_float_while_all_diodes_block(tmp_path, number, formulation):
     """No current tells the voltage of such a source to earth: eight of them, of sparse kernels, were refused before."""
     time, accuracy = np.linspace(0.0, 0.02, 201), 1e-4
@@ -99,6 +99,7 @@ def test_bridges_whose_sources_float_while_all_diodes_block(tmp_path, number, fo
 
 
 @pytest.mark.parametrize("seed", [*((1, 7, 9, 20, 24, 26, 33) if not LONG else range(60))])
+@pytest.mark.one_in(3)
 def test_random_rectifiers_start_where_their_diodes_leave_them(tmp_path, seed):
     """Sources float behind diodes that block by 200 V (exp(-7700)): nothing but leakage says where.  Four of these were
     refused before, the seventh began 42 mV off.

@@ -47,6 +47,7 @@ def ignition(t):
 
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-6])
 @pytest.mark.parametrize("reference", [exponential, epidemic, oscillator, pendulum, ignition], ids=lambda f: f.__name__)
+@pytest.mark.one_in(2)
 def test_what_grows_is_right(tmp_path, reference, accuracy):
     run = ran(tmp_path, FILE, scene=f"{reference.__name__}_run", accuracy=accuracy)
     assert not run.refused

@@ -11,6 +11,7 @@ FAINT = {36}
 """What is wrong by 5 times the accuracy is 1e-10 of the voltages beside it."""
 
 
+@pytest.mark.long
 def test_none_is_wrong_without_saying_so(tmp_path):
     found = {seed: judged(drawn(seed), tmp_path) for seed in SEEDS if seed not in FAINT}
     assert not {seed: verdict for seed, verdict in found.items() if verdict[0] == "wrong"}

@@ -20,6 +20,7 @@ def energy(start, push, angle):
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize(("start", "push", "b"), SETS)
+@pytest.mark.one_in(3)
 def test_a_flat_parallelogram_stays_one_or_is_refused(tmp_path, start, push, b, method, formulation):
     settings = (("start", repr(start)), ("push", repr(push)), ("b", repr(b)))
     run = ran(

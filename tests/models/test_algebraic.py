@@ -28,6 +28,7 @@ MORE = {"alone": "", "beside a capacitor": "C: potential(q = 0.1 F*e) a -> groun
 
 @pytest.mark.parametrize("more", MORE)
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_what_follows_its_source_at_once(tmp_path, formulation, more):
     """f = v/R; a spring under a force: its rate is that of the force over k."""
     trace = trace_of(tmp_path, TEXT.format(more=MORE[more]), scene="run", formulation=formulation)
@@ -70,6 +71,7 @@ scene run of clipper { time 0 s to 60 ms; trace R.f, D.e every 0.1 ms }
 
 @pytest.mark.parametrize("method", ["dopri", "radau", "bdf", "rosenbrock", "energy"])
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_a_diode_that_follows_its_source_between_long_steps(tmp_path, formulation, method):
     """i R + vT ln(1 + i/Is) = V; of it there is a closed form in Lambert's W.  No step of dopri has an error here, and
     its polynomial may be anywhere between: rows of 6e23 A were said to hold, in magnitudes that such points had left.

@@ -90,6 +90,7 @@ def test_a_line_meets_its_exponential(tmp_path, text, exact, formulation, method
 
 @pytest.mark.parametrize(("text", "left"), [(LADDER, 1.2), (WAVES, 2.2)], ids=["ladder", "waves"])
 @pytest.mark.parametrize("formulation", FOUR[:2])
+@pytest.mark.one_in(2)
 def test_what_is_left_of_a_node(tmp_path, monkeypatch, text, left, formulation):
     """One unknown a node of a ladder, two of a line of inductors; rows and matrix are those of all unknowns."""
     met = []
@@ -231,6 +232,7 @@ def _after_jump(matrix, drive):
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize(("source", "exact"), [(KINKED, _after_ramp), (JUMPING, _after_jump)], ids=["kink", "jump"])
+@pytest.mark.one_in(2)
 def test_pieces_between_kinks_and_jumps_are_condensed(tmp_path, monkeypatch, source, exact, method):
     """One unknown a node on both sides of it; no structure of all unknowns is made where no state jumps."""
     seen, whole = [], []

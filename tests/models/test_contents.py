@@ -103,7 +103,7 @@ CASES = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_contents(tmp_path, case, formulation):
     body, start = CASES[case]
     text = ("model net {{\n" + body + SCENE).format(traced=", ".join(start))

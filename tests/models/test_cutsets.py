@@ -278,6 +278,7 @@ scene go of levers {{ time 0 s to 3 s; accuracy 1e-6; trace x[n] as x, y[n] as y
 
 @pytest.mark.parametrize("n", [3, 300])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_however_many_levers_begin_where_their_balances_say(tmp_path, formulation, n):
     """2 x + 3 y = 0 follows from both balances of each, and its rate."""
     trace = trace_of(tmp_path, LEVERS.format(n=n), scene="go", formulation=formulation)

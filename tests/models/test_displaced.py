@@ -110,6 +110,7 @@ CASES = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.one_in(2)
 def test_a_step_across_stores(tmp_path, name, formulation):
     text, exact = CASES[name]
     trace = trace_of(tmp_path, text, formulation=formulation)

@@ -25,6 +25,7 @@ scene s of m {{
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("content", ["1/3*c*abs(x')^3", "1/3*c*x'^2*abs(x')", "1/3*c*hypot(x', 0 m/s)^3"])
 @pytest.mark.parametrize("speed", [1.0, -1.5])
+@pytest.mark.one_in(2)
 def test_quadratic_drag_is_smooth(tmp_path, formulation, content, speed):
     trace = trace_of(tmp_path, TEXT.format(coulomb=0, content=content, speed=speed), scene="s", formulation=formulation)
     known = speed / (1.0 + 2.0 * abs(speed))

@@ -42,6 +42,7 @@ def four(tmp_path_factory):
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-12])
+@pytest.mark.one_in(2)
 def test_floating_bridge_at_every_tolerance(method, rtol, four, tmp_path):
     found = run(bridge(1, 1), tmp_path, rtol=rtol, method=method)
     assert abs(found["R.e"][-1] - four["R.e"][-1]) < 2e3 * rtol + 2e-8
@@ -70,6 +71,7 @@ def test_diodes_behind_sources_of_their_own_are_no_parallel(tmp_path):
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("rtol", [1e-8, 1e-10])
+@pytest.mark.one_in(2)
 def test_bridge_before_a_coil_commutates_at_once(method, rtol, tmp_path):
     """The current of the coil changes arms where the source passes zero: at half periods, all four diodes at once."""
     gallery = Path(__file__).resolve().parents[2] / "models" / "gallery" / "diode_bridge.sd"

@@ -41,6 +41,7 @@ BRIDGES = [(2, "lagrangian"), (2, "hamiltonian"), (3, "lagrangian"), (5, "lagran
 
 
 @pytest.mark.parametrize(("phases", "formulation"), BRIDGES)
+@pytest.mark.one_in(2)
 def test_a_bridge_commutates_and_does_nothing_else(phases, formulation, tmp_path):
     trace = run(bridge(phases), tmp_path, formulation)
     waves = [10.0 * np.sin(W * trace.time + PHASE - 2.0 * np.pi * k / phases) for k in range(phases)]
@@ -314,6 +315,7 @@ scene s of rectifier { time 0 s to 0.2 s; trace b.e }
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7])
+@pytest.mark.one_in(2)
 def test_a_diode_before_a_capacitor_lets_go_at_every_accuracy(tmp_path, accuracy, method):
     """Its current ends while the voltage across it is nothing: what a draft leaves of that is no voltage.  Closed form:
     the source, from where the current is nothing the capacitor over the resistor.

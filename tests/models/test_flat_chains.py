@@ -45,6 +45,7 @@ def test_cranks_in_parallel_pass_where_all_bars_lie_flat(tmp_path, method, accur
 
 @pytest.mark.parametrize("accuracy", [1e-6, 1e-7, 1e-8])
 @pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.one_in(2)
 def test_a_chain_that_folds_is_never_met(tmp_path, formulation, accuracy):
     """There the chain might fold, which takes energy: by round-off a fine run does; it is refused then."""
     ran, _ = attempt(tmp_path, bars(accuracy), formulation=formulation, method="dopri", settings=(("n", "1"),))

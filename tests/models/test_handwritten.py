@@ -62,7 +62,7 @@ def run(folder, text, name, **options):
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("name", NETLISTS)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_a_netlist_runs_as_it_does_element_by_element(name, tmp_path, monkeypatch):
     text = NETLISTS[name]
     families = gathered(network(text))
@@ -129,6 +129,7 @@ def test_a_grid_without_order_keeps_its_names(tmp_path):
 
 
 @pytest.mark.parametrize("of", [power_grid, mixed, lambda n: mesh(n // 8, 8)], ids=["power_grid", "mixed", "mesh"])
+@pytest.mark.one_in(3)
 def test_what_is_joined_without_order_is_families_that_do_not_grow(of, effort):
     """Tables of indices tell what is joined to what: as many statements for any number of lines, each at equal cost."""
     short, few = effort(lambda: compiled(of(160)))
@@ -152,6 +153,7 @@ def test_a_grid_without_a_ground_is_counted_from_one_of_its_nodes(tmp_path, monk
     assert np.array_equal(one, run(tmp_path, text, "written", backend="numpy"))
 
 
+@pytest.mark.long
 def test_branches_of_an_array_beside_a_grid_without_order(tmp_path, monkeypatch):
     """What a `for` joins to it stays a loop; its nodes' indices do not show that they hang together."""
     more = "  node v[1..3]: electrical\n  for k in 1..3 { r[k]: resistor(R = k*1 ohm) v[k] -> bus4 }\n"

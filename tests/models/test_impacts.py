@@ -232,6 +232,7 @@ scene bounce of ball {
 
 @FORMULATIONS
 @pytest.mark.parametrize("mu", [0.1, 0.9])
+@pytest.mark.one_in(2)
 def test_a_bounce_rubs_by_its_impulse(tmp_path, formulation, mu):
     """Coulomb's law for impulses: each bounce takes mu of its impulse along the floor, at most what turns back; what is
     left when the ball rests slides on by its weight.

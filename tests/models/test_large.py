@@ -139,6 +139,7 @@ def test_a_section_of_a_large_line_takes_few_bytes_to_the_first_step(tmp_path, m
     [(LADDER, (25_000, 50_000), 760), (SECTIONS, (55_000, 75_000), 1300)],
     ids=["ladder", "sections"],
 )
+@pytest.mark.one_in(2)
 def test_a_section_of_a_run_holds_few_bytes(tmp_path, model, sections, most):
     """Of arrays and of the core, while it steps: 671 of a ladder by the bdf, 1152 of a line by radau today; 1239 where
     factors had orders and places of their own; 1633, 2932 where runs kept the start as they saw it, every place of
@@ -188,6 +189,7 @@ run(sys.argv[1:])
 """
 
 
+@pytest.mark.long
 def test_what_round_off_leaves_open_takes_few_bytes_a_section(tmp_path):
     """Of arrays and objects of Python, between two runs: 1251 of a ladder today; 1924 where each part of the Jacobian
     was held beside what it goes into, and all errors that are tried at once.

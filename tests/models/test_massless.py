@@ -26,6 +26,7 @@ FILTER = "\n  ".join(
 
 @pytest.mark.parametrize("method", ["dopri", "energy"])
 @pytest.mark.parametrize("formulation", [*FOUR, "kane"])
+@pytest.mark.one_in(2)
 def test_a_loop_with_two_resistors(tmp_path, formulation, method):
     """C u' = -u/R + f, L f' = -u - S f: f'' + f' + 5/4 f = 0 from f = 0, f' = -1; u = -f' - f/2."""
     trace = trace_of(tmp_path, HEAD + FILTER + SCENE, scene="run", formulation=formulation, method=method)

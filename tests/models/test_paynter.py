@@ -84,6 +84,7 @@ EVERY = list(itertools.product(STATE_FUNCTIONS, "efpq", UNITS, PLACES))
 
 
 @pytest.mark.parametrize(("function", "letter", "domain", "place"), EVERY)
+@pytest.mark.one_in(2)
 def test_a_function_of_one_variable(function, letter, domain, place):
     """Of its own variable alone: anything else is refused, with a code and a remedy."""
     variable = names(place, domain)[letter]
@@ -101,6 +102,7 @@ def test_a_function_of_one_variable(function, letter, domain, place):
 
 
 @pytest.mark.parametrize(("function", "letter", "domain", "place"), EVERY)
+@pytest.mark.one_in(2)
 def test_beside_its_own_variable(function, letter, domain, place):
     """Another variable beside its own: as the table has it."""
     known, written_as = STATE_FUNCTIONS[function], names(place, domain)

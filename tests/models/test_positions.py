@@ -95,6 +95,7 @@ def test_positions_and_contents(tmp_path, case, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_positions_and_contents_of_families(tmp_path, formulation):
     """Positions and contents are written of some elements each; nothing but x[0] moves at the start."""
     text = """
@@ -155,6 +156,7 @@ LOOPS = {
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
 @pytest.mark.parametrize("case", LOOPS)
+@pytest.mark.one_in(3)
 def test_springs_of_families_in_loops(tmp_path, case, formulation):
     """Masses of which nothing is said move least; around each loop of springs the stretches add up to nothing."""
     body, start = LOOPS[case]
@@ -285,6 +287,7 @@ scene go of cells {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("text", [ISLAND, CELLS], ids=["secondary", "family"])
+@pytest.mark.one_in(2)
 def test_parts_without_a_ground(tmp_path, text, formulation):
     """Efforts are read against the same node of the part, whatever the formulation."""
     trace = trace_of(tmp_path, text, formulation=formulation)

@@ -15,6 +15,7 @@ def test_without_sundials_it_says_why(tmp_path, monkeypatch):
     assert "that_is_not_there" in race.Peers(tmp_path).missing
 
 
+@pytest.mark.long
 def test_the_peers_reach_published_ends(tmp_path, monkeypatch):
     peers = race.Peers(tmp_path)
     if peers.missing:

@@ -29,6 +29,7 @@ def test_formulations_agree_whatever_the_parameters(name, number):
         assert all(code.startswith("E") for code, _ in tried.errors), tried.errors
 
 
+@pytest.mark.long
 def test_each_set_is_drawn_anew_and_again():
     first, second = (random_parameters.tried("seed/mass_spring", k).settings for k in (0, 1))
     assert first != second

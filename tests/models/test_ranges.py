@@ -28,6 +28,7 @@ def left():
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_the_run_ends_where_the_argument_leaves_the_data(tmp_path, capsys, formulation):
     path, out = tmp_path / "ramp.sd", tmp_path / "t.h5"
     path.write_text(RAMP, encoding="utf-8")

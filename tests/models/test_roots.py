@@ -110,6 +110,7 @@ scene run of vessels { time 0 s to 20 s; trace A.e, B.e every 0.1 s }
 
 
 @pytest.mark.parametrize("method", ["auto", "bdf", "radau", "dopri"])
+@pytest.mark.one_in(2)
 def test_a_flow_that_turns_through_a_square(tmp_path, method):
     """Against the law turned over, f = sqrt(d/k), by SciPy; where the flow turns the pressure has no slope."""
     trace = trace_of(tmp_path, TURNS, method=method)

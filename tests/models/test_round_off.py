@@ -19,6 +19,7 @@ from test_seed import SEED, settings_of
     ("model", "formulation"),
     [("rack_pinion", "co_lagrangian"), ("lever", "co_hamiltonian"), ("ebers_moll", "lagrangian")],
 )
+@pytest.mark.one_in(2)
 def test_last_digits_do_not_decide(tmp_path, monkeypatch, model, formulation, seed):
     random = np.random.default_rng(seed)
     exact = start.solve

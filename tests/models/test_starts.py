@@ -29,6 +29,7 @@ def test_a_junction_guessed_far_above_its_voltage(tmp_path, formulation, guess):
 
 @pytest.mark.parametrize("scene", ["shared", "dropped"])
 @pytest.mark.parametrize("start", [-2.5, -2.0, -0.8])
+@pytest.mark.one_in(2)
 def test_parallel_cranks_that_start_elsewhere(tmp_path, scene, start):
     """Near points may not be taken on the other side of a dead centre, nor the start moved by the row left out."""
     trace = trace_of(tmp_path, GALLERY / "sixbar_redundant.sd", scene=scene, settings=(("start", f"{start} rad"),))

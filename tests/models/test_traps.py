@@ -191,6 +191,7 @@ def voltage(e, saturation, vt=25.85e-3, r=10.0):
     ("drive", "saturation", "guess"),
     [(1000.0, 1e-12, 0.0), (1000.0, 1e-15, -1000.0), (-1000.0, 1e-12, 0.5), (20.0, 1e-16, -30.0)],
 )
+@pytest.mark.one_in(2)
 def test_a_diode_is_safe_against_overflow(tmp_path, formulation, drive, saturation, guess):
     settings = (("E", repr(drive)), ("Is", repr(saturation)), ("guess", repr(guess)))
     trace = trace_of(tmp_path, DIODE, formulation=formulation, settings=settings)

@@ -48,7 +48,7 @@ def test_each_kind_of_change(text):
 
 
 @pytest.mark.parametrize("name", run.LOWERING)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_mutants_of_the_lowering_compile_and_differ(name):
     found = run.sites(name)
     plain = ast.unparse(ast.parse((run.ROOT / "compiler" / name).read_text()))
@@ -59,6 +59,7 @@ def test_mutants_of_the_lowering_compile_and_differ(name):
         compile(run.changed(site.mutant.text), name, "exec")
 
 
+@pytest.mark.long
 def test_equivalents_are_mutants():
     """Every entry of EQUIVALENT names mutants that there are."""
     for name, function, text, _ in run.EQUIVALENT:

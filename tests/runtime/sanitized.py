@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[2]
-PLAIN = ("-O1", "-g1", "-std=c11", "-fPIC")
+PLAIN = ("-O0", "-g1", "-std=c11", "-fPIC")
 FLAGS = (*PLAIN, "-fsanitize=address,undefined", "-fno-sanitize-recover=undefined")
 THREADS = (*PLAIN, "-fsanitize=thread")
 OPTIONS = {

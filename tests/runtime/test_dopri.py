@@ -97,6 +97,7 @@ def test_no_drift_over_a_long_span(family):
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("form", ["1", "0"])
+@pytest.mark.one_in(2)
 def test_differentiated_rows_are_projected_after_each_step(monkeypatch, method, form):
     assert drift(models.pendulum(angle=2.0), 40.0, form, method, 1e-4) < 1e-12
     monkeypatch.setattr(settlers, "PROJECTED", ())

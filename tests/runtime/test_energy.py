@@ -108,7 +108,7 @@ def test_displacements_and_multipliers(form):
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-8])
 @pytest.mark.parametrize("made", [cartesian, minimal])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_energy_and_constraints_over_many_periods(made, rtol):
     t_end = (150.0 if LONG else 40.0) * SWING
     rows, _, finished = energy(made(), t_end, np.linspace(0.0, t_end, 100), rtol=rtol)
@@ -148,6 +148,7 @@ def test_the_phase_error_is_the_tolerance_of_a_period_times_their_number():
         assert off[-1] < 3e-2 * rtol * periods or off[-1] / off[periods // 2] == pytest.approx(2.0, rel=0.3)
 
 
+@pytest.mark.long
 def test_an_invariant_that_nothing_projects_does_not_drift():
     t_end = (100.0 if LONG else 40.0) * 2.0 * np.pi
     t = np.linspace(1.0, t_end, 200)
@@ -164,6 +165,7 @@ def test_the_balance_is_closed_where_energy_is_lost_and_supplied(form):
     assert np.abs(rows[:2, 6]).max() < 1e-11 * rows[:, 5].max()
 
 
+@pytest.mark.long
 def test_the_estimate_includes_the_phase(tmp_path):
     t_end = 70.0 * SWING
     outcome = simulated(tmp_path, minimal(), t_end, method="energy", accuracy=1e-6)

@@ -173,6 +173,7 @@ def van_der_pol():
                         initial={"q_x": (2, True), "f_x": (0, True)})
 
 
+@pytest.mark.long
 def test_auto_takes_it_for_cheap_accuracy_and_more_stages_for_dear_one(tmp_path):
     for accuracy, method in ((1e-3, "rosenbrock"), (1e-7, "radau")):
         outcome, trace = simulated(tmp_path, relaxing(1e5), 10.0, accuracy=accuracy)

@@ -37,6 +37,7 @@ def outcome(made, path, t_end, **options):
 
 @pytest.mark.parametrize("name", END)
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
+@pytest.mark.one_in(2)
 def test_accuracy_is_met(name, accuracy, tmp_path):
     make, t_end, values = END[name]
     result = outcome(make(), tmp_path / "o.h5", t_end, accuracy=accuracy, every=t_end / 40)

@@ -135,6 +135,7 @@ simulate(manifest, binding, load(module), Options({path!r}, 0.0, 1e9, every=None
 
 
 @pytest.mark.parametrize("flush", [0.8, 0.01])
+@pytest.mark.one_in(2)
 def test_a_killed_run_leaves_a_readable_trace(tmp_path, flush):
     random.seed(int(flush * 100))
     for k in range(3):
