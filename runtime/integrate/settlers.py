@@ -51,15 +51,15 @@ class Settlers:
         t, y, yd = point
         self._point = (t, y[:n], yd[:n]) if system.unknowns <= RATED else None
         self.settler = self.of("settled" if forms is not None else self.whole_form, self.keeps)
-        if not steep_balances(system):
-            sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
-            # steep laws magnify what a basis leaves
-            slack = SLACK * request.tolerance if sums and not system.form.scales else 0.0
-            # the least change shares what is open: flows between contacts, potentials where all laws are faint
-            flat = bool(request.events) and self.whole_form == "rated"
-            self.settler.by_basis(slack, determined=request.switched or flat)
-        # where constraints come and go what is left of a zero counts; steep laws magnify what is left of their rows
-        self.settler.core.contents.still = 0.0 if request.switched else STILL * request.tolerance
+        # where constraints come and go what is left of a zero counts
+        still = 0.0 if request.switched else STILL * request.tolerance
+        sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
+        # of steep laws what follows shares a move of the state
+        slack = still if system.form.scales else SLACK * request.tolerance if sums else 0.0
+        # the least change shares what is open: flows between contacts, potentials where all laws are faint
+        flat = bool(request.events) and self.whole_form == "rated"
+        self.settler.by_basis(slack, determined=request.switched or flat)
+        self.settler.core.contents.still = still
         self.settler.core.contents.enough = 0.0 if system.form.scales or not request.draft else request.settled_to
 
     @cached_property

@@ -9,7 +9,8 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
 
 MANIFEST = {"structure": chain.structure()}
-NEVER = 1 << 20
+NEVER, REFUSALS, AGAIN = 1 << 20, 3, 16
+"""Of core/system/settle.c."""
 
 
 @pytest.fixture
@@ -64,3 +65,15 @@ def test_a_state_off_its_constraints_moves_least_unless_slack_is_given(settler):
     least, basic = (np.linalg.norm(((x - off) / settler.scale[: y.size])[state]) for x in (b, c))
     assert least <= basic * (1.0 + 1e-6)
     assert basic < 10.0 * least
+
+
+def test_a_basis_that_was_refused_is_tried_again_later(settler):
+    settler, y, yd, _ = settler
+    core = settler.core.contents
+    core.refused, core.ready = REFUSALS, 0
+    tried = []
+    for _ in range(AGAIN):
+        assert settler.settle(0.0, y, yd)[2]
+        tried.append(core.refused == 0)
+    assert tried[-1]
+    assert not all(tried[: AGAIN // 2])

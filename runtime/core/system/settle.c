@@ -18,7 +18,9 @@
 #define HELD 1e8        /* weight of the state in a second attempt */
 #define LEAST_PIVOT 1e-11 /* part of its column below which a row of the basis follows from the others */
 #define STILL 1e-12     /* move of the state, in magnitudes, that is none */
-#define REFUSALS 3      /* of the basis in a row, behind which it is not tried any more */
+#define REFUSALS 3      /* of the basis in a row, behind which it is tried once in AGAIN points alone, */
+#define AGAIN 16
+#define OUT (1 << 20)   /* and behind these not any more */
 #define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
 #define BEYOND 1e3      /* times the point that was found, from which a magnitude was that of an iterate */
 #define SMALL_POINT 20000 /* unknowns and rates up to which room for slopes is kept */
@@ -271,7 +273,7 @@ static int choose_from(sd_settle *settle)
     if (!lu->pivoted || sd_sparse_refactor(lu, &matrix)) {
         int failed = sd_sparse_pivot(lu, &matrix);
         if (failed > 1) /* it fills too much */
-            settle->refused = REFUSALS;
+            settle->refused = OUT;
         if (failed || (settle->determined && leaves_open(settle)))
             return 1;
     }
@@ -481,7 +483,8 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     take(settle, y, yd, settle->x0);
     const size_t steep = settle->system->scales > 0 ? (size_t)(settle->unknowns + settle->rates) * sizeof(double) : 0;
     memcpy(settle->usual, settle->scale, steep);
-    if (settle->basis && (settle->hold == 1.0 || settle->determined) && settle->refused < REFUSALS) {
+    int tried = settle->refused < REFUSALS || (settle->refused < OUT && settle->calls % AGAIN == 0);
+    if (settle->basis && (settle->hold == 1.0 || settle->determined) && tried) {
         if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, fmax(CLOSE, settle->enough))) {
             take(settle, y, yd, settle->met);
             finish(settle, t, y, yd, 1, 1);
