@@ -181,7 +181,7 @@ def _load() -> Any:
         "sd_energy_start": (None, [_P, _D, _P, _P, _D]),
         "sd_settle_new": (c.POINTER(Settle), [_P, _P, _I]),
         "sd_settle_take": (c.c_int, [_P, _P]),
-        "sd_settle_widen": (c.c_int, [*[_P] * 6, _I]),
+        "sd_settle_widen": (c.c_int, [_P, _P, _I]),
         "sd_settle_pivoted": (_P, [_P]),
         "sd_condensed_bind": (None, [_P, _P]),
         "sd_condensed_expand": (None, [_P, _P, _P, _I]),
