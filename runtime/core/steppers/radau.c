@@ -10,6 +10,7 @@
 #include <string.h>
 
 #define OWN 4              /* vectors that every step hands on to the next one */
+#define SPARE 64           /* numbers behind each set of vectors: two sets are room for what has a few more than they */
 #define FIRST 1e-2         /* of the span: the first step at most */
 #define CREEPS 8           /* steps in a row for which Newton failed at first: towards a square root's zero they would never end */
 #define IDLE 1e-6          /* error of a step that only Newton keeps short */
@@ -100,7 +101,7 @@ static int provide_room(sd_radau *radau)
         return 0;
     radau->in_place = kept && sd_condensed_in_place(left) && 2 * m <= (size_t)left->full->unknowns + 8;
     all -= radau->in_place ? 2 : 0;
-    radau->work = calloc(all * m + (steep ? 3 : 2) * nnz, sizeof(double));
+    radau->work = calloc(all * m + sets * SPARE + (steep ? 3 : 2) * nnz, sizeof(double));
     radau->led = calloc((size_t)radau->n + 1, sizeof *radau->led);
     if (!radau->work || !radau->led) {
         leave_room(radau);
@@ -109,7 +110,7 @@ static int provide_room(sd_radau *radau)
     double *next = radau->work;
     for (size_t i = 0; i < number; i++, next += m)
         *vectors[i] = next;
-    for (size_t i = 0; i < sets; i++) {
+    for (size_t i = 0; i < sets; i++, next += SPARE) {
         for (int32_t s = 0; s < radau->most_stages; s++, next += m)
             of_stages[i][s] = next;
         for (size_t k = 0; k < pairs && of_stages[i] == radau->d; k++)
@@ -139,7 +140,7 @@ static int provide_room(sd_radau *radau)
 static double *spare(void *self, size_t *numbers)
 {
     sd_radau *radau = self;
-    *numbers = (size_t)sd_whole_lanes(radau->n + 1) * (size_t)(3 * radau->most_stages - 1 - 2 * radau->in_place);
+    *numbers = (size_t)sd_whole_lanes(radau->n + 1) * (size_t)(3 * radau->most_stages - 1 - 2 * radau->in_place) + SPARE;
     return provide_room(radau) ? NULL : radau->z[0] < radau->d[0] ? radau->z[0] : radau->d[0];
 }
 

@@ -57,19 +57,25 @@ static int provide_work(sd_settle *settle)
 {
     const sd_system *system = settle->system;
     size_t m = (size_t)settle->rows + 1, n = (size_t)(settle->unknowns + settle->rates) + 1;
-    size_t kept = system->left ? (size_t)system->unknowns + 8 : 0, longest = n > 2 * m ? n : 2 * m;
-    size_t all = 2 * m + 2 * n + longest + 2 * kept;
+    size_t kept = system->left ? (size_t)system->unknowns + 8 : 0, all = 2 * m + 2 * n + 2 * kept;
     double *next = settle->lent && settle->lent_room >= all ? settle->lent : settle->work;
     if (!next && !(next = settle->work = malloc(all * sizeof *next)))
         return 0;
     settle->r = next;
     settle->x0 = settle->r + m;
-    settle->step = settle->x0 + n; /* unknowns, rates and rows */
-    settle->x = settle->step + n + m; /* within a basis the right side of a step */
-    settle->room = settle->x + longest;
+    settle->step = settle->x0 + n; /* unknowns, rates and rows; a basis is chosen there before it steps */
+    settle->room = settle->step + n + m;
     if (settle->basis)
-        sd_sparse_lend(settle->basis, settle->x);
+        sd_sparse_lend(settle->basis, settle->step);
     return 1;
+}
+
+/* room for the best point of an iteration without a basis: its own from then on; 0: no memory */
+static int provide_best(sd_settle *settle)
+{
+    if (!settle->x)
+        settle->x = malloc(((size_t)(settle->unknowns + settle->rates) + 1) * sizeof *settle->x);
+    return settle->x != NULL;
 }
 
 static void free_slopes(sd_settle *settle)
@@ -130,6 +136,7 @@ void sd_settle_free(sd_settle *settle)
     sd_sparse_free(settle->basis);
     free_slopes(settle);
     free(settle->work);
+    free(settle->x);
     free(settle->memory);
     free(settle);
 }
@@ -156,7 +163,8 @@ void sd_settle_rest(sd_settle *settle)
     if (settle->unknowns + settle->rates <= SMALL_POINT)
         return;
     free(settle->work);
-    settle->work = NULL;
+    free(settle->x);
+    settle->work = settle->x = NULL;
 }
 
 int *sd_settle_pivoted(sd_settle *settle)
@@ -325,10 +333,10 @@ static int choose(sd_settle *settle, double t, const double *y, const double *yd
 static double move_basic(sd_settle *settle, double *y, double *yd, double *state)
 {
     int32_t n = settle->unknowns, moves = n + settle->rates;
-    double largest = 0.0, *b = settle->x;
+    double largest = 0.0, *b = settle->r; /* which is measured anew behind it */
     for (int32_t i = 0; i < settle->rows; i++)
         b[i] = -settle->r[i] * settle->row_scale[i];
-    sd_sparse_basic(settle->basis, b, settle->step, b + settle->rows);
+    sd_sparse_basic(settle->basis, b, settle->step, settle->step + moves);
     for (int32_t j = 0; j < moves; j++) {
         double move = settle->step[j] *= lift(settle, j);
         largest = fmax(largest, fabs(move));
@@ -537,6 +545,10 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
             return 0;
         }
         put(settle, settle->x0, y, yd);
+    }
+    if (!provide_best(settle)) {
+        settle->failures++;
+        return 1;
     }
     int plain = settle->hold == 1.0; /* else factors are of another weight, and serve once */
     settle->ready = plain ? settle->ready : NONE;
