@@ -151,6 +151,9 @@ class Sizes:
         if (np.abs(y) <= 2.0 * self.resolved).all():
             return
         np.maximum(self.resolved, np.abs(y), out=self.resolved, casting="same_kind")
+        if self.system.unknowns > LARGE and self._own is not None:
+            self.hand_down()
+            self.put_away()
         jy = self.system.slopes(t, y, yd, rate=False)
         self._at_least(np.where(carries, 0.0, noise(self.system, y, jy, self.time)))
 

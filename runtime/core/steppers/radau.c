@@ -60,14 +60,17 @@ static void show(const void *self, int32_t s, double *y, double *yd)
     }
 }
 
-/* Factors work in vectors of which nothing is read while they do: the point of a stage is made anew, as are rows of the whole
- * system where that has more; the right sides behind the first one are in others then.  0; 2: no memory */
+/* Factors work in vectors of which nothing is read while they do: the point of a stage is made anew, as are rates of the whole
+ * system where that has more; the right sides behind the first one are in others then.  Rows and columns of the complex
+ * matrices are scaled as those of the real one.  0; 2: no memory */
 static int borrow(sd_radau *radau)
 {
     const sd_condensed *kept = (const sd_condensed *)radau->system->left;
-    int failed = sd_linear_borrow(radau->linear, kept ? kept->r : radau->y, NULL);
+    sd_linear *real = radau->linear;
+    int failed = sd_linear_borrow(real, kept ? kept->yd : radau->y, NULL, NULL);
     for (int k = 0; k < (radau->most_stages - 1) / 2 && !failed; k++)
-        failed = sd_linear_z_borrow(radau->complex_linear[k], (double complex *)radau->d[1 + 2 * k], radau->linear->column_scale);
+        failed = sd_linear_z_borrow(radau->complex_linear[k], (double complex *)radau->d[1 + 2 * k], real->row_scale,
+                                    real->column_scale);
     return failed;
 }
 

@@ -58,10 +58,7 @@ static void factorise_one(void *context, int part)
     /* a pivot is small or not beside the unknowns themselves, whatever the step */
     const double *scale = radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->magnitude : radau->scale;
     if (sd_radau_sparing(radau)) {
-        double real = method->gamma / radau->h;
-        double complex both = part ? method->lambda[part - 1] / radau->h : 0.0;
-        all->failed[part] = part ? sd_linear_z_factor_sum(radau->complex_linear[part - 1], radau->jy, radau->jyd, &both, scale)
-                                 : sd_linear_factor_sum(radau->linear, radau->jy, radau->jyd, &real, scale);
+        all->failed[part] = part ? sd_linear_z_factor_sum(radau->complex_linear[part - 1]) : sd_linear_factor_sum(radau->linear);
         return;
     }
     if (part == 0) {
@@ -78,12 +75,26 @@ static void factorise_one(void *context, int part)
     all->failed[part] = sd_linear_z_factor(radau->complex_linear[part - 1], gz, scale);
 }
 
+/* the same scales for all matrices of a step, which nobody changes while they are factorised */
+static void scale_all(sd_radau *radau)
+{
+    const sd_radau_method *method = radau->method;
+    const double real = method->gamma / radau->h;
+    sd_linear_scale_sum(radau->linear, radau->jy, radau->jyd, &real, radau->scale);
+    for (int k = 0; k < method->pairs; k++) {
+        const double complex both = method->lambda[k] / radau->h;
+        sd_linear_z_scale_sum(radau->complex_linear[k], radau->jy, radau->jyd, &both, radau->scale);
+    }
+}
+
 /* The factors of all matrices of a step; the failure of the first that has none.  Large ones are all made in any case: what
  * they leave behind must not depend on how many threads there are. */
 static int factorise_all(sd_radau *radau)
 {
     factoring all = {radau, {0}};
     int failed = 0;
+    if (sd_radau_sparing(radau))
+        scale_all(radau);
     if (large(radau))
         sd_side_by_side(radau->method->pairs + 1, factorise_one, &all);
     for (int part = 0; part <= radau->method->pairs && !failed; part++) {
