@@ -42,8 +42,8 @@ class Sizes:
         return self._magnitude
 
     def put_away(self) -> None:
-        """Of a large system of which the method has sizes of its own: nobody reads those of all for a while.  Others are
-        held: |y| met, and the magnitudes that are not that.
+        """Of a large system of which the method has sizes of its own: nobody reads those of all for a while.  Of the
+        others |y| met is held, and magnitudes that are not that.
         """
         assert self._own is not None
         if self._away is not None:
@@ -151,16 +151,25 @@ class Sizes:
         if (np.abs(y) <= 2.0 * self.resolved).all():
             return
         np.maximum(self.resolved, np.abs(y), out=self.resolved, casting="same_kind")
-        if self.system.unknowns > LARGE and self._own is not None:
+        spared = self.system.unknowns > LARGE and self._own is not None
+        if spared:
             self.hand_down()
             self.put_away()
         jy = self.system.slopes(t, y, yd, rate=False)
-        self._at_least(np.where(carries, 0.0, noise(self.system, y, jy, self.time)))
+        open_ = noise(self.system, y, jy, self.time)
+        del jy
+        if spared:
+            self.system.put_away(whole=True)
+            self.system.spare()
+        open_[carries] = 0.0
+        self._at_least(open_)
 
     def resolve_by_rows(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
         """The same of all that the rows determine, by the inverse of their Jacobian: where steps fail by it."""
         self._at_least(np.where(carries, 0.0, open_unknowns(self.system, t, y, yd, self.time)))
 
     def _at_least(self, open_: Floats) -> None:
-        least = UNRESOLVED * open_ / max(self._request.rtol, 1e-15)
-        np.maximum(self.magnitude, least, out=self.magnitude)
+        """No magnitude is less than a tolerance needs of what is open [unknowns], which is written to."""
+        open_ *= UNRESOLVED
+        open_ /= max(self._request.rtol, 1e-15)
+        np.maximum(self.magnitude, open_, out=self.magnitude)

@@ -427,7 +427,8 @@ int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
     lu->block = malloc((rows + 1) * sizeof(sd_number));
     lu->among = calloc((size_t)lu->n / 64 + 1, sizeof(uint64_t));
     lu->first = lu->first ? lu->first : malloc(((size_t)lu->n + 1) * sizeof *lu->first);
-    if (!lu->stack || !lu->block || !lu->among || !lu->first || !provide_pattern(lu) || !provide_pivots(lu) || !provide_numbers(lu)) {
+    if (!lu->stack || !lu->block || !lu->among || !lu->first || !provide_pattern(lu) || !provide_pivots(lu) ||
+        !provide_numbers(lu)) {
         leave_search(lu);
         return 2;
     }
