@@ -54,10 +54,13 @@ static void show(const void *self, int32_t s, double *y, double *yd)
 {
     const sd_radau *radau = self;
     sd_radau_combine(radau->used->stages, radau->n, radau->used->inverse[s], radau->kept, radau->rate);
-    for (int32_t i = 0; i < radau->n; i++) {
-        y[i] = sd_radau_last(radau, i) + radau->kept[s][i];
+    const double *last = radau->last, *phi = radau->phi, *end = radau->kept[radau->used->stages - 1], *z = radau->kept[s];
+    for (int32_t i = 0; i < radau->n && last; i++)
+        y[i] = last[i] + z[i];
+    for (int32_t i = 0; i < radau->n && !last; i++)
+        y[i] = phi[i] - end[i] + z[i];
+    for (int32_t i = 0; i < radau->n; i++)
         yd[i] = radau->rate[i] / radau->h_used;
-    }
 }
 
 /* Factors work in vectors of which nothing is read while they do: the point of a stage is made anew, as are rates of the whole

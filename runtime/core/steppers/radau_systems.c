@@ -360,12 +360,10 @@ static inline __attribute__((always_inline)) sd_lanes newton_weights(const sd_ra
     sd_lanes found = {0.0};
     if (radau->newton_weight)
         return SD_FROM(radau->newton_weight, i);
-    for (int32_t l = 0; l < SD_LANES && i + l < radau->n; l++)
-        found[l] = radau->tolerance * radau->magnitude[i + l] + radau->tolerance * fabs(radau->phi[i + l]);
     if (i + SD_LANES <= radau->n)
-        return 1.0 / found;
+        return 1.0 / (radau->tolerance * SD_FROM(radau->magnitude, i) + radau->tolerance * SD_SIZES(SD_FROM(radau->phi, i)));
     for (int32_t l = 0; i + l < radau->n; l++)
-        found[l] = 1.0 / found[l];
+        found[l] = sd_radau_weight(radau, i + l);
     return found;
 }
 

@@ -465,19 +465,16 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
     }
 }
 
-/* an unknown or chosen rate of (y, yd) */
-static inline double *member(const sd_settle *settle, int32_t j, double *y, double *yd)
+/* met := what follows from the state: few unknowns, and most rates */
+static void note_met(const sd_settle *settle, const double *y, const double *yd)
 {
-    return j < settle->unknowns ? &y[j] : &yd[settle->rate[j - settle->unknowns]];
-}
-
-/* met := what follows from the state */
-static void note_met(const sd_settle *settle, double *y, double *yd)
-{
+    const char *state = settle->state, *end = state + settle->unknowns;
     double *next = settle->met;
-    for (int32_t j = 0; j < settle->unknowns + settle->rates; j++)
-        if (!settle->state[j])
-            *next++ = *member(settle, j, y, yd);
+    for (const char *at = state; (at = memchr(at, 0, (size_t)(end - at))); at++)
+        *next++ = y[at - state];
+    for (int32_t k = 0; k < settle->rates; k++)
+        if (!end[k])
+            *next++ = yd[settle->rate[k]];
 }
 
 /* (y, chosen yd): the state as in x0, what follows from it as at the last point that settled */
@@ -487,7 +484,7 @@ static void put_near(const sd_settle *settle, double *y, double *yd)
     put(settle, settle->x0, y, yd);
     for (int32_t j = 0; j < settle->unknowns + settle->rates; j++)
         if (!settle->state[j])
-            *member(settle, j, y, yd) = *next++;
+            *(j < settle->unknowns ? &y[j] : &yd[settle->rate[j - settle->unknowns]]) = *next++;
 }
 
 /* what the point makes of other unknowns, and its residuals; measured: those of the point as it comes are known */
