@@ -355,16 +355,16 @@ static inline double squares_of_state(const sd_radau *radau, int32_t i, sd_lanes
 }
 
 /* four of Newton's weights, zeros behind the last */
-static inline __attribute__((always_inline)) sd_lanes newton_weights(const sd_radau *radau, int32_t i)
+static inline __attribute__((always_inline)) void newton_weights(const sd_radau *radau, int32_t i, sd_lanes *weight)
 {
-    sd_lanes found = {0.0};
+    const double part = radau->tolerance;
     if (radau->newton_weight)
-        return SD_FROM(radau->newton_weight, i);
-    if (i + SD_LANES <= radau->n)
-        return 1.0 / (radau->tolerance * SD_FROM(radau->magnitude, i) + radau->tolerance * SD_SIZES(SD_FROM(radau->phi, i)));
-    for (int32_t l = 0; i + l < radau->n; l++)
-        found[l] = sd_radau_weight(radau, i + l);
-    return found;
+        *weight = SD_FROM(radau->newton_weight, i);
+    else if (i + SD_LANES <= radau->n)
+        *weight = 1.0 / (part * SD_FROM(radau->magnitude, i) + part * SD_SIZES(SD_FROM(radau->phi, i)));
+    else
+        for (int32_t l = 0; l < SD_LANES; l++)
+            (*weight)[l] = i + l < radau->n ? sd_radau_weight(radau, i + l) : 0.0;
 }
 
 /* z += S times the solutions in d and w; sums of squares of the correction in Newton's weights, over all unknowns and, where
@@ -373,7 +373,8 @@ static inline __attribute__((always_inline)) void join(sd_radau *radau, int stag
 {
     const sd_radau_method *method = radau->method;
     for (int32_t i = 0; i < radau->n; i += SD_LANES) {
-        const sd_lanes weight = newton_weights(radau, i);
+        sd_lanes weight;
+        newton_weights(radau, i, &weight);
         sd_lanes real = SD_FROM(radau->d[0], i), re[SD_PAIRS], im[SD_PAIRS];
         for (int k = 0; k < pairs; k++)
             parts(radau->w[k] + i, &re[k], &im[k]);
