@@ -53,6 +53,7 @@ class Room:
 
     def __init__(self, entries: int, *systems: System) -> None:
         self._systems, self._entries = systems, entries
+        self.large = systems[0].unknowns > LARGE
 
     @cached_property
     def y(self) -> Floats:
@@ -66,8 +67,9 @@ class Room:
 
     @cached_property
     def slope(self) -> Floats:
-        """Rows or entries of a matrix."""
-        return np.zeros(max(self._entries, *(system.rows for system in self._systems)) + 1)
+        """Rows or entries of a matrix, of large systems rows alone: the core finds room for each matrix."""
+        entries = 0 if self.large else self._entries
+        return np.zeros(max(entries, *(system.rows for system in self._systems)) + 1)
 
     def rest(self) -> None:
         """Lets go of it all: who has its addresses binds it anew before anything is evaluated."""
@@ -329,7 +331,8 @@ class Condensed:
         """Says where the whole system is evaluated: once it is known how much room all forms need."""
         condensed = self.condensed
         condensed.y, condensed.yd = lib.pointer(room.y), lib.pointer(room.yd)
-        condensed.r = condensed.slope = lib.pointer(room.slope)
+        condensed.r = lib.pointer(room.slope)
+        condensed.slope = None if room.large else condensed.r
         lib.core.sd_condensed_bind(c.byref(condensed), c.byref(self.core))
 
     def _told_products(self) -> dict[str, int | None]:

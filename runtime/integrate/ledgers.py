@@ -49,12 +49,14 @@ class Balance:
 
 
 def _kept(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[RowFamily], Ints, Signs]:
-    """Label, unit and first element of each ledger; rows of the elements; of each its ledger, if it is an inertia."""
+    """Label, unit and first element of each ledger; rows of the elements; of each of these families its ledger; of each
+    element whether it is an inertia.
+    """
     description = system.description
     heads = [description.rows[k] for k in description.rows_of("audit")][HEAD::ROWS]
     families = [description.rows[k] for k in description.rows_of("ledger")]
     sizes = [row.size for row in families]
-    of = np.repeat([*(int(row.kind.split()[0]) for row in families), 0], [*sizes, 1]).astype(np.int32)
+    of = np.array([int(row.kind.split()[0]) for row in families], dtype=np.int32)
     inertia = np.repeat([*("inertia" in row.kind for row in families), False], [*sizes, 1]).astype(np.int8)
     return [(row.label, row.unit, row.at(0)) for row in heads], families, of, inertia
 
@@ -64,7 +66,8 @@ class Ledgers:
 
     def __init__(self, system: System) -> None:
         self._heads, self._families, of, self._inertia = system.once("ledgers", lambda: _kept(system))
-        count, elements = len(self._heads), of.size - 1
+        count, elements = len(self._heads), self._inertia.size - 1
+        self._end = np.cumsum([row.size for row in self._families], dtype=np.int32)
         names = ("gross", "largest", "stored", "balance", "highest", "dissipated", "supplied")
         self._arrays = {name: np.zeros(count + 1) for name in names}
         self._arrays |= {name: np.zeros(elements + 1) for name in ("most", "value", "before")}
@@ -75,8 +78,10 @@ class Ledgers:
         self.core = lib.Ledgers(
             count=count,
             elements=elements,
+            families=of.size,
             contents=None if self._contents is None else c.addressof(self._contents),
             of=lib.pointer(of),
+            end=lib.pointer(self._end),
             inertia=lib.pointer(self._inertia),
             lost=-1,
             element=lib.pointer(self._element),
@@ -105,14 +110,15 @@ class Ledgers:
         """Of each ledger the sum over its elements of what each stored at most."""
         if self._stored is not None:
             return self._stored
-        return [float(self._arrays["most"][:-1][self._of[:-1] == k].sum()) for k in range(len(self._heads))]
+        most = [float(part.sum()) for part in np.split(self._arrays["most"][:-1], self._end[:-1])]
+        return [sum(most[f] for f in np.flatnonzero(self._of == k)) for k in range(len(self._heads))]
 
     def close(self) -> None:
         """Lets go of what the core notes of each element: no step follows."""
         self._stored = self.stored
         nothing = np.zeros(0)
         self._arrays |= {"most": nothing, "value": nothing, "before": nothing}
-        self._of, self._inertia = np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int8)
+        self._inertia = np.zeros(0, dtype=np.int8)
 
     def balances(self) -> tuple[Balance, ...]:
         """What came of each ledger."""

@@ -19,6 +19,9 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.stretches import Ascents, Stretches, whole_of
 from sysdyn.runtime.start.start import ConsistentState
 
+MET = -1.0
+"""Stands for a magnitude that is the largest |y| met."""
+
 
 class Sizes:
     """magnitude [unknowns] in SI units, time (s): the scale of the start."""
@@ -27,19 +30,40 @@ class Sizes:
         self.system, self._start, self._request = system, start, request
         self._origin: Origin | None = origin
         found, self.time = origin.sized(request.t_end)
-        self._magnitude: Floats | Stretches[np.float64] = np.maximum(found, self.least)
+        self._magnitude: Floats = np.maximum(found, self.least)
         self._own: tuple[Ints | Ascents, Floats, Floats] | None = None
+        self._met = np.zeros(0)
+        self._away: tuple[Ascents, Stretches[np.float64], Stretches[np.float64]] | None = None
 
     @property
     def magnitude(self) -> Floats:
         """[unknowns] in SI units."""
-        if isinstance(self._magnitude, Stretches):
-            self._magnitude = self._magnitude.whole
+        self._bring_back()
         return self._magnitude
 
     def put_away(self) -> None:
-        """Of a large system of which the method has sizes of its own: nobody reads those of all for a while."""
-        self._magnitude = Stretches(self.magnitude)
+        """Of a large system of which the method has sizes of its own: nobody reads those of all for a while.  Of the
+        others |y| met is held, and magnitudes that are not that.
+        """
+        assert self._own is not None
+        if self._away is not None:
+            return
+        other = np.ones(self.system.unknowns, dtype=bool)
+        other[whole_of(self._own[0])] = False
+        met, magnitude = self.met[other], self.magnitude[other]
+        apart = Stretches(np.where(magnitude == met, MET, magnitude))
+        self._away = Ascents(np.flatnonzero(other).astype(np.int32)), Stretches(met), apart
+        self._magnitude = self._met = met[:0].copy()
+
+    def _bring_back(self) -> None:
+        if self._away is None or self._own is None:
+            return
+        (other, *others), (kept, magnitude, met) = self._away, self._own
+        self._away = None
+        self._magnitude, self._met = np.empty(self.system.unknowns), np.empty(self.system.unknowns)
+        self._magnitude[whole_of(kept)], self._met[whole_of(kept)] = magnitude, met
+        largest, apart = (item.whole for item in others)
+        self._met[other.whole], self._magnitude[other.whole] = largest, np.where(apart == MET, largest, apart)
 
     @property
     def unnamed(self) -> NDArray[np.bool_]:
@@ -53,10 +77,13 @@ class Sizes:
         origin = self._origin or Origin(self.system, self._start, self._request.index)
         return origin.least / max(self._request.rtol, 1e-15)
 
-    @cached_property
+    @property
     def met(self) -> Floats:
         """Largest |y| met [unknowns]; of a condensed form as far as it is shared (`share`)."""
-        return np.zeros(self.system.unknowns)
+        self._bring_back()
+        if self._met.size < self.system.unknowns:
+            self._met = np.zeros(self.system.unknowns)
+        return self._met
 
     @cached_property
     def resolved(self) -> Floats | NDArray[np.float32]:
@@ -124,13 +151,25 @@ class Sizes:
         if (np.abs(y) <= 2.0 * self.resolved).all():
             return
         np.maximum(self.resolved, np.abs(y), out=self.resolved, casting="same_kind")
+        spared = self.system.unknowns > LARGE and self._own is not None
+        if spared:
+            self.hand_down()
+            self.put_away()
         jy = self.system.slopes(t, y, yd, rate=False)
-        self._at_least(np.where(carries, 0.0, noise(self.system, y, jy, self.time)))
+        open_ = noise(self.system, y, jy, self.time)
+        del jy
+        if spared:
+            self.system.put_away(whole=True)
+            self.system.spare()
+        open_[carries] = 0.0
+        self._at_least(open_)
 
     def resolve_by_rows(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
         """The same of all that the rows determine, by the inverse of their Jacobian: where steps fail by it."""
         self._at_least(np.where(carries, 0.0, open_unknowns(self.system, t, y, yd, self.time)))
 
     def _at_least(self, open_: Floats) -> None:
-        least = UNRESOLVED * open_ / max(self._request.rtol, 1e-15)
-        np.maximum(self.magnitude, least, out=self.magnitude)
+        """No magnitude is less than a tolerance needs of what is open [unknowns], which is written to."""
+        open_ *= UNRESOLVED
+        open_ /= max(self._request.rtol, 1e-15)
+        np.maximum(self.magnitude, open_, out=self.magnitude)

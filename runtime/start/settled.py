@@ -231,17 +231,14 @@ class Settler:
         if self._moves > LARGE:  # the core has its own
             self.scale = self.scale[:0].copy()
 
-    def _basis(self) -> tuple[Pattern, list[Ints], Ints]:
-        """Pattern of G^T, the places of dF/dy and dF/dyd in it, the order of its columns."""
+    def _basis(self) -> Ints:
+        """The order of the columns of G^T."""
         pattern = self._left.pattern
         columns, rows = pattern.columns_of(), pattern.row
         moved = columns_of_rates(self._n, self.rates, columns)
         with_rate = moved >= 0
         parts = [Places(columns, rows), Places(moved[with_rate], rows[with_rate])]
-        found, slots = compress(self._moves, self._left.rows, parts)
-        full = np.full(pattern.entries, -1, dtype=np.int32)
-        full[with_rate] = slots[1]
-        return found, [slots[0], full], tall_order(found)
+        return tall_order(compress(self._moves, self._left.rows, parts)[0])
 
     def by_basis(self, slack: float, *, determined: bool) -> None:
         """Points settle within a basis where the state moves by no more than slack, in magnitudes (settle.h).
@@ -249,9 +246,7 @@ class Settler:
         determined: only where it leaves nothing open that follows from the state.
         """
         self._wide = self.system.once(("basis", *self._key), self._basis)
-        pattern, slots, order = self._wide
-        arrays = (pattern.column, pattern.row, order, *slots)
-        if lib.core.sd_settle_widen(self.core, *(lib.pointer(item) for item in arrays), int(determined)):
+        if lib.core.sd_settle_widen(self.core, lib.pointer(self._wide), int(determined)):
             raise MemoryError
         self.core.contents.slack = slack
 

@@ -43,16 +43,17 @@ def test_factors_of_a_sum_are_those_of_its_entries_bit_by_bit(kind, number):
     pattern = [there.indptr.astype(np.int32), there.indices.astype(np.int32), np.arange(n, dtype=np.int32)]
     z = "_z" if number is complex else ""
     call = {name: getattr(lib.core, f"sd_linear{z}_{name}") for name in ("new", "factor", "solve", "free")}
-    call |= {name: getattr(lib.core, f"sd_linear{z}_{name}") for name in ("borrow", "factor_sum")}
+    call |= {name: getattr(lib.core, f"sd_linear{z}_{name}") for name in ("borrow", "scale_sum", "factor_sum")}
     plain, spare = (call["new"](n, *map(lib.pointer, pattern)) for _ in range(2))
     work, held = np.full(n + 1, np.nan, dtype=number), np.zeros(n)
-    assert call["borrow"](spare, lib.pointer(work), lib.pointer(held) if number is complex else None) == 0
+    assert call["borrow"](spare, lib.pointer(work), None, lib.pointer(held) if number is complex else None) == 0
     for k in range(3):
         c, scale = np.array([0.7 + k + (0.3j if number is complex else 0.0)]), 10.0 ** rng.uniform(-3, 3, n)
         held[:] = scale
         values = np.ascontiguousarray(a + c[0] * b, dtype=number)
         assert call["factor"](plain, lib.pointer(values), lib.pointer(scale)) == 0
-        assert call["factor_sum"](spare, *map(lib.pointer, (a, b, c, scale))) == 0
+        call["scale_sum"](spare, *map(lib.pointer, (a, b, c, scale)))
+        assert call["factor_sum"](spare) == 0
         scale[:] = np.nan  # nobody reads it any more
         x = rng.normal(size=n).astype(number)
         mine, theirs = x.copy(), x.copy()

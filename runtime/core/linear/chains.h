@@ -6,7 +6,7 @@
 #ifndef SYSDYN_CHAINS_H
 #define SYSDYN_CHAINS_H
 
-#include "linear/dense_rest.h"
+#include "linear/told.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -57,7 +57,7 @@ static int32_t list_chains(int32_t n, const int32_t *distance, int32_t sign, cha
                 return -1;
             *list = more;
         }
-        (*list)[found++] = (sd_chain){from, to, step};
+        (*list)[found++] = (sd_chain){from, to, step, 0};
     }
     return found;
 }
@@ -86,6 +86,12 @@ static void find_chains(sd_sparse *lu)
         lu->uppers = list_chains(n, work + n, 1, SD_BEFORE, &lu->upper, lu->pulled);
     }
     free(work);
+    for (int32_t i = 0; i < lu->lowers; i++)
+        if (lu->lower[i].step)
+            lu->lower[i].first = lu->l_start[lu->lower[i].from - lu->lower[i].step];
+    for (int32_t i = 0; i < lu->uppers; i++)
+        if (lu->upper[i].step)
+            lu->upper[i].first = lu->u_start[lu->upper[i].to - 1 + lu->upper[i].step];
     if (in_chains(lu->lowers, lu->lower) < n / 2 || in_chains(lu->uppers, lu->upper) < n / 2)
         leave_chains(lu);
 }
@@ -99,10 +105,11 @@ static inline int is_link(const sd_sparse *lu, int32_t k)
     return lu->l_start[j + 1] - lu->l_start[j] == 1 && lu->l_row[lu->l_start[j]] == k;
 }
 
-/* new values of its column on the pivot that it had: 1: that became unhealthy */
-static int refactor_link(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
+/* New values of its column on the pivot that it had: 1: that became unhealthy.  j: what it waits for; where entries stand: its
+ * own in U, that of j in L, its own in L (-1: there is none) */
+static inline int renew_link(sd_sparse *lu, const sd_matrix *matrix, int32_t k, int32_t j, int32_t u, int32_t before, int32_t l)
 {
-    int32_t c = lu->order[k], first = matrix->column[c], number = matrix->column[c + 1] - first, u = lu->u_start[k], l = lu->l_start[k], j = lu->u_row[u];
+    int32_t c = lu->order[k], first = matrix->column[c], number = matrix->column[c + 1] - first;
     const sd_number *value = sd_column_of(matrix, c);
     sd_number pivot = 0.0, above = 0.0, below = 0.0;
     for (int32_t e = 0; e < number; e++) {
@@ -114,15 +121,21 @@ static int refactor_link(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
         else
             below += value[e];
     }
-    pivot -= lu->l_value[lu->l_start[j]] * above;
+    pivot -= lu->l_value[before] * above;
     lu->u_value[u] = above;
     sd_number inverse = lu->inverse[k] = 1.0 / pivot;
     double largest = sd_size(pivot);
-    if (l < lu->l_start[k + 1]) {
+    if (l >= 0) {
         lu->l_value[l] = below * inverse;
         largest = sd_size(below) > largest ? sd_size(below) : largest;
     }
     return !keeps_pivot(lu, matrix, k, pivot, largest);
+}
+
+static int refactor_link(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
+{
+    int32_t u = lu->u_start[k], l = lu->l_start[k], j = lu->u_row[u];
+    return renew_link(lu, matrix, k, j, u, lu->l_start[j], l < lu->l_start[k + 1] ? l : -1);
 }
 
 static inline sd_number right_side(const sd_sparse *lu, int32_t k, const sd_number *x, const double *row_scale)
@@ -135,7 +148,7 @@ static inline sd_number right_side(const sd_sparse *lu, int32_t k, const sd_numb
 static inline __attribute__((always_inline)) void descend_chain(const sd_sparse *lu, const sd_chain *chain, const int32_t step,
                                                                 const sd_number *x, const double *row_scale, sd_number *work)
 {
-    const sd_number *l = lu->l_value + lu->l_start[chain->from - step];
+    const sd_number *l = lu->l_value + chain->first;
     sd_number last = work[chain->from - 1], before = step == 2 ? work[chain->from - 2] : last;
     for (int32_t k = chain->from; k < chain->to; k++) {
         sd_number v = right_side(lu, k, x, row_scale) - *l++ * (step > 2 ? work[k - step] : before);
@@ -148,8 +161,8 @@ static inline __attribute__((always_inline)) void descend_chain(const sd_sparse 
 static inline void descend_columns(const sd_sparse *lu, int32_t from, int32_t to, sd_number *work)
 {
     for (int32_t k = from; k < to; k++)
-        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1] && !(lu->pulled[k] & SD_BEHIND); l++)
-            work[lu->l_row[l]] -= lu->l_value[l] * work[k];
+        for (int32_t l = l_begin(lu, k), end = l_begin(lu, k + 1); l < end && !(lu->pulled[k] & SD_BEHIND); l++)
+            work[l_row_at(lu, l)] -= lu->l_value[l] * work[k];
 }
 
 static void descend_chains(const sd_sparse *lu, const sd_number *x, const double *row_scale, sd_number *work)
@@ -173,7 +186,7 @@ static void descend_chains(const sd_sparse *lu, const sd_number *x, const double
 static inline __attribute__((always_inline)) void ascend_chain(const sd_sparse *lu, const sd_chain *chain, const int32_t step,
                                                                sd_number *x, const double *column_scale, sd_number *work)
 {
-    const sd_number *u = lu->u_value + lu->u_start[chain->to - 1 + step], *inverse = lu->inverse;
+    const sd_number *u = lu->u_value + chain->first, *inverse = lu->inverse;
     sd_number last = work[chain->to], before = step == 2 ? work[chain->to + 1] : last;
     for (int32_t k = chain->to - 1; k >= chain->from; k--) {
         sd_number v = (work[k] - *u-- * (step > 2 ? work[k + step] : before)) * inverse[k];
@@ -197,8 +210,8 @@ static inline void ascend_columns(const sd_sparse *lu, int32_t from, int32_t to,
             work[k] *= lu->inverse[k];
             x[lu->order[k]] = column_scale ? work[k] * column_scale[lu->order[k]] : work[k];
         }
-        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1] && !(lu->pulled[k] & SD_BEFORE); p++)
-            work[lu->u_row[p]] -= lu->u_value[p] * work[k];
+        for (int32_t p = u_begin(lu, k), end = u_begin(lu, k + 1); p < end && !(lu->pulled[k] & SD_BEFORE); p++)
+            work[u_row_at(lu, p)] -= lu->u_value[p] * work[k];
     }
 }
 

@@ -23,9 +23,10 @@ void sd_linear_z_again(sd_linear_z *linear);
 double complex *sd_linear_z_values(sd_linear_z *linear);
 int sd_linear_z_factor(sd_linear_z *linear, const double complex *values, const double *scale);
 void sd_linear_z_solve(sd_linear_z *linear, double complex *x);
-/* as sd_linear_borrow, sd_linear_factor_sum */
-int sd_linear_z_borrow(sd_linear_z *linear, double complex *work, double *column_scale);
-int sd_linear_z_factor_sum(sd_linear_z *linear, const double *a, const double *b, const double complex *c, const double *scale);
+/* as sd_linear_borrow, sd_linear_scale_sum, sd_linear_factor_sum */
+int sd_linear_z_borrow(sd_linear_z *linear, double complex *work, double *row_scale, double *column_scale);
+void sd_linear_z_scale_sum(sd_linear_z *linear, const double *a, const double *b, const double complex *c, const double *scale);
+int sd_linear_z_factor_sum(sd_linear_z *linear);
 /* as sd_linear_rest */
 void sd_linear_z_rest(sd_linear_z *linear);
 /* null_pivot and idle of linear.h; the rank of the last factors */

@@ -15,6 +15,7 @@
 #define SD_LANES 4
 
 typedef double sd_lanes __attribute__((vector_size(8 * SD_LANES), aligned(8), may_alias));
+typedef int64_t sd_bits __attribute__((vector_size(8 * SD_LANES), aligned(8), may_alias));
 
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && !defined(SD_INTERPRETED)
 #define SD_WIDE __attribute__((target_clones("avx2", "default")))
@@ -31,6 +32,7 @@ static inline int32_t sd_whole_lanes(int32_t n)
 /* x[i .. i + SD_LANES) */
 #define SD_AT(x, i) (*(sd_lanes *)((x) + (i)))
 #define SD_FROM(x, i) (*(const sd_lanes *)((x) + (i)))
+#define SD_SIZES(x) ((sd_lanes)((sd_bits)(x) & INT64_MAX))
 #define SD_TOTAL(x) ((x)[0] + (x)[1] + (x)[2] + (x)[3])
 
 /* Until `sd_subnormals` gets back what this gives, numbers below 1e-307 are zeros where the machine can: each of them costs it a

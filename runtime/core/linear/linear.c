@@ -19,7 +19,8 @@ void sd_linear_free(sd_linear *linear)
     sd_sparse_free(linear->sparse);
     sd_elimination_free(linear->elimination);
     free(linear->null);
-    free(linear->row_scale);
+    if (linear->own_rows)
+        free(linear->row_scale);
     free(linear->scaled);
     free(linear->dense);
     free(linear->pivot);
@@ -51,7 +52,7 @@ sd_linear *sd_linear_new(int32_t n, const int32_t *column, const int32_t *row, c
         return NULL;
     }
     linear->column_scale = linear->row_scale + m;
-    linear->own_scale = 1;
+    linear->own_scale = linear->own_rows = 1;
     linear->work2 = order ? NULL : linear->work + m;
     return linear;
 }
@@ -92,12 +93,14 @@ static void equilibrate(sd_linear *linear, const sd_number *values, const double
 static void equilibrate_sum(sd_linear *linear, const double *scale)
 {
     const sd_matrix *sum = linear->sum;
+    if (linear->own_scale)
+        memcpy(linear->column_scale, scale, (size_t)linear->n * sizeof *scale);
+    if (!linear->own_rows)
+        return;
     for (int32_t i = 0; i < linear->n; i++)
         linear->row_scale[i] = 0.0;
     for (int32_t j = 0; j < linear->n; j++) {
         const double s = scale[j];
-        if (linear->own_scale)
-            linear->column_scale[j] = s;
         for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++) {
             double size = sd_size(sd_entry_of_sum(sum, e, s));
             if (size > linear->row_scale[linear->row[e]])
@@ -364,14 +367,30 @@ static void forget(sd_linear *linear)
     linear->pivoted = 1;
 }
 
-int sd_linear_borrow(sd_linear *linear, sd_number *work, double *column_scale)
+/* the scales where another one has them, or room for its own; 0: no memory */
+static int place_scales(sd_linear *linear, double *row_scale, double *column_scale)
+{
+    size_t n = (size_t)linear->n, own = (row_scale ? 0 : n) + (column_scale ? 0 : n);
+    double *room = own ? malloc((own + 1) * sizeof *room) : NULL;
+    if (linear->own_rows)
+        free(linear->row_scale);
+    linear->own_rows = room && !row_scale;
+    linear->own_scale = room && !column_scale;
+    linear->row_scale = row_scale ? row_scale : room;
+    linear->column_scale = column_scale ? column_scale : room + (row_scale ? 0 : n);
+    return !own || room;
+}
+
+int sd_linear_borrow(sd_linear *linear, sd_number *work, double *row_scale, double *column_scale)
 {
     int32_t longest = 0;
     for (int32_t j = 0; j < linear->n; j++)
         longest = linear->column[j + 1] - linear->column[j] > longest ? linear->column[j + 1] - linear->column[j] : longest;
     sd_matrix *sum = linear->sum ? linear->sum : malloc(sizeof *sum + (size_t)longest * sizeof(sd_number));
-    if (!sum)
+    if (!sum || !place_scales(linear, row_scale, column_scale)) {
+        linear->sum = sum;
         return 2;
+    }
     *sum = (sd_matrix){.column = linear->column, .row = linear->row, .row_scale = linear->row_scale};
     sum->room = (sd_number *)(sum + 1);
     linear->sum = sum;
@@ -379,12 +398,6 @@ int sd_linear_borrow(sd_linear *linear, sd_number *work, double *column_scale)
     linear->scaled = NULL;
     sd_sparse_lend(linear->sparse, work);
     linear->work = linear->lent = work;
-    if (column_scale) {
-        double *rows = linear->own_scale ? realloc(linear->row_scale, ((size_t)linear->n + 1) * sizeof *rows) : NULL;
-        sum->row_scale = linear->row_scale = rows ? rows : linear->row_scale;
-        linear->column_scale = column_scale;
-        linear->own_scale = 0;
-    }
     return 0;
 }
 
@@ -392,24 +405,32 @@ void sd_linear_rest(sd_linear *linear)
 {
     if (linear->sparse)
         sd_sparse_rest(linear->sparse);
+    if (linear->sum && linear->own_rows) {
+        free(linear->row_scale);
+        linear->row_scale = linear->column_scale = NULL;
+        linear->own_rows = 0;
+    }
 }
 
-int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale)
+void sd_linear_scale_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale)
 {
     sd_matrix *sum = linear->sum;
+    sum->a = a;
+    sum->b = b;
+    sum->c = *c;
+    sum->column_scale = linear->column_scale; /* a copy of scale, which changes */
+    equilibrate_sum(linear, scale);
+}
+
+int sd_linear_factor_sum(sd_linear *linear)
+{
     linear->factorisations++;
     if (!linear->pivoted)
         forget(linear);
     linear->replayed = 0;
-    sum->a = a;
-    sum->b = b;
-    sum->c = *c;
-    sum->column_scale = scale;
-    equilibrate_sum(linear, scale);
     int failed = sparse_factor(linear);
     if (!failed && linear->rank < linear->n)
         failed = null_vectors(linear);
-    sum->column_scale = linear->column_scale; /* a copy of these, which change */
     return failed;
 }
 

@@ -57,7 +57,7 @@ typedef struct sd_linear {
     const int32_t *otherwise;    /* of sd_order; NULL: the order stays */
     sd_matrix *sum;              /* R (A + c B) C instead of `scaled`, of which there is none; NULL: there is */
     sd_number *lent;             /* [n + 1] work of sparse factors that is the caller's; NULL: it is theirs */
-    int32_t own_scale;           /* 1: column_scale is not the caller's */
+    int32_t own_scale, own_rows; /* 1: column_scale, row_scale are not the caller's */
 } sd_linear;
 
 /* order: column order for the sparse factorisation, NULL for dense.  NULL without memory. */
@@ -72,12 +72,16 @@ void sd_linear_solve(sd_linear *linear, sd_number *x);
 /* left [n] := 1 for the columns that the last factors left */
 void sd_linear_left(const sd_linear *linear, char *left);
 /* Of sparse ones whose matrices will be A + c B: what follows from these is not kept, and work [n + 1] is room of the caller
- * which is free whenever they factorise or solve.  column_scale [n]: where the scale of the last factors stands from then on
- * (NULL: in room of their own).  0 done, 2 no memory */
-int sd_linear_borrow(sd_linear *linear, sd_number *work, double *column_scale);
-/* as sd_linear_factor, of A + c B: a, b [entries] stay as they are until the next factors; scale [n] */
-int sd_linear_factor_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale);
-/* lets go of the numbers of sparse factors: nothing is solved before the next ones */
+ * which is free whenever they factorise or solve.  row_scale, column_scale [n]: where the scales of the last factors stand from
+ * then on (NULL: in room of their own; those of another matrix of the pattern serve).  0 done, 2 no memory */
+int sd_linear_borrow(sd_linear *linear, sd_number *work, double *row_scale, double *column_scale);
+/* What is factorised next is A + c B in such scales: a, b [entries] stay as they are until the next one; scale [n] of columns,
+ * where they are its own */
+void sd_linear_scale_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale);
+/* as sd_linear_factor, of that */
+int sd_linear_factor_sum(sd_linear *linear);
+/* lets go of the numbers of sparse factors, and of scales of their own where they borrowed: nothing is solved before the next
+ * ones, for which they borrow again */
 void sd_linear_rest(sd_linear *linear);
 /* set to 0: the next factorisation chooses its pivots anew, and nothing is known of those before */
 int32_t *sd_linear_pivoted(sd_linear *linear);

@@ -71,6 +71,7 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_sparse_basic sd_sparse_z_basic
 #define sd_sparse_lend sd_sparse_z_lend
 #define sd_linear_borrow sd_linear_z_borrow
+#define sd_linear_scale_sum sd_linear_z_scale_sum
 #define sd_linear_factor_sum sd_linear_z_factor_sum
 #define sd_linear_rest sd_linear_z_rest
 #define sd_sparse_rest sd_sparse_z_rest

@@ -9,10 +9,13 @@
 
 #include <stdint.h>
 
-/* positions [from, to) of a factor that wait for the one `step` before (behind) them alone; step 0: for any (chains.h) */
+/* positions [from, to) of a factor that wait for the one `step` before (behind) them alone; step 0: for any (chains.h); first:
+ * where the entry stands that the first of L (the last of U) waits with */
 typedef struct sd_chain {
-    int32_t from, to, step;
+    int32_t from, to, step, first;
 } sd_chain;
+
+typedef struct sd_told sd_told;
 
 typedef struct sd_sparse {
     int32_t n, rows;             /* columns; rows, as many or more */
@@ -22,8 +25,9 @@ typedef struct sd_sparse {
                                     -1 of a column that was left out; those of the caller where each row pivots in its column */
     int32_t *pivots;             /* [n + rows] source and place where they are its own; NULL: they are the caller's */
     int32_t *first;              /* [n + 1] of the columns of L that fill alike (blocks.h): the first one; NULL: none do */
-    int32_t *l_start, *u_start;  /* [n + 1] */
+    int32_t *l_start, *u_start;  /* [n + 1]; NULL, like the rows: they are told */
     int32_t *l_row, *u_row;      /* pivot positions; u in the order of elimination, diagonal apart */
+    sd_told *told;               /* told.h: of a long line's factors instead of their pattern; NULL: it stands there */
     sd_number *l_value, *u_value, *inverse; /* inverse [n]: of the diagonal of U */
     int64_t l_room, u_room;
     int32_t *stack, *head, *mark, *count; /* [rows] search, while pivots are chosen */

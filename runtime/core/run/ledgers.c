@@ -58,13 +58,14 @@ static int32_t changed(const sd_ledgers *ledgers, const double *value, int32_t k
 {
     int32_t found = -1;
     double most = 0.0;
-    for (int32_t i = 0; i < ledgers->elements; i++) {
-        double change = fabs(value[i] - ledgers->before[i]);
-        if (ledgers->of[i] == k && !(change <= most)) {
-            most = change;
-            found = i;
+    for (int32_t f = 0, i = 0; f < ledgers->families; f++)
+        for (; i < ledgers->end[f]; i++) {
+            double change = fabs(value[i] - ledgers->before[i]);
+            if (ledgers->of[f] == k && !(change <= most)) {
+                most = change;
+                found = i;
+            }
         }
-    }
     return found;
 }
 

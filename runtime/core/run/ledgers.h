@@ -25,9 +25,9 @@ enum sd_inertia {
 };
 
 typedef struct sd_ledgers {
-    int32_t count, elements;
+    int32_t count, elements, families;
     const sd_call *contents;       /* block ledger; NULL: no element stores */
-    const int32_t *of;             /* [elements] ledger of each */
+    const int32_t *of, *end;       /* [families] of elements: the ledger of each; where it ends among these */
     int8_t *inertia;               /* [elements] sd_inertia: what its sign says of an inertia */
     /* results */
     double *gross;                 /* [count] int of the magnitudes of both powers, and what impulses brought */

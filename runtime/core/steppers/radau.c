@@ -9,7 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define OWN 6              /* vectors that every step hands on to the next one */
+#define OWN 4              /* vectors that every step hands on to the next one */
+#define SPARE 64           /* numbers behind each set of vectors: two sets are room for what has a few more than they */
 #define FIRST 1e-2         /* of the span: the first step at most */
 #define CREEPS 8           /* steps in a row for which Newton failed at first: towards a square root's zero they would never end */
 #define IDLE 1e-6          /* error of a step that only Newton keeps short */
@@ -53,20 +54,26 @@ static void show(const void *self, int32_t s, double *y, double *yd)
 {
     const sd_radau *radau = self;
     sd_radau_combine(radau->used->stages, radau->n, radau->used->inverse[s], radau->kept, radau->rate);
-    for (int32_t i = 0; i < radau->n; i++) {
-        y[i] = radau->last[i] + radau->kept[s][i];
+    const double *last = radau->last, *phi = radau->phi, *end = radau->kept[radau->used->stages - 1], *z = radau->kept[s];
+    for (int32_t i = 0; i < radau->n && last; i++)
+        y[i] = last[i] + z[i];
+    for (int32_t i = 0; i < radau->n && !last; i++)
+        y[i] = phi[i] - end[i] + z[i];
+    for (int32_t i = 0; i < radau->n; i++)
         yd[i] = radau->rate[i] / radau->h_used;
-    }
 }
 
-/* Factors work in vectors of which nothing is read while they do: the point of a stage is made anew, as are rows of the whole
- * system where that has more; the right sides behind the first one are in others then.  0; 2: no memory */
+/* Factors work in vectors of which nothing is read while they do: the point of a stage is made anew, as are rates of the whole
+ * system where that has more; the right sides behind the first one are in others then.  Rows and columns of the complex
+ * matrices are scaled as those of the real one.  0; 2: no memory */
 static int borrow(sd_radau *radau)
 {
     const sd_condensed *kept = (const sd_condensed *)radau->system->left;
-    int failed = sd_linear_borrow(radau->linear, kept ? kept->r : radau->y, NULL);
+    sd_linear *real = radau->linear;
+    int failed = sd_linear_borrow(real, kept ? kept->yd : radau->y, NULL, NULL);
     for (int k = 0; k < (radau->most_stages - 1) / 2 && !failed; k++)
-        failed = sd_linear_z_borrow(radau->complex_linear[k], (double complex *)radau->d[1 + 2 * k], radau->linear->column_scale);
+        failed = sd_linear_z_borrow(radau->complex_linear[k], (double complex *)radau->d[1 + 2 * k], real->row_scale,
+                                    real->column_scale);
     return failed;
 }
 
@@ -77,7 +84,7 @@ static void leave_room(sd_radau *radau)
     free(radau->beside);
     free(radau->point_y);
     free(radau->led);
-    radau->work = radau->ee = radau->weight = radau->point_y = NULL;
+    radau->work = radau->ee = radau->weight = radau->last = radau->point_y = NULL;
     radau->led = NULL;
     radau->beside = NULL;
 }
@@ -87,17 +94,20 @@ static int provide_room(sd_radau *radau)
 {
     const sd_system *system = radau->system;
     size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(radau->n + 1);
-    double **vectors[] = {&radau->last, &radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->weight,
+    double **vectors[] = {&radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->last, &radau->weight,
                           &radau->y, &radau->rate, &radau->ee, &radau->terms, &radau->first};
     const int sparing = sd_radau_sparing(radau), kept = sparing && system->left;
     /* z and kept change places, and either has next to it what no step hands on (`spare`); the last three: of steep laws */
     double **of_stages[] = {radau->z, radau->d, radau->kept, radau->base, radau->full, radau->moved};
-    size_t steep = system->scales > 0, number = kept ? OWN : sparing ? OWN + 2 : OWN + 3 + 2 * steep;
+    size_t steep = system->scales > 0, number = kept ? OWN : sparing ? OWN + 4 : OWN + 5 + 2 * steep;
     size_t sets = sizeof of_stages / sizeof *of_stages - 3 + 3 * steep;
     size_t pairs = (size_t)(radau->most_stages - 1) / 2, all = number + sets * (size_t)radau->most_stages + 2 * pairs;
+    const sd_condensed *left = (const sd_condensed *)system->left;
     if (radau->work)
         return 0;
-    radau->work = calloc(all * m + (steep ? 3 : 2) * nnz, sizeof(double));
+    radau->in_place = kept && sd_condensed_in_place(left) && 2 * m <= (size_t)left->full->unknowns + 8;
+    all -= radau->in_place ? 2 : 0;
+    radau->work = calloc(all * m + sets * SPARE + (steep ? 3 : 2) * nnz, sizeof(double));
     radau->led = calloc((size_t)radau->n + 1, sizeof *radau->led);
     if (!radau->work || !radau->led) {
         leave_room(radau);
@@ -106,14 +116,18 @@ static int provide_room(sd_radau *radau)
     double *next = radau->work;
     for (size_t i = 0; i < number; i++, next += m)
         *vectors[i] = next;
-    for (size_t i = 0; i < sets; i++) {
+    for (size_t i = 0; i < sets; i++, next += SPARE) {
         for (int32_t s = 0; s < radau->most_stages; s++, next += m)
             of_stages[i][s] = next;
-        for (size_t k = 0; k < pairs && of_stages[i] == radau->d; k++, next += 2 * m)
-            radau->w[k] = (double complex *)next;
+        for (size_t k = 0; k < pairs && of_stages[i] == radau->d; k++)
+            if (k > 0 || !radau->in_place) {
+                radau->w[k] = (double complex *)next;
+                next += 2 * m;
+            } else
+                radau->w[k] = (double complex *)left->y;
     }
     if (kept) { /* the point of a stage is made anew behind each solution */
-        radau->y = (double *)radau->w[0];
+        radau->y = radau->in_place ? radau->d[1] : (double *)radau->w[0];
         radau->rate = radau->y + m;
     }
     radau->jy = next;
@@ -132,7 +146,7 @@ static int provide_room(sd_radau *radau)
 static double *spare(void *self, size_t *numbers)
 {
     sd_radau *radau = self;
-    *numbers = (size_t)sd_whole_lanes(radau->n + 1) * (size_t)(2 * radau->most_stages + (radau->most_stages - 1));
+    *numbers = (size_t)sd_whole_lanes(radau->n + 1) * (size_t)(3 * radau->most_stages - 1 - 2 * radau->in_place) + SPARE;
     return provide_room(radau) ? NULL : radau->z[0] < radau->d[0] ? radau->z[0] : radau->d[0];
 }
 
@@ -206,28 +220,32 @@ static void set_weights(sd_radau *radau)
         double atol = radau->tolerance * radau->magnitude[i];
         if (radau->atol && radau->test[i] >= 0)
             atol = radau->atol[i] * radau->tolerance / radau->rtol;
-        radau->weight[i] = 1.0 / (atol + radau->tolerance * size);
+        if (radau->weight)
+            radau->weight[i] = 1.0 / (atol + radau->tolerance * size);
     }
 }
 
 /* Newton's weights and the scale of columns: of unknowns that all count as they are those that there are; where memory for
- * others is missing none, which the first step tells */
+ * others is missing no scale, which the first step tells */
 static void provide_newton_weights(sd_radau *radau)
 {
     size_t m = (size_t)sd_whole_lanes(radau->n + 1);
     int powers = 0;
     for (int32_t i = 0; i < radau->n; i++)
         powers |= radau->power[i] != 0;
-    if (powers && !radau->powered)
-        radau->powered = calloc(2 * m, sizeof *radau->powered);
+    int others = powers || (radau->atol && !radau->weight);
+    if (others && !radau->powered)
+        radau->powered = calloc(3 * m, sizeof *radau->powered);
+    if (others && !radau->weight && radau->powered)
+        radau->weight = radau->powered + 2 * m;
     radau->newton_weight = powers ? radau->powered : radau->weight;
-    radau->scale = !powers ? radau->magnitude : radau->powered ? radau->powered + m : NULL;
+    radau->scale = others && !radau->powered ? NULL : powers ? radau->powered + m : radau->magnitude;
 }
 
 /* index-2 unknowns and index-3 multipliers count with powers of h */
 static void set_newton_weights(sd_radau *radau)
 {
-    for (int32_t i = 0; i < radau->n && radau->newton_weight != radau->weight; i++) {
+    for (int32_t i = 0; i < radau->n && radau->scale != radau->magnitude; i++) {
         double power = radau->power[i] == 0 ? 1.0 : radau->power[i] == 1 ? radau->h : radau->h * radau->h;
         radau->newton_weight[i] = radau->weight[i] * power;
         radau->scale[i] = radau->magnitude[i] / power;
@@ -240,7 +258,7 @@ double sd_radau_norm(const sd_radau *radau, const double *x)
     double sum = 0.0;
     for (int32_t i = 0; i < radau->n; i++)
         if (radau->test[i] >= 0) {
-            double v = x[i] * radau->weight[i] * (radau->test[i] ? radau->h : 1.0);
+            double v = x[i] * sd_radau_weight(radau, i) * (radau->test[i] ? radau->h : 1.0);
             sum += v * v;
         }
     return radau->tested ? sqrt(sum / radau->tested) : 0.0;
@@ -394,9 +412,13 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
     if (!(radau->fixed_h > 0.0))
         next = sd_radau_choose(radau, next, error, iterations, troubled);
     double *oldest = radau->before, *slope = radau->slope[2];
-    radau->before = radau->last;
-    radau->last = oldest;
-    memcpy(radau->last, radau->phi, size);
+    for (int32_t i = 0; i < radau->n && !radau->last; i++)
+        oldest[i] = sd_radau_last(radau, i);
+    if (radau->last) {
+        radau->before = radau->last;
+        radau->last = oldest;
+        memcpy(radau->last, radau->phi, size);
+    }
     for (int k = 2; k > 0; k--) {
         radau->slope[k] = radau->slope[k - 1];
         radau->refined[k] = radau->refined[k - 1];
@@ -412,7 +434,11 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
         radau->z[s] = swap;
     }
     radau->used = method;
-    show(radau, method->stages - 1, radau->phi, radau->yd);
+    sd_radau_combine(method->stages, radau->n, method->inverse[method->stages - 1], radau->kept, radau->rate);
+    for (int32_t i = 0; i < radau->n; i++) {
+        radau->phi[i] += radau->kept[method->stages - 1][i];
+        radau->yd[i] = radau->rate[i] / h;
+    }
     memcpy(radau->slope[0], radau->yd, size);
     show_nodes(radau);
     double t = radau->t + h;
@@ -459,7 +485,7 @@ int sd_radau_step(sd_radau *radau)
 {
     int singular = 0, iterations = 0, failures = 0, leap = 0, strained = 0;
     double retry = 0.5, error = 0.0;
-    radau->cause = radau->work && radau->newton_weight ? SD_FINE : SD_MEMORY;
+    radau->cause = radau->work && radau->scale ? SD_FINE : SD_MEMORY;
     if (radau->cause)
         return radau->cause;
     set_weights(radau);

@@ -82,7 +82,8 @@ typedef struct sd_radau {
     double lead[SD_STAGES][SD_STAGES], h_lead;      /* A^-1 / h, of the h and the method that they were made for */
     const sd_radau_method *of_lead;
     double *phi, *yd;         /* [n] the last accepted point */
-    double *last, *before;    /* [n] the points before it: the start of the last step, of the one before */
+    double *last, *before;    /* [n] the points before it: the start of the last step, of the one before; last NULL: it is
+                               * what the last stage leaves of phi */
     double *slope[SD_POINTS]; /* [n] derivatives at phi, last, before, for values within the step */
     int32_t refined[SD_POINTS];                     /* they are settled */
     double *z[SD_STAGES], *kept[SD_STAGES];         /* of this step, of the last accepted one */
@@ -98,9 +99,13 @@ typedef struct sd_radau {
                                                * their sum */
     double *at_zero;          /* [entries] dF/dy where all unknowns are zero, of steep laws; made when first needed */
     char *open;               /* [n] columns that factors left */
-    double *y, *rate, *ee, *weight, *terms, *jy, *jyd, *g, *work; /* work: the memory of all vectors but phi and yd */
-    double *newton_weight, *scale, *powered; /* of Newton's norm, of columns; their memory where powers of h count */
+    double *y, *rate, *ee, *weight, *terms, *jy, *jyd, *g, *work; /* work: the memory of all vectors but phi and yd;
+                               * weight NULL: made where it is read */
+    double *newton_weight, *scale, *powered; /* of Newton's norm (NULL: as weight), of columns; their memory where powers of
+                                              * h count */
     double complex *w[SD_PAIRS]; /* right sides and solutions */
+    int32_t in_place;         /* the point of a stage, its rates and its residual take turns in d; y and rate stand there too,
+                               * w where the point of the whole system does */
     struct sd_beside *beside; /* condensed.h: for two threads; made when first needed */
     sd_system *twice[2];          /* their systems */
     double *point_y, *point_rate; /* [n]; y of a system with all its unknowns alone */
@@ -133,6 +138,26 @@ void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1]);
 void sd_radau_note_points(sd_radau *radau);
 /* z [stages] of a step of size h from the last step's polynomial */
 void sd_radau_extrapolate(sd_radau *radau, double h);
+
+/* the start of the last step */
+static inline double sd_radau_last(const sd_radau *radau, int32_t i)
+{
+    return radau->last ? radau->last[i] : radau->phi[i] - radau->kept[radau->used->stages - 1][i];
+}
+
+/* weight of an unknown in the error test, of magnitudes that a step leaves as they are */
+static inline double sd_radau_weight(const sd_radau *radau, int32_t i)
+{
+    if (radau->weight)
+        return radau->weight[i];
+    return 1.0 / (radau->tolerance * radau->magnitude[i] + radau->tolerance * fabs(radau->phi[i]));
+}
+
+/* the same in Newton's norm */
+static inline double sd_radau_newton_weight(const sd_radau *radau, int32_t i)
+{
+    return radau->newton_weight ? radau->newton_weight[i] : sd_radau_weight(radau, i);
+}
 
 /* radau.c: root mean square over the tested unknowns in the error weights; what the estimate of a method counts beside
  * that of three stages */

@@ -89,7 +89,7 @@ static void since(const sd_radau *radau, double *step)
 {
     for (int s = 0; s < radau->method->stages; s++)
         for (int32_t k = 0; k < radau->n; k++)
-            step[s * radau->n + k] = (radau->z[s][k] - step[s * radau->n + k]) * radau->newton_weight[k];
+            step[s * radau->n + k] = (radau->z[s][k] - step[s * radau->n + k]) * sd_radau_newton_weight(radau, k);
 }
 
 /* Whether two corrections by the factors at hand, from the extrapolated stages on, have one direction: it is all that is wrong

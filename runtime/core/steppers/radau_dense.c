@@ -108,7 +108,7 @@ static void between_points(const sd_radau *radau, double t, double *y, double *y
     hermite(radau, t, a, b, ad, bd);
     for (int32_t i = 0; i < radau->n; i++)
         if (radau->led[i]) {
-            double base = radau->last[i]; /* differences against one value: no cancellation of large ones */
+            double base = sd_radau_last(radau, i); /* differences against one value: no cancellation of large ones */
             double end = radau->phi[i] - base, old = points > 2 ? radau->before[i] - base : 0.0;
             double d0 = radau->slope[0][i], d1 = radau->slope[1][i];
             y[i] = base + a[0] * end + b[0] * d0 + b[1] * d1;
@@ -128,13 +128,13 @@ static void between_stages(const sd_radau *radau, double t, double *y, double *y
     lifted(radau, (t - (radau->t - h)) / h, v, d, by);
     for (int32_t i = 0; i < radau->n; i++)
         if (radau->led[i]) {
-            double end = radau->phi[i] - radau->last[i], slope = radau->slope[1][i];
+            double base = sd_radau_last(radau, i), end = radau->phi[i] - base, slope = radau->slope[1][i];
             double sum = v[last + 1] * end, rate = d[last + 1] * end;
             for (int s = 0; s < last; s++) {
                 sum += v[s + 1] * radau->kept[s][i];
                 rate += d[s + 1] * radau->kept[s][i];
             }
-            y[i] = radau->last[i] + (sum + h * by[0] * slope);
+            y[i] = base + (sum + h * by[0] * slope);
             yd[i] = rate / h + by[1] * slope;
         }
 }
@@ -147,7 +147,7 @@ static void of_stages(const sd_radau *radau, double t, double *y, double *yd)
     lagrange(radau, method, (t - (radau->t - h)) / h, v, d);
     for (int32_t i = 0; i < radau->n; i++)
         if (!radau->led[i]) {
-            double sum = radau->last[i], rate = 0.0;
+            double sum = sd_radau_last(radau, i), rate = 0.0;
             for (int s = 0; s < method->stages; s++) {
                 sum += v[s + 1] * radau->kept[s][i];
                 rate += d[s + 1] * radau->kept[s][i];
@@ -175,14 +175,14 @@ void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
 /* the point that is settled may be room that was lent for it, of which nothing is read from where all unknowns follow from it */
 void sd_radau_refine(sd_radau *radau, sd_settle *settle)
 {
-    const double *value[SD_POINTS] = {radau->phi, radau->last, radau->before};
     double t[SD_POINTS] = {radau->t, radau->t - radau->h_used, radau->t - radau->h_used - radau->h_before};
     size_t size = (size_t)radau->n * sizeof(double);
     int32_t n = settle->seen || radau->n < settle->unknowns ? radau->n : settle->unknowns;
     for (int k = 0; k < SD_POINTS && k <= radau->taken; k++) {
         if (radau->refined[k])
             continue;
-        memcpy(radau->y, value[k], size);
+        for (int32_t i = 0; i < radau->n; i++)
+            radau->y[i] = k == 0 ? radau->phi[i] : k == 1 ? sd_radau_last(radau, i) : radau->before[i];
         memcpy(radau->rate, radau->slope[k], size);
         if (sd_settle_point(settle, t[k], radau->y, radau->rate) == 0)
             for (int32_t i = 0; i < n; i++)

@@ -58,10 +58,7 @@ static void factorise_one(void *context, int part)
     /* a pivot is small or not beside the unknowns themselves, whatever the step */
     const double *scale = radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->magnitude : radau->scale;
     if (sd_radau_sparing(radau)) {
-        double real = method->gamma / radau->h;
-        double complex both = part ? method->lambda[part - 1] / radau->h : 0.0;
-        all->failed[part] = part ? sd_linear_z_factor_sum(radau->complex_linear[part - 1], radau->jy, radau->jyd, &both, scale)
-                                 : sd_linear_factor_sum(radau->linear, radau->jy, radau->jyd, &real, scale);
+        all->failed[part] = part ? sd_linear_z_factor_sum(radau->complex_linear[part - 1]) : sd_linear_factor_sum(radau->linear);
         return;
     }
     if (part == 0) {
@@ -78,12 +75,26 @@ static void factorise_one(void *context, int part)
     all->failed[part] = sd_linear_z_factor(radau->complex_linear[part - 1], gz, scale);
 }
 
+/* the same scales for all matrices of a step, which nobody changes while they are factorised */
+static void scale_all(sd_radau *radau)
+{
+    const sd_radau_method *method = radau->method;
+    const double real = method->gamma / radau->h;
+    sd_linear_scale_sum(radau->linear, radau->jy, radau->jyd, &real, radau->scale);
+    for (int k = 0; k < method->pairs; k++) {
+        const double complex both = method->lambda[k] / radau->h;
+        sd_linear_z_scale_sum(radau->complex_linear[k], radau->jy, radau->jyd, &both, radau->scale);
+    }
+}
+
 /* The factors of all matrices of a step; the failure of the first that has none.  Large ones are all made in any case: what
  * they leave behind must not depend on how many threads there are. */
 static int factorise_all(sd_radau *radau)
 {
     factoring all = {radau, {0}};
     int failed = 0;
+    if (sd_radau_sparing(radau))
+        scale_all(radau);
     if (large(radau))
         sd_side_by_side(radau->method->pairs + 1, factorise_one, &all);
     for (int part = 0; part <= radau->method->pairs && !failed; part++) {
@@ -119,6 +130,20 @@ void sd_radau_stage(sd_radau *radau, int s, double *y, double *rate)
         y[i] = radau->phi[i] + radau->z[s][i];
 }
 
+/* sd_jacobian, for which right sides, which nobody knows yet, are room for the slopes of a whole system that has none */
+static int32_t slopes(sd_radau *radau, double t, const double *y, const double *yd)
+{
+    sd_condensed *kept = sd_radau_sparing(radau) ? (sd_condensed *)radau->system->left : NULL;
+    double *own = kept ? kept->slope : NULL;
+    size_t room = (size_t)(radau->d[1] - radau->d[0]) * (size_t)radau->most_stages;
+    if (kept && !own && y == radau->phi && (size_t)kept->full->entries < room)
+        kept->slope = radau->d[0];
+    int32_t bad = sd_jacobian(radau->system, t, y, yd, radau->magnitude, radau->jy, radau->jyd);
+    if (kept)
+        kept->slope = own;
+    return bad;
+}
+
 /* J, E where they are not old, and the factors of J + gamma/h E and all J + lambda/h E.  Taken at the last accepted point, or
  * at the present guess of the end of the step, where slopes at the start mislead (a valve near rest). */
 int sd_radau_factorise(sd_radau *radau, int at_end)
@@ -127,8 +152,8 @@ int sd_radau_factorise(sd_radau *radau, int at_end)
     if (!radau->old_jacobian) {
         if (at_end)
             sd_radau_stage(radau, radau->method->stages - 1, radau->y, radau->rate);
-        int32_t bad = sd_jacobian(system, at_end ? radau->t + radau->h : radau->t, at_end ? radau->y : radau->phi,
-                                  at_end ? radau->rate : radau->yd, radau->magnitude, radau->jy, radau->jyd);
+        int32_t bad = slopes(radau, at_end ? radau->t + radau->h : radau->t, at_end ? radau->y : radau->phi,
+                             at_end ? radau->rate : radau->yd);
         if (*system->stop)
             return SD_STOPPED;
         if (bad >= 0) {
@@ -198,11 +223,29 @@ int sd_radau_lean(sd_radau *radau, int where)
     return sd_radau_factorise(radau, 1);
 }
 
+static void residual_in_place(sd_radau *radau, sd_system *system, int s, double t)
+{
+    const sd_condensed *left = (const sd_condensed *)system->left;
+    double *d = radau->d[s];
+    for (int32_t i = 0; i < radau->n; i++)
+        d[i] = radau->phi[i] + radau->z[s][i];
+    sd_condensed_place(left, d);
+    sd_radau_combine(radau->method->stages, radau->n, radau->lead[s], radau->z, d);
+    sd_condensed_place_rates(left, d);
+    sd_condensed_rows(left, t, d, d);
+    system->residual_evaluations++;
+}
+
 /* d of stage s := its residual, of `system`, by way of y and rate */
 static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, double *rate)
 {
-    sd_radau_stage(radau, s, y, rate);
-    sd_residual(system, radau->t + radau->method->c[s] * radau->h, y, rate, radau->d[s]);
+    const double t = radau->t + radau->method->c[s] * radau->h;
+    if (radau->in_place)
+        residual_in_place(radau, system, s, t);
+    else {
+        sd_radau_stage(radau, s, y, rate);
+        sd_residual(system, t, y, rate, radau->d[s]);
+    }
     for (int32_t i = radau->n; i < sd_whole_lanes(radau->n); i++)
         radau->d[s][i] = 0.0; /* others have worked there */
 }
@@ -228,8 +271,8 @@ static int accompanied(sd_radau *radau)
         return 0;
     if (!radau->beside) {
         radau->beside = sd_beside_new(radau->system);
-        size_t m = (size_t)sd_whole_lanes(radau->n + 1), alone = radau->system->left ? 0 : m;
-        radau->point_y = calloc(alone + m, sizeof(double));
+        size_t m = (size_t)sd_whole_lanes(radau->n + 1), alone = radau->system->left ? 0 : m, rate = radau->in_place ? 0 : m;
+        radau->point_y = calloc(alone + rate + 1, sizeof(double));
         radau->point_rate = radau->point_y + alone;
     }
     if (!radau->beside || !radau->point_y)
@@ -311,12 +354,27 @@ static inline double squares_of_state(const sd_radau *radau, int32_t i, sd_lanes
     return sum;
 }
 
+/* four of Newton's weights, zeros behind the last */
+static inline __attribute__((always_inline)) void newton_weights(const sd_radau *radau, int32_t i, sd_lanes *weight)
+{
+    const double part = radau->tolerance;
+    if (radau->newton_weight)
+        *weight = SD_FROM(radau->newton_weight, i);
+    else if (i + SD_LANES <= radau->n)
+        *weight = 1.0 / (part * SD_FROM(radau->magnitude, i) + part * SD_SIZES(SD_FROM(radau->phi, i)));
+    else
+        for (int32_t l = 0; l < SD_LANES; l++)
+            (*weight)[l] = i + l < radau->n ? sd_radau_weight(radau, i + l) : 0.0;
+}
+
 /* z += S times the solutions in d and w; sums of squares of the correction in Newton's weights, over all unknowns and, where
  * some are idle, over what carries the state */
 static inline __attribute__((always_inline)) void join(sd_radau *radau, int stages, int pairs, sd_lanes *sum, double *state)
 {
     const sd_radau_method *method = radau->method;
     for (int32_t i = 0; i < radau->n; i += SD_LANES) {
+        sd_lanes weight;
+        newton_weights(radau, i, &weight);
         sd_lanes real = SD_FROM(radau->d[0], i), re[SD_PAIRS], im[SD_PAIRS];
         for (int k = 0; k < pairs; k++)
             parts(radau->w[k] + i, &re[k], &im[k]);
@@ -324,7 +382,7 @@ static inline __attribute__((always_inline)) void join(sd_radau *radau, int stag
             sd_lanes dz = method->column[s] * real;
             for (int k = 0; k < pairs; k++)
                 dz += 2.0 * (creal(method->columns[k][s]) * re[k] - cimag(method->columns[k][s]) * im[k]);
-            sd_lanes v = dz * SD_FROM(radau->newton_weight, i);
+            sd_lanes v = dz * weight;
             SD_AT(radau->z[s], i) += dz;
             *sum += v * v;
             if (radau->linear->idle)

@@ -2,6 +2,7 @@
 #include "system/condensed.h"
 #include "linear/lanes.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -124,29 +125,44 @@ void sd_condensed_gather(const sd_condensed *condensed, const double *x, double 
     gather(condensed->unknown_spans, condensed->unknown, x, z);
 }
 
-/* the point (z, zd) in y, yd, rates as far as blocks read them */
-static void place(const sd_condensed *condensed, const double *z, const double *zd)
+void sd_condensed_place(const sd_condensed *condensed, const double *z)
 {
     sd_condensed_expand(condensed, z, condensed->y, 0);
+}
+
+void sd_condensed_place_rates(const sd_condensed *condensed, const double *zd)
+{
     scatter(condensed->rate_spans, condensed->rate, zd, condensed->yd);
+}
+
+static void place(const sd_condensed *condensed, const double *z, const double *zd)
+{
+    sd_condensed_place(condensed, z);
+    sd_condensed_place_rates(condensed, zd);
 }
 
 /* kept rows q' - f that are nothing else */
 SD_WIDE static void write_own(const sd_condensed *condensed, const double *zd, double *r)
 {
     for (const int32_t *own = condensed->own, *end = own + 4 * (size_t)condensed->own_spans; own < end; own += 4) {
-        const double *restrict q = zd + own[2], *restrict f = condensed->y + own[3];
-        double *restrict to = r + own[1];
+        const double *q = zd + own[2], *restrict f = condensed->y + own[3];
+        double *to = r + own[1];
         const int32_t number = own[0];
         for (int32_t i = 0; i < number; i++)
             to[i] = q[i] - f[i];
     }
 }
 
-static void residual(const sd_left *left, double t, const double *z, const double *zd, double *r)
+int sd_condensed_in_place(const sd_condensed *condensed)
 {
-    const sd_condensed *condensed = (const sd_condensed *)left;
-    place(condensed, z, zd);
+    int own = 1;
+    for (int32_t s = 0; s < condensed->own_spans; s++)
+        own &= condensed->own[4 * (size_t)s + 1] == condensed->own[4 * (size_t)s + 2];
+    return own;
+}
+
+void sd_condensed_rows(const sd_condensed *condensed, double t, const double *zd, double *r)
+{
     for (int32_t s = 0; s < condensed->rest_spans; s++) /* others are nobody's */
         memset(condensed->r + condensed->rest[s].full, 0, (size_t)condensed->rest[s].number * sizeof *r);
     sd_add_rows(condensed->full, t, condensed->y, condensed->yd, condensed->r);
@@ -154,10 +170,15 @@ static void residual(const sd_left *left, double t, const double *z, const doubl
     write_own(condensed, zd, r);
 }
 
-/* values += share * slope of the products */
-static void add_products(const sd_condensed *condensed, double *values)
+static void residual(const sd_left *left, double t, const double *z, const double *zd, double *r)
 {
-    const double *slope = condensed->slope;
+    place((const sd_condensed *)left, z, zd);
+    sd_condensed_rows((const sd_condensed *)left, t, zd, r);
+}
+
+/* values += share * slope of the products */
+static void add_products(const sd_condensed *condensed, const double *slope, double *values)
+{
     for (int64_t p = 0; p < condensed->products && condensed->from; p++)
         values[condensed->to[p]] += condensed->share[p] * slope[condensed->from[p]];
     for (int64_t s = 0; s < condensed->stretches; s++) {
@@ -171,11 +192,18 @@ static void add_products(const sd_condensed *condensed, double *values)
 static void jacobian(const sd_left *left, double t, const double *z, const double *zd, double *jz, double *jzd)
 {
     const sd_condensed *condensed = (const sd_condensed *)left;
+    double *slope = condensed->slope ? condensed->slope : malloc(((size_t)condensed->full->entries + 1) * sizeof *slope);
+    if (!slope) {
+        jz[0] = NAN;
+        return;
+    }
     place(condensed, z, zd);
     for (int rate = 0; rate < 2; rate++) { /* one room for both: of a large system it is long */
-        sd_slopes(condensed->full, t, condensed->y, condensed->yd, rate, condensed->slope);
-        add_products(condensed, rate ? jzd : jz);
+        sd_slopes(condensed->full, t, condensed->y, condensed->yd, rate, slope);
+        add_products(condensed, slope, rate ? jzd : jz);
     }
+    if (!condensed->slope)
+        free(slope);
 }
 
 static void steep(const sd_left *left, double t, const double *z, const double *rate, double *s, sd_terms *terms)

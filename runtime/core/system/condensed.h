@@ -12,7 +12,8 @@
  *   own [own_spans][4]: kept rows q' - f that no block adds to, as stretches: number, kept row, kept q, place of f in y
  *   straight: eliminated unknowns in an order in which each reads kept ones and those before it
  *   from, to, share [products]: entry `to` of the kept matrix += share * entry `from` of the full one
- *   y, yd [room of the full system], r [full rows], slope [full entries]: work
+ *   y, yd [full unknowns + 8 at least], r [full rows], slope [full entries]: work; slope NULL: found for each Jacobian, as of a
+ *   large system, where the room counts
  */
 #ifndef SYSDYN_CONDENSED_H
 #define SYSDYN_CONDENSED_H
@@ -64,6 +65,13 @@ typedef struct sd_beside sd_beside;
 sd_beside *sd_beside_new(const sd_system *system);
 /* of what the system is now (its held rows change) */
 void sd_beside_as(sd_beside *beside, const sd_system *system, sd_system *twice[2]);
+
+/* A residual in parts: the point z in y, then the rates zd in yd as far as blocks read them, then its rows.  in_place: these may
+ * stand where zd does (each row q' - f is that of its own unknown). */
+void sd_condensed_place(const sd_condensed *condensed, const double *z);
+void sd_condensed_place_rates(const sd_condensed *condensed, const double *zd);
+void sd_condensed_rows(const sd_condensed *condensed, double t, const double *zd, double *r);
+int sd_condensed_in_place(const sd_condensed *condensed);
 
 /* all unknowns x of the full system from kept values z; rate: x and z are derivatives.  What is neither kept nor
  * eliminated stays as it is */

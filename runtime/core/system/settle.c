@@ -59,42 +59,59 @@ static int provide_work(sd_settle *settle)
 {
     const sd_system *system = settle->system;
     size_t m = (size_t)settle->rows + 1, n = (size_t)(settle->unknowns + settle->rates) + 1;
-    size_t kept = system->left ? (size_t)system->unknowns + 8 : 0, longest = n > 2 * m ? n : 2 * m;
-    size_t all = 2 * m + 2 * n + longest + 2 * kept;
+    size_t kept = system->left ? (size_t)system->unknowns + 8 : 0, all = 2 * m + 2 * n + 2 * kept;
     double *next = settle->lent && settle->lent_room >= all ? settle->lent : settle->work;
     if (!next && !(next = settle->work = malloc(all * sizeof *next)))
         return 0;
     settle->r = next;
     settle->x0 = settle->r + m;
-    settle->step = settle->x0 + n; /* unknowns, rates and rows */
-    settle->x = settle->step + n + m; /* within a basis the right side of a step */
-    settle->room = settle->x + longest;
+    settle->step = settle->x0 + n; /* unknowns, rates and rows; a basis is chosen there before it steps */
+    settle->room = settle->step + n + m;
     if (settle->basis)
-        sd_sparse_lend(settle->basis, settle->x);
+        sd_sparse_lend(settle->basis, settle->step);
     return 1;
+}
+
+/* room for the best point of an iteration without a basis: its own from then on; 0: no memory */
+static int provide_best(sd_settle *settle)
+{
+    if (!settle->x)
+        settle->x = malloc(((size_t)(settle->unknowns + settle->rates) + 1) * sizeof *settle->x);
+    return settle->x != NULL;
+}
+
+static void free_slopes(sd_settle *settle)
+{
+    free(settle->jy);
+    free(settle->basis_column);
+    settle->jy = settle->jyd = settle->basis_value = NULL;
+    settle->basis_column = settle->basis_row = NULL;
 }
 
 /* room for slopes, and for what a basis takes of them; 0: no memory */
 static int provide_slopes(sd_settle *settle)
 {
-    size_t entries = (size_t)settle->system->entries + 1;
-    size_t basis = settle->basis_column ? (size_t)settle->basis_column[settle->rows] + 1 : 0;
+    size_t entries = (size_t)settle->system->entries + 1, rows = (size_t)settle->rows + 1;
+    size_t basis = settle->basis ? (size_t)settle->basis_entries + 1 : 0;
     if (settle->jy)
         return 1;
-    if (!(settle->jy = malloc((2 * entries + basis) * sizeof *settle->jy)))
+    settle->jy = malloc((2 * entries + basis) * sizeof *settle->jy);
+    settle->basis_column = basis ? malloc((rows + basis) * sizeof *settle->basis_column) : NULL;
+    if (!settle->jy || (basis && !settle->basis_column)) {
+        free_slopes(settle);
         return 0;
+    }
     settle->jyd = settle->jy + entries;
     settle->basis_value = settle->jyd + entries;
+    settle->basis_row = settle->basis_column + rows;
     return 1;
 }
 
 /* of a large one lets go of it: rows of linear laws take new slopes once in many steps */
 static void leave_slopes(sd_settle *settle)
 {
-    if (settle->unknowns + settle->rates <= SMALL_POINT)
-        return;
-    free(settle->jy);
-    settle->jy = settle->jyd = settle->basis_value = NULL;
+    if (settle->unknowns + settle->rates > SMALL_POINT)
+        free_slopes(settle);
 }
 
 /* 1 / weight of an unknown or rate; of a state that is to stay where it is 0 */
@@ -119,28 +136,27 @@ void sd_settle_free(sd_settle *settle)
         return;
     free(settle->taken);
     sd_sparse_free(settle->basis);
-    free(settle->jy);
+    free_slopes(settle);
     free(settle->work);
+    free(settle->x);
     free(settle->memory);
     free(settle);
 }
 
-int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row, const int32_t *order,
-                    const int32_t *place_y, const int32_t *place_yd, int32_t determined)
+int sd_settle_widen(sd_settle *settle, const int32_t *order, int32_t determined)
 {
-    int32_t n = settle->unknowns + settle->rates;
-    settle->basis = sd_sparse_new(n, settle->rows, order);
+    const int32_t *column = settle->system->column;
+    sd_sparse_free(settle->basis);
+    settle->basis = sd_sparse_new(settle->unknowns + settle->rates, settle->rows, order);
     if (!settle->basis)
         return 2;
+    settle->basis_entries = settle->system->entries;
+    for (int32_t k = 0; k < settle->rates; k++)
+        settle->basis_entries += column[settle->rate[k] + 1] - column[settle->rate[k]];
     settle->basis->null_pivot = LEAST_PIVOT;
-    settle->basis->most = 1000000 + (int64_t)FILL * column[settle->rows];
-    settle->basis_column = column;
-    settle->basis_row = row;
-    settle->basis_y = place_y;
-    settle->basis_yd = place_yd;
+    settle->basis->most = 1000000 + (int64_t)FILL * settle->basis_entries;
     settle->determined = determined;
-    free(settle->jy); /* room for more is wanted */
-    settle->jy = NULL;
+    free_slopes(settle); /* room for more is wanted */
     return 0;
 }
 
@@ -149,7 +165,8 @@ void sd_settle_rest(sd_settle *settle)
     if (settle->unknowns + settle->rates <= SMALL_POINT)
         return;
     free(settle->work);
-    settle->work = NULL;
+    free(settle->x);
+    settle->work = settle->x = NULL;
 }
 
 int *sd_settle_pivoted(sd_settle *settle)
@@ -251,22 +268,47 @@ static int leaves_open(const sd_settle *settle)
     return 0;
 }
 
+/* puts the scaled slopes [entries] by an unknown, or by a rate, behind what there is of the column of each row; number: of
+ * it among unknowns and rates */
+static void add_to_basis(sd_settle *settle, int32_t unknown, int32_t number, const double *slope)
+{
+    const sd_system *system = settle->system;
+    double weight = lift(settle, number);
+    for (int32_t e = system->column[unknown]; e < system->column[unknown + 1]; e++) {
+        int32_t at = settle->basis_column[system->row[e] + 1]++; /* which is the end of that column at last */
+        settle->basis_row[at] = number;
+        settle->basis_value[at] = slope[e] * settle->row_scale[system->row[e]] * weight;
+    }
+}
+
+/* G^T in scaled unknowns and rows, whose columns ascend */
+static void lay_out_basis(sd_settle *settle)
+{
+    const sd_system *system = settle->system;
+    int32_t *begin = settle->basis_column + 1, before = 0;
+    memset(settle->basis_column, 0, ((size_t)settle->rows + 1) * sizeof *begin);
+    for (int32_t e = 0; e < system->entries; e++)
+        begin[system->row[e]]++;
+    for (int32_t k = 0; k < settle->rates; k++)
+        for (int32_t j = settle->rate[k], e = system->column[j]; e < system->column[j + 1]; e++)
+            begin[system->row[e]]++;
+    for (int32_t i = 0; i < settle->rows; i++) {
+        int32_t number = begin[i];
+        begin[i] = before;
+        before += number;
+    }
+    for (int32_t j = 0; j < settle->unknowns; j++)
+        add_to_basis(settle, j, j, settle->jy);
+    for (int32_t k = 0; k < settle->rates; k++)
+        add_to_basis(settle, settle->rate[k], settle->unknowns + k, settle->jyd);
+}
+
 /* the basis from slopes */
 static int choose_from(sd_settle *settle)
 {
-    const sd_system *system = settle->system;
-    int32_t entries = settle->basis_column[settle->rows];
-    double *value = settle->basis_value;
-    memset(value, 0, (size_t)entries * sizeof *value);
-    for (int32_t e = 0; e < system->entries; e++) {
-        double scale = settle->row_scale[system->row[e]];
-        int32_t a = settle->basis_y[e], b = settle->basis_yd[e];
-        if (a >= 0)
-            value[a] += settle->jy[e] * scale * lift(settle, settle->basis_row[a]);
-        if (b >= 0)
-            value[b] += settle->jyd[e] * scale * lift(settle, settle->basis_row[b]);
-    }
-    if (sd_first_bad(entries, value) >= 0)
+    const double *value = settle->basis_value;
+    lay_out_basis(settle);
+    if (sd_first_bad(settle->basis_entries, value) >= 0)
         return 1;
     sd_sparse *lu = settle->basis;
     const sd_matrix matrix = {.column = settle->basis_column, .row = settle->basis_row, .value = value};
@@ -293,10 +335,10 @@ static int choose(sd_settle *settle, double t, const double *y, const double *yd
 static double move_basic(sd_settle *settle, double *y, double *yd, double *state)
 {
     int32_t n = settle->unknowns, moves = n + settle->rates;
-    double largest = 0.0, *b = settle->x;
+    double largest = 0.0, *b = settle->r; /* which is measured anew behind it */
     for (int32_t i = 0; i < settle->rows; i++)
         b[i] = -settle->r[i] * settle->row_scale[i];
-    sd_sparse_basic(settle->basis, b, settle->step, b + settle->rows);
+    sd_sparse_basic(settle->basis, b, settle->step, settle->step + moves);
     for (int32_t j = 0; j < moves; j++) {
         double move = settle->step[j] *= lift(settle, j);
         largest = fmax(largest, fabs(move));
@@ -425,14 +467,26 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
     }
 }
 
+/* met := what follows from the state: few unknowns, and most rates */
+static void note_met(const sd_settle *settle, const double *y, const double *yd)
+{
+    const char *state = settle->state, *end = state + settle->unknowns;
+    double *next = settle->met;
+    for (const char *at = state; (at = memchr(at, 0, (size_t)(end - at))); at++)
+        *next++ = y[at - state];
+    for (int32_t k = 0; k < settle->rates; k++)
+        if (!end[k])
+            *next++ = yd[settle->rate[k]];
+}
+
 /* (y, chosen yd): the state as in x0, what follows from it as at the last point that settled */
 static void put_near(const sd_settle *settle, double *y, double *yd)
 {
-    int32_t n = settle->unknowns;
+    const double *next = settle->met;
     put(settle, settle->x0, y, yd);
-    for (int32_t j = 0; j < n + settle->rates; j++)
+    for (int32_t j = 0; j < settle->unknowns + settle->rates; j++)
         if (!settle->state[j])
-            *(j < n ? &y[j] : &yd[settle->rate[j - n]]) = settle->met[j];
+            *(j < settle->unknowns ? &y[j] : &yd[settle->rate[j - settle->unknowns]]) = *next++;
 }
 
 /* what the point makes of other unknowns, and its residuals; measured: those of the point as it comes are known */
@@ -486,11 +540,15 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     int tried = settle->refused < REFUSALS || (settle->refused < OUT && settle->calls % AGAIN == 0);
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && tried) {
         if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, fmax(CLOSE, settle->enough))) {
-            take(settle, y, yd, settle->met);
+            note_met(settle, y, yd);
             finish(settle, t, y, yd, 1, 1);
             return 0;
         }
         put(settle, settle->x0, y, yd);
+    }
+    if (!provide_best(settle)) {
+        settle->failures++;
+        return 1;
     }
     int plain = settle->hold == 1.0; /* else factors are of another weight, and serve once */
     settle->ready = plain ? settle->ready : NONE;
@@ -521,7 +579,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     put(settle, settle->x, y, yd);
     done = done || holds(settle, t, y, yd, best, CLOSE);
     if (done)
-        take(settle, y, yd, settle->met);
+        note_met(settle, y, yd);
     else
         put(settle, settle->x0, y, yd);
     settle->failures += !done;

@@ -25,7 +25,7 @@ typedef struct sd_settle {
     sd_system *system;
     sd_linear *linear;               /* of the saddle-point matrix [unknowns + rates + rows]; NULL: not there yet */
     int32_t unknowns, rates, rows;
-    const int32_t *rate;             /* [rates] positions in yd */
+    const int32_t *rate;             /* [rates] positions in yd, ascending */
     const int32_t *slot_y, *slot_y_t;     /* [entries] places of dF/dy in the matrix and its transpose, -1: none */
     const int32_t *slot_yd, *slot_yd_t;   /* [entries] the same of dF/dyd */
     const int32_t *slot_x, *slot_r;       /* [unknowns + rates], [rows] diagonal */
@@ -35,16 +35,18 @@ typedef struct sd_settle {
     const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE; SD_LEFT_OUT */
     const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
     int32_t kinematics;
-    double *jy, *jyd;                /* [entries]; of large ones where they are wanted alone, like the matrix of a basis */
+    double *jy, *jyd;                /* [entries]; of large ones where they are wanted alone, like the matrix of a basis and its
+                                      * pattern */
     double *matrix, *row_scale, *r, *x, *x0, *step; /* all but row_scale: of one point alone */
     double *memory, *work;           /* what is known from point to point; room for one that is nobody's else, or NULL */
     double *lent;                    /* room of the caller for a point [lent_room], who set it; NULL: none */
     size_t lent_room;
-    double *met, *usual;             /* [unknowns + rates] last point that settled; of steep laws: magnitudes before */
+    double *met, *usual;             /* [unknowns + rates] what followed at the last point that settled, one behind the other;
+                                      * of steep laws: magnitudes before */
     sd_sparse *basis;                /* of G^T, its rows over the weights: what follows pivots first; or NULL */
-    const int32_t *basis_column, *basis_row;      /* its pattern: [rows + 1], unknowns and rates of each row */
-    const int32_t *basis_y, *basis_yd;            /* [entries] places of dF/dy, dF/dyd in it, -1: none */
-    double *basis_value;             /* [entries of the pattern] */
+    int32_t basis_entries;           /* of its matrix */
+    int32_t *basis_column, *basis_row;            /* its pattern: [rows + 1], unknowns and rates of each row */
+    double *basis_value;             /* [basis_entries] */
     double hold;                     /* weight of the state; 1 but in a second attempt */
     double enough;                   /* scaled residual with which a draft is content; 0: round-off */
     double slack;                    /* move of the state, in magnitudes, by which a basic solution may differ */
@@ -67,10 +69,9 @@ typedef struct sd_settle {
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates);
 /* takes the factors of the saddle-point matrix; 2: no memory */
 int sd_settle_take(sd_settle *settle, sd_linear *linear);
-/* The basis: pattern of G^T, order of its columns, the rows; places as above; determined: of what follows from the state
- * alone, and all of that.  2: no memory. */
-int sd_settle_widen(sd_settle *settle, const int32_t *column, const int32_t *row, const int32_t *order,
-                    const int32_t *place_y, const int32_t *place_yd, int32_t determined);
+/* The basis: order of the columns of G^T, the rows; determined: of what follows from the state alone, and all of that.
+ * 2: no memory. */
+int sd_settle_widen(sd_settle *settle, const int32_t *order, int32_t determined);
 /* whether a pattern of the basis exists; NULL without one */
 int *sd_settle_pivoted(sd_settle *settle);
 /* of a large one lets go of the room for a point, which it has where nobody lent any */

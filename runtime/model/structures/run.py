@@ -23,7 +23,8 @@ class Ledgers(c.Structure):
     _fields_ = [
         ("count", I),
         ("elements", I),
-        *[(name, P) for name in ["contents", "of", "inertia", "gross", "most", "largest", "element", "record"]],
+        ("families", I),
+        *[(name, P) for name in ["contents", "of", "end", "inertia", "gross", "most", "largest", "element", "record"]],
         ("records", I),
         ("room", I),
         *[(name, P) for name in ["stored", "balance", "highest", "dissipated", "supplied", "value", "before"]],

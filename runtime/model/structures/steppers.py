@@ -181,6 +181,7 @@ class Radau(c.Structure):
         *[(name, P) for name in ["y", "rate", "ee", "weight", "terms", "jy", "jyd", "g", "work"]],
         *[(name, P) for name in ["newton_weight", "scale", "powered"]],
         ("w", P * PAIRS),
+        ("in_place", I),
         ("beside", P),
         ("twice", P * 2),
         *[(name, P) for name in ["point_y", "point_rate", "coupled"]],
