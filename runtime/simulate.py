@@ -139,10 +139,18 @@ def _missed(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Es
 
 
 def _achieved(
-    runs: Runs, options: Options, *, doubted: bool = False, tame: bool = False, lighter: Lighter | None = None
+    runs: Runs,
+    options: Options,
+    *,
+    last: bool = True,
+    doubted: bool = False,
+    tame: bool = False,
+    lighter: Lighter | None = None,
 ) -> Achieved:
+    """Runs by one method; last: no other takes over, so that it goes on where it would be left to the next."""
     target, first = _targets(runs, options), options.first
-    return control(runs.sampled, target, runs.way.law, doubted=doubted, tame=tame, first=first, lighter=lighter)
+    law = replace(runs.way.law, brief=False) if last else runs.way.law
+    return control(runs.sampled, target, law, doubted=doubted, tame=tame, first=first, lighter=lighter)
 
 
 def _lighter(runs: Runs, options: Options, others: tuple[Way, ...]) -> Lighter | None:
@@ -217,7 +225,7 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
         runs.patience = PATIENCE.get(runs.method, (None, None))[steep] if others else None
         try:
             lighter = _lighter(runs, options, others)
-            achieved = _achieved(runs, options, doubted=doubted, tame=tame, lighter=lighter)
+            achieved = _achieved(runs, options, last=not others, doubted=doubted, tame=tame, lighter=lighter)
         except SolverFailure as failure:
             if not others or _bounded(failure, runs):
                 if missed is None:

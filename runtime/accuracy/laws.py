@@ -33,7 +33,7 @@ class Law:
     short: the most that is credited to runs of less than SHORT steps; least: of a tolerance, the estimate at least;
     order: power of the steps with which errors fall at least, as far as is credited (0: they are not counted);
     brief: runs of less than LENGTHY steps that have nothing in common, or would have to be as fine as DEAR, are left to
-    the next method.
+    the next method, where there is one.
     """
 
     gain: float

@@ -14,7 +14,7 @@ from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.integrate.round_off import open_unknowns
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN, magnitudes, noise
+from sysdyn.runtime.model.scales import GROUP, ROUND_OFF, UNKNOWN, group_maximum, magnitudes, noise
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.stretches import Ascents, Stretches, whole_of
 from sysdyn.runtime.start.start import ConsistentState
@@ -137,12 +137,18 @@ class Sizes:
         return largest, sizes
 
     def begin_to_move(self, t: float, y: Floats, rate: Floats) -> None:
-        """Unknowns that stood at zero so far, of unknown size, and whose rates say only now how large they will be."""
-        begin = (self.met <= ROUND_OFF) & (self.magnitude == UNKNOWN) & (rate != 0.0) & self.unnamed
-        if begin.any():
+        """Unknowns that stood at zero so far, and whose rates say only now how large they will be: their size, where it
+        is unknown; a part of what their like have been at least, as at the start.
+        """
+        moves = (rate != 0.0) & self.unnamed
+        unknown = moves & (self.met <= ROUND_OFF) & (self.magnitude == UNKNOWN)
+        if unknown.any():
             with np.errstate(over="ignore"):
                 found, _ = magnitudes(self.system, t, self._request.t_end, y, rate)
-            self.magnitude[begin] = np.maximum(found, self.least)[begin]
+            self.magnitude[unknown] = np.maximum(found, self.least)[unknown]
+        like = group_maximum(self.system, self.met)
+        begin = moves & (self.met <= ROUND_OFF * like)
+        self.magnitude[begin] = np.maximum(self.magnitude, GROUP * like)[begin]
 
     def resolve(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
         """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; carries
