@@ -162,7 +162,9 @@ class Succession:
         """The point at t with the active set that fits `time` (s) later; None where that is the one that stood."""
         y, yd = point
         found = self._restart.struck(t + time, y + time * yd, yd)
-        mean = yd if found is None else 0.5 * (yd + found[1])  # a flow that begins at rest moves by time^2 alone
+        # a flow that begins at rest moves by time^2 alone; a gap that such a move closes is another event's
+        straight = self._restart.settler.system.are("q")
+        mean = yd if found is None else np.where(straight, yd, 0.5 * (yd + found[1]))
         try:
             self.determined.fit(t + time, y + time * mean, yd, self._restart.struck)
         except NoActiveSetError:

