@@ -89,6 +89,7 @@ def test_a_root_locus_is_that_of_the_polynomial(tmp_path, capsys):
     assert (steps <= other + 1e-12).all()  # a curve goes on with the nearest
 
 
+@pytest.mark.long
 def test_matrices_in_files_are_those_of_the_command(tmp_path, capsys, monkeypatch):
     path = write(tmp_path, RLC)
     monkeypatch.chdir(tmp_path)

@@ -383,7 +383,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_ports_of_arrays_of_components_within_each_other(formulation, tmp_path):
     got = traced(write(tmp_path, ARRAYS), formulation=formulation, output=str(tmp_path / "o.h5"))
     i = got["i"]

@@ -602,6 +602,7 @@ model four_bar {
 """
 
 
+@pytest.mark.long
 def test_long_terms_are_not_factored(tmp_path, monkeypatch, capsys):
     """A solution longer than anyone reads is refused; factors of one of its terms alone took minutes."""
     import sympy

@@ -138,6 +138,7 @@ def test_imports_and_tables_count(tmp_path, capsys):
     assert "force.csv changed" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_scenes_are_locked_beside_each_other(tmp_path):
     text = PENDULUM + PENDULUM[PENDULUM.index("scene") :].replace("scene swing", "scene again")
     file = write(tmp_path, text)
@@ -147,6 +148,7 @@ def test_scenes_are_locked_beside_each_other(tmp_path):
     assert {name: said["method"] for name, said in held.items()} == {"again": "radau", "swing": "bdf"}
 
 
+@pytest.mark.long
 def test_trade_verify_and_golden_ignore_locks(tmp_path, capsys):
     file = locked(tmp_path)
     found = run_json(capsys, "verify", file)[1]["result"]["runs"]

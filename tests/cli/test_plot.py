@@ -150,6 +150,7 @@ def test_ends_of_a_range_are_told_apart():
     assert told_apart(0.123456789, 0.2) == ("0.12346", "0.2")
 
 
+@pytest.mark.long
 def test_many_quantities():
     trace = made([(f"x{k}", f"m{k}", np.sin) for k in range(2, 19)])
     from sysdyn.cli.page.picture import picture

@@ -267,6 +267,7 @@ scene go of linked {
 """
 
 
+@pytest.mark.long
 def test_what_a_stiff_shaft_joins_becomes_one_node(tmp_path, capsys):
     file = write(tmp_path, LINKED.replace("  init right.f = 0 rad/s\n", ""))
     code, found = run_json(capsys, "reduce", file, "-o", str(tmp_path / "small.sd"))
@@ -284,6 +285,7 @@ def test_what_a_stiff_shaft_joins_becomes_one_node(tmp_path, capsys):
     assert np.abs(np.asarray(trace["om"]) - exact).max() < 2e-4 * exact.max()
 
 
+@pytest.mark.long
 def test_a_node_that_something_speaks_of_keeps_its_name(tmp_path, capsys):
     code, _found = run_json(capsys, "reduce", write(tmp_path, LINKED), "-o", str(tmp_path / "small.sd"))
     assert code == 0

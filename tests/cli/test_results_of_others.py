@@ -74,6 +74,7 @@ def test_a_result_takes_no_other_result_s_place(model, capsys, command, output):
     assert Path(output).read_bytes() == before
 
 
+@pytest.mark.long
 def test_a_result_takes_the_place_of_its_like(model):
     for command, output in ((["sweep", *OVER], "runs.h5"), (["simulate"], "trace.h5"), (["linearize"], "matrices.h5")):
         Path("empty.h5").write_bytes(b"")
@@ -184,6 +185,7 @@ def test_a_value_that_was_typed_wrong_is_wrong_usage(model, capsys, command, opt
 
 
 @pytest.mark.parametrize("command", ["trade", "reduce"])
+@pytest.mark.one_in(3)
 def test_a_limit_of_wall_time_has_a_unit(model, capsys, command):
     for text in ("1 m", "soon", "inf"):
         assert run([command, model, "--max-wall", text]) == 2

@@ -116,6 +116,7 @@ def test_commands_that_choose_processes_say_what_one_says(tmp_path, capsys, monk
             assert file.read_text() == Path("kept0.0", *file.parts[1:]).read_text()
 
 
+@pytest.mark.long
 def test_checks_say_the_same_in_any_number_of_processes(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a.sd").write_text(FALL)
@@ -142,6 +143,7 @@ def goes_on(group):
     return True
 
 
+@pytest.mark.long
 def test_an_interrupt_ends_every_process_and_keeps_what_was_computed(tmp_path):
     """Of a trade: the runs of its journal; nobody goes on."""
     andrews = str(MODELS / "benchmark" / "andrews.sd")

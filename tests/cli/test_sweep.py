@@ -223,6 +223,7 @@ def deadly(pipe, request, keep):
         pipe.send(([Kept(number, 0, True) for number in numbers], []))
 
 
+@pytest.mark.long
 def test_a_run_that_kills_its_worker_is_named_and_nothing_else_is_lost(tmp_path):
     request = Request("none.sd", output=str(tmp_path / "marker"))
     found = {k.run: k for k in workers.results(request, [(n, {}) for n in range(12)], 12, 2, "end", deadly)}
@@ -280,6 +281,7 @@ def test_a_text_that_ends_too_soon_says_so(spring, tmp_path, capsys):
         api.load(path)
 
 
+@pytest.mark.long
 def test_numbers_that_the_text_refuses_fail_alone(tmp_path, capsys, monkeypatch):
     """The first case among them: the others run, in the core and out of it."""
     monkeypatch.chdir(tmp_path)

@@ -204,6 +204,7 @@ def test_a_result_that_went_with_its_worker_is_made_again():
 
 
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.long
 def test_the_command_and_python_on_dask(fall, cluster, capsys):
     from sysdyn.cli.main import run
 

@@ -162,6 +162,7 @@ def test_the_search_finds_what_the_full_product_does(tmp_path, name, formulation
         assert sum(m.work - m.fixed for m in found.measured) <= 0.15 * spent
 
 
+@pytest.mark.long
 def test_the_object_and_the_command_that_uses_the_choice(tmp_path, capsys):
     file = write(tmp_path, PENDULUM)
     code, found = run_json(capsys, "trade", str(file), "--accuracy", "1e-5", "--set", "l=2")
@@ -196,8 +197,8 @@ def test_two_trades_are_equal_but_for_seconds(tmp_path, capsys):
     assert one == two
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("options", [[], ["--full", "--method", "radau", "--formulation", "lagrangian"]])
+@pytest.mark.long
 def test_runs_made_ahead_change_nothing(tmp_path, capsys, options):
     file = write(tmp_path, PENDULUM)
     options = ["--no-timings", "--until", "0.3", *options]
@@ -206,6 +207,7 @@ def test_runs_made_ahead_change_nothing(tmp_path, capsys, options):
     assert one[0] == 0
 
 
+@pytest.mark.long
 def test_a_trade_that_is_killed_goes_on_where_it_was(tmp_path, capsys, monkeypatch):
     file = write(tmp_path, PENDULUM)
     _, whole = run_json(capsys, "trade", file, "--no-timings")
@@ -281,6 +283,7 @@ def test_the_accuracy_chooses_the_level(tmp_path, capsys, accuracy, levels):
     assert "lock" not in again.attributes
 
 
+@pytest.mark.long
 def test_pictures(tmp_path, capsys):
     file = str(write(tmp_path, PENDULUM))
     assert run(["trade", file, "-o", "trade.png", "--formulation", "lagrangian"]) == 0

@@ -132,6 +132,7 @@ def test_models_of_each_kind_agree(name, options, formulations, capsys):
 
 
 @pytest.mark.parametrize("name", ["seed/gear_pair", "seed/lever"])
+@pytest.mark.one_in(3)
 def test_kane_agrees_in_momenta_too(name, capsys):
     code, found = run_json(capsys, "verify", str(MODELS / f"{name}.sd"))
     assert code == 0, found["diagnostics"]
@@ -139,6 +140,7 @@ def test_kane_agrees_in_momenta_too(name, capsys):
     assert found["result"]["disagreements"] == []
 
 
+@pytest.mark.long
 def test_kane_is_not_run_where_every_reaction_is_read(capsys):
     """What a source supplies reads its reaction: the rows are those of the Lagrangian in momenta."""
     code, found = run_json(capsys, "verify", str(MODELS / "seed/lead_filter.sd"))
@@ -174,7 +176,7 @@ COSTLY = (
 
 
 @pytest.mark.parametrize(("file", "scene"), list(scenes()))
-@pytest.mark.one_in(34)
+@pytest.mark.one_in(102)
 def test_every_scene_agrees(file, scene, capsys):
     if (file, scene) in COSTLY and not LONG:
         pytest.skip("SYSDYN_LONG=1 verifies it")
@@ -186,6 +188,7 @@ def test_every_scene_agrees(file, scene, capsys):
     assert file in WARNED or all(not r["warnings"] for r in found["result"]["runs"])
 
 
+@pytest.mark.long
 def test_a_method_is_verified_beside_bdf_where_a_formulation_has_it(capsys):
     """Of an amplifier without capacitors at its nodes the complementary forms have no underlying equation."""
     path = str(MODELS / "benchmark/transistor.sd")
@@ -247,6 +250,7 @@ def test_a_wrong_sign_in_the_complementary_family_is_found(tmp_path, capsys, mon
     assert "and hamiltonian" not in shown.err
 
 
+@pytest.mark.long
 def test_a_reference_that_explodes_differs_from_all_others(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(pipeline.FORMULATIONS, "lagrangian", wrong_potential(pipeline.FORMULATIONS["lagrangian"]))
     path = write(tmp_path, CIRCUIT)
@@ -527,6 +531,7 @@ def test_horizon_is_the_last_instant_before_the_first_difference():
 @pytest.mark.parametrize(
     "name", ["coulomb_slide", *(["pendulum", "redundant_pendulum", "incline_friction"] if LONG else [])]
 )
+@pytest.mark.one_in(3)
 def test_processes_side_by_side_find_what_one_finds(name, capsys):
     """Runs, gaps, refusals, warnings and exit code, in the same order, whatever ends first."""
     model = str(Path(__file__).parents[2] / "models" / "seed" / f"{name}.sd")

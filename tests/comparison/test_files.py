@@ -63,6 +63,7 @@ def test_cut_files_are_refused(file, tmp_path):
             verdict(file, path)
 
 
+@pytest.mark.long
 def test_flipped_bits_never_raise_anything_else(file, tmp_path):
     data = bytearray(file.read_bytes())
     random = np.random.default_rng(0)

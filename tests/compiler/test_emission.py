@@ -45,6 +45,7 @@ print(total.hexdigest())
 """
 
 
+@pytest.mark.long
 def test_two_processes_print_the_same():
     prints = set()
     for seed in ("0", "1", "424242"):

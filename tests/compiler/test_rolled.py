@@ -52,6 +52,7 @@ def test_loops_through_tables_compute_the_same_numbers(text, formulation, monkey
         assert rolled[name].tobytes() == plain.tobytes(), name
 
 
+@pytest.mark.long
 def test_loops_that_share_a_function_compute_the_same_numbers(monkeypatch):
     monkeypatch.setattr(emit_c_rolled, "SHARED", 2)
     model = compiled(mesh(5, 24), gather=True)

@@ -11,7 +11,7 @@ NUMBERS = [k for k in range(44) if k not in UNKNOWN]
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("number", NUMBERS)
-@pytest.mark.one_in(304)
+@pytest.mark.long
 def test_circuits_run_as_by_radau(number, formulation, tmp_path):
     case = drawn(number)
     (tmp_path / "net.sd").write_text(case.text)

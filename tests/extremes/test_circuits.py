@@ -53,6 +53,7 @@ def check(folder, numbers, formulations):
     assert count["right"] >= 0.95 * len(found), {k: v for k, v in found.items() if v[0] != "right"}
 
 
+@pytest.mark.long
 def test_circuits_are_right_or_refused(tmp_path):
     check(tmp_path, SLICE, ("lagrangian", "co_lagrangian"))
 
@@ -87,7 +88,7 @@ def test_rows_between_steps_are_as_accurate_as_steps(tmp_path, number, formulati
 @pytest.mark.parametrize(
     ("number", "formulation"), [(1, "hamiltonian"), (2, "co_lagrangian"), (4, "lagrangian"), (8, "lagrangian")]
 )
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(40)
 def test_bridges_whose_sources_float_while_all_diodes_block(tmp_path, number, formulation):
     """No current tells the voltage of such a source to earth: eight of them, of sparse kernels, were refused before."""
     time, accuracy = np.linspace(0.0, 0.02, 201), 1e-4

@@ -25,6 +25,7 @@ scene s of chain {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_a_chain_of_twenty_comes_to_rest(formulation, tmp_path):
     file = tmp_path / "m.sd"
     traced = ", ".join(f"x[{i}] as x{i}, x[{i}]' as v{i}" for i in range(1, 21))

@@ -147,6 +147,7 @@ def test_twice_differentiable_law_has_no_events(tmp_path):
     assert not run(SMOOTH, tmp_path).events
 
 
+@pytest.mark.long
 def test_a_long_step_that_crosses_what_the_point_does_not_is_taken_in_parts(tmp_path):
     """The current's error leaves zero upwards, far below what a first step of order 1 resolves: its line falls."""
     file = ROOT / "models" / "gallery" / "ev_powertrain.sd"

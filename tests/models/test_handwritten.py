@@ -62,7 +62,7 @@ def run(folder, text, name, **options):
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("name", NETLISTS)
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(12)
 def test_a_netlist_runs_as_it_does_element_by_element(name, tmp_path, monkeypatch):
     text = NETLISTS[name]
     families = gathered(network(text))
@@ -129,7 +129,7 @@ def test_a_grid_without_order_keeps_its_names(tmp_path):
 
 
 @pytest.mark.parametrize("of", [power_grid, mixed, lambda n: mesh(n // 8, 8)], ids=["power_grid", "mixed", "mesh"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(12)
 def test_what_is_joined_without_order_is_families_that_do_not_grow(of, effort):
     """Tables of indices tell what is joined to what: as many statements for any number of lines, each at equal cost."""
     short, few = effort(lambda: compiled(of(160)))
@@ -141,6 +141,7 @@ def test_what_is_joined_without_order_is_families_that_do_not_grow(of, effort):
     assert (many - few) / lines < 4000  # lines of Python a line of text
 
 
+@pytest.mark.long
 def test_a_grid_without_a_ground_is_counted_from_one_of_its_nodes(tmp_path, monkeypatch):
     """Nothing tells by which node of a family: it is lowered as it is written."""
     text = power_grid(30).replace("-> ground", "-> earth").replace("to 5 ms", "to 100 us")
@@ -183,6 +184,7 @@ def test_a_chain_of_scalars_leaves_no_full_matrix():
     assert many < 2.5 * few
 
 
+@pytest.mark.long
 def test_what_nothing_traces_is_traced_under_its_own_name(tmp_path):
     text = re.sub(r"; trace .* }", " }", ladder(70))
     file = tmp_path / "n.sd"
@@ -202,6 +204,7 @@ def test_a_wrong_number_is_told_of_its_element():
     assert (said_.code, said_.message) == ("E605", "the law of Ci9 cannot be inverted: Ci9.C is zero")
 
 
+@pytest.mark.long
 def test_initial_values_that_contradict_each_other_are_told_at_their_own_lines(tmp_path, monkeypatch):
     """Beside a family's statements one more: its element is named, not the family's first."""
     monkeypatch.setattr(gathered_, "LEAST", 16)

@@ -242,6 +242,7 @@ def test_without_flow_constraint_and_quasi_velocity_the_flows_are_the_speeds(cap
     assert [d.code for d in report if d.severity == "error"] == ["E607"]
 
 
+@pytest.mark.long
 def test_where_every_reaction_is_read_verify_runs_lagrange_alone(tmp_path, capsys):
     """The rows are Lagrange's then: their agreement would show nothing.  Where none is read, they are Kane's own."""
     text = """

@@ -139,7 +139,7 @@ def test_a_section_of_a_large_line_takes_few_bytes_to_the_first_step(tmp_path, m
     [(LADDER, (25_000, 50_000), 760), (SECTIONS, (55_000, 75_000), 1300)],
     ids=["ladder", "sections"],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_section_of_a_run_holds_few_bytes(tmp_path, model, sections, most):
     """Of arrays and of the core, while it steps: 671 of a ladder by the bdf, 1152 of a line by radau today; 1239 where
     factors had orders and places of their own; 1633, 2932 where runs kept the start as they saw it, every place of
@@ -150,7 +150,7 @@ def test_a_section_of_a_run_holds_few_bytes(tmp_path, model, sections, most):
 
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallinfo2"), reason="needs glibc's mallinfo2")
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_between_two_pieces_of_a_run_a_section_holds_few_bytes(tmp_path):
     """Where the matrix of all unknowns is looked at behind a jump of the text: 1940 of a line by radau today; 2400
     where factors kept their numbers and the settling its room; 2870 to 3380 where both had more of their own, 3785
@@ -160,6 +160,7 @@ def test_between_two_pieces_of_a_run_a_section_holds_few_bytes(tmp_path):
     assert _bytes(CROSSED, tmp_path, LINE, *options, sections=(27_000, 33_000)) < 2300
 
 
+@pytest.mark.long
 def test_the_end_of_a_run_takes_few_bytes_a_section(tmp_path):
     """Of arrays and objects of Python: 639 of a ladder today; 805 where the start and magnitudes were held while it
     stepped, 400 more where magnitudes were confirmed with the pattern of the whole matrix and copies of what was met.

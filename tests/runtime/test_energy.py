@@ -117,6 +117,7 @@ def test_energy_and_constraints_over_many_periods(made, rtol):
     assert rows[:, 7].max() < 1e-14
 
 
+@pytest.mark.long
 def test_a_weight_that_supplies_energy_is_conservative_too():
     # displacements that are moved onto the constraint work against it
     made = models.small(
@@ -133,6 +134,7 @@ def test_a_weight_that_supplies_energy_is_conservative_too():
     assert np.abs(columns["H"] + G * np.cos(ANGLE)).max() < 1e-13
 
 
+@pytest.mark.long
 def test_no_drift_of_constraints_at_the_steps_themselves():
     assert drift(models.pendulum("hamiltonian"), 400.0 if LONG else 100.0, "0", "energy", 1e-4) < 1e-14
     assert drift(models.slider_crank(), 20.0, "0", "energy", 1e-4) < 1e-13

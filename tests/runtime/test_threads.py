@@ -124,6 +124,7 @@ FORKED = """
 """
 
 
+@pytest.mark.long
 def test_a_forked_process_has_threads_of_its_own():
     made = subprocess.run(
         [sys.executable, "-c", dedent(FORKED), str(Path(__file__).parent)], check=False, capture_output=True, text=True
