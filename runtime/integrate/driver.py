@@ -68,7 +68,7 @@ class Driver:
             run.least_norm = self._least_norm.address
         self._observers(start_rate)
         self._asked(request)
-        run.rough = 0.0 if system.form.scales else request.settled_to
+        run.rough = request.settled_to
         run.bare = int(self._bare(keeps) and not request.audited)
         unread = not request.audited and request.events is None and self._unread
         run.unsummed = 1 + request.draft if unread else 0

@@ -24,7 +24,7 @@ from sysdyn.runtime.integrate.origin import Origin
 from sysdyn.runtime.integrate.pieces import Pieces
 from sysdyn.runtime.integrate.request import LONGEST, ON_UNDERLYING, Finished, Request, Statistics
 from sysdyn.runtime.integrate.segments import segments
-from sysdyn.runtime.integrate.settlers import Settlers, steep_balances
+from sysdyn.runtime.integrate.settlers import Settlers
 from sysdyn.runtime.integrate.sizes import Sizes
 from sysdyn.runtime.integrate.told import Told
 from sysdyn.runtime.integrate.underlying import Underlying
@@ -211,7 +211,8 @@ class Integration:
         if request.method == "bdf":
             method.max_order = request.max_order
         elif request.method == "radau":
-            method.stages, method.balances = first, int(steep_balances(self.system))
+            steep = any(scale.block == "dynamics_scale" for scale in self.system.form.scales)
+            method.stages, method.balances = first, int(steep)
         elif self.underlying is not None:
             method.patience = request.stiff_steps
         if request.method == "dopri":

@@ -60,7 +60,7 @@ class Settlers:
         flat = bool(request.events) and self.whole_form == "rated"
         self.settler.by_basis(slack, determined=request.switched or flat)
         self.settler.core.contents.still = still
-        self.settler.core.contents.enough = 0.0 if system.form.scales or not request.draft else request.settled_to
+        self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
 
     @cached_property
     def whole_form(self) -> str:
@@ -114,8 +114,3 @@ class Settlers:
         self.settler.rest()
         if "restart" in self.__dict__:
             self.restart.settler.rest()
-
-
-def steep_balances(system: System) -> bool:
-    """Whether laws of balances are so steep that the rows have scales of their own."""
-    return any(scale.block == "dynamics_scale" for scale in system.form.scales)

@@ -146,9 +146,10 @@ class Sizes:
             with np.errstate(over="ignore"):
                 found, _ = magnitudes(self.system, t, self._request.t_end, y, rate)
             self.magnitude[unknown] = np.maximum(found, self.least)[unknown]
-        like = group_maximum(self.system, self.met)
-        begin = moves & (self.met <= ROUND_OFF * like)
-        self.magnitude[begin] = np.maximum(self.magnitude, GROUP * like)[begin]
+        if (moves & (self.met <= ROUND_OFF * self.met.max(initial=0.0))).any():
+            like = group_maximum(self.system, self.met)
+            begin = moves & (self.met <= ROUND_OFF * like)
+            self.magnitude[begin] = np.maximum(self.magnitude, GROUP * like)[begin]
 
     def resolve(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
         """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; carries

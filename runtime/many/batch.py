@@ -17,7 +17,7 @@ from sysdyn.runtime.accuracy import pairs
 from sysdyn.runtime.accuracy.control import DRAFT, Achieved
 from sysdyn.runtime.accuracy.laws import FEW_STEPS, Law
 from sysdyn.runtime.accuracy.options import Options
-from sysdyn.runtime.accuracy.runs import APART, ROUGH, Runs
+from sysdyn.runtime.accuracy.runs import APART, Runs
 from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
@@ -146,7 +146,6 @@ class Batch:
             instants=instants,
             instant_kinds=kinds,
             h_max=min(longest * (options.t_end - options.t_start), options.longest or np.inf),
-            settled_to=ROUGH * tolerance,
             draft=not number,
             apart=APART if runs.instants.common is not None and not number else 0.0,
             condense=False,

@@ -47,7 +47,7 @@ def test_a_slice_is_right_or_refused(tmp_path, family):
         assert not [v for v in found if v.kind == "falsely"]
 
 
-@pytest.mark.skipif(not LONG, reason="SYSDYN_LONG=1 runs all cases")
+@pytest.mark.long
 def test_nine_of_ten_are_right(tmp_path):
     count = Counter(v.kind for family in FAMILIES for v in judged(tmp_path, family, family.cases))
     assert sum(count.values()) >= 300

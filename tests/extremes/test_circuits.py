@@ -58,7 +58,7 @@ def test_circuits_are_right_or_refused(tmp_path):
     check(tmp_path, SLICE, ("lagrangian", "co_lagrangian"))
 
 
-@pytest.mark.skipif(not LONG, reason="SYSDYN_LONG=1 runs all circuits in all formulations")
+@pytest.mark.long
 def test_all_circuits_are_right_or_refused(tmp_path):
     check(tmp_path, range(NUMBER), FORMULATIONS)
 

@@ -40,7 +40,7 @@ def test_the_core_turns_laws_as_the_handler_does(monkeypatch, method):
     assert len(trace.events) == len(other.events) == 10
     for one, two in zip(trace.events, other.events, strict=True):
         assert (one.name, one.before, one.after) == (two.name, two.before, two.after)
-        assert abs(one.time - two.time) < 1e-4 * trace.time[-1]
+        assert abs(one.time - two.time) < 1e-5 * trace.time[-1]
     for name in trace.names:
         one, two = trace[name].values, other[name].values
         assert abs(one[-1] - two[-1]) < 3e-4 * max(abs(one).max(), abs(two).max()), name

@@ -172,7 +172,7 @@ def test_changed_values(tmp_path, model, formulation, case):
     assert max(worst.values()) <= ALLOWED, worst
 
 
-@pytest.mark.skipif(not LONG, reason="a minute: SYSDYN_LONG=1")
+@pytest.mark.long
 @pytest.mark.parametrize(("model", "formulation"), CASES)
 @pytest.mark.parametrize("case", range(3))
 def test_changed_values_at_the_finer_accuracy(tmp_path, model, formulation, case):

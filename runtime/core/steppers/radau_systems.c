@@ -48,6 +48,12 @@ typedef struct factoring {
     int failed[SD_PAIRS + 1];
 } factoring;
 
+/* of columns: where pivots are left out they are small or not beside the unknowns themselves, whatever the step */
+static const double *column_scale(const sd_radau *radau)
+{
+    return radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->magnitude : radau->scale;
+}
+
 /* part 0: J + gamma/h E and its factors; part k: those of J + lambda/h E of pair k - 1 */
 static void factorise_one(void *context, int part)
 {
@@ -55,8 +61,7 @@ static void factorise_one(void *context, int part)
     sd_radau *radau = all->radau;
     const sd_radau_method *method = radau->method;
     int32_t entries = radau->system->entries;
-    /* a pivot is small or not beside the unknowns themselves, whatever the step */
-    const double *scale = radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->magnitude : radau->scale;
+    const double *scale = column_scale(radau);
     if (sd_radau_sparing(radau)) {
         all->failed[part] = part ? sd_linear_z_factor_sum(radau->complex_linear[part - 1]) : sd_linear_factor_sum(radau->linear);
         return;
@@ -79,11 +84,11 @@ static void factorise_one(void *context, int part)
 static void scale_all(sd_radau *radau)
 {
     const sd_radau_method *method = radau->method;
-    const double real = method->gamma / radau->h;
-    sd_linear_scale_sum(radau->linear, radau->jy, radau->jyd, &real, radau->scale);
+    const double real = method->gamma / radau->h, *scale = column_scale(radau);
+    sd_linear_scale_sum(radau->linear, radau->jy, radau->jyd, &real, scale);
     for (int k = 0; k < method->pairs; k++) {
         const double complex both = method->lambda[k] / radau->h;
-        sd_linear_z_scale_sum(radau->complex_linear[k], radau->jy, radau->jyd, &both, radau->scale);
+        sd_linear_z_scale_sum(radau->complex_linear[k], radau->jy, radau->jyd, &both, scale);
     }
 }
 
