@@ -21,10 +21,9 @@ PROJECTED = ("1", "0")
 SLACK = 0.1
 """Of the tolerance: what rows within a step may move of the state, in magnitudes, and need not be the least change,
 where constraints are constant sums: their unknowns are interpolated differently (radau_dense.c).  Of curved ones
-the least change takes out most of the error between steps (a parallelogram by dopri: 25 times)."""
-STILL = 1e-3
-"""Of the tolerance: what a settled state may be off the least change by, in magnitudes.  Where laws are steep what
-follows shares the change, and the iteration nears it slowly (a tube of water: six solutions where rows hold after one).
+the least change takes out most of the error between steps (a parallelogram by dopri: 25 times).  Where laws are steep
+what follows shares the change, and the iteration nears the least one slowly (a tube of water: six solutions where rows
+hold after one).
 """
 RATED = 5_000
 """Unknowns up to which a point behind a jump is asked for flows that are open.  With the rates of all balances that
@@ -52,7 +51,7 @@ class Settlers:
         self._point = (t, y[:n], yd[:n]) if system.unknowns <= RATED else None
         self.settler = self.of("settled" if forms is not None else self.whole_form, self.keeps)
         # where constraints come and go what is left of a zero counts
-        still = 0.0 if request.switched else STILL * request.tolerance
+        still = 0.0 if request.switched else SLACK * request.tolerance
         sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
         # of steep laws what follows shares a move of the state
         slack = still if system.form.scales else SLACK * request.tolerance if sums else 0.0

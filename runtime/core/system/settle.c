@@ -438,11 +438,12 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
 {
     int fresh = settle->ready != MATRIX, failed = fresh && factorise(settle, t, y, yd);
     double moved = 0.0, pulled = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
+    double still = settle->hold == 1.0 ? settle->still : 0.0; /* one that is held stays where it is */
     *best = before;
     settle->drift = settle->constraints;
     take(settle, y, yd, settle->x);
     for (int m = 0; m < most && !failed && !*settle->system->stop; m++) {
-        if ((moved < SMALL || pulled < settle->still) && before <= fmax(EXACT, settle->enough))
+        if ((moved < SMALL || pulled < still) && before <= fmax(EXACT, settle->enough))
             break;
         moved = move(settle, y, yd, &pulled);
         double now = measure(settle, t, y, yd);
