@@ -26,25 +26,25 @@ def write_trace(path: Path, trace: Arrays, attributes: Mapping[str, str | float 
 
 def _written(path: Path, trace: Arrays, attributes: Mapping[str, str | float | int], packed: bool, most: float) -> int:
     import h5py
+    from sysdyn.runtime.trace import hdf5
 
     part = path.with_suffix(".h5.part")
     with input_output(path):
         try:
             with h5py.File(part, "w", libver=("v110" if packed else "earliest", "v110")) as file:
-                for name, value in {**attributes, "final": 1}.items():
-                    file.attrs[name] = _attribute(value)
+                hdf5.say(file.id, {**attributes, "final": 1})
                 time = _data(file, packed, "time", trace.time, "s", "time")
                 time.make_scale("time")
                 for name, values in trace.values.items():
                     about = trace.quantities[name]
                     data = _data(file, packed, name, values, about.unit, name)
-                    data.attrs["nominal"] = _nominal(trace, name)
+                    hdf5.say(data.id, {"nominal": _nominal(trace, name)})
                     data.dims[0].attach_scale(time)
                     if name in trace.rates:
                         unit = "1/s" if about.unit == "1" else f"({about.unit})/s"
                         rate = f"/derivatives/{name}"
                         _data(file, packed, rate, trace.rates[name], unit, f"time derivative of {name}")
-                        data.attrs["derivative"] = _attribute(rate)
+                        hdf5.say(data.id, {"derivative": rate})
                 if trace.events:
                     _data(file, packed, "/events/time", np.array([e.time for e in trace.events]), "s", "time of events")
                     names = np.array([e.name.encode() for e in trace.events])
@@ -63,16 +63,9 @@ def _nominal(trace: Arrays, name: str) -> float:
 
 
 def _data(file: Any, packed: bool, name: str, values: Any, unit: str, long_name: str) -> Any:
+    from sysdyn.runtime.trace import hdf5
+
     how = {"chunks": (len(values),), "compression": 9, "shuffle": True} if packed and len(values) else {}
     data = file.create_dataset(name, data=values, track_times=False, **how)
-    data.attrs["units"], data.attrs["long_name"] = _attribute(unit), _attribute(long_name)
+    hdf5.say(data.id, {"units": unit, "long_name": long_name})
     return data
-
-
-def _attribute(value: str | float | int) -> Any:
-    import h5py
-
-    if not isinstance(value, str):
-        return value
-    data = value.encode("utf-8") or b" "
-    return np.array(data, dtype=h5py.string_dtype("utf-8", len(data)))

@@ -85,45 +85,16 @@ def input_output(path: Path) -> Iterator[None]:
         raise TraceError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
 
 
-def _text(value: str) -> Any:
-    """A fixed-length UTF-8 string for an attribute."""
-    import h5py
-
-    data = value.encode("utf-8") or b" "
-    return np.array(data, dtype=h5py.string_dtype("utf-8", len(data)))
-
-
-def _set(attributes: Any, values: Mapping[str, Any]) -> None:
-    for name, value in values.items():
-        attributes[name] = _text(value) if isinstance(value, str) else value
-
-
-def _template(group: Any, unit: str) -> Any:
-    """A data set without a name, which HDF5 removes with its last handle: a scalar in its own header, and its unit."""
-    from h5py import h5a, h5d, h5p, h5s, h5t
-
-    scalar, made = h5s.create(h5s.SCALAR), h5p.create(h5p.DATASET_CREATE)
-    made.set_obj_track_times(False)
-    made.set_layout(h5d.COMPACT)
-    data, said = h5d.create(group.id, None, h5t.IEEE_F64LE, scalar, made), _text(unit)
-    kind = h5t.py_create(said.dtype, logical=True)
-    h5a.create(data, b"units", kind, scalar).write(said, kind)
-    return data
-
-
 def _keep(group: Any, parameters: Sequence[Parameter]) -> None:
     """A scalar data set with its unit each: a netlist has tens of thousands, and a copy costs a third of a new one."""
-    from h5py import h5o, h5s, h5t
+    from sysdyn.runtime.trace import hdf5
 
     templates: dict[str, Any] = {}
-    value = np.zeros((), dtype=np.float64)
     for parameter in parameters:
         template = templates.get(parameter.unit)
         if template is None:
-            template = templates[parameter.unit] = _template(group, parameter.unit)
-        value[()] = parameter.value
-        template.write(h5s.ALL, h5s.ALL, value, h5t.IEEE_F64LE)
-        h5o.copy(template, b".", group.id, parameter.name.replace("/", "\u2215").encode())
+            template = templates[parameter.unit] = hdf5.template(group, parameter.unit)
+        hdf5.copy(template, group, parameter.name.replace("/", "\u2215"), parameter.value)
 
 
 def clear(path: Path) -> None:
@@ -145,11 +116,12 @@ class Store:
     def __init__(self, path: Path, layout: Layout, like: Store | None = None) -> None:
         """Empty, or a copy of another store, of which all is on the disk."""
         import h5py
+        from sysdyn.runtime.trace import hdf5
 
         self.path = path
         self._length = 0
         self._closed = False
-        self._sets: list[tuple[Any, int]] = []
+        self._sets: list[tuple[Any, str, int]] = []
         self._room(0 if like is None else like._length)
         if like is not None:
             shutil.copyfile(like.path, path)
@@ -159,12 +131,12 @@ class Store:
             fcntl.flock(self._file.id.get_vfd_handle(), fcntl.LOCK_UN)
         try:
             if like is None:
-                _set(self._file.attrs, {**layout.attributes, "final": np.int64(0), "met": np.int64(0), "judged": ""})
+                hdf5.say(self._file.id, {**layout.attributes, "final": np.int64(0), "met": np.int64(0), "judged": ""})
                 self._create(layout)
                 self._file.flush()
             else:
                 self._length = like._length
-                self._sets = [(self._file[data.name], place) for data, place in like._sets]
+                self._sets = [(self._file[name].id, name, place) for _, name, place in like._sets]
         except (OSError, RuntimeError, ValueError):
             self.abandon()
             raise
@@ -182,52 +154,46 @@ class Store:
         return False
 
     def _create(self, layout: Layout) -> None:
-        time = self._data("time", "s", "time", None)
-        time.make_scale("time")
-        self._sets = [(time, 0)]
+        from sysdyn.runtime.trace import hdf5
+
+        time = self._data("time", "s", "time", None, 0)
+        hdf5.make_scale(time, "time")
         for column in layout.columns:
-            data = self._data(column.name, column.unit, column.long_name, time)
-            data.attrs["nominal"] = 0.0
-            self._sets.append((data, BEFORE + column.place))
+            data = self._data(column.name, column.unit, column.long_name, time, BEFORE + column.place)
+            hdf5.say(data, {"nominal": 0.0})
             group, _, member = column.name.partition(".")
             if group == "audit" and member not in ("energy", "constraints"):
-                self._file[f"/audit/{member}"] = data
+                hdf5.link(self._file.id, f"/audit/{member}", data)
             if column.derivative:
                 path = f"/derivatives/{column.name}"
                 unit = f"({column.unit})/s" if column.unit != "1" else "1/s"
-                rate = self._data(path, unit, f"time derivative of {column.long_name}", time)
-                data.attrs["derivative"] = _text(path)
-                self._sets.append((rate, BEFORE + layout.observed + column.place))
+                name = f"time derivative of {column.long_name}"
+                self._data(path, unit, name, time, BEFORE + layout.observed + column.place)
+                hdf5.say(data, {"derivative": path})
         for path, unit, name, place in (
             ("/audit/energy", "J", "balance of stored, dissipated and supplied energy since the start", 6),
             ("/audit/constraints", "1", "norm of the scaled constraint equations", 7),
         ):
-            self._sets.append((self._data(path, unit, name, time), place))
+            self._data(path, unit, name, time, place)
         if layout.parameters:
-            _keep(self._file.create_group("parameters"), layout.parameters)
+            _keep(self._file.create_group("parameters").id, layout.parameters)
 
-    def _data(self, name: str, unit: str, long_name: str, scale: Any) -> Any:
-        data = self._file.create_dataset(
-            name,
-            shape=(0,),
-            maxshape=(None,),
-            chunks=(BLOCK,),
-            dtype="f8",
-            fillvalue=np.nan,
-            track_times=False,
-        )
-        _set(data.attrs, {"units": unit, "long_name": long_name})
-        if scale is not None:
-            data.dims[0].attach_scale(scale)
+    def _data(self, name: str, unit: str, long_name: str, scale: Any, place: int) -> Any:
+        """A data set for the number at a place of each row."""
+        from sysdyn.runtime.trace import hdf5
+
+        data = hdf5.column(self._file.id, name, BLOCK, {"units": unit, "long_name": long_name}, scale)
+        self._sets.append((data, name, place))
         return data
 
     def append(self, rows: Floats) -> None:
         """Appends rows and flushes."""
+        from sysdyn.runtime.trace import hdf5
+
         self._room(rows.shape[0])
         first, self._length = self._length, self._length + rows.shape[0]
-        for data, place in self._sets:
-            data.resize((self._length,))
-            data[first:] = rows[:, place]
+        for data, _, place in self._sets:
+            hdf5.append(data, first, np.ascontiguousarray(rows[:, place]))
         self._file.flush()
 
     def _room(self, rows: int) -> None:
@@ -245,25 +211,18 @@ class Store:
 
     def close_with(self, attributes: Mapping[str, Mapping[str, Any]], events: Sequence[Happened] = ()) -> None:
         """Events, attributes by data set ("/": the root), then closes the file."""
+        from sysdyn.runtime.trace import hdf5
+
         if events:
-            self._events(events)
+            time = hdf5.whole(self._file.id, "/events/time", np.array([e.time for e in events]))
+            hdf5.say(time, {"units": "s"})
+            for name in ("name", "element", "before", "after"):
+                hdf5.whole(self._file.id, f"/events/{name}", [getattr(e, name) for e in events])
         for name, values in attributes.items():
-            _set(self._file[name].attrs, values)
+            hdf5.say_again(self._file[name].id, values)
         self._file.flush()
         self._file.close()
         self._closed = True
-
-    def _events(self, events: Sequence[Happened]) -> None:
-        """/events: time, and fixed-length strings."""
-        import h5py
-
-        group = self._file.create_group("events")
-        data = group.create_dataset("time", data=[e.time for e in events], track_times=False)
-        data.attrs["units"] = _text("s")
-        for name in ("name", "element", "before", "after"):
-            texts = [getattr(e, name).encode("utf-8") for e in events]
-            kind = h5py.string_dtype("utf-8", max(1, *map(len, texts)))
-            group.create_dataset(name, data=np.array(texts, dtype=kind), track_times=False)
 
     def close(self) -> None:
         """Closes a file to which nothing was added since it was flushed."""
