@@ -74,7 +74,8 @@ class Compared:
 
     def _between(self, rows: Floats, finished: Finished, quantities: Quantities) -> Floats | None:
         """What the compared quantities move by [k, quantities], as fast as at the rows of either run, from an event of
-        this run to the same one of the run before it; infinite at instants that are not between them.  None: no instant is.
+        this run to the same one of the run before it; infinite at instants that are not between them.  None: no
+        instant is.
         """
         jumps = np.unique([e.time for e in finished.events]) if finished.events else np.zeros(0)
         last, self.jumps = self.jumps, jumps

@@ -61,8 +61,8 @@ class Law:
 
 
 LAWS = {
-    # the error of the bdf falls irregularly where its order changes (harmonic oscillator: locally 0.3; a sled whose errors
-    # grow a thousandfold: differences with the power 1.8, and an error of 1.9 times what was asked)
+    # the error of the bdf falls irregularly where its order changes (harmonic oscillator: locally 0.3; a sled whose
+    # errors grow a thousandfold: differences with the power 1.8, and an error of 1.9 times what was asked)
     "bdf": Law(30.0, 1.0, 0.7, 2e-14, fastest=1.3),
     # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3: a
     # hundredth of the draft's tolerance spares some third runs, and left every third one below a hundredth of what was
