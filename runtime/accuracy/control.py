@@ -5,8 +5,8 @@ the draft took many steps, less, and both are compared at instants of the draft'
 instants of the last one's.  Where little happens in a draft of radau, the run behind it is one of the bdf.
 With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as
 measured over three runs, at most what the method's law credits; where it is more than errors ever fall with, one of the
-runs is good by chance, and the last is as much better than the first as is credited.  Where the estimate misses what was
-asked, a finer run follows and is compared with the last one.
+runs is good by chance, and the last is as much better than the first as is credited.  Where the estimate misses what
+was asked, a finer run follows and is compared with the last one.
 The finest run is handed back with its estimate; laws.py says what tolerances promise.
 Each run finds the magnitudes of its unknowns for itself: those that an earlier run met late would hide what is small
 early and grows.  Two runs that took the same steps say nothing: a third takes steps of half the length elsewhere.
