@@ -279,7 +279,8 @@ static void carriers(const sd_sizing *s, const double *jyd, int32_t *carries)
 
 /* open [n] := what round-off of the terms of its rows makes of a rate in the time tau, and of a displacement its flow's; of a
  * step of that length at (t, y, yd).  0; -1: no memory */
-static int left_open(const sd_sizing *s, sd_system *system, double t, double tau, const double *y, const double *yd, double *open)
+static int left_open(const sd_sizing *s, sd_system *system, double t, double tau, const double *y, const double *yd,
+                     double *open)
 {
     const sd_balance *b = s->balance;
     size_t entries = (size_t)b->entries;
@@ -304,11 +305,11 @@ static int left_open(const sd_sizing *s, sd_system *system, double t, double tau
 }
 
 /* found [n]: zeros of which no rate says how far they get lie between what moves with t plainly makes of them, or GROUP of
- * their like, and what it would make of them if it stayed there for the span, and are no less than round-off makes of them in tau;
- * least, most [n], largest [kinds]: room */
+ * their like, and what it would make of them if it stayed there for the span, and are no less than round-off makes of
+ * them in tau; least, most [n], largest [kinds]: room */
 static int bounded(const sd_sizing *s, sd_system *system, const sd_order *order, double t0, double quick, double span,
-                   double tau, const double *y, const double *yd, const double *moves, const int32_t *carries, const double *divisor, double *found,
-                   double *least, double *most, double *largest)
+                   double tau, const double *y, const double *yd, const double *moves, const int32_t *carries,
+                   const double *divisor, double *found, double *least, double *most, double *largest)
 {
     const sd_balance *b = s->balance;
     int32_t n = b->unknowns, zeros = 0;
