@@ -1,4 +1,4 @@
-"""A diode that conducts for a part of a step is seen to, and what settled points say of it is sought where it was seen."""
+"""A diode that conducts for a part of a step is seen to, and sought where it was seen once points are settled."""
 
 import numpy as np
 import pytest
