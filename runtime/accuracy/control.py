@@ -4,8 +4,9 @@ A draft with longer steps is followed by a run at the tolerance that should do, 
 the draft took many steps, less, and both are compared at instants of the draft's own rows; a run behind them at
 instants of the last one's.  Where little happens in a draft of radau, the run behind it is one of the bdf.
 With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as
-measured over three runs, at most what the method's law credits.  Where the estimate misses what was asked, a finer run
-follows and is compared with the last one.
+measured over three runs, at most what the method's law credits; where it is more than errors ever fall with, one of the
+runs is good by chance, and the last is as much better than the first as is credited.  Where the estimate misses what
+was asked, a finer run follows and is compared with the last one.
 The finest run is handed back with its estimate; laws.py says what tolerances promise.
 Each run finds the magnitudes of its unknowns for itself: those that an earlier run met late would hide what is small
 early and grows.  Two runs that took the same steps say nothing: a third takes steps of half the length elsewhere.
@@ -179,7 +180,8 @@ class _Estimate:
         self._unknown = lost and (step >= DEEP or self.lost)
         self._deep = _affordable(coarse, fine) if lost and not self._unknown else 1.0
         self.lost = lost
-        shrink = None
+        shrink, luck = None, 1.0
+        credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
         if shorter is not None:
             part = shorter**BY_STEPS
             shrink = self.law.safety * part / (1.0 - part)
@@ -188,13 +190,16 @@ class _Estimate:
             if over > over_before:
                 shrink = 1.0  # no convergence seen: no credit for the smaller tolerance
             elif over > 0.0 and np.isfinite(over_before):
-                self._power = float(np.clip(np.log10(over_before / over) / step_before, 0.3, 1.0))
+                power = np.log10(over_before / over) / step_before
+                self._power = float(np.clip(power, 0.3, 1.0))
+                if power > self.law.fastest:  # by chance: the pair before speaks for the last run
+                    luck = 10.0 ** ((power - credit) * step_before)
         if shrink is None:
-            credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
             longer = fine.steps / max(coarse.steps, 1)
             shrink = _shrink(self.law, credit if self._power is None else min(self._power, credit), step, longer)
         self._before = (over, step) if shorter is None and not lost else None  # what is lost has no power
         least = self.law.least * fine.tolerance
+        shrink *= luck
         self.apart, self.over = max(apart * shrink, least), max(over * shrink, least / float(np.min(self.target)))
         return apart
 

@@ -67,6 +67,7 @@ class Pivoting:
         fewest = len(self.contacts.contacts)
         block: tuple[NDArray[np.bool_], int, Floats] | None = None
         self.contacts.finite(t, y, yd)
+        known = self.contacts.observer.largest.copy()
         for _ in range(TRIALS * (1 + len(self.contacts.contacts))):
             self.contacts.apply()
             state = self.contacts.state()
@@ -80,6 +81,8 @@ class Pivoting:
             found = found or self._beside(t, y, yd, settle, seen)
             if found is None:
                 break
+            # of a set that does not hold no size stays: where it has no rank its multipliers are without bound
+            self.contacts.observer.largest[:] = known
             values = self.contacts.observer(t, found[0], found[1])
             wrong = sorted({*self.contacts.wrongs(values, found[2]), *self.contacts.backwards(t, y, found)})
             if not wrong:
@@ -95,6 +98,7 @@ class Pivoting:
                 turned.setdefault(k, set()).add(bool(self.contacts.active[k]))
                 changed.append(k)
                 self.contacts.turn(k, values)
+        self.contacts.observer.largest[:] = known
         contacts = self.contacts.contacts
         names = dict.fromkeys(contacts[k].name for k in changed[-6:] or range(min(len(contacts), 6)))
         raise NoActiveSetError(tuple(names))

@@ -33,6 +33,8 @@ UNSEEN = 100.0
 PARTS = 8
 """Steps at least that such a bounce takes (radau and dopri follow a parabola in one), or after one that misled."""
 
+WIDER = 3.0
+"""Times the stretch in which a change was seen, and was none once settled: the next one behind it that is searched."""
 HALT = 1e-5
 """Of a step, before friction in the plane comes to rest: there a slip still has a direction."""
 FAINT = 1e3
@@ -162,11 +164,12 @@ class Pieces:
             _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
         end = method.t
         begin = max(self._from, min(core.t_clear, end))
+        reach = core.t_seen
         while True:
-            seen = core.t_seen if begin < core.t_seen < end else end
+            seen = reach if begin < reach < end else end
             found = self.handler.crossed(self._values, begin, seen)
             if found is None and seen < end:
-                begin = seen
+                begin, reach = seen, seen + WIDER * (seen - begin)
                 continue
             if found is None:
                 self._accept(end, 0, sink)

@@ -9,7 +9,8 @@ of the row, and how far the row itself moves with t over the span (sources that 
 proposes is shortened to what it bears: its slope is that of one point (core/start/magnitudes.c).  Such a row knows
 nothing of what relieves it (the whole of a source on a diode would drive 1e8 A), and balances little where what drives
 it is round-off (a diode that blocks): those that carry the state lie within what the sources make of them by the time
-in which they move, or a thousandth of that of their like, and what by the whole span (core/start/response.h).
+in which they move, or a thousandth of that of their like, and what by the whole span (core/start/response.h).  They are
+no less than round-off of the terms that balance there makes of them, for what is held answers to nothing.
 During a run magnitudes grow with max |y|, and what begins to move gets a thousandth of its like; a second run starts
 with the maxima of the first.
 """

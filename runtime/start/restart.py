@@ -51,12 +51,20 @@ class Restart:
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """y, yd [unknowns as written] on the far side at t; None where none was found."""
-        found = self.struck(t, y, yd)
+        found = self._struck(t, y, yd, self.magnitude(y.size))
         return None if found is None else found[:2]
 
     def struck(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
-        """The same with the impulses [unknowns as written] that took the flows there."""
-        magnitude = self.magnitude(y.size)
+        """The same with the impulses [unknowns as written] that took the flows there, of a set of constraints that is
+        tried.  Sizes stay as they were: where it has no rank its multipliers are without bound.
+        """
+        known = self.magnitude(y.size)
+        found = self._struck(t, y, yd, known)
+        lib.reader(self.settler.core.contents.scale, y.size)[:] = known
+        return found
+
+    def _struck(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats, Floats] | None:
+        """The same; magnitude [unknowns as written] before it."""
         before = y
         same, moved = _held(self.settler, t, (y, yd), magnitude)
         moved &= self.state

@@ -1,6 +1,7 @@
 """A method that was asked for goes on where `auto` would leave the motion to the next one."""
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 from sysdyn import api
 
@@ -34,11 +35,13 @@ def _slopes(t, state):
     return np.concatenate([f, INVERSE * (push - across * k)]), k
 
 
-def test_rosenbrock_takes_a_third_run(tmp_path):
-    """A sled whose blade turns it about: errors grow a thousandfold, and the run behind the draft misses."""
-    accuracy = 1e-6
+@pytest.mark.parametrize(("method", "accuracy"), [("rosenbrock", 1e-6), ("bdf", 1e-5), ("bdf", 1e-6)])
+def test_a_sled_slides(method, accuracy, tmp_path):
+    """Its blade turns it about, and errors grow a thousandfold: by rosenbrock the run behind the draft misses; by the
+    bdf one of two runs was so good by chance that the other was believed, 1.5 and 1.9 times off.
+    """
     (tmp_path / "model.sd").write_text(SLED)
-    trace = api.simulate(tmp_path / "model.sd", method="rosenbrock", accuracy=accuracy, output=tmp_path / "out.h5")
+    trace = api.simulate(tmp_path / "model.sd", method=method, accuracy=accuracy, output=tmp_path / "out.h5")
     begin = [0.0, 0.0, 0.2, 0.0, 0.05 / np.cos(0.2), 0.5]
     exact = solve_ivp(
         lambda t, s: _slopes(t, s)[0], (0, 10), begin, method="DOP853", rtol=1e-13, atol=1e-14, t_eval=trace.time

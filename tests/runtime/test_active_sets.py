@@ -12,6 +12,15 @@ from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting
 ROUND_OFF = 1e-12
 
 
+class Observed:
+    """The values are the unknowns; what they have been is of no account."""
+
+    largest = np.zeros(0)
+
+    def __call__(self, t, y, yd):
+        return y
+
+
 class Problem:
     """w = M z + q, w >= 0, z >= 0, w z = 0: what `Contacts` is to pivoting, of inequalities alone."""
 
@@ -19,10 +28,7 @@ class Problem:
         self.matrix, self.q, n = matrix, q, len(q)
         self.contacts = [SimpleNamespace(kind="phi", name=f"c{k}") for k in range(n)]
         self.active, self.p, self.frozen = np.zeros(n, dtype=bool), np.zeros(0), {}
-        self.multiplier, self.open = list(range(n)), frozenset()
-
-    def observer(self, t, y, yd):
-        return y
+        self.multiplier, self.open, self.observer = list(range(n)), frozenset(), Observed()
 
     def state(self):
         return tuple(self.active.tolist())

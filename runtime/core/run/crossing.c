@@ -10,6 +10,7 @@
 #define SAME 8.0         /* spacings of t within which two instants are one */
 #define FOLLOWED 6       /* points settled from an instant of the dense output as it is */
 #define ENOUGH 1e-3      /* of what counts as zero: what is watched may be past it by */
+#define WIDER 3.0        /* times the stretch before: the next one that is searched behind where it has been seen */
 
 typedef void look(sd_run *run, double t, double *values);
 
@@ -86,8 +87,9 @@ static int32_t part_of(sd_run *run, look *at, double end, double *low, double *h
     double begin = fmax(m->begin, fmin(run->t_clear, end));
     *low = *high = begin;
     at(run, begin, m->low);
-    double stop = begin < run->t_seen && run->t_seen < end ? run->t_seen : end; /* where it has been seen, then all */
-    for (int more = 1; more && !hits; begin = stop, stop = end) {
+    /* where it has been seen, which may be less than what a settled point is off by, then ever more behind it */
+    double stop = begin < run->t_seen && run->t_seen < end ? run->t_seen : end;
+    for (int more = 1; more && !hits;) {
         more = stop < end;
         for (int part = 1; part <= SD_PARTS && !hits; part++) {
             if (*high > *low) {
@@ -100,6 +102,9 @@ static int32_t part_of(sd_run *run, look *at, double end, double *low, double *h
                 if (falls(m, k, m->low, m->high))
                     m->which[hits++] = k;
         }
+        double next = fmin(end, stop + WIDER * (stop - begin));
+        begin = stop;
+        stop = next;
     }
     return hits;
 }

@@ -268,6 +268,15 @@ static double kind_here(const sd_run *run, int asked)
     return (double)kind;
 }
 
+/* Whether the next instant, within a step that ends at t, is nearer to the row before than rows are to be.  The last one
+ * before an event is written: in a run behind this one it may stand behind the event. */
+static int passes_over(const sd_run *run, double t)
+{
+    int32_t next = run->next;
+    int last = next + 1 == run->instants || run->instant[next + 1] >= t;
+    return run->instant[next] < run->t_row + run->apart * (t - run->t_from) && !(last && t < *run->stepper->t);
+}
+
 /* rows of the last step that are still to be written; 1: no room left */
 int sd_run_drain(sd_run *run)
 {
@@ -279,7 +288,7 @@ int sd_run_drain(sd_run *run)
             return 1;
         int asked = run->next < run->instants && run->instant[run->next] <= t;
         if (asked && run->instant[run->next] < t) {
-            if (run->instant[run->next] < run->t_row + run->apart * (t - run->t_from)) {
+            if (passes_over(run, t)) {
                 run->next++;
                 continue;
             }

@@ -124,6 +124,5 @@ int sd_run_changes(sd_run *run, double from)
             break;
     }
     run->t_clear = parted ? fmax(from, 2.0 * run->t_clear - run->t_seen) : from;
-    run->t_seen = parted ? run->t_seen : to;
     return fell;
 }

@@ -277,11 +277,39 @@ static void carriers(const sd_sizing *s, const double *jyd, int32_t *carries)
             carries[b->column[e]] = 1;
 }
 
+/* open [n] := what round-off of the terms of its rows makes of a rate in the time tau, and of a displacement its flow's; of a
+ * step of that length at (t, y, yd).  0; -1: no memory */
+static int left_open(const sd_sizing *s, sd_system *system, double t, double tau, const double *y, const double *yd,
+                     double *open)
+{
+    const sd_balance *b = s->balance;
+    size_t entries = (size_t)b->entries;
+    double *jy = calloc(2 * entries + (size_t)b->rows + 1, sizeof *jy), *jyd = jy + entries, *row = jyd + entries;
+    if (!jy)
+        return -1;
+    sd_jacobian(system, t, y, yd, NULL, jy, jyd);
+    for (int32_t e = 0; e < b->entries; e++)
+        row[b->row[e]] = sd_larger(row[b->row[e]], fabs(jy[e] * y[b->column[e]]));
+    memset(open, 0, (size_t)b->unknowns * sizeof *open);
+    for (int32_t e = 0; e < b->entries; e++)
+        if (jyd[e] != 0.0) {
+            double *own = open + b->column[e];
+            *own = sd_larger(*own, DBL_EPSILON * row[b->row[e]] / (fabs(jy[e]) + fabs(jyd[e]) / tau));
+        }
+    for (int32_t k = 0; k < system->kinematics; k++) {
+        double *q = open + system->k_q[k];
+        *q = sd_larger(*q, tau * open[system->k_f[k]]);
+    }
+    free(jy);
+    return 0;
+}
+
 /* found [n]: zeros of which no rate says how far they get lie between what moves with t plainly makes of them, or GROUP of
- * their like, and what it would make of them if it stayed there for the span; least, most [n], largest [kinds]: room */
+ * their like, and what it would make of them if it stayed there for the span, and are no less than round-off makes of
+ * them in tau; least, most [n], largest [kinds]: room */
 static int bounded(const sd_sizing *s, sd_system *system, const sd_order *order, double t0, double quick, double span,
-                   const double *y, const double *moves, const int32_t *carries, const double *divisor, double *found,
-                   double *least, double *most, double *largest)
+                   double tau, const double *y, const double *yd, const double *moves, const int32_t *carries,
+                   const double *divisor, double *found, double *least, double *most, double *largest)
 {
     const sd_balance *b = s->balance;
     int32_t n = b->unknowns, zeros = 0;
@@ -303,6 +331,11 @@ static int bounded(const sd_sizing *s, sd_system *system, const sd_order *order,
     for (int32_t k = 0; k < n; k++)
         if (carries[k] && y[k] == 0.0 && moves[k] == 0.0 && named(s, k) == 0.0 && most[k] > 0.0)
             found[k] = sd_larger(sd_smaller(found[k], most[k]), least[k]);
+    if (left_open(s, system, t0, tau, y, yd, least))
+        return -1;
+    for (int32_t k = 0; k < n; k++)
+        if (carries[k] && y[k] == 0.0 && moves[k] == 0.0 && named(s, k) == 0.0)
+            found[k] = sd_larger(found[k], least[k]);
     return 0;
 }
 
@@ -364,7 +397,7 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     for (size_t k = 0; k < n; k++)
         found[k] = found[k] > TINY ? found[k] : UNKNOWN;
     if (rate)
-        failed |= bounded(s, system, order, t0, quick, span, y, moves, carries, divisor, found, kept, balanced, most);
+        failed |= bounded(s, system, order, t0, quick, span, *tau, y, yd, moves, carries, divisor, found, kept, balanced, most);
     free(first);
     free(memory);
     free(carries);
