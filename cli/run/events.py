@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import count
 
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.binding.binding import places_of
@@ -64,7 +65,8 @@ class _Planner:
         network = self.prepared.network
         whens = tuple(self._when(e) for e in network.events if e.condition is not None)
         sampled = tuple(self._sampled(e) for e in network.events if e.period is not None)
-        contacts = tuple(self._contact(k, s) for k, s in enumerate(network.switches))
+        number = count()
+        contacts = tuple(self._contact(next(number) if s.holds is None else -1, s) for s in network.switches)
         limits = dict(network.scene.limits) if network.scene else {}
         limit = round(self.prepared.binding.evaluate(limits["events"])) if "events" in limits else None
         kinks = tuple(self._kink(k) for k in self.prepared.compiled.form.kinks)
@@ -131,9 +133,10 @@ class _Planner:
             raise ModelError([Diagnostic("E514", text, s.place)])
         sense = -1 if s.sense is None else self.parameter(s.sense)
         return Contact(
-            s.name, s.kind, number, row(s.value), row(s.rate), row(s.multiplier), row(s.acceleration), row(s.bound),
+            s.name, "friction" if s.kind == "relation" else s.kind, number, row(s.value), row(s.rate), row(s.multiplier), row(s.acceleration), row(s.bound),
             row(s.upper), row(s.lower), sense, row(s.guard), restitution,
             tuple(self.row[name] for name in s.aim), tuple(self.parameter(n) for n in s.direction),
+            -1 if s.holds is None else self.parameter(s.holds),
         )  # fmt: skip
 
 

@@ -53,7 +53,8 @@ class Contacts:
             same = [c for c in contacts if (c.kind, observer.unit(c.value)) == kind]
             for name in ("value", "rate", "multiplier"):
                 observer.alike([getattr(c, name) for c in same])
-        self.multiplier = [int(system.form.at[places[k.number][0]]) + places[k.number][1] for k in contacts]
+        own = [places[k.number] if k.hold < 0 else None for k in contacts]
+        self.multiplier = [-1 if at is None else int(system.form.at[at[0]]) + at[1] for at in own]
         self.frozen = mates(plan, system, self.multiplier)
 
     def size(self, magnitude: Floats, time: float) -> None:
@@ -69,7 +70,8 @@ class Contacts:
             alike = own & (units == self.observer.unit(contact.value))
             size = FAINT * float(magnitude[: kinds.size][alike if alike.any() else own].max(initial=0.0))
             rows = ((contact.value, size), (contact.rate, size / time), (contact.acceleration, size / time**2))
-            for row, least in (*rows, (contact.multiplier, FAINT * float(magnitude[place]))):
+            loaded = FAINT * float(magnitude[place]) if place >= 0 else 0.0
+            for row, least in (*rows, (contact.multiplier, loaded)):
                 if row >= 0:
                     largest[row] = max(largest[row], least)
 
@@ -83,7 +85,7 @@ class Contacts:
 
     def take(self, switches: NDArray[np.bool_]) -> None:
         """The active set of the switches as it is given."""
-        self.active = np.array([switches[c.number] for c in self.contacts], dtype=bool)
+        self.active = np.array([switches[c.number] if c.hold < 0 else self.p[c.hold] for c in self.contacts], dtype=bool)
         self.switches.set(switches)
 
     def apply(self) -> None:
@@ -94,7 +96,10 @@ class Contacts:
         for k, contact in enumerate(self.contacts):
             if contact.kind == "follows":
                 self.active[k] = self.active[k - 1]
-            now[contact.number] = self.active[k]
+            if contact.hold < 0:
+                now[contact.number] = self.active[k]
+            else:
+                self.p[contact.hold] = self.active[k]
         self.switches.set(now)
 
     def state(self) -> tuple[float, ...]:
@@ -113,6 +118,8 @@ class Contacts:
     def word(self, k: int) -> str:
         """How a contact stands."""
         contact = self.contacts[k]
+        if contact.hold >= 0:
+            return "= 0" if self.active[k] else "> 0" if self.p[contact.sense] > 0.0 else "< 0"
         if contact.kind == "friction":
             return "sticks" if self.active[k] else f"slips {'+' if self.p[contact.sense] > 0.0 else '-'}"
         if contact.kind == "planar":
@@ -178,6 +185,8 @@ class Contacts:
 
     def _impulse_on(self, k: int, impulses: Floats) -> float:
         """That of a contact; of friction in the plane its size."""
+        if self.multiplier[k] < 0:
+            return 0.0
         own = float(impulses[self.multiplier[k]])
         return float(np.hypot(own, impulses[self.multiplier[k + 1]])) if self.contacts[k].kind == "planar" else own
 

@@ -72,7 +72,8 @@ class Determined:
                 rows, _, number, _ = switch_rows(system.description, system.form)
                 share = np.linalg.norm(left[rows, some:], axis=1)
                 at = np.array([c.number for c in self.contacts.contacts])
-                total = np.zeros(len(system.description.switches.places))
+                total = np.zeros(len(system.description.switches.places) + 1)
+                total[-1] = 1.0  # of relations, which have no switch
                 np.maximum.at(total, number, share)
                 part = total[at]
             self._regular[key] = sigma.size - some, part
