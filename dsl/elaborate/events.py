@@ -333,7 +333,7 @@ def relation(
     sense, holds = (_sense(frame, f"{name} {what}", at, loops, place) for what in ("sense", "holds"))
     frame.parts.unknowns.append(Unknown(name, shape, si(NONE), place))
     s = ex.var(name, "e", *at)
-    row = ex.conditional(ex.compare("==", holds, ex.const(1.0)), u, ex.sub(s, sense))
+    row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, ex.sub(s, sense))
     frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
     rest = ex.substitute(root, {found[0]: ex.const(0.0)})
     left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)

@@ -142,7 +142,7 @@ class Pivoting:
         all of them before.
         """
         contacts, frozen = self.contacts.contacts, self.contacts.frozen
-        free = [k for k, c in enumerate(contacts) if c.kind in ("phi", "psi") and k not in frozen]
+        free = [k for k, c in enumerate(contacts) if (c.kind in ("phi", "psi") or c.hold >= 0) and k not in frozen]
         rest = [k for k in free if not before[k]]
         order = rest + [k for k in free if before[k]]
         nearest = (c for number in range(1, NEAR + 1) for c in combinations(order, number))
