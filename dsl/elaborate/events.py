@@ -17,8 +17,8 @@ from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Action, Constraint, Event, Loop, Observation, Parameter, Unknown
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
-from sysdyn.dsl.names.laws import LawOf
 from sysdyn.dsl.names.failures import Failed
+from sysdyn.dsl.names.laws import LawOf
 from sysdyn.dsl.names.symbols import ParameterSymbol, Typed, Vector
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
@@ -294,53 +294,63 @@ def sticking(
 def of_law(
     frame: ElaborationContext, law: LawOf, label: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place
 ) -> Node:
-    """The law of a branch: dry friction of its own flow sticks by a reaction, every other set-valued law is a relation."""
-    terms = [n.args[0] for n in ex.topological([law.law]) if n.op == "call" and n.data == "setsign"]
-    if law.kind not in ("dissipator", "effort", "flow"):
+    """The law of a branch: dry friction of its own flow sticks by a reaction, else it is a relation."""
+    terms = [n.args[0] for n in ex.topological([law.law]) if _set_at(n)]
+    if law.kind in ("kinetic", "potential") and not all(map(_steady, terms)):
         return law.law
     flow = ex.var(label, "bf", *at)
-    if law.kind == "dissipator" and law.side == "e" and all(ex.is_const(derivative(u, flow), 1.0) for u in terms):
+    if law.kind == "dissipator" and law.side == "e" and all(_steady(ex.sub(u, flow)) for u in terms):
         return sticking(frame, law.law, label, at, loops, place)
-    return relation(frame, law.law, ex.sub(ex.var(label, f"b{law.side}", *at), law.law), label, loops, place)
+    return relation(frame, law.law, ex.var(label, f"b{law.side}", *at), label, loops, place)
 
 
 def relation(
-    frame: ElaborationContext, text: Node, root: Node, label: str, loops: tuple[Loop, ...], place: Place
+    frame: ElaborationContext, text: Node, given: Node, label: str, loops: tuple[Loop, ...], place: Place
 ) -> Node:
-    """The text of a relation root = 0 with its term c*setsign(u) as c*s: s closes  u = 0  where that holds, else
-    s = sense, the sign of u.  It holds as long as c*s, what the rest of root leaves, is within c.  Where u moves at
-    finite rates alone it is a sign, which may slide (forms/corners).
+    """The text of a relation given = text with each term c*setsign(u) as c*s: s closes  u = 0  where that holds, else
+    s = sense, the sign of u.  It holds as long as c*s, what the others leave, is within c.  Where u moves at finite
+    rates alone it is a sign, which may slide (forms/corners).
     """
-    found = [n for n in ex.topological([text]) if n.op == "call" and n.data == "setsign"]
-    if not found:
-        return text
-    (u,), mark = found[0].args, ex.var("#sign", "s")
-    if all(n.op == "time" or (n.data[1] in ("q", "nq", "bq", "s") and not n.data[2]) for n in ex.variables(u)):
-        change = {found[0]: ex.call("sign", u)}
-        return relation(frame, ex.substitute(text, change), ex.substitute(root, change), label, loops, place)
-    factor = derivative(ex.substitute(root, {found[0]: mark}), mark)
-    bound = {n for n in ex.topological([u, factor]) if n.op == "index"} - {ex.index(loop.index) for loop in loops}
-    if len(found) > 1 or bound:
-        help_ = "implicit s: 1 for each, and gamma: s = setsign(u)"
-        frame.report.error("N608", f"{label}: more than one setsign in a relation is not supported", place, help=help_)
-        raise Failed
-    if mark in ex.variables(factor):
-        frame.report.error("E705", f"setsign enters {label} in another way than c*setsign(u)", place)
-        raise Failed
     at, shape = tuple(ex.index(loop.index) for loop in loops), tuple((loop.first, loop.last) for loop in loops)
+    change: dict[Node, Node] = {}
+    made: list[tuple[Node, Node]] = []
     again = sum(draft.element == label for draft in frame.parts.drafts)
-    name = f"{label} set" + (f" {again + 1}" if again else "")
-    sense, holds = (_sense(frame, f"{name} {what}", at, loops, place) for what in ("sense", "holds"))
-    frame.parts.unknowns.append(Unknown(name, shape, si(NONE), place))
-    s = ex.var(name, "e", *at)
-    row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, ex.sub(s, sense))
-    frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
-    rest = ex.substitute(root, {found[0]: ex.const(0.0)})
-    left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
-    frame.parts.drafts.append(
-        Draft(name, at, loops, "relation", place, si(NONE), u, left, label, ex.call("abs", factor), sense, holds=holds)
-    )
-    return ex.substitute(text, {found[0]: s})
+    for node in filter(_set_at, ex.topological([text])):
+        u = ex.substitute(node.args[0], change)
+        if _steady(u):
+            change[node] = ex.call("sign", u)
+            continue
+        name = f"{label} set" + (f" {again + len(made) + 1}" if again + len(made) else "")
+        change[node] = ex.var(name, "e", *at)
+        frame.parts.unknowns.append(Unknown(name, shape, si(NONE), place))
+        made.append((change[node], u))
+    text = ex.substitute(text, change)
+    root = ex.sub(given, text)
+    for s, u in made:
+        factor, name = derivative(root, s), s.data[0]
+        inside = {n for n in ex.topological([u, factor]) if n.op == "index"} - set(at)
+        if s in ex.variables(factor) or ex.is_const(factor, 0.0) or inside:
+            said = f"setsign enters {label} in another way than c*setsign(u)"
+            frame.report.error("E705", said, place, help="implicit s: 1, closed by gamma ...: s = setsign(u)")
+            raise Failed
+        sense, holds = (_sense(frame, f"{name} {what}", at, loops, place) for what in ("sense", "holds"))
+        row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, ex.sub(s, sense))
+        frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
+        rest = ex.substitute(root, {s: ex.const(0.0)})
+        left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
+        bound = ex.call("abs", factor)
+        draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, holds=holds)
+        frame.parts.drafts.append(draft)
+    return text
+
+
+def _set_at(node: Node) -> bool:
+    return node.op == "call" and node.data == "setsign"
+
+
+def _steady(u: Node) -> bool:
+    """Whether a value moves at finite rates alone: of displacements, states and time."""
+    return all(n.op == "time" or (n.data[1] in ("q", "nq", "bq", "s") and not n.data[2]) for n in ex.variables(u))
 
 
 def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], place: Place) -> Node:

@@ -46,6 +46,7 @@ class Contacts:
         self._finite: frozenset[int] | None = None
         # wrong open and closed (pivoting.py): zero of its value is none of its multiplier, any value above zero is open
         self.open: frozenset[int] = frozenset()
+        self.through: set[int] = set()  # relations whose value goes through zero
         self.time = 0.0
         places = self.switches.places
         kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
@@ -85,7 +86,8 @@ class Contacts:
 
     def take(self, switches: NDArray[np.bool_]) -> None:
         """The active set of the switches as it is given."""
-        self.active = np.array([switches[c.number] if c.hold < 0 else self.p[c.hold] for c in self.contacts], dtype=bool)
+        held = [switches[c.number] if c.hold < 0 else self.p[c.hold] for c in self.contacts]
+        self.active = np.array(held, dtype=bool)
         self.switches.set(switches)
 
     def apply(self) -> None:
@@ -297,6 +299,9 @@ class Contacts:
             self.p[contact.sense] = 1.0
             return
         slips = contact.kind == "friction" and not self.active[k]
+        if slips and k in self.through:
+            self.p[contact.sense] = -self.p[contact.sense] or np.sign(values[contact.rate]) or 1.0
+            return
         if slips and abs(values[contact.value]) > self.observer.zero(contact.value):
             self.p[contact.sense] = np.sign(values[contact.value])
             return

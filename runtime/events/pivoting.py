@@ -41,7 +41,7 @@ class Pivoting:
 
     def __init__(self, contacts: Contacts, singular: Callable[[float, Floats, Floats], bool]) -> None:
         self.contacts, self.singular = contacts, singular
-        self._contradicts: set[tuple[bool, ...]] = set()
+        self._contradicts: set[tuple[float, ...]] = set()
 
     def fit(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats]:
         """A consistent point whose active set fits, from the present one; NoActiveSetError."""
@@ -117,10 +117,14 @@ class Pivoting:
         """Where the active set contradicts itself (a source that two diodes short): the point of a near one, not seen
         yet, that does not: the first that fits, else the first; the active set then is that.
         """
-        before, first = self.contacts.active.copy(), None
+        before, stood, first = self.contacts.active.copy(), self.contacts.state(), None
         for turned in self._near(before):
-            self.contacts.active[:] = before
+            self.contacts.become(stood)
             self.contacts.active[list(turned)] = ~before[list(turned)]
+            for k in turned:
+                if before[k] and self.contacts.contacts[k].hold >= 0:
+                    self.contacts.slip(k, 1.0)
+                    self.contacts.through.add(k)
             self.contacts.apply()
             open_ = len(turned) <= NEAR and self.singular(t, y, yd)
             if open_ or self.contacts.state() in seen:
@@ -129,11 +133,10 @@ class Pivoting:
             if found is not None and self.contacts.fits(t, y, found):
                 return found
             if found is not None and first is None:
-                first = found, self.contacts.active.copy()
+                first = found, self.contacts.state()
         if first is None:
             return None
-        self.contacts.active[:] = first[1]
-        self.contacts.apply()
+        self.contacts.become(first[1])
         seen.add(self.contacts.state())
         return first[0]
 
@@ -152,7 +155,7 @@ class Pivoting:
 
     def _settled_by(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats, Floats] | None:
         """As settle; a set whose equations depend on each other, and that contradicted itself, is not tried again."""
-        key = tuple(self.contacts.active.tolist())
+        key = self.contacts.state()
         if key in self._contradicts:
             return None
         found = settle(t, y, yd)

@@ -195,13 +195,12 @@ def stated(
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A compiled model bound to parameter values.  p [parameters] SI, the binding's own and read-only where no event
+    """A compiled model bound to parameter values. p [parameters] SI, the binding's own and read-only where no event
     writes there (`System.own_numbers`); ix [integers]; layouts: what follows from the structure of the index forms
-    made so far, found once (System.once); branches: places in p of laws that may slide (events/kinks.py); holds: those that
-    say whether set-valued relations hold; systems:
-    those of runs one after the other that share p, by index form; alive: those that somebody has now, where runs do
-    not share them; room: work of their Jacobians; constants: of integrated constraints, by their family of rows, where
-    they begin in p and how many there are.
+    made so far, found once (System.once); branches: places in p of laws that may slide (events/kinks.py); holds: those
+    that say whether set-valued relations hold; systems: those of runs one after the other that share p, by index form;
+    alive: those that somebody has now, where runs do not share them; room: work of their Jacobians; constants: of
+    integrated constraints, by their family of rows, where they begin in p and how many there are.
     """
 
     families: tuple[Family, ...]
