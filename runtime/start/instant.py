@@ -200,12 +200,14 @@ class Instant:
         return free is not None and bool(free[column].any())
 
     def _sloping(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
-        """Y with implicit efforts at their magnitudes where their laws are flat: a flat one decides about the flows."""
+        """Y with implicit efforts at their magnitudes where their laws are flat (a flat one decides about the flows), but
+        for those that multipliers tell.
+        """
         steepest = np.zeros(y.size)
         jy, _ = self.system.jacobian(t, y, yd)
         mine = self._states[self._row]
         np.maximum.at(steepest, self._column[mine], np.abs(jy[mine]))
-        return np.where((self.system.kinds == "e") & (steepest == 0.0), y + magnitude, y)
+        return np.where((self.system.kinds == "e") & ~self._struck & (steepest == 0.0), y + magnitude, y)
 
     def _jump(
         self,
