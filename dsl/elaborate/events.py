@@ -2,8 +2,9 @@
 
 What an event reads is observed beside the traced quantities, so every arrow of the compiler carries it as it carries
 those: a relation a > b is the observation a - b, the value of an action another.  A constraint that holds at times is
-an equality among the rows, and a `Switch` that says when; `c*setsign(u)` and `c*abs(u)` in a content become the
-effort c*sense with a sense that events set, and psi: u = 0, which holds while the bodies stick.
+an equality among the rows, and a `Switch` that says when; dry friction, `c*setsign(f)` of an element's own flow and
+`c*abs(u)` in a content, becomes the effort c*sense with a sense that events set, and psi: u = 0, which holds while the
+bodies stick.  In any other relation `setsign(u)` is an unknown, closed by u = 0 or by the sense (`relation`).
 """
 
 from __future__ import annotations
@@ -331,7 +332,7 @@ def relation(
         inside = {n for n in ex.topological([u, factor]) if n.op == "index"} - set(at)
         if s in ex.variables(factor) or ex.is_const(factor, 0.0) or inside:
             said = f"setsign enters {label} in another way than c*setsign(u)"
-            frame.report.error("E705", said, place, help="implicit s: 1, closed by gamma ...: s = setsign(u)")
+            frame.report.error("E705", said, place, help="implicit s: 1, closed by gamma set: s = setsign(u)")
             raise Failed
         sense, holds = (_sense(frame, f"{name} {what}", at, loops, place) for what in ("sense", "holds"))
         row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, ex.sub(s, sense))

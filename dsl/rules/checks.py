@@ -186,7 +186,7 @@ def _has_setsign(root: Node) -> bool:
 
 def _no_set(place: Place, report: Report) -> None:
     text = "setsign outside a gamma and the law of a dissipator or source"
-    help_ = "implicit s: 1, closed by gamma ...: s = setsign(u); sign for an ordinary function"
+    help_ = "implicit s: 1, closed by gamma set: s = setsign(u); sign for an ordinary function"
     report.error("E705", text, place, help=help_)
 
 
