@@ -46,7 +46,8 @@ class Contacts:
         self._finite: frozenset[int] | None = None
         # wrong open and closed (pivoting.py): zero of its value is none of its multiplier, any value above zero is open
         self.open: frozenset[int] = frozenset()
-        self.through: set[int] = set()  # relations whose value goes through zero
+        self.through: set[int] = set()  # frictions whose value goes through zero
+        self.reversed: set[int] = set()  # those that have turned back, as long as one active set is sought
         self.time = 0.0
         places = self.switches.places
         kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
@@ -302,7 +303,9 @@ class Contacts:
         if slips and k in self.through:
             self.p[contact.sense] = -self.p[contact.sense] or np.sign(values[contact.rate]) or 1.0
             return
-        if slips and abs(values[contact.value]) > self.observer.zero(contact.value):
+        if slips and abs(values[contact.value]) > self.observer.zero(contact.value) and k not in self.reversed:
+            if self.p[contact.sense] != 0.0:
+                self.reversed.add(k)
             self.p[contact.sense] = np.sign(values[contact.value])
             return
         self.flip(k, values)

@@ -45,6 +45,7 @@ class Pivoting:
 
     def fit(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats]:
         """A consistent point whose active set fits, from the present one; NoActiveSetError."""
+        self.contacts.reversed.clear()
         before, turned = (self.contacts.active.copy(), self.contacts.p.copy()), dict[int, set[bool]]()
         try:
             return self._pivoted(t, y, yd, settle, turned)
@@ -121,10 +122,9 @@ class Pivoting:
         for turned in self._near(before):
             self.contacts.become(stood)
             self.contacts.active[list(turned)] = ~before[list(turned)]
-            for k in turned:
-                if before[k] and self.contacts.contacts[k].hold >= 0:
-                    self.contacts.slip(k, 1.0)
-                    self.contacts.through.add(k)
+            for k in (k for k in turned if self.contacts.contacts[k].kind == "friction"):
+                self.contacts.p[self.contacts.contacts[k].sense] = float(before[k])
+                self.contacts.through.update([k] if before[k] else [])
             self.contacts.apply()
             open_ = len(turned) <= NEAR and self.singular(t, y, yd)
             if open_ or self.contacts.state() in seen:
@@ -141,13 +141,13 @@ class Pivoting:
         return first[0]
 
     def _near(self, before: NDArray[np.bool_]) -> Iterator[Sequence[int]]:
-        """Which inequalities to turn, the fewest first, those that do not hold before those that do; where none holds,
-        all of them before.
+        """Which to turn, the fewest first, inequalities that do not hold before those that do and frictions; where no
+        inequality holds, all of them before.
         """
         contacts, frozen = self.contacts.contacts, self.contacts.frozen
-        free = [k for k, c in enumerate(contacts) if (c.kind in ("phi", "psi") or c.hold >= 0) and k not in frozen]
+        free = [k for k, c in enumerate(contacts) if c.kind in ("phi", "psi") and k not in frozen]
         rest = [k for k in free if not before[k]]
-        order = rest + [k for k in free if before[k]]
+        order = rest + [k for k in free if before[k]] + [k for k, c in enumerate(contacts) if c.kind == "friction"]
         nearest = (c for number in range(1, NEAR + 1) for c in combinations(order, number))
         if rest == free:
             return islice(chain([rest], nearest), BESIDE)
