@@ -122,7 +122,7 @@ class Contacts:
         """How a contact stands."""
         contact = self.contacts[k]
         if contact.hold >= 0:
-            return "= 0" if self.active[k] else "> 0" if self.p[contact.sense] > 0.0 else "< 0"
+            return "at zero" if self.active[k] else "above" if self.p[contact.sense] > 0.0 else "below"
         if contact.kind == "friction":
             return "sticks" if self.active[k] else f"slips {'+' if self.p[contact.sense] > 0.0 else '-'}"
         if contact.kind == "planar":

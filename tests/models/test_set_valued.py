@@ -351,3 +351,99 @@ def test_a_law_reads_another_speed_than_its_own(tmp_path):
 def test_what_no_relation_can_say_is_refused(law):
     text = relay("0 N").replace("gamma g: F = 0 N", law)
     assert codes(text) == [("E705", "error")]
+
+
+PLAY = """\
+model play {
+  coord x: translation = 0 m
+  coord y: translation = 0 m
+  energy T* = 1/2*(2 kg)*x'^2
+  energy V = 1/2*(200 N/m)*(x - y)^2
+  DAMPER
+  work 9 N*sin(3 rad/s*t) on x
+  FRICTION
+  init x' = 1 m/s
+}
+scene s of play { time 0 s to 2 s; trace x, y every 0.02 s }
+"""
+
+
+@PRIMAL
+@pytest.mark.parametrize("damper", ["", "content D = 1/2*(1 N.s/m)*(x' - y')^2"])
+@pytest.mark.parametrize("friction", [
+    "implicit F: N ~ 0 N; work F on y; gamma g: F = -(3 N)*setsign(y')", "rub: dissipator(e = 3 N*setsign(f)) on y",
+])  # fmt: skip
+def test_what_rubs_without_a_mass_starts_between_both_senses(tmp_path, formulation, damper, friction):
+    """A spring before a friction: without a damper the play of 3/200 m (Prandtl); small steps of Euler's say the same."""
+    trace = run(tmp_path, PLAY.replace("DAMPER", damper).replace("FRICTION", friction), formulation)
+    d, h, t_end = float(bool(damper)), 2e-5, 2.0
+    (x, v, y), seen = (0.0, 1.0, 0.0), []
+    for k in range(round(t_end / h) + 1):
+        if k % 1000 == 0:
+            seen.append((x, y))
+        stretch = 200.0 * (x - y)
+        if d:
+            drive = stretch + d * v
+            u = (drive - np.clip(drive, -3.0, 3.0)) / d
+            force = stretch + d * (v - u)
+            y += h * u
+        else:
+            force = np.clip(stretch, -3.0, 3.0)
+        v += h * (9 * np.sin(3 * k * h) - force) / 2
+        x += h * v
+        if not d:
+            y = min(max(y, x - 0.015), x + 0.015)
+    at = np.arange(len(seen)) * 1000 * h
+    for name, column in (("x", 0), ("y", 1)):
+        values = np.interp(at, trace.time, trace[name].values)
+        assert np.abs(values - np.array(seen)[:, column]).max() < 2e-4, name
+
+
+def test_what_a_relation_leaves_open_is_refused(tmp_path):
+    """y rests whatever F is, and F moves x: any value of the set would do."""
+    text = TWO.replace("FRICTION", "implicit F: N ~ 0 N; work F on x; gamma g: F = -(3 N)*setsign(y')")
+    with pytest.raises(api.ModelError) as caught:
+        run(tmp_path, text)
+    assert [d.code for d in caught.value.diagnostics if d.severity == "error"] == ["E516"]
+
+
+@PRIMAL
+def test_two_frictions_on_one_body_are_their_sum(tmp_path, formulation):
+    """What each takes while both hold is open, and moves nothing."""
+    two = """implicit F, G: N ~ 0 N; work F + G on x; gamma g: F = -(2 N)*setsign(x'); gamma h: G = -(1 N)*setsign(x')
+  init x' = 0.2 m/s"""
+    one = "implicit F: N ~ 0 N; work F on x; gamma g: F = -(3 N)*setsign(x'); init x' = 0.2 m/s"
+    traces = [run(tmp_path, TWO.replace("FRICTION", text), formulation) for text in (two, one)]
+    at = np.linspace(0.0, 10.0, 101)
+    values = [np.interp(at, trace.time, trace["x"].values) for trace in traces]
+    assert np.abs(values[0] - values[1]).max() < 1e-9
+
+
+@PRIMAL
+def test_frictions_of_an_array_in_components(tmp_path, formulation):
+    """A component with a gamma, its own row of an array, and dissipators: one motion."""
+    parts = """\
+component rubbing { param c = 3 N; port p: translation; implicit F: N ~ 0 N; push: effort(e = F) ground -> p
+  gamma g: F = -c*setsign(p.f) }
+"""
+    chain = """\
+model chain {
+  param n = 4
+  node x[1..n]: translation
+  for i in 1..n { M[i]: kinetic(p = 1 kg*f) x[i]; init x[i].q = 0 m; init x[i].f = 2 m/s }
+  for i in 1..n-1 { K[i]: potential(e = 30 N/m*q) x[i] -> x[i+1] }
+  FRICTION
+}
+scene s of chain { time 0 s to 3 s; trace x[1].q, x[4].q every 0.1 s }
+"""
+    said = (
+        "for i in 1..n { R[i]: rubbing(c = i*1 N) p = x[i] }",
+        """implicit F[1..n]: N ~ 0 N; for i in 1..n { A[i]: effort(e = F[i]) ground -> x[i] }
+  for i in 2..n { gamma g[i]: F[i] = -i*1 N*setsign(x[i].f) }; gamma g[1]: F[1] = -1 N*setsign(x[1].f)""",
+        "for i in 1..n { R[i]: dissipator(e = i*1 N*setsign(f)) x[i] }",
+    )
+    traces = [run(tmp_path, parts + chain.replace("FRICTION", text), formulation) for text in said]
+    at = np.linspace(0.05, 2.95, 30)
+    for name in ("x[1].q", "x[4].q"):
+        first, *others = (np.interp(at, trace.time, trace[name].values) for trace in traces)
+        assert all(np.abs(other - first).max() < 1e-12 for other in others)
