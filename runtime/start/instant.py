@@ -200,8 +200,8 @@ class Instant:
         return free is not None and bool(free[column].any())
 
     def _sloping(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
-        """Y with implicit efforts at their magnitudes where their laws are flat (a flat one decides about the flows), but
-        for those that multipliers tell.
+        """Y with implicit efforts at their magnitudes where their laws are flat (a flat one decides about the flows),
+        but for those that multipliers tell.
         """
         steepest = np.zeros(y.size)
         jy, _ = self.system.jacobian(t, y, yd)

@@ -1,4 +1,4 @@
-"""setsign in gammas and in laws that give a flow: closed forms, the dissipator that says the same, what it cannot be."""
+"""setsign in gammas and in laws that give a flow: closed forms, the dissipator that says the same; what is refused."""
 
 import numpy as np
 import pytest
@@ -79,8 +79,8 @@ def test_a_block_slides_back_above_the_angle_of_friction(tmp_path, formulation):
 @pytest.mark.parametrize("mu", [0.1, 0.9])
 def test_an_impact_rubs_by_its_impulse(tmp_path, formulation, start, bounce, mu):
     """Friction on a reaction has an impulse with it, at most what stops the block: as that of a dissipator."""
-    one, other = (run(tmp_path, block(text, start, bounce).replace("mu = 0.5", f"mu = {mu}"), formulation, method="radau")
-                  for text in (GAMMA, TWIN))  # fmt: skip
+    texts = [block(text, start, bounce).replace("mu = 0.5", f"mu = {mu}") for text in (GAMMA, TWIN)]
+    one, other = (run(tmp_path, text, formulation, method="radau") for text in texts)
     at = np.linspace(0.0, 2.0, 41)[1:]
     for name in ("x", "x'", "y"):
         values = [np.interp(at, trace.time, trace[name].values) for trace in (one, other)]
@@ -374,7 +374,7 @@ scene s of play { time 0 s to 2 s; trace x, y every 0.02 s }
     "implicit F: N ~ 0 N; work F on y; gamma g: F = -(3 N)*setsign(y')", "rub: dissipator(e = 3 N*setsign(f)) on y",
 ])  # fmt: skip
 def test_what_rubs_without_a_mass_starts_between_both_senses(tmp_path, formulation, damper, friction):
-    """A spring before a friction: without a damper the play of 3/200 m (Prandtl); small steps of Euler's say the same."""
+    """A spring before a friction: without a damper the play of 3/200 m (Prandtl); Euler's small steps say the same."""
     trace = run(tmp_path, PLAY.replace("DAMPER", damper).replace("FRICTION", friction), formulation)
     d, h, t_end = float(bool(damper)), 2e-5, 2.0
     (x, v, y), seen = (0.0, 1.0, 0.0), []
