@@ -196,7 +196,7 @@ def _corner(node: Node, place: Place, report: Report) -> None:
     for flow in unknowns_of(node, "f"):
         if _jumps(node, flow) or _jumps(derivative(node, flow), flow):
             message = f"the law is not differentiable at {flow} = 0 and contains abs or sign"
-            report.warning("W301", message, place, help="tanh to smooth; set-valued friction is content D with abs")
+            report.warning("W301", message, place, help="setsign for set-valued friction, tanh to smooth")
             return
 
 
