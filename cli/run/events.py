@@ -61,11 +61,11 @@ class _Planner:
 
     def plan(self, rest: float) -> Plan:
         """Everything that may happen."""
-        network = self.prepared.network
+        network, switches = self.prepared.network, self.prepared.compiled.network.switches
         whens = tuple(self._when(e) for e in network.events if e.condition is not None)
         sampled = tuple(self._sampled(e) for e in network.events if e.period is not None)
         number = count()
-        contacts = tuple(self._contact(next(number) if s.holds is None else -1, s) for s in network.switches)
+        contacts = tuple(self._contact(next(number) if s.holds is None else -1, s) for s in switches)
         limits = dict(network.scene.limits) if network.scene else {}
         limit = round(self.prepared.binding.evaluate(limits["events"])) if "events" in limits else None
         kinks = tuple(self._kink(k) for k in self.prepared.compiled.form.kinks)

@@ -59,7 +59,7 @@ class Prepared:
         b = self.binding
         sizes = b.ix.tobytes(), b.shapes, b.row_shapes
         stand = not (self.network.events or self.network.switches or self.compiled.form.kinks)
-        holds = [self.place(s.holds) for s in self.network.switches if s.holds is not None]
+        holds = [self.place(s.holds) for s in self.compiled.network.switches if s.holds is not None]
         found = {**self.arrays_of(b), "stand": stand, "holds": holds}
         return {**found, "layouts": self.layouts.setdefault(sizes, {}), "alone": self.alone}
 

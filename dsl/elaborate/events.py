@@ -277,10 +277,11 @@ def sticking(
     """A law or content with its set-valued terms c*setsign(u), c*abs(u) as c*sense and c*sense*u; the switches that
     say which sense, and psi: u = 0 for sticking.
     """
-    found = [n for n in ex.topological([root]) if n.op == "call" and n.data == "setsign"]
-    for k, node in enumerate(found):
+    again = sum(draft.element == label for draft in frame.parts.drafts)  # elements of one label, said one by one
+    own = tuple(ex.index(loop.index) for loop in loops)
+    for k, node in enumerate(filter(_set_at, ex.topological([root]))):
         name = f"{label} sticking" + (f" {k + 1}" if k else "")
-        sense = _sense(frame, f"{name} sense", at, loops, place)
+        sense = _sense(frame, f"{name} sense" + (f" {again + 1}" if again else ""), own, loops, place)
         inner = node.args[0]
         mark = ex.var("#sign", "s")
         bound = derivative(ex.substitute(root, {node: mark}), mark)

@@ -447,3 +447,57 @@ scene s of chain { time 0 s to 3 s; trace x[1].q, x[4].q every 0.1 s }
     for name in ("x[1].q", "x[4].q"):
         first, *others = (np.interp(at, trace.time, trace[name].values) for trace in traces)
         assert all(np.abs(other - first).max() < 1e-12 for other in others)
+
+
+@pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
+@pytest.mark.parametrize("text", [
+    """\
+model rubbing {
+  param n = 4
+  node x[1..n]: translation
+  for i in 1..n {
+    M[i]: kinetic(p = 1 kg*f) x[i]
+    R[i]: dissipator(e = i*1 N*setsign(f)) x[i]
+    init x[i].q = 0 m
+    init x[i].f = 2 m/s
+  }
+  for i in 1..n-1 { K[i]: potential(e = 30 N/m*q) x[i] -> x[i+1] }
+}
+scene s of rubbing { time 0 s to 3 s; trace x[1].f as a, x[4].f as b, R[2].e as c every 0.1 s }
+""", """\
+model clamp {
+  node a, b: electrical
+  Vs: effort(e = 50 V*sin(314 rad/s*t)) a -> ground
+  R: dissipator(e = 1 kohm*f) a -> b
+  Z: dissipator(e = 30 V*setsign(f) + 10 V*setsign(f - 5 mA) + 10 ohm*f) b -> ground
+}
+scene s of clamp { time 0 s to 40 ms; trace Z.f as a, Z.e as b, b.e as c every 0.5 ms }
+""",
+])  # fmt: skip
+def test_dry_friction_is_one_in_both_families(tmp_path, formulation, text):
+    one, other = (run(tmp_path, text, f, method="radau") for f in ("lagrangian", formulation))
+    assert len(one.events) == len(other.events) > 3
+    end = one.time[-1]
+    at = np.linspace(0.011 * end, 0.989 * end, 40)  # no instant of an event
+    for name in "abc":
+        values = [np.interp(at, trace.time, trace[name].values) for trace in (one, other)]
+        assert np.abs(values[0] - values[1]).max() < 1e-6 * np.abs(values[0]).max(), name
+
+
+@ALL
+def test_elements_of_one_label_are_said_one_by_one(tmp_path, formulation):
+    """Of frictions in two loops, and of limiters by themselves, each has a sense of its own."""
+    text = """\
+model row {
+  node x[1..4]: translation
+  for i in 1..4 { M[i]: kinetic(p = 1 kg*f) x[i]; init x[i].q = 0 m; init x[i].f = i*1 m/s }
+  for i in 1..2 { R[i]: dissipator(e = i*1 N*setsign(f)) x[i] }
+  for i in 3..3 { R[i]: dissipator(e = i*1 N*setsign(f)) x[i] }
+  R[4]: dissipator(e = 2 N*setsign(f)) x[4]
+}
+scene s of row { time 0 s to 3 s; trace x[1].f, x[2].f, x[3].f, x[4].f every 0.5 s }
+"""
+    trace = run(tmp_path, text, formulation)
+    for i, slows in ((1, 1.0), (2, 2.0), (3, 3.0), (4, 2.0)):
+        expected = np.maximum(i - slows * trace.time, 0.0)
+        assert np.abs(trace[f"x[{i}].f"].values - expected).max() < 1e-9
