@@ -75,6 +75,7 @@ class ContactRest:
     def _fitting(self, guess: Floats, begin: tuple[float, ...]) -> Rest | None:
         """The same, from a state of the contacts."""
         self.contacts.become(begin)
+        self.contacts.through.clear()
         pivoting = Pivoting(self.contacts, lambda *_: False)
         try:
             pivoting.fit(self.t, guess, np.zeros_like(guess), self._settle)

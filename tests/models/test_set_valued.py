@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from sysdyn import api
 
@@ -501,3 +502,40 @@ scene s of row { time 0 s to 3 s; trace x[1].f, x[2].f, x[3].f, x[4].f every 0.5
     for i, slows in ((1, 1.0), (2, 2.0), (3, 3.0), (4, 2.0)):
         expected = np.maximum(i - slows * trace.time, 0.0)
         assert np.abs(trace[f"x[{i}].f"].values - expected).max() < 1e-9
+
+
+@PRIMAL
+def test_a_bead_rubs_on_a_hoop_by_its_reaction(tmp_path, formulation):
+    """Friction 0.2 of what the hoop bears, of either sign: against the angle's own equation, piece by piece."""
+    text = """\
+model hoop {
+  coord x: translation = 1 m
+  coord y: translation = 0 m
+  energy T* = 1/2*(2 kg)*(x'^2 + y'^2)
+  work -(2 kg)*g0 on y
+  phi hoop: x^2 + y^2 = 1 m^2
+  implicit F: N ~ 0 N
+  work -F*y/(1 m) on x
+  work F*x/(1 m) on y
+  gamma rub: F = -0.2*abs(2*hoop.multiplier*1 m)*setsign((x*y' - y*x')/(1 m))
+  init y' = 0 m/s
+}
+scene s of hoop { time 0 s to 6 s; trace x, y every 0.05 s }
+"""
+    trace = run(tmp_path, text, formulation, method="radau")
+    angle, begin, pieces, sense = 0.0, 0.0, [], -1.0
+    while sense:
+        def rate(_, z, sense=sense):
+            return [z[1], -G0 * np.cos(z[0]) - 0.2 * sense * abs(z[1] ** 2 - G0 * np.sin(z[0]))]
+        def halts(_, z):
+            return z[1]
+        halts.terminal, halts.direction = True, -sense
+        found = solve_ivp(rate, (begin, 9.0), [angle, sense * 1e-14], rtol=1e-11, atol=1e-13, events=halts,
+                          dense_output=True, max_step=0.02)  # fmt: skip
+        pieces.append((begin, found.sol))
+        begin, angle = found.t[-1], found.y[0, -1]
+        sense = -np.sign(np.cos(angle)) if abs(np.cos(angle)) > 0.2 * abs(np.sin(angle)) else 0.0
+    expected = [next((s(t)[0] for b, s in reversed(pieces) if b <= t), 0.0) if t < begin else angle for t in trace.time]
+    assert np.abs(trace["x"].values - np.cos(expected)).max() < 1e-6
+    turns = [e.time for e in trace.events if e.time > 0.0]
+    assert turns == pytest.approx([*(b for b, _ in pieces[1:]), begin], abs=1e-6)
