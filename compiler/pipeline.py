@@ -107,7 +107,7 @@ class CompiledModel:
     def _bound(self, overrides: Overrides | None) -> Binding:
         binding = binding_.bind(self.network, self.energies, self.form, self.program, overrides)
         scene = self.network.scene
-        at_times = frozenset(s.label for s in self.network.switches)
+        at_times = frozenset(s.label for s in self.network.switches if s.holds is None)
         found = check_counts(self.form, self.program, binding, at_times)
         if scene is not None and scene.redundancy in ("drop", "minimum_norm"):
             found = tuple(d for d in found if d.code != "E517")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import count
 
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.compiler.binding.binding import places_of
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, DescriptorForm, Frozen
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Action, Event, Switch
@@ -61,10 +61,11 @@ class _Planner:
 
     def plan(self, rest: float) -> Plan:
         """Everything that may happen."""
-        network = self.prepared.network
+        network, switches = self.prepared.network, self.prepared.compiled.network.switches
         whens = tuple(self._when(e) for e in network.events if e.condition is not None)
         sampled = tuple(self._sampled(e) for e in network.events if e.period is not None)
-        contacts = tuple(self._contact(k, s) for k, s in enumerate(network.switches))
+        number = count()
+        contacts = tuple(self._contact(next(number) if s.holds is None else -1, s) for s in switches)
         limits = dict(network.scene.limits) if network.scene else {}
         limit = round(self.prepared.binding.evaluate(limits["events"])) if "events" in limits else None
         kinks = tuple(self._kink(k) for k in self.prepared.compiled.form.kinks)
@@ -102,7 +103,7 @@ class _Planner:
     def _assignment(self, action: Action) -> Assignment:
         row, target = self.row[action.value], action.target
         if target.op == "param":
-            return Assignment(_shown(target.data, target), "discrete", self.parameter(target), row)
+            return Assignment(_shown(target.data, target), "discrete", self.prepared.place(target), row)
         name, kind, _ = target.data
         if (name, kind) not in self.unknown:
             text = f"an event assigns the flow of {name}, which is no unknown of this formulation"
@@ -112,15 +113,6 @@ class _Planner:
         place = first + position_of(shape, (n.data for n in target.args))
         return Assignment(shown, "state" if kind == "s" else "flow", place, row)
 
-    def parameter(self, node: Node) -> int:
-        """The place in p of a parameter, or of an element of one."""
-        compiled, binding = self.prepared.compiled, self.prepared.binding
-        if not node.args:
-            return compiled.program.scalars.index(node.data)
-        boxes = binding.parameters.boxes[node.data]
-        where = places_of(compiled.network, compiled.form, compiled.program, binding)[1][node.data]
-        return where + position_of(boxes, (n.data for n in node.args))
-
     def _contact(self, number: int, s: Switch) -> Contact:
         def row(name: str | None) -> int:
             return -1 if name is None else self.row[name]
@@ -129,11 +121,13 @@ class _Planner:
         if not 0.0 <= restitution <= 1.0:
             text = f"phi {s.name}: restitution {restitution:g} is not between 0 and 1"
             raise ModelError([Diagnostic("E514", text, s.place)])
-        sense = -1 if s.sense is None else self.parameter(s.sense)
+        sense = -1 if s.sense is None else self.prepared.place(s.sense)
+        kind = "friction" if s.kind == "relation" else s.kind
         return Contact(
-            s.name, s.kind, number, row(s.value), row(s.rate), row(s.multiplier), row(s.acceleration), row(s.bound),
+            s.name, kind, number, row(s.value), row(s.rate), row(s.multiplier), row(s.acceleration), row(s.bound),
             row(s.upper), row(s.lower), sense, row(s.guard), restitution,
-            tuple(self.row[name] for name in s.aim), tuple(self.parameter(n) for n in s.direction),
+            tuple(self.row[name] for name in s.aim), tuple(self.prepared.place(n) for n in s.direction),
+            -1 if s.holds is None else self.prepared.place(s.holds),
         )  # fmt: skip
 
 

@@ -9,16 +9,18 @@ import time
 from dataclasses import field
 from typing import Any
 
-from sysdyn.compiler.binding.binding import Binding
+from sysdyn.compiler.binding.binding import Binding, places_of
 from sysdyn.compiler.formulations import choose
 from sysdyn.compiler.network.pruning import Removal, pruned
 from sysdyn.compiler.pipeline import CompiledModel, compile_network
 from sysdyn.compiler.program import build
 from sysdyn.dsl.model.collecting import at_rest
+from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import ModelError, Place, Report
 from sysdyn.runtime.model import carrier
 from sysdyn.runtime.model.carrier import Carrier
+from sysdyn.runtime.model.description import position_of
 from sysdyn.values import dataclass
 
 
@@ -57,8 +59,18 @@ class Prepared:
         b = self.binding
         sizes = b.ix.tobytes(), b.shapes, b.row_shapes
         stand = not (self.network.events or self.network.switches or self.compiled.form.kinks)
-        found = {**self.arrays_of(b), "stand": stand}
+        holds = [self.place(s.holds) for s in self.compiled.network.switches if s.holds is not None]
+        found = {**self.arrays_of(b), "stand": stand, "holds": holds}
         return {**found, "layouts": self.layouts.setdefault(sizes, {}), "alone": self.alone}
+
+    def place(self, node: Node) -> int:
+        """The place in p of a parameter, or of an element of one."""
+        compiled, binding = self.compiled, self.binding
+        if not node.args:
+            return compiled.program.scalars.index(node.data)
+        boxes = binding.parameters.boxes[node.data]
+        where = places_of(compiled.network, compiled.form, compiled.program, binding)[1][node.data]
+        return where + position_of(boxes, (n.data for n in node.args))
 
     @staticmethod
     def arrays_of(b: Binding) -> dict[str, Any]:

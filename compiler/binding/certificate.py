@@ -100,10 +100,13 @@ class _Judge:
         """Every element that may lose or supply power."""
         controlled: list[tuple[str, Node, Place]] = []
         self.senses = frozenset(s.sense.data for s in network.switches if s.sense is not None)
+        sets = {s.label for s in network.switches if s.holds is not None}
+        closing = [c for c in network.constraints if c.kind == "gamma" and c.name in sets]  # u = 0, or s = sense
+        signs = {ex.var(c.name, "e", *c.at): ex.call("sign", c.expression.args[1]) for c in closing}
         for b in network.branches:
             if b.domain.pseudo or b.law is None:
                 continue
-            yield from self._branch(b, b.law, network, controlled)
+            yield from self._branch(b, ex.substitute(b.law, signs) if signs else b.law, network, controlled)
         yield from self._contents(network)
         yield from self._stores(network)
         yield from self._works(network, controlled)

@@ -34,7 +34,7 @@ def structure(form: DescriptorForm, program: Program, network: Network) -> dict[
 
     return {
         "branches": [program.scalars.index(k.branch) for k in form.kinks if k.slide],
-        "switches": [{"owner": s.label, "at": list(s.at)} for s in network.switches],
+        "switches": [{"owner": s.label, "at": list(s.at)} for s in network.switches if s.holds is None],
         "families": [_family(f) | gathered(f.name) for f in form.families],
         "rows": [_row(r) | gathered(r.label) for r in form.rows],
         "blocks": {name: {"kernels": [_kernel(k) for k in patterns]} for name, patterns in program.patterns},

@@ -191,7 +191,7 @@ def energies(network: Network) -> EnergyModel:
         labels={c.name: c.unit.text for c in network.constraints},
         quasis=network.quasis,
         speeds=tuple(Quantity(o.name, flows(o.expression), False, o.unit.text, o.place) for o in network.speeds),
-        switched=frozenset(s.label for s in network.switches),
+        switched=frozenset(s.label for s in network.switches if s.holds is None),
     )
     touched = tangible(model)
     coordinates = tuple(replace(c, tangible=c.name in touched) for c in model.coordinates)

@@ -19,6 +19,7 @@ from sysdyn.compiler.network.positions import from_stores, with_positions
 from sysdyn.compiler.network.primal.reading import KINDS
 from sysdyn.compiler.network.quadratures import from_masses, massive, with_quadratures
 from sysdyn.compiler.network.stated import ALL, as_elements
+from sysdyn.compiler.network.sticking import as_relations
 from sysdyn.compiler.network.ungrounded import grounded
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -46,7 +47,7 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    bare = from_masses(from_stores(grounded(as_elements(network, ALL))))
+    bare = from_masses(from_stores(grounded(as_elements(as_relations(network), ALL))))
     network = with_positions(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
@@ -122,7 +123,7 @@ def _read(network: Network) -> Iterable[str]:
 
 def unreflectable(network: Network) -> Diagnostic | None:
     """The first statement that reads a displacement or flow where only momenta and efforts may stand (E602)."""
-    network = as_elements(along(network, complementary=True), ALL)
+    network = as_elements(along(as_relations(network), complementary=True), ALL)
     help_ = "formulation lagrangian, hamiltonian"
     statements: list[tuple[str, tuple[ex.Node, ...], Place]] = [
         (f"energy {e.function}", (e.expression,), e.place) for e in network.energies if e.function in ALL

@@ -128,9 +128,8 @@ class Elements(Connections):
             self._hidden(value, own, symbol.name)
             with self.resolver.inside(loops, {**bound, **own}):
                 law = law_of(self.resolver, symbol, whole, side, value, kind, span)
-            if law.kind == "dissipator" and side == "e":
-                node = events.sticking(self, law.law, symbol.family.name, whole, loops, self.place(s.span))
-                law = replace(law, law=node)
+            node = events.of_law(self, law, symbol.family.name, whole, loops, self.place(s.span))
+            law = replace(law, law=node)
             self.resolver.laws[symbol.family.name] = law
             said = law.kind, law.side, law.law
             branch = self.branch(symbol.family.name, symbol.domain, whole, loops, said, ends, self.place(s.span))

@@ -2,8 +2,9 @@
 
 What an event reads is observed beside the traced quantities, so every arrow of the compiler carries it as it carries
 those: a relation a > b is the observation a - b, the value of an action another.  A constraint that holds at times is
-an equality among the rows, and a `Switch` that says when; `c*setsign(u)` and `c*abs(u)` in a content become the
-effort c*sense with a sense that events set, and psi: u = 0, which holds while the bodies stick.
+an equality among the rows, and a `Switch` that says when; dry friction, `c*setsign(f)` of an element's own flow and
+`c*abs(u)` in a content, becomes the effort c*sense with a sense that events set, and psi: u = 0, which holds while the
+bodies stick.  In any other relation `setsign(u)` is an unknown, closed by u = 0 or by the sense (`relation`).
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Action, Constraint, Event, Loop, Observation, Parameter
+from sysdyn.dsl.model.network import Action, Constraint, Event, Loop, Observation, Parameter, Unknown
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
+from sysdyn.dsl.names.failures import Failed
+from sysdyn.dsl.names.laws import LawOf
 from sysdyn.dsl.names.symbols import ParameterSymbol, Typed, Vector
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
@@ -46,6 +49,7 @@ class Draft:
     rate: Node | None = None
     aim: tuple[Node, ...] = ()
     direction: tuple[Node, ...] = ()
+    holds: Node | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,10 +277,11 @@ def sticking(
     """A law or content with its set-valued terms c*setsign(u), c*abs(u) as c*sense and c*sense*u; the switches that
     say which sense, and psi: u = 0 for sticking.
     """
-    found = [n for n in ex.topological([root]) if n.op == "call" and n.data == "setsign"]
-    for k, node in enumerate(found):
+    again = sum(draft.element == label for draft in frame.parts.drafts)  # elements of one label, said one by one
+    own = tuple(ex.index(loop.index) for loop in loops)
+    for k, node in enumerate(filter(_set_at, ex.topological([root]))):
         name = f"{label} sticking" + (f" {k + 1}" if k else "")
-        sense = _sense(frame, f"{name} sense", at, loops, place)
+        sense = _sense(frame, f"{name} sense" + (f" {again + 1}" if again else ""), own, loops, place)
         inner = node.args[0]
         mark = ex.var("#sign", "s")
         bound = derivative(ex.substitute(root, {node: mark}), mark)
@@ -286,6 +291,68 @@ def sticking(
         _stick(frame, name, (at, loops), (inner, bound, sense), place, label)
         root = ex.substitute(root, {node: sense})
     return root
+
+
+def of_law(
+    frame: ElaborationContext, law: LawOf, label: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place
+) -> Node:
+    """The law of a branch: dry friction of its own flow sticks by a reaction, else it is a relation."""
+    terms = [n.args[0] for n in ex.topological([law.law]) if _set_at(n)]
+    if law.kind in ("kinetic", "potential") and not all(map(_steady, terms)):
+        return law.law
+    flow = ex.var(label, "bf", *at)
+    if law.kind == "dissipator" and law.side == "e" and all(_steady(ex.sub(u, flow)) for u in terms):
+        return sticking(frame, law.law, label, at, loops, place)
+    return relation(frame, law.law, ex.var(label, f"b{law.side}", *at), label, loops, place)
+
+
+def relation(
+    frame: ElaborationContext, text: Node, given: Node, label: str, loops: tuple[Loop, ...], place: Place
+) -> Node:
+    """The text of a relation given = text with each term c*setsign(u) as c*s: s closes  u = 0  where that holds, else
+    s = sense, the sign of u.  It holds as long as c*s, what the others leave, is within c.  Where u moves at finite
+    rates alone it is a sign, which may slide (forms/corners).
+    """
+    at, shape = tuple(ex.index(loop.index) for loop in loops), tuple((loop.first, loop.last) for loop in loops)
+    change: dict[Node, Node] = {}
+    made: list[tuple[Node, Node]] = []
+    again = sum(draft.element == label for draft in frame.parts.drafts)
+    for node in filter(_set_at, ex.topological([text])):
+        u = ex.substitute(node.args[0], change)
+        if _steady(u):
+            change[node] = ex.call("sign", u)
+            continue
+        name = f"{label} set" + (f" {again + len(made) + 1}" if again + len(made) else "")
+        change[node] = ex.var(name, "e", *at)
+        frame.parts.unknowns.append(Unknown(name, shape, si(NONE), place))
+        made.append((change[node], u))
+    text = ex.substitute(text, change)
+    root = ex.sub(given, text)
+    for s, u in made:
+        factor, name = derivative(root, s), s.data[0]
+        inside = {n for n in ex.topological([u, factor]) if n.op == "index"} - set(at)
+        if s in ex.variables(factor) or ex.is_const(factor, 0.0) or inside:
+            said = f"setsign enters {label} in another way than c*setsign(u)"
+            frame.report.error("E705", said, place, help="implicit s: 1, closed by gamma set: s = setsign(u)")
+            raise Failed
+        sense, holds = (_sense(frame, f"{name} {what}", at, loops, place) for what in ("sense", "holds"))
+        row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, ex.sub(s, sense))
+        frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
+        rest = ex.substitute(root, {s: ex.const(0.0)})
+        left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
+        bound = ex.call("abs", factor)
+        draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, holds=holds)
+        frame.parts.drafts.append(draft)
+    return text
+
+
+def _set_at(node: Node) -> bool:
+    return node.op == "call" and node.data == "setsign"
+
+
+def _steady(u: Node) -> bool:
+    """Whether a value moves at finite rates alone: of displacements, states and time."""
+    return all(n.op == "time" or (n.data[1] in ("q", "nq", "bq", "s") and not n.data[2]) for n in ex.variables(u))
 
 
 def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], place: Place) -> Node:

@@ -45,6 +45,8 @@ class Statements(Declarations):
             self.report.error("E106", f"'{s.decl.name}' is declared twice", self.place(s.decl.span), related=related)
             raise Failed
         node = ex.sub(left.node, right.node)
+        if s.kind == "gamma":
+            node = events.relation(self, node, ex.const(0.0), family.name, self.resolver.loops, place)
         constraint = Constraint(s.kind, family.name, at, node, self.resolver.loops, si(dimension), place)
         constraint = events.guarded(self, s, constraint)
         self.said(constraint)

@@ -158,23 +158,17 @@ def smoothness(model: Elaborator, report: Report) -> None:
 
 
 def _set_valued(model: Elaborator, report: Report) -> None:
-    """E705: setsign where no multiplier can stand for it; N608 of a gamma."""
+    """E705: setsign where no relation can say its value; gammas and laws have none left."""
     parts = model.parts
-    said = [(c.expression, c.place, c.kind) for c in parts.constraints]
-    said += [(b.law, b.place, "law") for b in parts.branches if b.law is not None]
-    said += [(w.effort, w.place, "work") for w in parts.works] + [(d.expression, d.place, "") for d in parts.dynamics]
-    said += [(e.expression, e.place, e.function) for e in parts.energies]
-    said += [(o.expression, o.place, "") for o in parts.watched]
-    said += [(a.value, a.place, "") for d in parts.event_drafts for a in d.actions]
-    said += [(d.condition, d.place, "") for d in parts.event_drafts if d.condition is not None]
-    for node, place, kind in said:
-        if _has_setsign(node):
-            if kind in ("gamma", "D", "law"):
-                what = {"law": "a law that gives a flow"}.get(kind, f"a {kind}")
-                help_ = "dissipator(e = c*setsign(f))"
-                report.note("N608", f"setsign in {what} is not supported yet", place, help=help_)
-            else:
-                _no_set(place, report)
+    said = [(c.expression, c.place) for c in parts.constraints]
+    said += [(b.law, b.place) for b in parts.branches if b.law is not None]
+    said += [(w.effort, w.place) for w in parts.works] + [(d.expression, d.place) for d in parts.dynamics]
+    said += [(e.expression, e.place) for e in parts.energies]
+    said += [(o.expression, o.place) for o in parts.watched]
+    said += [(a.value, a.place) for d in parts.event_drafts for a in d.actions]
+    said += [(d.condition, d.place) for d in parts.event_drafts if d.condition is not None]
+    for place in dict.fromkeys(place for node, place in said if _has_setsign(node)):
+        _no_set(place, report)
 
 
 def set_valued_results(model: Elaborator, observations: Iterable[Observation], report: Report) -> None:
@@ -191,7 +185,9 @@ def _has_setsign(root: Node) -> bool:
 
 
 def _no_set(place: Place, report: Report) -> None:
-    report.error("E705", "setsign outside a law, gamma or content", place, help="sign for an ordinary function")
+    text = "setsign outside a gamma and the law of a dissipator or source"
+    help_ = "implicit s: 1, closed by gamma set: s = setsign(u); sign for an ordinary function"
+    report.error("E705", text, place, help=help_)
 
 
 def _corner(node: Node, place: Place, report: Report) -> None:
@@ -200,7 +196,7 @@ def _corner(node: Node, place: Place, report: Report) -> None:
     for flow in unknowns_of(node, "f"):
         if _jumps(node, flow) or _jumps(derivative(node, flow), flow):
             message = f"the law is not differentiable at {flow} = 0 and contains abs or sign"
-            report.warning("W301", message, place, help="tanh to smooth; set-valued friction is content D with abs")
+            report.warning("W301", message, place, help="setsign for set-valued friction, tanh to smooth")
             return
 
 

@@ -97,7 +97,7 @@ REMEDIES = {
     "E702": "a discrete variable, a state, or the rate x' of a coordinate",
     "E703": "a positive time: every 5 ms",
     "E704": "one assignment to each variable",
-    "E705": "setsign in a dissipator's law, or content D = Fc*abs(x')",
+    "E705": "implicit s: 1, closed by gamma set: s = setsign(u); sign for an ordinary function",
     "E801": "leave one of the two out",
     "E802": "one of its levels: sysdyn list FILE",
     "E803": "mark one of them 'default', or choose one where it is used",

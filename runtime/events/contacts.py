@@ -46,6 +46,8 @@ class Contacts:
         self._finite: frozenset[int] | None = None
         # wrong open and closed (pivoting.py): zero of its value is none of its multiplier, any value above zero is open
         self.open: frozenset[int] = frozenset()
+        self.through: set[int] = set()  # frictions whose value goes through zero
+        self.reversed: set[int] = set()  # those that have turned back, as long as one active set is sought
         self.time = 0.0
         places = self.switches.places
         kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
@@ -53,7 +55,8 @@ class Contacts:
             same = [c for c in contacts if (c.kind, observer.unit(c.value)) == kind]
             for name in ("value", "rate", "multiplier"):
                 observer.alike([getattr(c, name) for c in same])
-        self.multiplier = [int(system.form.at[places[k.number][0]]) + places[k.number][1] for k in contacts]
+        own = [places[k.number] if k.hold < 0 else None for k in contacts]
+        self.multiplier = [-1 if at is None else int(system.form.at[at[0]]) + at[1] for at in own]
         self.frozen = mates(plan, system, self.multiplier)
 
     def size(self, magnitude: Floats, time: float) -> None:
@@ -69,7 +72,8 @@ class Contacts:
             alike = own & (units == self.observer.unit(contact.value))
             size = FAINT * float(magnitude[: kinds.size][alike if alike.any() else own].max(initial=0.0))
             rows = ((contact.value, size), (contact.rate, size / time), (contact.acceleration, size / time**2))
-            for row, least in (*rows, (contact.multiplier, FAINT * float(magnitude[place]))):
+            loaded = FAINT * float(magnitude[place]) if place >= 0 else 0.0
+            for row, least in (*rows, (contact.multiplier, loaded)):
                 if row >= 0:
                     largest[row] = max(largest[row], least)
 
@@ -83,7 +87,8 @@ class Contacts:
 
     def take(self, switches: NDArray[np.bool_]) -> None:
         """The active set of the switches as it is given."""
-        self.active = np.array([switches[c.number] for c in self.contacts], dtype=bool)
+        held = [switches[c.number] if c.hold < 0 else self.p[c.hold] for c in self.contacts]
+        self.active = np.array(held, dtype=bool)
         self.switches.set(switches)
 
     def apply(self) -> None:
@@ -94,7 +99,10 @@ class Contacts:
         for k, contact in enumerate(self.contacts):
             if contact.kind == "follows":
                 self.active[k] = self.active[k - 1]
-            now[contact.number] = self.active[k]
+            if contact.hold < 0:
+                now[contact.number] = self.active[k]
+            else:
+                self.p[contact.hold] = self.active[k]
         self.switches.set(now)
 
     def state(self) -> tuple[float, ...]:
@@ -113,6 +121,8 @@ class Contacts:
     def word(self, k: int) -> str:
         """How a contact stands."""
         contact = self.contacts[k]
+        if contact.hold >= 0:
+            return "at zero" if self.active[k] else "above" if self.p[contact.sense] > 0.0 else "below"
         if contact.kind == "friction":
             return "sticks" if self.active[k] else f"slips {'+' if self.p[contact.sense] > 0.0 else '-'}"
         if contact.kind == "planar":
@@ -178,6 +188,8 @@ class Contacts:
 
     def _impulse_on(self, k: int, impulses: Floats) -> float:
         """That of a contact; of friction in the plane its size."""
+        if self.multiplier[k] < 0:
+            return 0.0
         own = float(impulses[self.multiplier[k]])
         return float(np.hypot(own, impulses[self.multiplier[k + 1]])) if self.contacts[k].kind == "planar" else own
 
@@ -288,7 +300,12 @@ class Contacts:
             self.p[contact.sense] = 1.0
             return
         slips = contact.kind == "friction" and not self.active[k]
-        if slips and abs(values[contact.value]) > self.observer.zero(contact.value):
+        if slips and k in self.through:
+            self.p[contact.sense] = -self.p[contact.sense] or np.sign(values[contact.rate]) or 1.0
+            return
+        if slips and abs(values[contact.value]) > self.observer.zero(contact.value) and k not in self.reversed:
+            if self.p[contact.sense] != 0.0:
+                self.reversed.add(k)
             self.p[contact.sense] = np.sign(values[contact.value])
             return
         self.flip(k, values)

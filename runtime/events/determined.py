@@ -72,7 +72,8 @@ class Determined:
                 rows, _, number, _ = switch_rows(system.description, system.form)
                 share = np.linalg.norm(left[rows, some:], axis=1)
                 at = np.array([c.number for c in self.contacts.contacts])
-                total = np.zeros(len(system.description.switches.places))
+                total = np.zeros(len(system.description.switches.places) + 1)
+                total[-1] = 1.0  # of relations, which have no switch
                 np.maximum.at(total, number, share)
                 part = total[at]
             self._regular[key] = sigma.size - some, part
@@ -111,11 +112,19 @@ class Determined:
                     turn()
                     contacts.apply()
                     found = self._near(t, point, settle, pivots=pivots)
-                    if found is not None:
+                    if found is not None and self._goes_on(k, point, found):
                         less = self.nullity(t, *found)
                         if less < open_:
                             yield found, less
                     contacts.become(before)
+
+    def _goes_on(self, k: int, point: Point, other: Point) -> bool:
+        """Whether the motion is the same; what a relation leaves open moves something where its sense decides."""
+        if self.contacts.contacts[k].hold < 0:
+            return True
+        moves = np.isin(self._system.kinds, ("f", "s"))[: point[1].size]
+        rates = np.stack([one[1][: moves.size][moves] for one in (point, other)])
+        return bool((np.abs(rates[0] - rates[1]) <= NOTHING * np.abs(rates).max(initial=0.0)).all())
 
     def _turns(self, k: int, values: Floats) -> Iterator[Callable[[], None]]:
         """What else contact k may be: friction that sticks may be at its bound in either sense, first that in which it

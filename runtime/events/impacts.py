@@ -128,20 +128,25 @@ class Impacts:
             if k is None:
                 return found
             held = contacts.active[k]
-            contacts.slip(k, float(np.sign(found.whole[contacts.multiplier[k]])) if held else 0.0)
+            contacts.slip(k, float(np.sign(self._impulse(k, found, blow)[0])) if held else 0.0)
             contacts.active[k] = not held
         raise NoActiveSetError(tuple(contacts.contacts[k].name for k in told))
 
     def _gives_wrong(self, k: int, found: _Struck, blow: _Blow) -> bool:
         """Whether a friction that holds has more than its bound, or one that slides has turned back."""
-        contacts, (t, y, yd) = self.contacts, blow.point
-        contact, sense = contacts.contacts[k], float(contacts.p[contacts.contacts[k].sense])
+        contacts, contact = self.contacts, self.contacts.contacts[k]
         if not contacts.active[k]:
-            return bool(sense * found.values[contact.value] < -contacts.observer.zero(contact.value))
-        reactions = contacts.system.are("kappa", "mu", "e")[: y.size]
-        bounds = (contacts.system.observe(t, np.where(reactions, given, y), yd) for given in (found.whole, 0.0 * y))
-        bound = np.subtract(*(values[contact.bound] for values in bounds))
-        return bool(abs(found.whole[contacts.multiplier[k]]) > bound + contacts.impulse(contact))
+            slip = float(contacts.p[contact.sense]) * found.values[contact.value]
+            return bool(slip < -contacts.observer.zero(contact.value))
+        impulse, bound = self._impulse(k, found, blow)
+        return bool(abs(impulse) > bound + contacts.impulse(contact))
+
+    def _impulse(self, k: int, found: _Struck, blow: _Blow) -> Floats:
+        """What a friction that holds has given, and its bound: both are linear in impulses."""
+        contact, (t, y, yd), system = self.contacts.contacts[k], blow.point, self.contacts.system
+        reactions = system.are("kappa", "mu", "e")[: y.size]
+        values = [system.observe(t, np.where(reactions, given, y), yd) for given in (found.whole, 0.0 * y)]
+        return np.subtract(*values)[[contact.multiplier, contact.bound]]
 
     def _struck(self, blow: _Blow) -> _Struck:
         """Behind the impulses of inequalities, with the frictions that hold as they are."""

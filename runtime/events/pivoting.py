@@ -41,10 +41,11 @@ class Pivoting:
 
     def __init__(self, contacts: Contacts, singular: Callable[[float, Floats, Floats], bool]) -> None:
         self.contacts, self.singular = contacts, singular
-        self._contradicts: set[tuple[bool, ...]] = set()
+        self._contradicts: set[tuple[float, ...]] = set()
 
     def fit(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats]:
         """A consistent point whose active set fits, from the present one; NoActiveSetError."""
+        self.contacts.reversed.clear()
         before, turned = (self.contacts.active.copy(), self.contacts.p.copy()), dict[int, set[bool]]()
         try:
             return self._pivoted(t, y, yd, settle, turned)
@@ -121,10 +122,13 @@ class Pivoting:
         """Where the active set contradicts itself (a source that two diodes short): the point of a near one, not seen
         yet, that does not: the first that fits, else the first; the active set then is that.
         """
-        before, first = self.contacts.active.copy(), None
+        before, stood, first = self.contacts.active.copy(), self.contacts.state(), None
         for turned in self._near(before):
-            self.contacts.active[:] = before
+            self.contacts.become(stood)
             self.contacts.active[list(turned)] = ~before[list(turned)]
+            for k in (k for k in turned if self.contacts.contacts[k].kind == "friction"):
+                self.contacts.p[self.contacts.contacts[k].sense] = float(before[k])
+                self.contacts.through.update([k] if before[k] else [])
             self.contacts.apply()
             open_ = len(turned) <= NEAR and self.singular(t, y, yd)
             if open_ or self.contacts.state() in seen:
@@ -133,22 +137,21 @@ class Pivoting:
             if found is not None and self.contacts.fits(t, y, found):
                 return found
             if found is not None and first is None:
-                first = found, self.contacts.active.copy()
+                first = found, self.contacts.state()
         if first is None:
             return None
-        self.contacts.active[:] = first[1]
-        self.contacts.apply()
+        self.contacts.become(first[1])
         seen.add(self.contacts.state())
         return first[0]
 
     def _near(self, before: NDArray[np.bool_]) -> Iterator[Sequence[int]]:
-        """Which inequalities to turn, the fewest first, those that do not hold before those that do; where none holds,
-        all of them before.
+        """Which to turn, the fewest first, inequalities that do not hold before those that do and frictions; where no
+        inequality holds, all of them before.
         """
         contacts, frozen = self.contacts.contacts, self.contacts.frozen
         free = [k for k, c in enumerate(contacts) if c.kind in ("phi", "psi") and k not in frozen]
         rest = [k for k in free if not before[k]]
-        order = rest + [k for k in free if before[k]]
+        order = rest + [k for k in free if before[k]] + [k for k, c in enumerate(contacts) if c.kind == "friction"]
         nearest = (c for number in range(1, NEAR + 1) for c in combinations(order, number))
         if rest == free:
             return islice(chain([rest], nearest), BESIDE)
@@ -156,7 +159,7 @@ class Pivoting:
 
     def _settled_by(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats, Floats] | None:
         """As settle; a set whose equations depend on each other, and that contradicted itself, is not tried again."""
-        key = tuple(self.contacts.active.tolist())
+        key = self.contacts.state()
         if key in self._contradicts:
             return None
         found = settle(t, y, yd)

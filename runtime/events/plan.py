@@ -55,6 +55,7 @@ class Contact:
 
     kind: phi, psi (value >= 0, multiplier >= 0 where it holds), guarded (holds while the row `guard` is not zero),
     friction (where it holds, abs(multiplier) <= bound; else the place `sense` of p is the sign of the value).
+    hold: place of p that is 1 while it does, of friction that a relation reads: it has no switch (number -1).
     planar is friction in the plane: value is the speed along `direction` (a flow: places in p) less half the speed,
     rate that of the former, aim the rows of both flows, both multipliers and the speed; follows holds where the one
     before it does.
@@ -77,6 +78,7 @@ class Contact:
     restitution: float = 0.0
     aim: tuple[int, ...] = ()
     direction: tuple[int, ...] = ()
+    hold: int = -1
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,6 +67,7 @@ class Succession:
     ) -> tuple[Point, bool]:
         """The same from this very point."""
         restart = self._restart
+        self.contacts.through.clear()
         self._guards(t, y, yd)
         stood = self.contacts.state()
         known = None if stalled else self._remembered(t, (y, yd), (stood, tuple(touched)))
@@ -76,6 +77,7 @@ class Succession:
         self.blow = False
         values = self.observer(t, y, yd)
         for k in touched:
+            self._let_through(k, t, y, yd)
             if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
                 self.contacts.turn(k, values)
         self.contacts.apply()
@@ -85,6 +87,23 @@ class Succession:
         if not self._impacts:
             self._follows[stood, tuple(touched)] = self.contacts.state()
         return self._closed(t, found), True
+
+    def _let_through(self, k: int, t: float, y: Floats, yd: Floats) -> None:
+        """Whether the value of a relation goes through zero: neither it nor its rate follows the sense at once."""
+        contacts, contact = self.contacts, self.contacts.contacts[k]
+        if contact.hold < 0 or contacts.active[k]:
+            return
+        ends, stood = list[Floats](), contacts.state()
+        for sense in (1.0, -1.0):
+            contacts.slip(k, sense)
+            contacts.apply()
+            found = self._restart.struck(t, y, yd)
+            if found is not None:
+                ends.append(self.observer(t, *found[:2])[[contact.value, contact.rate]])
+        contacts.become(stood)
+        least = [self.observer.zero(row) for row in (contact.value, contact.rate)]
+        if len(ends) == 2 and (np.abs(ends[0] - ends[1]) <= least).all():
+            contacts.through.add(k)
 
     def _closed(self, t: float, point: Point) -> Point:
         """The point with gaps that hold brought to nothing: one that is caught in flight is only nearly closed."""

@@ -33,7 +33,7 @@ class ContactRest:
     def __init__(self, system: System, tangible: AbstractSet[str], t: float, first: Floats, plan: Plan) -> None:
         self.system, self.tangible, self.t, self.first = system, tangible, t, first
         self.contacts = Contacts(plan, system, Observer(system), system.description.p, starting=True)
-        self.contacts.active = np.array([system.description.switches.active[c.number] for c in plan.contacts])
+        self.contacts.take(system.description.switches.active)
         self._frictions = [k for k, c in enumerate(plan.contacts) if c.kind in ("friction", "planar")]
         self._of: dict[tuple[bool, ...], Resting] = {}
         started = self.contacts.state()
@@ -75,6 +75,7 @@ class ContactRest:
     def _fitting(self, guess: Floats, begin: tuple[float, ...]) -> Rest | None:
         """The same, from a state of the contacts."""
         self.contacts.become(begin)
+        self.contacts.through.clear()
         pivoting = Pivoting(self.contacts, lambda *_: False)
         try:
             pivoting.fit(self.t, guess, np.zeros_like(guess), self._settle)
@@ -99,7 +100,7 @@ class ContactRest:
         values = contacts.observer(self.t, y, yd)
         for k in self._frictions:
             contact, place = contacts.contacts[k], contacts.multiplier[k]
-            if contacts.active[k]:
+            if contacts.active[k] or place < 0:
                 continue
             if contact.kind == "friction":
                 y[place] = contacts.p[contact.sense] * values[contact.bound]

@@ -195,12 +195,12 @@ def stated(
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A compiled model bound to parameter values.  p [parameters] SI, the binding's own and read-only where no event
+    """A compiled model bound to parameter values. p [parameters] SI, the binding's own and read-only where no event
     writes there (`System.own_numbers`); ix [integers]; layouts: what follows from the structure of the index forms
-    made so far, found once (System.once); branches: places in p of laws that may slide (events/kinks.py); systems:
-    those of runs one after the other that share p, by index form; alive: those that somebody has now, where runs do
-    not share them; room: work of their Jacobians; constants: of integrated constraints, by their family of rows, where
-    they begin in p and how many there are.
+    made so far, found once (System.once); branches: places in p of laws that may slide (events/kinks.py); holds: those
+    that say whether set-valued relations hold; systems: those of runs one after the other that share p, by index form;
+    alive: those that somebody has now, where runs do not share them; room: work of their Jacobians; constants: of
+    integrated constraints, by their family of rows, where they begin in p and how many there are.
     """
 
     families: tuple[Family, ...]
@@ -211,6 +211,7 @@ class Description:
     initial: tuple[Initial, ...]
     switches: Switches
     branches: tuple[int, ...] = ()
+    holds: tuple[int, ...] = ()
     systems: dict[Any, Any] | None = field(default=None, compare=False)
     layouts: dict[Any, Any] = field(default_factory=dict, compare=False)
     alive: WeakValueDictionary[Any, Any] = field(default_factory=WeakValueDictionary, compare=False)
@@ -358,6 +359,7 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
         initial=initial,
         switches=Switches(tuple(_switched(item, families, shapes) for item in structure.get("switches", ()))),
         branches=tuple(int(place) for place in structure.get("branches", ())),
+        holds=tuple(binding.get("holds", ())),
         systems={} if binding.get("alone") else None,
         layouts=layouts,
         constants=tuple((int(row), int(place), int(number)) for row, place, number in binding.get("offsets", ())),

@@ -50,12 +50,12 @@ integral over the instant, of flows and momenta their rate behind it.
 @dataclass(frozen=True, slots=True)
 class _Rows:
     """Rows [rows] that hold behind the instant, in unknowns that move [unknowns]; the entries of those that are linear
-    in moves and integrals, from dF/dy and dF/dyd; ease [unknowns]: times their magnitudes, how far these may move.
+    in moves and integrals, from dF/dy, dF/dyd and y; ease [unknowns]: times their magnitudes, how far these may move.
     """
 
     behind: Mask
     moves: Mask
-    integrals: Callable[[Floats, Floats], Entries]
+    integrals: Callable[[Floats, Floats, Floats], Entries]
     ease: Floats | float = 1.0
     iterations: int = ITERATIONS
 
@@ -70,6 +70,7 @@ class Instant:
         self._balances = settled.of_groups("dynamics")
         self._states, self._constraints = settled.of_groups("momentum", "gamma"), settled.of_groups("phi_rate", "psi")
         self._moving, self._force = np.isin(kinds, ("f", "p", "e")), np.isin(kinds, FORCES)
+        self._told, self._struck = self._reacting()
         self._moved = np.full(settled.unknowns, -1, dtype=np.int64)
         self._moved[form.k_f] = form.k_q
         inertial, (in_y, in_rate) = inertial_rows(settled), settled.structural()
@@ -79,6 +80,20 @@ class Instant:
         answered = inertial.copy()
         answered[self._row[in_rate | (in_y & flow)]] = True
         self._given = settled.of_groups("phi", "dynamics", "gamma") & ~answered
+
+    def _reacting(self) -> tuple[Mask, Mask]:
+        """Gammas [rows] of implicit efforts that follow from multipliers (friction on a reaction); which forces have
+        impulses where flows jump [unknowns]: those efforts, and multipliers.
+        """
+        kinds, gammas = self.system.kinds, self.system.of_groups("gamma")[self._row]
+        reactions = np.isin(kinds, ("kappa", "mu"))
+        reads = np.zeros(self.system.rows, dtype=bool)
+        reads[self._row[gammas & reactions[self._column]]] = True
+        follows = reactions.copy()
+        follows[self._column[reads[self._row] & (kinds == "e")[self._column]]] = True
+        told = np.zeros(self.system.rows, dtype=bool)
+        told[self._row[gammas & (follows & ~reactions)[self._column]]] = True
+        return told, follows
 
     def broken(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> bool:
         """Whether a constraint on flows does not hold at the point."""
@@ -153,8 +168,8 @@ class Instant:
         push, open_ = np.zeros(self.system.rows) if push is None else push, self._leaves_open(t, y, yd, magnitude)
         if aims is None and not (push.any() or open_ or self.broken(t, y, yd, magnitude)):
             return y, np.zeros(y.size)
-        moving, acts = self._moving[self._column], self._acting() & (self.system.kinds != "e")[self._column]
-        at = np.flatnonzero(self._balances[self._row] & (moving | acts))
+        moving, acts = self._moving[self._column], self._acting() & self._struck[self._column]
+        at = np.flatnonzero((self._balances[self._row] & (moving | acts)) | (self._told[self._row] & acts))
         rows, columns = 2 * self._row[at] + 1, 2 * self._column[at] + acts[at]
         behind, moves, ease = self._now(self._constraints) | self._states, self._moving, 1.0
         rated = at[:0]
@@ -163,7 +178,12 @@ class Instant:
             behind, moves = behind | self._balances, moves | self._force
             rows, columns = np.append(rows, 2 * self._row[rated]), np.append(columns, 2 * self._column[rated] + 1)
 
-        def integrals(jy: Floats, jyd: Floats) -> Entries:
+        reacts = self._struck & (self.system.kinds != "e")
+        told = self._told[self._row] if self._told.any() else None
+
+        def integrals(jy: Floats, jyd: Floats, here: Floats) -> Entries:
+            if told is not None:  # friction on a reaction that is nothing yet
+                jy = np.where(told, self.system.jacobian(t, np.where(reacts, here + magnitude, here), yd)[0], jy)
             return rows, columns, np.append(np.where(acts, jy, jyd)[at], jyd[rated])
 
         aim = np.stack([np.zeros(self.system.rows) if aims is None else aims, -push], axis=1)
@@ -180,12 +200,14 @@ class Instant:
         return free is not None and bool(free[column].any())
 
     def _sloping(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
-        """Y with implicit efforts at their magnitudes where their laws are flat: a flat one decides about the flows."""
+        """Y with implicit efforts at their magnitudes where their laws are flat (a flat one decides about the flows),
+        but for those that multipliers tell.
+        """
         steepest = np.zeros(y.size)
         jy, _ = self.system.jacobian(t, y, yd)
         mine = self._states[self._row]
         np.maximum.at(steepest, self._column[mine], np.abs(jy[mine]))
-        return np.where((self.system.kinds == "e") & (steepest == 0.0), y + magnitude, y)
+        return np.where((self.system.kinds == "e") & ~self._struck & (steepest == 0.0), y + magnitude, y)
 
     def _jump(
         self,
@@ -208,7 +230,7 @@ class Instant:
         here = meant.behind[self._row] & meant.moves[self._column]
         for _ in range(meant.iterations):
             jy, jyd = (np.where(np.isfinite(item), item, 0.0) for item in self.system.jacobian(t, y, yd))
-            i, j, v = meant.integrals(jy, jyd)
+            i, j, v = meant.integrals(jy, jyd, y)
             aim = np.zeros((self.system.rows, 2)) + aims
             aim[meant.behind, 0] -= self.system.residual(t, y, yd)[meant.behind]
             change, aim = np.stack([y - start, integral], axis=1).ravel(), aim.ravel()

@@ -246,11 +246,15 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
 
 
 def _sliding_index(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
-    """The index that the model may come to where laws slide that can: whose sense their function's rate contains."""
+    """The index that the model may come to where laws slide that can (whose sense their function's rate contains), or
+    set-valued relations turn.
+    """
     p, (index, undetermined) = system.description.p, index_of(system, state)
-    for place in system.description.branches:
+    others = [(place, SLIDES) for place in system.description.branches]
+    others += [(place, 1.0 - p[place]) for place in system.description.holds]
+    for place, other in others:
         before = p[place]
-        p[place] = SLIDES
+        p[place] = other
         most, _ = index_of(system, state)
         p[place] = before
         if index is not None and most == 2:

@@ -70,7 +70,7 @@ def _sticking(network: Network) -> dict[str, tuple[str, ...]]:
     """Labels of the constraints that hold the branches of a family while they stick."""
     found: dict[str, tuple[str, ...]] = {}
     for s in network.switches:
-        if s.element and s.label not in found.get(s.element, ()):
+        if s.element and s.holds is None and s.label not in found.get(s.element, ()):
             found[s.element] = (*found.get(s.element, ()), s.label)
     return found
 
