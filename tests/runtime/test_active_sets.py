@@ -28,7 +28,7 @@ class Problem:
         self.matrix, self.q, n = matrix, q, len(q)
         self.contacts = [SimpleNamespace(kind="phi", name=f"c{k}") for k in range(n)]
         self.active, self.p, self.frozen = np.zeros(n, dtype=bool), np.zeros(0), {}
-        self.multiplier, self.open, self.observer = list(range(n)), frozenset(), Observed()
+        self.multiplier, self.open, self.observer, self.reversed = list(range(n)), frozenset(), Observed(), set()
 
     def state(self):
         return tuple(self.active.tolist())
@@ -49,6 +49,9 @@ class Problem:
 
     def fits(self, t, y, found):
         return not self.wrongs(found[0], found[2])
+
+    def become(self, state):
+        self.active[:] = state
 
     def turn(self, k, values):
         self.active[k] = not self.active[k]
