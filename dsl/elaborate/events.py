@@ -277,7 +277,7 @@ def sticking(
     """A law or content with its set-valued terms c*setsign(u), c*abs(u) as c*sense and c*sense*u; the switches that
     say which sense, and psi: u = 0 for sticking.
     """
-    again = sum(draft.element == label for draft in frame.parts.drafts)  # elements of one label, said one by one
+    again = _said_before(frame, label)
     own = tuple(ex.index(loop.index) for loop in loops)
     for k, node in enumerate(filter(_set_at, ex.topological([root]))):
         name = f"{label} sticking" + (f" {k + 1}" if k else "")
@@ -316,7 +316,7 @@ def relation(
     at, shape = tuple(ex.index(loop.index) for loop in loops), tuple((loop.first, loop.last) for loop in loops)
     change: dict[Node, Node] = {}
     made: list[tuple[Node, Node]] = []
-    again = sum(draft.element == label for draft in frame.parts.drafts)
+    again = _said_before(frame, label)
     for node in filter(_set_at, ex.topological([text])):
         u = ex.substitute(node.args[0], change)
         if _steady(u):
@@ -344,6 +344,11 @@ def relation(
         draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, holds=holds)
         frame.parts.drafts.append(draft)
     return text
+
+
+def _said_before(frame: ElaborationContext, label: str) -> int:
+    """Switches of the elements of one label so far, which may be said one by one."""
+    return sum(draft.element == label for draft in frame.parts.drafts)
 
 
 def _set_at(node: Node) -> bool:
