@@ -11,7 +11,7 @@ from sysdyn.compiler.forms.descriptor import BLOCKS, HOME, Block, Equations, Ker
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.calculus import without_signals
 from sysdyn.dsl.model.expression import Node, add, is_const
-from sysdyn.dsl.model.network import Loop
+from sysdyn.dsl.model.network import Loop, loop_ranges
 
 _Bounds = tuple[tuple[Node, Node], ...]
 _Place = tuple[int, tuple[Node, ...]]
@@ -36,7 +36,7 @@ class Assembly:
         if is_const(expression, 0.0):
             return
         key = (self._numbers[HOME.get(block, block), owner], tuple(at))
-        bounds = tuple((loop.first, loop.last) for loop in nest)
+        bounds = loop_ranges(nest)
         self._found[block].setdefault(bounds, {}).setdefault(key, []).append(expression)
 
     def blocks(self) -> tuple[Block, ...]:

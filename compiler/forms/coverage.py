@@ -15,7 +15,7 @@ from sysdyn.compiler.model.interpret import over
 from sysdyn.compiler.model.parameters import Extents, Parameters
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.expression import Node, add, const, param
-from sysdyn.dsl.model.network import Loop
+from sysdyn.dsl.model.network import Loop, loop_ranges
 
 Cover = tuple[str, tuple[tuple[Nest, Node], ...]]  # coordinate; where stores move with it: loops, index
 
@@ -30,7 +30,7 @@ def cover(model: EnergyModel, family: Family, *, given: bool) -> Cover | None:
     for term in model.function(function):
         for node in local_variables(term.expression, kind):
             if node.data[0] == family.name:
-                bounds = tuple((loop.first, loop.last) for loop in term.loops)
+                bounds = loop_ranges(term.loops)
                 if bounds == family.shape and node.args == (counter(0),):
                     return None
                 places.append((term.loops, node.args[0]))

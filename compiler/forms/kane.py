@@ -22,6 +22,7 @@ from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.calculus import derivative, signals_held
 from sysdyn.dsl.model.expression import Node, add, const, is_const, mul, neg, substitute, topological, var, variables
+from sysdyn.dsl.model.network import loop_ranges
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass
 
@@ -107,7 +108,7 @@ def _entries(row: Row, families: Mapping[str, Family]) -> Entries:
         held, signals = signals_held(term.expression)
         for flow in local_variables(held, "f"):
             name = flow.data[0]
-            whole = tuple((loop.first, loop.last) for loop in row.nest) == families[name].shape
+            whole = loop_ranges(row.nest) == families[name].shape
             if flow.args != row.at or term.loops != row.nest or not whole:
                 raise _impossible(row, f"psi {row.name} joins flows of several elements ('{flow!r}')")
             slope = substitute(derivative(held, flow), signals)

@@ -29,7 +29,7 @@ from sysdyn.dsl.model.calculus import rate as rate_of
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node, add, is_const, neg, ordered_variables, substitute, var, variables
 from sysdyn.dsl.model.expression_text import to_text
-from sysdyn.dsl.model.network import Loop
+from sysdyn.dsl.model.network import Loop, loop_ranges
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 
 HELD = "#held "
@@ -59,7 +59,7 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
         form.held(shared(model) - carriers - measured)
     owners = (*model.coordinates, *model.unknowns, *model.states, *model.positions)
     shapes = [(f.name, f.shape) for f in owners]
-    shapes += [(e.owner, tuple((loop.first, loop.last) for loop in e.target.nest)) for e in equations]
+    shapes += [(e.owner, loop_ranges(e.target.nest)) for e in equations]
     shapes += [(HELD + c.name, c.shape) for c in model.coordinates]
     shapes += stored
     hulls: dict[str, list[tuple[tuple[Node, ...], Nest, Place]]] = {}
@@ -102,7 +102,7 @@ def _massless(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
     moved, joined = set[str](), set[str]()
     for function, kind in ((m.coenergy, m.rate), (m.energy, m.conjugate)):
         for term in model.function(function):
-            bounds = tuple((loop.first, loop.last) for loop in term.loops)
+            bounds = loop_ranges(term.loops)
             at = tuple(counter(k) for k in range(len(bounds)))
             rates = local_variables(term.expression, kind)
             found = joined if _of_one_combination(term.expression, rates) else moved

@@ -14,7 +14,7 @@ from dataclasses import replace
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Coupling, Network, NodeFamily, Terminal
+from sysdyn.dsl.model.network import Branch, Coupling, Network, NodeFamily, Terminal, loop_indices, loop_ranges
 from sysdyn.dsl.model.rewriting import expressions, rewritten
 from sysdyn.values import dataclass
 
@@ -58,11 +58,11 @@ def _with_transformers(network: Network) -> Network:
     couplings: list[Coupling] = []
     for b in network.branches:
         parts = None if b.on is None else _combination(b.on)
-        own = b.at == tuple(ex.index(loop.index) for loop in b.loops)
+        own = b.at == loop_indices(b.loops)
         if parts is None or not own or _plain(parts):
             branches.append(b)
             continue
-        shape = tuple((loop.first, loop.last) for loop in b.loops)
+        shape = loop_ranges(b.loops)
         effort = b.domain.common == "effort"
         names = [f"{b.name}.inner{k}" for k in range(1, 2 if effort else len(parts) + 1)]
         nodes += [NodeFamily(name, shape, b.domain, b.place) for name in names]
@@ -210,8 +210,8 @@ def _placed(chain: _Chain) -> tuple[list[NodeFamily], Iterator[Branch]]:
     """Nodes between the elements of a chain, and the elements there."""
     root = chain.root
     members = [*chain.elements, *([(1, root)] if chain.kept else [])]
-    shape = tuple((loop.first, loop.last) for loop in root.loops)
-    at = tuple(ex.index(loop.index) for loop in root.loops)
+    shape = loop_ranges(root.loops)
+    at = loop_indices(root.loops)
     names = [f"{root.name}.inner{k}" for k in range(1, len(members))]
     points = [root.plus, *(Terminal(name, at) for name in names), root.minus]
 

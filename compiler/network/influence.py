@@ -23,8 +23,8 @@ from typing import Any
 
 from sysdyn.compiler.model.terms import summands
 from sysdyn.dsl.model.calculus import signals_held
-from sysdyn.dsl.model.expression import Node, index, variables
-from sysdyn.dsl.model.network import Branch, Constraint, Coupling, Network, Shape
+from sysdyn.dsl.model.expression import Node, variables
+from sysdyn.dsl.model.network import Branch, Constraint, Coupling, Network, Shape, loop_indices, loop_ranges
 from sysdyn.values import dataclass
 
 Quantity = tuple[str, str]
@@ -165,8 +165,8 @@ def _closed(network: Network) -> Iterator[tuple[Constraint, frozenset[Quantity]]
 
 def _whole(c: Constraint, shape: Shape) -> bool:
     """Whether there is one row for each element of an unknown of that shape."""
-    ranges = tuple((loop.first, loop.last) for loop in c.loops)
-    return ranges == shape and c.at == tuple(index(loop.index) for loop in c.loops)
+    ranges = loop_ranges(c.loops)
+    return ranges == shape and c.at == loop_indices(c.loops)
 
 
 def reached(found: Sequence[Link], asked: frozenset[Quantity]) -> frozenset[Quantity]:

@@ -13,7 +13,17 @@ from sysdyn.compiler.network.primal.bounds import Box, Sizes, without
 from sysdyn.compiler.network.primal.overlaps import ranges_of
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Domain, Dynamic, Loop, Network, NodeFamily, State
+from sysdyn.dsl.model.network import (
+    Branch,
+    Domain,
+    Dynamic,
+    Loop,
+    Network,
+    NodeFamily,
+    State,
+    loop_indices,
+    loop_ranges,
+)
 from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
 from sysdyn.dsl.text.diagnostics import Place
 
@@ -36,7 +46,7 @@ def from_masses(network: Network) -> Network:
         for sign, b, at in held.get(node.data[0], ()):
             if not b.loops and at == node.args:
                 terms.append((sign, ex.var(b.name, "bp", *b.at, order=node.data[2])))
-            elif b.loops and node.data[0] in whole and at == tuple(ex.index(loop.index) for loop in b.loops):
+            elif b.loops and node.data[0] in whole and at == loop_indices(b.loops):
                 here = dict(zip(at, node.args, strict=True))
                 own = (ex.substitute(a, here) for a in b.at)
                 terms.append((sign, ex.var(b.name, "bp", *own, order=node.data[2])))
@@ -69,7 +79,7 @@ def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
     states, dynamics = [], []
     for name, kind in wanted:
         for loops, at, domain, place in families[name, kind]:
-            shape = tuple((loop.first, loop.last) for loop in loops)
+            shape = loop_ranges(loops)
             states.append(State(f"{name}.q", shape, domain.displacement, place))
             dynamics.append(Dynamic(quadrature(name, at), ex.var(name, f"{kind[0]}f", *at), loops, place))
     told = {(*w, 0) for w in wanted if w[1] == "bq"}
@@ -88,7 +98,7 @@ def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
 def whole(node: NodeFamily) -> tuple[tuple[Loop, ...], tuple[Node, ...]]:
     """Loops over all points of a family, and their indices."""
     loops = tuple(Loop(f"#x{k}", first, last) for k, (first, last) in enumerate(node.shape))
-    return loops, tuple(ex.index(x.index) for x in loops)
+    return loops, loop_indices(loops)
 
 
 def massive(network: Network) -> frozenset[str]:

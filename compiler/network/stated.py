@@ -20,7 +20,7 @@ from sysdyn.compiler.model.terms import summands, vanishes
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Domain, Energy, Network, Terminal
+from sysdyn.dsl.model.network import Branch, Domain, Energy, Network, Terminal, loop_indices
 from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
 
 ALL = frozenset(STATE_FUNCTIONS)
@@ -62,7 +62,7 @@ def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -
     slope = derivative(piece, a)
     if b is not None and (function.name == "T" or not vanishes(slope, derivative(piece, b))):
         return None
-    at = tuple(ex.index(loop.index) for loop in energy.loops)
+    at = loop_indices(energy.loops)
     own = ex.var(name, f"b{function.own}", *at)
     law = ex.substitute(slope, {a: own} if b is None else {a: own, b: ex.const(0.0)})
     minus = Terminal(None, ()) if b is None else Terminal(b.data[0], b.args)

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Constraint, Network, Switch, Unknown
+from sysdyn.dsl.model.network import Constraint, Network, Switch, Unknown, loop_indices
 from sysdyn.dsl.model.rewriting import rewritten
 from sysdyn.dsl.model.units import NONE, si
 
@@ -54,7 +54,7 @@ def _holds(sense: str) -> str:
 
 def _row(c: Constraint, sense: str) -> Constraint:
     """The psi u = 0 of a statement as the gamma that closes its unknown."""
-    at = tuple(ex.index(loop.index) for loop in c.loops)
+    at = loop_indices(c.loops)
     slips = ex.sub(ex.var(_set(sense), "e", *at), ex.param(sense, *at))
     sticks = ex.compare("!=", ex.param(_holds(sense), *at), ex.const(0.0))
     return replace(c, kind="gamma", name=_set(sense), at=at, expression=ex.conditional(sticks, c.expression, slips))

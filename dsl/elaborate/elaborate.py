@@ -21,7 +21,7 @@ from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.port_efforts import NotSaidError, conjugate_of
 from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Dynamic, Initial, Loop, Observation, State
+from sysdyn.dsl.model.network import Dynamic, Initial, Loop, Observation, State, loop_indices
 from sysdyn.dsl.model.units import Dimension, si
 from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.symbols import Definition, End, Scope, Space, Typed
@@ -131,7 +131,7 @@ class Elaborator(Instances):
         """States for the integrals that traces, lets and expectations read."""
         for name, found in self.resolver.quadratures.items():
             loops = tuple(Loop(f"#e{k}", first, last) for k, (first, last) in enumerate(found.shape))
-            at = tuple(ex.index(loop.index) for loop in loops)
+            at = loop_indices(loops)
             state = ex.var(name, "s", *at)
             try:
                 power = found.power() if callable(found.power) else found.power

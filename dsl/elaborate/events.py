@@ -16,7 +16,17 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Action, Constraint, Event, Loop, Observation, Parameter, Unknown
+from sysdyn.dsl.model.network import (
+    Action,
+    Constraint,
+    Event,
+    Loop,
+    Observation,
+    Parameter,
+    Unknown,
+    loop_indices,
+    loop_ranges,
+)
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.laws import LawOf
@@ -278,8 +288,8 @@ def sticking(
     say which sense, and psi: u = 0 for sticking.
     """
     again = _said_before(frame, label)
-    own = tuple(ex.index(loop.index) for loop in loops)
-    for k, node in enumerate(filter(_set_at, ex.topological([root]))):
+    own = loop_indices(loops)
+    for k, node in enumerate(ex.calls(root, "setsign")):
         name = f"{label} sticking" + (f" {k + 1}" if k else "")
         sense = _sense(frame, f"{name} sense" + (f" {again + 1}" if again else ""), own, loops, place)
         inner = node.args[0]
@@ -297,7 +307,7 @@ def of_law(
     frame: ElaborationContext, law: LawOf, label: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place
 ) -> Node:
     """The law of a branch: dry friction of its own flow sticks by a reaction, else it is a relation."""
-    terms = [n.args[0] for n in ex.topological([law.law]) if _set_at(n)]
+    terms = [n.args[0] for n in ex.calls(law.law, "setsign")]
     if law.kind in ("kinetic", "potential") and not all(map(_steady, terms)):
         return law.law
     flow = ex.var(label, "bf", *at)
@@ -313,11 +323,11 @@ def relation(
     s = sense, the sign of u.  It holds as long as c*s, what the others leave, is within c.  Where u moves at finite
     rates alone it is a sign, which may slide (forms/corners).
     """
-    at, shape = tuple(ex.index(loop.index) for loop in loops), tuple((loop.first, loop.last) for loop in loops)
+    at, shape = loop_indices(loops), loop_ranges(loops)
     change: dict[Node, Node] = {}
     made: list[tuple[Node, Node]] = []
     again = _said_before(frame, label)
-    for node in filter(_set_at, ex.topological([text])):
+    for node in ex.calls(text, "setsign"):
         u = ex.substitute(node.args[0], change)
         if _steady(u):
             change[node] = ex.call("sign", u)
@@ -351,10 +361,6 @@ def _said_before(frame: ElaborationContext, label: str) -> int:
     return sum(draft.element == label for draft in frame.parts.drafts)
 
 
-def _set_at(node: Node) -> bool:
-    return node.op == "call" and node.data == "setsign"
-
-
 def _steady(u: Node) -> bool:
     """Whether a value moves at finite rates alone: of displacements, states and time."""
     return all(n.op == "time" or (n.data[1] in ("q", "nq", "bq", "s") and not n.data[2]) for n in ex.variables(u))
@@ -362,7 +368,7 @@ def _steady(u: Node) -> bool:
 
 def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], place: Place) -> Node:
     """A content D with its terms c*abs(u) of flows as those of set-valued friction (decision 7 of the language)."""
-    at = tuple(ex.index(loop.index) for loop in loops)
+    at = loop_indices(loops)
     for node in ex.topological([root]):
         if node.op != "call" or node.data not in ("abs", "hypot") or not any(map(_rates, node.args)):
             continue
@@ -428,7 +434,7 @@ def _sense(
     begins: float = 0.0,
 ) -> Node:
     """A parameter that holds the sense of a slip: 1, -1, or 0 while it sticks; or a part of its direction."""
-    shape = tuple((loop.first, loop.last) for loop in loops) if at else ()
+    shape = loop_ranges(loops) if at else ()
     indices = tuple(loop.index for loop in loops) if at else ()
     parameter = Parameter(name, shape, si(NONE), (ex.const(begins),), indices, place)
     frame.parts.parameters[parameter.name] = parameter

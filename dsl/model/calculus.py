@@ -12,6 +12,7 @@ from sysdyn.dsl.model.expression import (
     Node,
     add,
     call,
+    calls,
     compare,
     conditional,
     const,
@@ -226,7 +227,7 @@ def time_derivative(root: Node) -> Node:
 
 def signals_held(root: Node) -> tuple[Node, dict[Node, Node]]:
     """Root with an opaque parameter for each signal, and what puts the signals back."""
-    found = [n for n in topological([root]) if n.op == "call" and n.data == "signal"]
+    found = calls(root, "signal")
     change = {node: param(f"#signal {k}") for k, node in enumerate(found)}
     return (substitute(root, change), {new: old for old, new in change.items()}) if found else (root, {})
 
@@ -234,7 +235,7 @@ def signals_held(root: Node) -> tuple[Node, dict[Node, Node]]:
 def without_signals(root: Node) -> Node:
     """Root with signals as plain values."""
     done: dict[Node, Node] = {}
-    if not any(n.op == "call" and n.data == "signal" for n in topological([root])):
+    if not calls(root, "signal"):
         return root
     for node in topological([root]):
         marked = node.op == "call" and node.data == "signal"

@@ -322,6 +322,16 @@ def topological(roots: Iterable[Node]) -> list[Node]:
     return _ordered(roots, bodies=True)
 
 
+def nodes_of(root: Node) -> Sequence[Node]:
+    """All nodes of an expression, arguments before users; most are no deeper than one operation."""
+    return topological([root]) if any(a.args for a in root.args) else (*root.args, root)
+
+
+def calls(root: Node, function: str) -> list[Node]:
+    """Where an expression calls a function, arguments before users."""
+    return [n for n in nodes_of(root) if n.op == "call" and n.data == function]
+
+
 def topological_unbound(roots: Iterable[Node]) -> list[Node]:
     """Like `topological`, but does not enter the bodies of reductions (their loop variable is not bound there)."""
     return _ordered(roots, bodies=False)

@@ -7,10 +7,10 @@ A *family* is a name with a shape: `coord x[1..n]` is one family, its shape the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 
-from sysdyn.dsl.model.expression import Node, is_const
+from sysdyn.dsl.model.expression import Node, index, is_const
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
@@ -26,6 +26,16 @@ class Loop:
 
 
 Shape = tuple[tuple[Node, Node], ...]  # (first, last) of each index of a family; () is a scalar
+
+
+def loop_indices(loops: Iterable[Loop]) -> tuple[Node, ...]:
+    """The variables of loops as nodes."""
+    return tuple(index(loop.index) for loop in loops)
+
+
+def loop_ranges(loops: Iterable[Loop]) -> Shape:
+    """The shape of what is written once for each turn of loops."""
+    return tuple((loop.first, loop.last) for loop in loops)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,11 +14,23 @@ from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Constraint, Coordinate, Dynamic, Loop, NodeFamily, Shape, State, Unknown
+from sysdyn.dsl.model.expression import Node, nodes_of
+from sysdyn.dsl.model.network import (
+    Branch,
+    Constraint,
+    Coordinate,
+    Dynamic,
+    Loop,
+    NodeFamily,
+    Shape,
+    State,
+    Unknown,
+    loop_indices,
+    loop_ranges,
+)
 from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.model.values import Values, as_constants
-from sysdyn.dsl.rules.checks import looped_expressions_of, nodes_of
+from sysdyn.dsl.rules.checks import looped_expressions_of
 from sysdyn.dsl.text.diagnostics import Place, Report
 
 LOOKED_AT = 1000
@@ -207,8 +219,8 @@ def _indexed(name: str, element: Sequence[float]) -> str:
 
 def _whole(dynamic: Dynamic, state: State) -> bool:
     """Whether a dynamic is plainly that of every element once: its loops are the bounds of the state."""
-    own = tuple(ex.index(loop.index) for loop in dynamic.loops)
-    return dynamic.state.args == own and tuple((loop.first, loop.last) for loop in dynamic.loops) == state.shape
+    own = loop_indices(dynamic.loops)
+    return dynamic.state.args == own and loop_ranges(dynamic.loops) == state.shape
 
 
 def _known(first: Node, last: Node, known: Values) -> bool:

@@ -167,7 +167,7 @@ def _set_valued(model: Elaborator, report: Report) -> None:
     said += [(o.expression, o.place) for o in parts.watched]
     said += [(a.value, a.place) for d in parts.event_drafts for a in d.actions]
     said += [(d.condition, d.place) for d in parts.event_drafts if d.condition is not None]
-    for place in dict.fromkeys(place for node, place in said if _has_setsign(node)):
+    for place in dict.fromkeys(place for node, place in said if ex.calls(node, "setsign")):
         _no_set(place, report)
 
 
@@ -176,12 +176,8 @@ def set_valued_results(model: Elaborator, observations: Iterable[Observation], r
     said = [(o.place, o.expression) for o in observations]
     said += [(e.place, node) for e in model.parts.expectations for node in (e.left, e.right)]
     said += [(i.place, node) for i in model.parts.initials for node in (i.target, i.value)]
-    for place in dict.fromkeys(place for place, node in said if _has_setsign(node)):
+    for place in dict.fromkeys(place for place, node in said if ex.calls(node, "setsign")):
         _no_set(place, report)
-
-
-def _has_setsign(root: Node) -> bool:
-    return any(n.op == "call" and n.data == "setsign" for n in nodes_of(root))
 
 
 def _no_set(place: Place, report: Report) -> None:
@@ -225,11 +221,6 @@ def parameters(model: Elaborator, report: Report, *, required: bool) -> None:
             help_ = f"set {name} = ... in the scene, or a default"
             subject = f"value {name}"
             report.error("E406", f"parameter '{name}' has no value", parameter.place, help=help_, subject=subject)
-
-
-def nodes_of(root: Node) -> Sequence[Node]:
-    """All nodes of an expression; most are no deeper than one operation."""
-    return ex.topological([root]) if any(a.args for a in root.args) else (*root.args, root)
 
 
 def expressions_of(model: Elaborator) -> Iterable[tuple[Node, Place]]:

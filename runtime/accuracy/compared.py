@@ -31,7 +31,6 @@ class Compared:
         self.options, self.instants, self._observed = options, instants, observed
         self.samplings: tuple[Sampled, ...] = ()
         self.jumps: Floats | None = None
-        self._moving: Floats | None = None
         self._at: Floats | None = None
         self._opened: tuple[Finished, LeftOpen] | None = None
         self.begin()
@@ -67,15 +66,13 @@ class Compared:
         open_ = partial(self._open_quantities, finished, quantities)
         sizes, steps = quantities.of_run(finished), finished.statistics.steps
         between = self._between(rows, finished, quantities)
-        self._moving = np.abs(self._rates(own, quantities)) if finished.events else None
         found = Sampled(tolerance, values, sizes, steps, noise, open_, between, late, there)
         self.samplings = (*self.samplings[-1:], found)
         return found
 
     def _between(self, rows: Floats, finished: Finished, quantities: Quantities) -> Floats | None:
-        """What the compared quantities move by [k, quantities], as fast as at the rows of either run, from an event of
-        this run to the same one of the run before it; infinite at instants that are not between them.  None: no
-        instant is.
+        """What the compared quantities move by [k, quantities], as fast as at these rows, from an event of this run to
+        the same one of the run before it; infinite at instants that are not between them.  None: no instant is.
         """
         jumps = np.unique([e.time for e in finished.events]) if finished.events else np.zeros(0)
         last, self.jumps = self.jumps, jumps
@@ -85,10 +82,7 @@ class Compared:
         late = late_by(self._at, last, jumps, self.options.t_end - self.options.t_start)[:, None]
         if not late.any():
             return None
-        rates = np.abs(self._rates(rows, quantities))
-        if self._moving is not None and self._moving.shape == rates.shape:
-            rates = np.fmax(rates, self._moving)
-        moved = _with_meters(late * rates, quantities)
+        moved = _with_meters(late * np.abs(self._rates(rows, quantities)), quantities)
         return np.where((late > 0.0) & np.isfinite(moved), moved, np.inf)
 
     def _rates(self, rows: Floats, quantities: Quantities) -> Floats:

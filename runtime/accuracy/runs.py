@@ -222,6 +222,7 @@ class Runs:
     def _leave(self, integration: Integration, first: bool) -> None:
         """After a failure: the rows so far stay if there is no finished run to keep."""
         assert self.writer is not None
+        integration.method.rest()
         if first:
             magnitude = group_maxima(self.system, integration.sizes.magnitude)
             nominal = self.quantities.nominal(integration.driver.largest(), magnitude)

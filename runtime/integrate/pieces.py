@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from sysdyn.runtime.events.handler import Handler, Point, Watched
 from sysdyn.runtime.events.plan import Happened, Plan
+from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.crossing import go_on
 from sysdyn.runtime.integrate.driver import Sink
 from sysdyn.runtime.integrate.modes import Modes, serves
@@ -145,6 +146,8 @@ class Pieces:
         _DENSE(stepper.dense)(stepper.self, t, lib.pointer(y), lib.pointer(yd))
         n = system.form.written
         y, yd, _ = self.run.settler.settle(t, y[:n], yd[:n])
+        if not (np.isfinite(y).all() and np.isfinite(yd).all()):  # flows that are solved for have none there
+            raise failure(self.run, "newton")
         return y, yd
 
     def _values(self, t: float) -> Floats:

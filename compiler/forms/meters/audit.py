@@ -38,7 +38,7 @@ from sysdyn.dsl.model.expression import (
     var,
     variables,
 )
-from sysdyn.dsl.model.network import Shape
+from sysdyn.dsl.model.network import Shape, loop_ranges
 
 ROUNDED = 1e-15
 """Of what a rounding error is at most, for one unit of the last place (2.2e-16) of a function from a library."""
@@ -89,7 +89,7 @@ def _add_ledger(
             continue
         owner = f"#ledger {number} element {len(shapes)}"
         apart = not any(n.op == "index" for loop in found.nest for n in topological([loop.first, loop.last]))
-        shape = tuple((loop.first, loop.last) for loop in found.nest) if apart else ()
+        shape = loop_ranges(found.nest) if apart else ()
         shapes.append((owner, shape))
         label = found.place.element or ledger.label(found)
         inertia = _of_one_rate(found, model)
