@@ -15,8 +15,6 @@ from sysdyn.dsl.names.symbols import Space
 from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Related
 from sysdyn.dsl.tree import syntax
 
-_ARGUMENT = re.compile(r"argument (\w+) of")
-
 
 def told(elaborator: Elaborator, found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     """The findings, those of a library at the author's place."""
@@ -31,7 +29,7 @@ def _told(elaborator: Elaborator, d: Diagnostic) -> Diagnostic:
     meant = [s for s in spaces if s.path == d.place.element]
     named = [s for s in spaces if re.search(rf"(?<![\w.]){re.escape(s.path)}(?![\w])", d.message)]
     for space in (*meant, *sorted(named, key=lambda s: -len(s.path)), *spaces):
-        place = _author(elaborator, space, d)
+        place = _author(elaborator, space)
         if place is not None:
             said = f"in component '{space.component}'"
             return replace(d, place=place, related=(Related(said, d.place), *d.related))
@@ -47,22 +45,17 @@ def _within(elaborator: Elaborator, space: Space, place: Place) -> bool:
     return any(span.start <= place.span.start and place.span.end <= span.end for span in spans)
 
 
-def _author(elaborator: Elaborator, space: Space, d: Diagnostic) -> Place | None:
-    """The statement in the author's file that a space comes from, or its argument that the finding is about."""
+def _author(elaborator: Elaborator, space: Space) -> Place | None:
+    """The statement in the author's file that a space comes from."""
     labels = [label.partition("[")[0] for label in space.path.split(".")]
-    inner: tuple[Space, syntax.Instance] | None = None
+    inner: syntax.Instance | None = None
     for depth, label in enumerate(labels):
         around = ".".join(labels[:depth])
         for outer, body in elaborator.bodies:
             if outer.source is elaborator.source and _plain(outer.path) == around:
                 made = [s for s, _ in body if isinstance(s, syntax.Instance) and s.decl.name == label]
-                inner = (outer, made[0]) if made else inner
-    if inner is None:
-        return None
-    statement = inner[1]
-    argument = _ARGUMENT.search(d.message)
-    span = next((a.span for a in statement.args or () if argument and a.name == argument.group(1)), statement.span)
-    return Place(elaborator.source, span)
+                inner = made[0] if made else inner
+    return None if inner is None else Place(elaborator.source, inner.span)
 
 
 def _plain(path: str) -> str:

@@ -246,7 +246,8 @@ class Instances(Elements):
                 raise self.resolver.fail(
                     "E405", f"'{component.name}' has no parameter '{arg.name}'", arg.span, help=listed
                 )
-            found[arg.name] = (arg.value, self.resolver.resolve(arg.value), self.resolver.bare(arg.value))
+            value, bare = self.resolver.resolve(arg.value), self.resolver.bare(arg.value)
+            found[arg.name] = Argument(arg.value, value, bare, Place(self.resolver.source, arg.span))
         return found, inputs
 
     def _required(

@@ -15,12 +15,21 @@ from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.symbols import ParameterSymbol, Typed, Vector
 from sysdyn.dsl.names.unit_reading import read_unit
-from sysdyn.dsl.text.diagnostics import Related
+from sysdyn.dsl.text.diagnostics import Place, Related
 from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
 
 Stated = tuple[syntax.Param, tuple[syntax.For, ...]]
-Argument = tuple[syntax.Expr, Typed | Vector, str | None]
-"""As written, its value where the instance stands, and the name of the bare number that it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """As written, its value and place where the instance stands; bare: the parameter that it is, one without a unit."""
+
+    written: syntax.Expr
+    value: Typed | Vector
+    bare: str | None
+    place: Place
 
 
 class Parameters(ElaborationContext):
@@ -101,7 +110,7 @@ class Parameters(ElaborationContext):
         elif given is not None:
             if unit is None and statement.value is not None:  # the default fixes the dimension
                 unit = self._values(statement, statement.value, self.resolver.resolve(statement.value), None, shape)[1]
-            values, unit, truth = self._values(statement, given[0], given[1], unit, shape, given[2])
+            values, unit, truth = self._values(statement, given.written, given.value, unit, shape, given)
         if unit is None:
             raise self.resolver.fail("E207", f"'{decl.name}' has neither a unit nor a default", decl.span)
         around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
@@ -116,19 +125,18 @@ class Parameters(ElaborationContext):
         value: Typed | Vector,
         unit: Unit | None,
         shape: Shape,
-        bare: str | None = None,
+        given: Argument | None = None,
     ) -> tuple[tuple[Node, ...], Unit, bool]:
-        """Nodes of a default or an argument, and the unit that it fixes where none is declared.
-
-        bare: the parameter of the user that the argument is, where that is a number without unit.
-        """
+        """Nodes of a default or an argument, and the unit that it fixes where none is declared."""
         items = value.items if isinstance(value, Vector) else (value,)
         for item in items:
-            self._is_run_constant(item.node, statement)
+            self._is_run_constant(item.node, statement, given)
         if not self.fills(value, shape):
             message = f"'{statement.decl.name}' has {len(items)} values, which do not fit its shape"
             help_ = None if shape or not isinstance(value, Vector) else f"param {statement.decl.name}[1..{len(items)}]"
-            raise self.resolver.fail("E805", message, self._where(statement), help=help_)
+            if given is not None:
+                help_ = None if shape else "one value"
+            raise self._wrong("E805", message, statement, given, help=help_)
         what = "default" if written is statement.value else "argument"
         known = [i.dimension for i in items if i.dimension is not None]
         dimension = unit.dimension if unit is not None else (known[0] if known else NONE)
@@ -148,9 +156,10 @@ class Parameters(ElaborationContext):
                     message = f"argument {statement.decl.name} of '{name}' is {is_}, wants {want}"
                     if help_ is None and isinstance(written, syntax.Name) and have != "dimensionless":
                         help_ = f"'{written.name}' is {is_}, {want} is wanted"
+                    bare = given.bare if given is not None else None
                     if bare is not None and help_ is None and have == "dimensionless":
                         help_ = f"'{bare}' is a number without unit; in {want} it fits"
-                raise self.resolver.fail(code, message, self._where(statement), help=help_)
+                raise self._wrong(code, message, statement, given, help=help_)
         truth = isinstance(value, Typed) and value.truth
         nodes = tuple(i.node for i in items)
         if truth:
@@ -169,14 +178,22 @@ class Parameters(ElaborationContext):
                 return found
         return si(dimension)
 
-    def _is_run_constant(self, node: Node, statement: syntax.Param) -> None:
+    def _is_run_constant(self, node: Node, statement: syntax.Param, given: Argument | None) -> None:
         for inner in ex.topological([node]):
             if inner.op in ("var", "time"):
                 message = f"parameter '{statement.decl.name}' depends on '{inner}': a parameter is a constant"
-                raise self.resolver.fail("E807", message, self._where(statement))
+                help_ = f"numbers and parameters alone; 'input {statement.decl.name}' could vary" if given is not None else None
+                raise self._wrong("E807", message, statement, given, help=help_)
 
-    def _where(self, statement: syntax.Param) -> syntax.Span:
-        return statement.value.span if statement.value is not None else statement.decl.span
+    def _wrong(
+        self, code: str, message: str, statement: syntax.Param, given: Argument | None, help: str | None
+    ) -> Failed:
+        """Report an error in a default, or in what an instance gives instead; raise what is returned."""
+        here = self.place((statement.value or statement.decl).span)
+        if given is None:
+            return self.resolver.fail(code, message, here.span, help=help)
+        where = Related(f"in component '{self.current.component}'", self.place(statement.decl.span))
+        return self.resolver.fail(code, message, given.place, help=help, related=(where,))
 
 
 def _names_in(statement: syntax.Param) -> set[str]:

@@ -40,7 +40,7 @@ def solve_units(
         if not any(f.name.startswith("$") for f in unit.factors):
             continue
         if name in arguments:
-            value = arguments[name][1]
+            value = arguments[name].value
             given = value.dimension if isinstance(value, Typed) else None
         elif name in inputs:
             given = frame.resolver.scalar(inputs[name]).dimension

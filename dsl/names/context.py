@@ -244,10 +244,11 @@ class Context:
         """A span of the present text."""
         return Place(self.source, span)
 
-    def fail(self, code: str, message: str, span: syntax.Span, **more: object) -> Failed:
-        """Report an error; raise what is returned."""
+    def fail(self, code: str, message: str, at: syntax.Span | Place, **more: object) -> Failed:
+        """Report an error at a span of the present text, or at a place; raise what is returned."""
+        place = at if isinstance(at, Place) else self.place(at)
         more.setdefault("subject", habits.blamed(more.get("help")))
-        self.report.error(code, message, self.place(span), **more)  # type: ignore[arg-type]
+        self.report.error(code, message, place, **more)  # type: ignore[arg-type]
         return Failed()
 
     def remedied(self, code: str, message: str, span: syntax.Span, remedy: habits.Remedy) -> Failed:

@@ -53,6 +53,27 @@ def test_the_element_that_is_named_is_the_one_that_is_shown(tmp_path):
     assert [text_of(d.place) for d in errors] == ["R1: resistor(R = -2 ohm) a -> b", "R3: resistor(R = -4 ohm) a -> b"]
 
 
+@pytest.mark.parametrize("component", ["resistor", "stage"])
+@pytest.mark.parametrize(
+    ("given", "code", "remedy"),
+    [
+        ("2 V", "E214", "write '2 ohm'"),
+        ("2 ohm*sin(1 rad/s*t)", "E807", "numbers and parameters alone; 'input R' could vary"),
+        ("[2 ohm, 3 ohm]", "E805", "one value"),
+    ],
+)
+def test_an_argument_is_shown_where_it_stands_among_its_like(tmp_path, component, given, code, remedy):
+    ends = "a -> b" if component == "resistor" else "a = a, b = b"
+    values = ("1 ohm", given, "3 ohm")
+    lines = "".join(f"  R{k}: {component}(R = {value}) {ends}\n" for k, value in enumerate(values))
+    path = tmp_path / "m.sd"
+    path.write_text(f"{HEAD}{lines}  Z: resistor(R = 3 ohm) b -> c\n  S: resistor(R = 1 ohm) c -> ground\n}}\n")
+    (error,) = [d for d in findings(path) if d.severity == "error"]
+    assert (error.code, error.place.file, text_of(error.place)) == (code, str(path), f"R = {given}")
+    assert error.help == remedy
+    assert error.related[0].message == f"in component '{component}'"
+
+
 def test_a_library_of_ones_own_is_a_library(tmp_path):
     (tmp_path / "parts.sd").write_text(
         "component heavy {\n  param m: kg\n  branch: translation\n  law p = m*f\n  require m > 0 kg\n}\n"
