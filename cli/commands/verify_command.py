@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.failures import SOLVER
+from sysdyn.cli.failures import INTERRUPTED, SOLVER, worst
 from sysdyn.cli.options import chosen, side_by_side, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.progress import ProgressLine
@@ -67,7 +67,11 @@ def command(
         return console.unable()
     console.result = _result(found, keep=output is not None, timings=not no_timings)
     console.data(_table(found, timings=not no_timings))
-    return console.finish(_judged(found, console))
+    code = _judged(found, console)
+    if found.interrupted:
+        console.complain("interrupted: these are the runs so far", INTERRUPTED)
+        code = worst((code, INTERRUPTED))
+    return console.finish(code)
 
 
 def _judged(found: Verified, console: Console) -> int:
@@ -169,8 +173,8 @@ def _table(found: Verified, *, timings: bool) -> str:
     lines += _refused(found)
     lines += [f"not compared: {name}: {reason}" for name, reason in found.left_out]
     if found.twins:
-        worst = max(found.twins, key=lambda t: t.difference)
-        lines.append(f"residuals of {' and '.join(worst.backends)}: {worst.difference:.1e} apart")
+        apart = max(found.twins, key=lambda t: t.difference)
+        lines.append(f"residuals of {' and '.join(apart.backends)}: {apart.difference:.1e} apart")
     return "\n".join([*lines, _horizon(found), _verdict(found)])
 
 

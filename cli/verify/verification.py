@@ -123,9 +123,10 @@ class _Verification:
         self.bounds: dict[str, float] = {}
         self.span = (0.0, 0.0)
         self.finer: Run | None = None
+        self.interrupted = False
 
     def all(self, jobs: int | None = 1) -> Verified | None:
-        """Every formulation, then the comparison.
+        """Every formulation, then the comparison; of an interruption that of the runs so far, once there is a reference.
 
         jobs: processes; None: as many as pay, as the reference, which runs here, foretells it.  What they find is taken
         in in the order of formulations, not of their ends.
@@ -142,15 +143,20 @@ class _Verification:
                 first = ready(self.request, self.target, Report())
             asked += [None, *(name for name in EVERY if first and name != first.formulation)]
         items = [(self.request, self.folder, name) for name in asked]
-        for name, part in zip(asked, each(_part, items, jobs, self._here, time.monotonic() - began), strict=True):
-            if isinstance(part, Lost):
-                raise RuntimeError(f"the process of {name or 'the reference'} died ({part.how})")
-            if part is not None:
-                self._take(part)
-                self.done = min(self.planned, self.done + len(METHODS) + (name is None))
-                self._advance(0.0, None)
-            if name is None and self._stopped():
-                return None
+        try:
+            for name, part in zip(asked, each(_part, items, jobs, self._here, time.monotonic() - began), strict=True):
+                if isinstance(part, Lost):
+                    raise RuntimeError(f"the process of {name or 'the reference'} died ({part.how})")
+                if part is not None:
+                    self._take(part)
+                    self.done = min(self.planned, self.done + len(METHODS) + (name is None))
+                    self._advance(0.0, None)
+                if name is None and self._stopped():
+                    return None
+        except KeyboardInterrupt:
+            if self.finer is None:
+                raise
+            self.interrupted = True
         self._tell()
         assert self.finer is not None
         return self._compared(self.finer)
@@ -310,6 +316,7 @@ class _Verification:
             tuple(bounds),
             tuple(sorted(self.left_out.items())),
             found,
+            self.interrupted,
         )
 
     def _own_horizon(self, name: str, bounds: Bounds) -> tuple[float, Gap | None]:

@@ -92,7 +92,7 @@ class Verified:
 
     runs: the reference first; finer: the reference at a tenth of the accuracy; worst: gap of each run to the reference;
     horizon [s], beyond: what differs after it (None: compared to the end), by: the run that gives it; compared: names;
-    left_out: names and why.
+    left_out: names and why; interrupted: other runs would have followed.
     """
 
     name: str
@@ -108,6 +108,7 @@ class Verified:
     compared: tuple[str, ...]
     left_out: tuple[tuple[str, str], ...]
     disagreements: tuple[Disagreement, ...]
+    interrupted: bool = False
 
     @property
     def failures(self) -> tuple[Run, ...]:

@@ -16,6 +16,7 @@ import numpy as np
 from sysdyn.runtime.condense.condensed import Condensed, Forms, condensed
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.causes import NEWTON, failure, placed
+from sysdyn.runtime.integrate.creeping import Creeping
 from sysdyn.runtime.integrate.crossing import cross
 from sysdyn.runtime.integrate.driver import Driver, Sink
 from sysdyn.runtime.integrate.methods import Method
@@ -44,9 +45,6 @@ little of what a run finds."""
 CHUNK_STEPS = 1 << 20
 OPENED = ("dopri", "rosenbrock")
 """Methods that are told how long their first step may be."""
-CRAWL, DRAFT_CRAWL = 200_000, 20_000
-"""Steps after which a run, a draft must have got CREPT of the span further: else it would take for ever."""
-CREPT = 1e-6
 STAGED = 100_000
 """Unknowns of a system up to which radau may take more stages than three, whose factors need three times the room."""
 SMOOTH = 4.5
@@ -292,7 +290,7 @@ class Integration:
         if self.pieces is not None:
             self.pieces.aim(segment_end)
         request, method = self.request, self.method.contents
-        marked, at = method.steps, method.t
+        creeping = Creeping(request.t_end - self.start.t, method.t, self.statistics(), draft=request.draft)
         most, failed = CHUNK_STEPS, method.newton_failures
         while True:
             left = CHUNK_STEPS if request.max_steps is None else request.max_steps - method.steps
@@ -330,10 +328,8 @@ class Integration:
                 self.driver.drain(sink)
             if state == 1:
                 break
-            if method.steps - marked >= (DRAFT_CRAWL if request.draft else CRAWL):
-                if method.t - at < CREPT * (request.t_end - self.start.t):
-                    raise failure(self, "crawl")
-                marked, at = method.steps, method.t
+            if not creeping.goes_on(method.t, self.statistics()):
+                raise failure(self, "crawl")
 
     def _resolved(self) -> bool:
         """Whether a step failed by what round-off leaves of unknowns that are still zero where the terms of their rows

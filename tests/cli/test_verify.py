@@ -307,6 +307,24 @@ def test_a_solver_that_stops_is_exit_3_with_time_and_run(tmp_path, capsys):
 # --- what is compared -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(("at", "shown"), [("co_lagrangian", 4), ("hamiltonian", 2), (None, 0)])
+def test_an_interruption_shows_the_runs_so_far(tmp_path, capsys, monkeypatch, at, shown):
+    made = verification._Verification._formulation
+
+    def interrupted(self, name):
+        if name == at:
+            raise KeyboardInterrupt
+        made(self, name)
+
+    monkeypatch.setattr(verification._Verification, "_formulation", interrupted)
+    code = run(["verify", write(tmp_path, CIRCUIT), "--jobs", "1"])
+    out, said = capsys.readouterr()
+    assert code == 130
+    assert "interrupted" in said
+    assert len(re.findall(r"^(?:co_)?(?:lagr|hamilt)\w+ +(?:bdf|radau) ", out, re.M)) == shown + (shown > 0)  # the finer one
+    assert (f"{shown} runs agree on" in out) == (shown > 0)
+
+
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.one_in(2)
 def test_a_chaotic_model_is_compared_up_to_its_horizon(tmp_path, method, capsys):
