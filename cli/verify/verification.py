@@ -126,7 +126,7 @@ class _Verification:
         self.interrupted = False
 
     def all(self, jobs: int | None = 1) -> Verified | None:
-        """Every formulation, then the comparison; of an interruption that of the runs so far, once there is a reference.
+        """Every formulation, then the comparison; behind an interruption of the runs so far, once there is a reference.
 
         jobs: processes; None: as many as pay, as the reference, which runs here, foretells it.  What they find is taken
         in in the order of formulations, not of their ends.

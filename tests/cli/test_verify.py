@@ -321,7 +321,7 @@ def test_an_interruption_shows_the_runs_so_far(tmp_path, capsys, monkeypatch, at
     out, said = capsys.readouterr()
     assert code == 130
     assert "interrupted" in said
-    assert len(re.findall(r"^(?:co_)?(?:lagr|hamilt)\w+ +(?:bdf|radau) ", out, re.M)) == shown + (shown > 0)  # the finer one
+    assert len(re.findall(r"^(?:co_)?(?:lagr|hamilt)\w+ +(?:bdf|radau) ", out, re.M)) == shown + (shown > 0)
     assert (f"{shown} runs agree on" in out) == (shown > 0)
 
 
