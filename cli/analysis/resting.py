@@ -11,6 +11,7 @@ from sysdyn.cli.analysis.asked import Found, compiled, of_nodes
 from sysdyn.cli.analysis.linear import linearised, loose_of
 from sysdyn.cli.analysis.states import at, resting
 from sysdyn.cli.run.asked import Request
+from sysdyn.dsl.model.units import Unit, quantity
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy.options import Progress
 from sysdyn.runtime.linear.rest import Rest
@@ -27,16 +28,17 @@ MOST = 24
 
 @dataclass(frozen=True, slots=True)
 class Equilibrium:
-    """A state of rest; values: of y by name; efforts: of the common-effort nodes (an operating point); judged: None
-    where there is no linearisation, for the reason `why`.
+    """A state of rest; values: of y by name, in SI with these units; efforts: of the common-effort nodes (an operating
+    point), as the scene traces them; judged: None where there is no linearisation, for the reason `why`.
     """
 
     rest: Rest
     values: dict[str, float]
     kinds: tuple[str, ...]
+    units: tuple[str, ...]
     judged: Verdict | None
     why: str
-    efforts: dict[str, float] = field(default_factory=dict)
+    efforts: dict[str, tuple[float, Unit]] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """The object of --json."""
@@ -44,7 +46,7 @@ class Equilibrium:
         energy = judged.energy if judged is not None else None
         return {
             "values": self.values,
-            "efforts": self.efforts,
+            "efforts": {name: value for name, (value, _) in self.efforts.items()},
             "stability": judged.stability if judged is not None else None,
             "by": judged.by if judged is not None else None,
             "why": self.why or None,
@@ -61,15 +63,15 @@ class Equilibrium:
         """A few lines for the terminal."""
         lines = [f"{number}  {self._judgement()}"]
         shown = [
-            f"{name} = {value + 0.0:.9g}"
-            for (name, value), kind in zip(self.values.items(), self.kinds, strict=True)
+            f"{name} = {value + 0.0:.9g}{'' if unit == '1' else f' {unit}'}"
+            for (name, value), kind, unit in zip(self.values.items(), self.kinds, self.units, strict=True)
             if kind in SHOWN and (kind != "f" or value != 0.0)
         ]
         more = [f"... {len(shown) - MOST} more"] if len(shown) > MOST else []
         lines += [f"   {text}" for text in [*shown[:MOST], *more]]
         if self.efforts:
             kept = list(self.efforts.items())[:MOST]
-            lines.append(f"   nodes {', '.join(f'{name} = {value:.9g}' for name, value in kept)}")
+            lines.append(f"   nodes {', '.join(f'{name} = {quantity(value, unit)}' for name, (value, unit) in kept)}")
         if self.rest.holding:
             lines.append(f"   {', '.join(f'{name} {how}' for name, how in list(self.rest.holding.items())[:MOST])}")
         if self.rest.free:
@@ -118,15 +120,20 @@ def equilibria(
     return found, tuple(replace(_judged(found, rest), efforts=_efforts(at(found, rest))) for rest in states), why
 
 
-def _efforts(here: Found) -> dict[str, float]:
-    """Efforts of the nodes at a state, those that are known there."""
+def _efforts(here: Found) -> dict[str, tuple[float, Unit]]:
+    """Efforts of the nodes at a state in SI, those that are known there; the unit in which each is traced."""
     state = here.state
     if not here.prepared.unasked:
         return {}
     with np.errstate(all="ignore"):
         values = here.system.observe(state.t, state.y, state.yd)
-    columns = [(c.name.removesuffix(".e"), float(values[c.place])) for c in columns_of(here.system.description)]
-    return {name: value for name, value in columns if np.isfinite(value)}
+    units = {o.name: o.unit for o in here.prepared.network.observations}
+    columns = [(c.name, float(values[c.place])) for c in columns_of(here.system.description)]
+    return {
+        name.removesuffix(".e"): (value * float(units[name].scale) + float(units[name].offset), units[name])
+        for name, value in columns
+        if np.isfinite(value)
+    }
 
 
 def _judged(found: Found, rest: Rest) -> Equilibrium:
@@ -135,17 +142,18 @@ def _judged(found: Found, rest: Rest) -> Equilibrium:
     n = system.form.written
     names = dict(zip(system.unknown_names[:n], map(float, rest.state.y), strict=True))
     kinds = tuple(map(str, system.kinds[:n]))
+    units = tuple(system.description.families[int(k)].unit for k in system.family_of[:n])
     sampled = next((e.name for e in found.prepared.network.events if e.period is not None), None)
     if sampled is not None:
-        return Equilibrium(rest, names, kinds, None, f"eigenvalues do not know what '{sampled}' does")
+        return Equilibrium(rest, names, kinds, units, None, f"eigenvalues do not know what '{sampled}' does")
     try:
         small = linearised(here, ()).reduced
     except NoLinearisation as error:
-        return Equilibrium(rest, names, kinds, None, str(error))
+        return Equilibrium(rest, names, kinds, units, None, str(error))
     primal = found.prepared.formulation in ("lagrangian", "hamiltonian")
     with np.errstate(all="ignore"):
         energy = energy_at(system, rest.state) if primal else None
-    return Equilibrium(rest, names, kinds, verdict(small, loose_of(here), energy, rest.together), "")
+    return Equilibrium(rest, names, kinds, units, verdict(small, loose_of(here), energy, rest.together), "")
 
 
 def _complex(value: complex) -> str:

@@ -44,9 +44,20 @@ def eventful_start(system: System, t0: float, plan: Plan, until: float | None = 
 
 
 def _fitting(system: System, t0: float, plan: Plan, until: float | None, *, constants: bool) -> ConsistentState:
-    """The same; constants: those of integrated constraints are found too."""
+    """The same; constants: those of integrated constraints are found too.  Active sets that contradict themselves have
+    no start, which takes long to be sure of: first those are tried that have one at once.
+    """
     if not plan.contacts:
         return consistent_start(system, t0, until=until, constants=constants)
+    with suppress(InconsistentStart):
+        return _pivoted(system, t0, plan, until, constants=constants, quickly=True)
+    return _pivoted(system, t0, plan, until, constants=constants, quickly=False)
+
+
+def _pivoted(
+    system: System, t0: float, plan: Plan, until: float | None, *, constants: bool, quickly: bool
+) -> ConsistentState:
+    """The same; quickly: each set by the first strategy of a start alone."""
     contacts = Contacts(plan, system, Observer(system), system.description.p, starting=True)
     contacts.begin()
     zeros = np.zeros(system.form.written)
@@ -59,7 +70,7 @@ def _fitting(system: System, t0: float, plan: Plan, until: float | None, *, cons
 
     def settle(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         try:
-            found.append(consistent_start(system, t, until=until, constants=constants))
+            found.append(consistent_start(system, t, until=until, constants=constants, quickly=quickly))
         except InconsistentStart as error:
             errors.append(error)
             return None

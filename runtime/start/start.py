@@ -152,11 +152,15 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
     return best
 
 
-def _attempt(starter: Starter, t: float, guess: Floats, free: Mask) -> tuple[Solution, str]:
-    """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
+def _attempt(
+    starter: Starter, t: float, guess: Floats, free: Mask, most: int | None = None
+) -> tuple[Solution, str]:
+    """The first strategy that holds, of all or as many, from the guess, and its name; the least residual and "" where
+    none does.
+    """
     x = _begun(starter, t, guess, free)
     best = Solution(x, np.inf)
-    for name, strategy in applicable(starter, t, x):
+    for name, strategy in itertools.islice(applicable(starter, t, x), most):
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = _anew(starter, t, found, x, guess, free)
         if holds or sure:
@@ -242,15 +246,17 @@ def consistent_start(
     until: float | None = None,
     *,
     constants: bool = False,
+    quickly: bool = False,
 ) -> ConsistentState:
     """A state at t0 that satisfies all rows and their hidden derivatives.
 
     system: any index form of the model; near: a state to stay close to, else the guesses; until: `time.monotonic()` at
     which the search is given up; constants: those of integrated constraints, which the model then has, follow from the
-    rest.  Raises InconsistentStart; SolverFailure (max_wall).
+    rest; quickly: by the first strategy alone, and no word why there is none.  Raises InconsistentStart; SolverFailure
+    (max_wall).
     """
     try:
-        return _consistent(system, t0, near, until, constants=constants)
+        return _consistent(system, t0, near, until, constants=constants, quickly=quickly)
     except OutOfTimeError as error:
         raise SolverFailure("max_wall", t0, 0.0) from error
 
@@ -265,7 +271,7 @@ def _integrated(starter: Starter) -> tuple[Places, Places]:
 
 
 def _consistent(
-    system: System, t0: float, near: ConsistentState | None, until: float | None, *, constants: bool
+    system: System, t0: float, near: ConsistentState | None, until: float | None, *, constants: bool, quickly: bool
 ) -> ConsistentState:
     """The same; OutOfTimeError."""
     system = system if system.form.name == "3" else system.another("3")
@@ -278,7 +284,9 @@ def _consistent(
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
         guess = starter.unknowns(t0, y, np.zeros(y.size))
-    best, strategy = _attempt(starter, t0, guess, starter.free)
+    best, strategy = _attempt(starter, t0, guess, starter.free, 1 if quickly else None)
+    if quickly and not strategy:
+        raise InconsistentStart("stuck", best.residual)
     if not strategy:
         flat = _flat(starter, t0, guess, starter.free)
         if _without_rates(starter, flat):

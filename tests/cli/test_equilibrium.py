@@ -371,3 +371,31 @@ def test_large_models_are_not_tried_at_random_points(tmp_path, capsys, monkeypat
     assert len(rests(capsys, path)) == 3
     monkeypatch.setattr(rest, "MANY", 1)
     assert len(rests(capsys, path)) == 1
+
+
+def test_operating_points_are_in_si_for_programs_and_in_their_units_for_people(tmp_path, capsys):
+    """A node that the scene traces in bar was 3 among pascals."""
+    path = write(
+        tmp_path,
+        """
+model pipes {
+  node a, b: hydraulic
+  S: effort(e = 3 bar) a -> ground
+  R1: dissipator(e = 1e9 Pa.s/m^3*f) a -> b
+  R2: dissipator(e = 2e9 Pa.s/m^3*f) b -> ground
+  C: potential(e = 1e12 Pa/m^3*q) b -> ground
+  init C.q = 0 m^3
+}
+
+scene fill of pipes {
+  time 0 s to 1 s
+  trace a.e in bar
+}
+""",
+    )
+    (found,) = rests(capsys, path)
+    assert found["efforts"] == pytest.approx({"a": 3e5, "b": 2e5})
+    assert run(["equilibrium", path]) == 0
+    out = capsys.readouterr().out
+    assert "nodes a = 3 bar, b = 200000 Pa" in out
+    assert "C = 2e-07 m^3" in out
