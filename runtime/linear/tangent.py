@@ -141,18 +141,28 @@ def rows_at(system: System, state: ConsistentState) -> Rows:
 
 
 def _tangent(g: Floats, by_column: Floats) -> tuple[Floats, Floats]:
-    """The null space of G, orthonormal in units [unknowns] in which those that move at all move alike; these units.
+    """The null space of G, orthonormal in units [unknowns] in which those that move at all move alike, and the others
+    weigh no more in a row than these; these units.
 
-    Where a farad counts in millionths, charges would pass for at rest beside voltages.
+    Where a farad counts in millionths, charges would pass for at rest beside voltages; the flow of a source, which no
+    stiff law weighs, would hide the balance of all others at its node.
     """
     by_row = 1.0 / np.where(g.any(axis=1), np.abs(g * by_column).max(axis=1, initial=0.0), 1.0)
     tangent = _null_space(by_row[:, None] * g * by_column)
     for _ in range(PASSES):
         size = np.linalg.norm(tangent, axis=1)
-        by_column = by_column * np.where(size > MOVES, size, 1.0)
+        by_column = _no_heavier(g, by_column * np.where(size > MOVES, size, 1.0), size > MOVES)
         by_row = 1.0 / np.where(g.any(axis=1), np.abs(g * by_column).max(axis=1, initial=0.0), 1.0)
         tangent = _null_space(by_row[:, None] * g * by_column)
     return tangent, by_column
+
+
+def _no_heavier(g: Floats, units: Floats, moves: Mask) -> Floats:
+    """Units in which no entry of what does not move is larger than the largest in its row of what does."""
+    size = np.abs(g) * units
+    largest = size[:, moves].max(axis=1, initial=0.0)[:, None]
+    share = np.divide(largest, size, out=np.ones_like(size), where=(largest > 0.0) & (size > 0.0))
+    return np.where(moves, units, units * np.minimum(share.min(axis=0, initial=1.0), 1.0))
 
 
 def _null_space(matrix: Floats) -> Floats:

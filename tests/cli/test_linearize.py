@@ -557,3 +557,35 @@ def test_extremes_and_products_over_a_range_have_slopes(tmp_path, capsys):
     assert found["states"] == ["s[1]", "s[2]", "s[3]"]
     for name, row in expected.items():
         assert np.abs(slopes[name] - row).max() <= CLOSE
+
+
+VESSEL = """
+model vessel {
+  param Q = 12 l/min
+  param R = 2e9 Pa.s/m^3
+  node a, m: hydraulic
+  feed: flow(f = Q) ground -> a
+  gas: potential(e = 60 bar*0.6 l/(0.6 l - q)) a -> ground
+  seat: effort(e = 95 bar) a -> m
+  loss: dissipator(e = R*f) m -> ground
+  psi one_way: seat.f >= 0 m^3/s
+  init gas.q = 0.15 l
+}
+
+scene run of vessel {
+  time 0 s to 1 s
+  trace a.e
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", PRIMAL)
+def test_a_flow_that_is_given_hides_no_balance(formulation, tmp_path, capsys):
+    """The flow of a source weighs 1e10 times as much as those beside a stiff law: it hid the balance of its node."""
+    path = write(tmp_path, VESSEL)
+    found = linear(capsys, path, "--scene", "run", "--formulation", formulation, "--inputs", "Q", "--no-prune")
+    assert np.abs(values(found["eigenvalues"])).max() <= 1e-12
+    a, b, c, d = (np.array(found["reduced"][name]) for name in "ABCD")
+    slope = 60e5 * 0.6e-3 / 0.45e-3**2  # of the pressure by the volume
+    at = 2.0j
+    assert complex((c @ np.linalg.solve(at * np.eye(len(a)) - a, b) + d)[0, 0]) == pytest.approx(slope / at, rel=CLOSE)
