@@ -182,8 +182,8 @@ class Parameters(ElaborationContext):
         for inner in ex.topological([node]):
             if inner.op in ("var", "time"):
                 message = f"parameter '{statement.decl.name}' depends on '{inner}': a parameter is a constant"
-                help_ = f"numbers and parameters alone; 'input {statement.decl.name}' could vary" if given is not None else None
-                raise self._wrong("E807", message, statement, given, help=help_)
+                vary = f"numbers and parameters alone; 'input {statement.decl.name}' could vary"
+                raise self._wrong("E807", message, statement, given, help=None if given is None else vary)
 
     def _wrong(
         self, code: str, message: str, statement: syntax.Param, given: Argument | None, help: str | None
