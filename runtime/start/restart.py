@@ -56,11 +56,13 @@ class Restart:
 
     def struck(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         """The same with the impulses [unknowns as written] that took the flows there, of a set of constraints that is
-        tried.  Sizes stay as they were: where it has no rank its multipliers are without bound.
+        tried.  Sizes stay as they were: where it has no rank its multipliers are without bound, and so are rates.
         """
-        known = self.magnitude(y.size)
-        found = self._struck(t, y, yd, known)
-        lib.reader(self.settler.core.contents.scale, y.size)[:] = known
+        core = self.settler.core.contents
+        scale = lib.reader(core.scale, core.unknowns + core.rates)
+        known = scale.copy()
+        found = self._struck(t, y, yd, known[: y.size])
+        scale[:] = known
         return found
 
     def _struck(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats, Floats] | None:
