@@ -56,14 +56,17 @@ class Restart:
 
     def struck(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         """The same with the impulses [unknowns as written] that took the flows there, of a set of constraints that is
-        tried.  Sizes stay as they were: where it has no rank its multipliers are without bound, and so are rates.
+        tried.  Sizes stay as they were: where it has no rank its multipliers are without bound.
         """
-        core = self.settler.core.contents
-        scale = lib.reader(core.scale, core.unknowns + core.rates)
-        known = scale.copy()
-        found = self._struck(t, y, yd, known[: y.size])
-        scale[:] = known
+        known = self.magnitude(y.size)
+        found = self._struck(t, y, yd, known)
+        lib.reader(self.settler.core.contents.scale, y.size)[:] = known
         return found
+
+    def sizes_of_rates(self) -> Floats:
+        """Sizes [rates] as they stand, of sets that were tried too."""
+        core = self.settler.core.contents
+        return lib.reader(core.scale, core.unknowns + core.rates)[core.unknowns :]
 
     def _struck(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats, Floats] | None:
         """The same; magnitude [unknowns as written] before it."""
