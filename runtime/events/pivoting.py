@@ -88,6 +88,8 @@ class Pivoting:
             wrong = sorted({*self.contacts.wrongs(values, found[2]), *self.contacts.backwards(t, y, found)})
             if not wrong:
                 return found[0], found[1]
+            if again:  # driven back by either sense: it does not go through where other constraints hold than before
+                self.contacts.through.difference_update(wrong)
             if again and self._done(t, wrong, y, found):  # from behind their impulses on
                 y, yd = found[:2]
                 seen.clear()

@@ -29,3 +29,38 @@ def test_what_flows_ends_in_finite_time(tmp_path, method, pressure, start, accur
     trace = api.simulate(tmp_path / "model.sd", method=method, accuracy=accuracy, output=tmp_path / "out.h5")
     exact = pressure + (start - pressure) * np.maximum(1.0 - trace.time / 8.0, 0.0) ** 2
     assert np.abs(trace["h"].values - exact).max() <= accuracy
+
+
+SUCKED = """\
+model sucked {
+  node a, b: hydraulic
+  C: potential(q = 1 m^3/Pa*e) a -> ground
+  R: dissipator(e = 1 Pa.s/m^3*f) a -> b
+  P: effort(e = PRESSURE) b -> ground
+  phi level: C.q >= 0 m^3
+  init C.q = START m^3
+}
+scene flows of sucked {
+  time 0 s to 4 s
+  trace C.q as q every 0.05 s
+}
+"""
+
+
+def _sucked(t, start):
+    """Down to -1 from 1 until it is empty, at ln 2 s; from nothing once the suction, cos t, has turned."""
+    if start:
+        return np.maximum(2.0 * np.exp(-t) - 1.0, 0.0)
+    return np.where(t < np.pi / 2, 0.0, 0.5 * (np.exp(np.pi / 2 - t) - np.cos(t) - np.sin(t)))
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock"])
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-8])
+@pytest.mark.parametrize(("pressure", "start"), [("-1 Pa", 1), ("-1 Pa*cos(t/(1 s))", 0)])
+def test_a_level_is_never_below_the_bottom(tmp_path, pressure, start, accuracy, method, formulation):
+    (tmp_path / "model.sd").write_text(SUCKED.replace("PRESSURE", pressure).replace("START", str(start)))
+    asked = {"method": method, "formulation": formulation, "accuracy": accuracy, "output": tmp_path / "out.h5"}
+    trace = api.simulate(tmp_path / "model.sd", **asked)
+    assert [event.after for event in trace.events] == ["holds" if start else "free"]
+    assert np.abs(trace["q"].values - _sucked(trace.time, start)).max() <= accuracy

@@ -285,6 +285,13 @@ double sd_radau_strictness(const sd_radau *radau, const sd_radau_method *method)
     return radau->strict[method - sd_radau_methods];
 }
 
+/* the same of the step at hand: values within the first one, of three stages, are a cubic's, of the order of the estimate */
+static double strictness(const sd_radau *radau)
+{
+    int cubic = radau->taken == 0 && radau->method->stages == 3;
+    return cubic ? radau->strict_first : sd_radau_strictness(radau, radau->method);
+}
+
 /* 1 / order of the estimate's error in the step */
 static double power_of(const sd_radau *radau)
 {
@@ -302,6 +309,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->tolerance = fmax(0.1 * pow(radau->rtol, 2.0 / 3.0), 1e-13);
     for (int k = 0; k < SD_METHODS; k++)
         radau->strict[k] = fmax(1.0, fmin(within[k] * pow(radau->rtol, WITHIN), radau->tolerance / FINEST));
+    radau->strict_first = fmax(1.0, fmin(pow(radau->rtol, WITHIN), radau->tolerance / FINEST));
     memmove(radau->phi, y, size);
     memmove(radau->yd, yd, size);
     if (provide_room(radau)) /* which the first step tells */
@@ -340,7 +348,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
 static int estimate_error(sd_radau *radau, double *error)
 {
     int32_t n = radau->n;
-    double *v = radau->rate, *ee = radau->ee, strict = sd_radau_strictness(radau, radau->method);
+    double *v = radau->rate, *ee = radau->ee, strict = strictness(radau);
     memcpy(radau->y, radau->phi, (size_t)n * sizeof(double));
     for (int again = 0;; again++) {
         sd_radau_combine(radau->method->stages, n, radau->method->estimate, radau->z, v);
@@ -392,6 +400,7 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
     size_t size = (size_t)radau->n * sizeof(double);
     const sd_radau_method *method = radau->method;
     double h = radau->h, power = power_of(radau);
+    error *= sd_radau_strictness(radau, method) / strictness(radau); /* what the next step is judged by */
     int usual = sd_radau_iterations(radau);
     double limit = fmin(SD_SAFETY, SD_SAFETY * (1 + 2 * usual) / (iterations + 2 * usual));
     double ratio = fmax(1.0 / SD_GROWTH, fmin(1.0 / SD_SHRINK, pow(error, power) / limit));

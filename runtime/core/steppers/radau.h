@@ -67,6 +67,7 @@ typedef struct sd_radau {
     /* state of the integration */
     double tolerance;         /* 0.1 rtol^(2/3) */
     double strict[SD_METHODS]; /* what the estimate of each method counts beside the first one's */
+    double strict_first;       /* what it does in the first step, of three stages */
     double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size;
     double growth;            /* of the next step at most where laws are steep */
     double longest;           /* step accepted */
@@ -173,6 +174,8 @@ int sd_radau_sparing(const sd_radau *radau);
 int sd_radau_lean(sd_radau *radau, int where);
 int sd_radau_residuals(sd_radau *radau);
 double sd_radau_correct(sd_radau *radau);
+/* how far the last correction moved the unknowns with derivatives, in Newton's weights */
+double sd_radau_state_moved(const sd_radau *radau);
 /* radau_newton.c */
 void sd_radau_leave_below(sd_radau *radau, double null_pivot);
 int sd_radau_iterations(const sd_radau *radau);

@@ -428,6 +428,21 @@ static void solve_one(void *context, int part)
         sd_linear_z_solve(radau->complex_linear[part - 1], radau->w[part - 1]);
 }
 
+double sd_radau_state_moved(const sd_radau *radau)
+{
+    const sd_radau_method *method = radau->method;
+    double sum = 0.0;
+    for (int32_t i = 0; i < radau->n; i++)
+        for (int s = 0; s < method->stages && radau->smooth[i]; s++) {
+            double dz = method->column[s] * radau->d[0][i];
+            for (int k = 0; k < method->pairs; k++)
+                dz += 2.0 * creal(method->columns[k][s] * radau->w[k][i]);
+            double v = dz * sd_radau_newton_weight(radau, i);
+            sum += v * v;
+        }
+    return radau->n ? sqrt(sum / ((double)method->stages * radau->n)) : 0.0;
+}
+
 /* One Newton step from the residuals in d; the size of the correction in Newton's weights, and that of what carries the
  * state in state_size. */
 double sd_radau_correct(sd_radau *radau)

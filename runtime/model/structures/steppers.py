@@ -163,6 +163,7 @@ class Radau(c.Structure):
         *[(name, P) for name in ["atol", "magnitude", "met", "test", "power", "smooth"]],
         ("tolerance", D),
         ("strict", D * 3),
+        ("strict_first", D),
         *[(name, D) for name in ["t", "h", "h_used", "h_factored", "h_before", "h_accepted"]],
         *[(name, D) for name in ["error_accepted", "theta", "state_size", "growth", "longest"]],
         *[(name, I) for name in ["balances", "pressed", "ready", "old_jacobian", "rejected"]],
