@@ -1,7 +1,7 @@
 """Dry friction as relations: the complementary family has no row for flows that are zero, and gammas read any effort
 and flow.
 
-Its sense becomes an unknown s, closed by u = 0 while it sticks, else by the sense; its effort is c*s.  That of a written
+Its sense becomes an unknown s, closed by u = 0 while it sticks, else by the sense; its effort is c*s.  That of a
 content over nodes becomes a branch between them first.
 """
 
