@@ -319,8 +319,8 @@ def relation(
 ) -> Node:
     """The text of a relation given = text with each term c*setsign(u) as c*s: s closes  u = 0  where that holds, else
     s = sense, the sign of u.  It holds as long as c*s, what the others leave, is within abs(c): a relation may be
-    written with either sign of c.  Where u is what a dissipator `absorbs` by, c itself is the bound, which is not negative.
-    Where u moves at finite rates alone it is a sign, which may slide (forms/corners).
+    written with either sign of c.  Where u is what a dissipator `absorbs` by, c itself is the bound, which is not
+    negative.  Where u moves at finite rates alone it is a sign, which may slide (forms/corners).
     """
     at, shape = tuple(ex.index(loop.index) for loop in loops), tuple((loop.first, loop.last) for loop in loops)
     change: dict[Node, Node] = {}

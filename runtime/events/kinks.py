@@ -2,8 +2,8 @@
 
 The branch stands in p (forms/corners/frozen.py): LIVE as the text says, ABOVE and BELOW zero, SLIDES on zero, RESTS
 on zero with the value of the law there.  A branch fits where its function has that sign, or is zero and does not move
-to the other side; where both branches drive it back, the law slides between them (Filippov 1988), and leaves by the side
-whose sense reaches 1.  Where a law that jumps is on zero and no branch drives it back, and its own value there (0 of
+to the other side; where both branches drive it back, the law slides between them (Filippov 1988), and leaves by the
+side whose sense reaches 1.  Where a law that jumps is on zero, no branch drives it back, and its own value there (0 of
 sign) leaves the function without a rate, it rests.
 """
 
