@@ -15,6 +15,7 @@ from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared, place_at
 from sysdyn.cli.run.starting import Started
 from sysdyn.cli.run.targets import Target
+from sysdyn.dsl.model.expression import topological
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.judgement import Cancelled, NotMet
@@ -174,6 +175,11 @@ def _inaccurate(
 ) -> None:
     """E920; flat: laws by whose slopes the method steps, and that have none at the start."""
     where = next((o.place for o in prepared.network.observations if o.name == missed.element), place)
+    stops = _stops(prepared, missed.element) if missed.undefined else None
+    if stops is not None:
+        text = f"the argument of table {stops}, which {missed.element} reads, left its range at t = {missed.time:.9g} s"
+        report.error("E932", text, where, help=_REMEDIES["E932"])
+        return
     if missed.undefined:
         text = f"{missed.element} is no number from t = {missed.time:.9g} s on: a function is outside its domain"
         report.error("E920", f"the accuracy asked was not reached: {text}", where, help=_REMEDIES["E933"])
@@ -186,6 +192,13 @@ def _inaccurate(
         text += f"; {no_slope(flat, 'the start')}, by which rosenbrock steps"
         help_ = f"--method radau or bdf, or auto; {WITH_A_SLOPE}"
     report.error("E920", text, where, help=help_)
+
+
+def _stops(prepared: Prepared, quantity: str) -> str | None:
+    """A table that stops runs and that a traced quantity reads."""
+    stopping = {table.name for table in prepared.network.tables if table.outside == "stop"}
+    read = topological([o.expression for o in prepared.network.observations if o.name == quantity])
+    return next((str(n.data[0]) for n in read if n.op == "table" and n.data[0] in stopping), None)
 
 
 def _unbalanced(target: Target, prepared: Prepared, missed: NotMet, report: Report) -> None:

@@ -16,7 +16,18 @@ from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Constraint, Coordinate, Dynamic, Loop, NodeFamily, Shape, State, Unknown
+from sysdyn.dsl.model.network import (
+    Branch,
+    Constraint,
+    Coordinate,
+    Dynamic,
+    Loop,
+    NodeFamily,
+    Observation,
+    Shape,
+    State,
+    Unknown,
+)
 from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.model.values import Values, as_constants
 from sysdyn.dsl.rules.checks import looped_expressions_of, nodes_of
@@ -26,8 +37,8 @@ LOOKED_AT = 1000
 """Elements of an array whose divisors are looked at."""
 
 
-def run(model: Elaborator, known: Values, report: Report) -> None:
-    """E119, E313 of dry friction, E322, E324, E805 with the values bound."""
+def run(model: Elaborator, known: Values, observations: Iterable[Observation], report: Report) -> None:
+    """E119, E313 of dry friction, E322, E324, E805 with the values bound; observations: what is traced."""
     _allowances(model, known, report)
     for r in model.parts.requirements:
         read = min(map(str, ex.variables(r.condition)), default=None)
@@ -45,7 +56,8 @@ def run(model: Elaborator, known: Values, report: Report) -> None:
                 shown = shown or ", ".join(f"{i} = {v:g}" for i, v in at.items())
                 report.error("E322", f"require {text} fails: {shown}", r.place, help=f"values for which {text}")
                 break
-    for node, loops, place in looped_expressions_of(model):
+    traced = [(o.expression, (), o.place) for o in observations]
+    for node, loops, place in (*looped_expressions_of(model), *traced):
         if not _undefined(node, place, report):
             _divisions(model, node, tuple(loops), place, known, report)
     _frictions(model, known, report)
