@@ -85,6 +85,9 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
     report.error("E201", message, place, help=help_, edit=edit)
 
 
+_PREFIXES = {"n": "1e-9", "u": "1e-6", "µ": "1e-6", "m": "1e-3", "c": "1e-2", "k": "1e3", "M": "1e6", "G": "1e9"}
+
+
 def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     """The unit as it is written here: by rewriting; else the line that would declare it, else the nearest name."""
     right = respelled(unit.text)
@@ -99,5 +102,8 @@ def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     line = declaration(factor.name)
     if line is not None:
         return f"declare it at the top of the file: {line}"
+    prefix, base = factor.name[:1], factor.name[1:]
+    if prefix in _PREFIXES and known(base) is not None:
+        return f"{base} takes no prefix: {_PREFIXES[prefix]} {base}"
     near = nearest(factor.name, (*names(), "mm", "km", "kN", "kohm", "mA", "uF", "degC"))
     return f"nearest unit: '{near}'" if near and len(factor.name) > 1 else "sysdyn help units lists them"
