@@ -101,7 +101,7 @@ def _contradiction(label: str, wrong: Equation, equations: list[Equation], told:
     alone = next(e for e in equations if e[2] == wrong[2])
     variable = next(iter(alone[0]))
     first = told.get(variable)
-    if first is None or len(alone[0]) > 1 or len(first[0]) > 1:
+    if first is None or any(len(e[0]) > 1 or abs(e[0][variable]) != 1 for e in (first, alone)):
         return f"the unit variables of '{label}' contradict each other at '{wrong[2]}' (off by {dim.show(wrong[1])})"
     one, other = (dim.show(raised(e[1], 1 / e[0][variable])) for e in (first, alone))
     return f"unit variable {variable} of '{label}' is {one} by '{first[2]}' and {other} by '{wrong[2]}'"

@@ -37,7 +37,7 @@ LOOKED_AT = 1000
 """Elements of an array whose divisors are looked at."""
 
 
-def run(model: Elaborator, known: Values, observations: Iterable[Observation], report: Report) -> None:
+def run(model: Elaborator, known: Values, report: Report, observations: Iterable[Observation] = ()) -> None:
     """E119, E313 of dry friction, E322, E324, E805 with the values bound; observations: what is traced."""
     _allowances(model, known, report)
     for r in model.parts.requirements:
