@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Container
 from fractions import Fraction
 
@@ -69,13 +70,17 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
             help="write the unit itself",
         )
         return
-    message = f"'{factor.name}' is not a unit, in '{unit.text}'"
+    beside = place.source.text[max(unit.span.start - 40, 0) : unit.span.start]
+    number = re.search(r"(?<![\w.])[0-9][\w.+-]*[ \t]+$", beside)
+    quantity = (number.group() if number else "") + unit.text
+    message = f"'{factor.name}' is not a unit, in '{quantity}'"
     help_: str | None
     edit = None
     before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
     if in_sight and before:
         sign = "/" if factor.op == "/" else "*"
         verb = "divide" if factor.op == "/" else "multiply"
+        before = quantity.removesuffix(unit.text) + before
         help_ = f"to {verb} by the variable {factor.name} write '{before} {sign} {factor.name}'"
     else:
         help_ = _meant(unit, factor)

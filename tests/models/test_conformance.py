@@ -205,6 +205,29 @@ scene s of b { time 0 s to 1 s; trace K[1].q, K[3].q }
         FIVE,
         CLOSE,
     ),
+    # section 5, initial values: where nothing is said, each position is a guess of zero, in both families
+    "a group of points that an init stretches": (
+        """
+model k {
+  node a, b: translation
+  F: effort(e = 3 N*sin(2 rad/s*t)) ground -> a
+  K: potential(e = 5 N/m*q) a -> b
+  D: dissipator(e = 2 N.s/m*f) b -> ground
+  M: kinetic(p = 1 kg*f) a
+  init K.q = 0.4 m
+  init M.f = 1 m/s
+}
+scene s of k { time 0 s to 3 s; trace a.q, D.q, D.p }
+""",
+        solved(
+            lambda t, y: [3 * sin(2 * t) - 5 * y[1], y[0] - 5 * y[1] / 2, 5 * y[1] / 2, 5 * y[1]],
+            [1, 0.4, -0.2, 0],
+            3,
+            **{"a.q": lambda t, y: y[1] + y[2], "D.q": lambda t, y: y[2], "D.p": lambda t, y: y[3]},
+        ),
+        EACH,
+        CLOSE,
+    ),
     # members of nodes (sections 5, 6): rates in the complementary forms
     "the acceleration of a point": (
         "model b { node x: translation; M: kinetic(p = 2 kg*f) x; K: potential(e = 8 N/m*q) x -> ground\n"
@@ -399,6 +422,10 @@ REFUSED = {
         ("E407", 2, "'el' is no node", "on el.q"),
     ),
     "kelvins take no prefix": ("model m { let a = 3 mK }\n", ("E201", 1, "'mK'", "1e-3 K")),
+    "what divides behind a unit is a variable": (
+        "model z { param n = 3\n param c = 4 kJ/K/n }\n",
+        ("E201", 2, "'n' is not a unit, in '4 kJ/K/n'", "'4 kJ/K / n'"),
+    ),
     "unit variables that disagree": (
         "component c { param k: $u\n input u: $u\n output y = u + k }\nmodel z { K: c(k = 3 A) u = 3 V }\n",
         ("E209", 4, "is A by 'k' and V by 'u'", ""),
