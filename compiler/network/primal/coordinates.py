@@ -37,8 +37,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
         return network, (), ()
     sizes = Sizes(network)
     incidence = Incidence(network, sizes)
-    charges = _charges(network)
-    classes = series(incidence, network.read, charges)
+    classes = series(incidence, network.read)
     nodes = balances(incidence, classes.merged)
     said = laws(network, incidence.elements, sizes, reflected=reflected)
     potentials = Potentials(nodes.efforts)
@@ -47,7 +46,8 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     book.sticking = _sticking(network)
     reader = Rewriter(sizes, book)
     initials = foremost(tuple(at_stores(network, incidence, reader)), network.branches, sizes)
-    contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected, read=charges)
+    read = _charges(network)
+    contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected, read=read)
     guesses, stores = measured(network, initials, sizes, reader, reflected=reflected)
     found = replace(
         network,

@@ -58,8 +58,8 @@ class Series:
     merged: tuple[NodeCell, ...]
 
 
-def series(incidence: Incidence, read: frozenset[str], charges: frozenset[str] = frozenset()) -> Series:
-    """The series classes; charges: branches whose displacement something reads."""
+def series(incidence: Incidence, read: frozenset[str]) -> Series:
+    """The series classes."""
     flowing = [e for e in incidence.elements if e.ends and e.branch.domain.common == "effort"]
     candidates = [cell for cell in incidence.all_cells() if _mergeable(cell, incidence, read)]
     number_of = {e.number: k for k, e in enumerate(flowing)}
@@ -70,7 +70,7 @@ def series(incidence: Incidence, read: frozenset[str], charges: frozenset[str] =
             break
         plain = {_key(link) for link in likeness.refused}
         candidates = [c for c, link in zip(candidates, links, strict=True) if _key(link) not in plain]
-    coordinates, members = _classes(flowing, likeness, charges)
+    coordinates, members = _classes(flowing, likeness)
     return Series(coordinates, members, tuple(candidates))
 
 
@@ -124,11 +124,8 @@ class _Class:
     kept: tuple[int, ...]  # indices of the leader's name that the coordinate has
 
 
-def _classes(
-    flowing: Sequence[Element], likeness: IndexClasses, charges: frozenset[str]
-) -> tuple[tuple[Coordinate, ...], tuple[Member, ...]]:
-    groups = likeness.groups().values()
-    classes = sorted((_class(m, flowing, likeness, charges) for m in groups), key=lambda c: c.leader)
+def _classes(flowing: Sequence[Element], likeness: IndexClasses) -> tuple[tuple[Coordinate, ...], tuple[Member, ...]]:
+    classes = sorted((_class(m, flowing, likeness) for m in likeness.groups().values()), key=lambda c: c.leader)
     named = [_family(c, flowing, likeness) for c in classes]
     plain = [(name, box) for name, box, whole in named if whole]
     names = iter(parts(plain))
@@ -153,15 +150,10 @@ def _unused(name: str, taken: set[str]) -> str:
     return next(n for k in range(2, len(taken) + 3) if (n := f"{name}.{k}") not in taken)
 
 
-def _class(
-    members: list[tuple[Cell, int]], flowing: Sequence[Element], likeness: IndexClasses, charges: frozenset[str]
-) -> _Class:
-    """The leader is the first potential store, else the first branch whose displacement is read, else the first; runs
-    lose the index they run along.
-    """
+def _class(members: list[tuple[Cell, int]], flowing: Sequence[Element], likeness: IndexClasses) -> _Class:
+    """The leader is the first potential store, else the first branch; runs lose the index they run along."""
     stores = [m for m in members if flowing[m[0][0]].branch.kind == "potential"]
-    read = [m for m in members if flowing[m[0][0]].name in charges]
-    leader, sign = (stores or read or members)[0]
+    leader, sign = (stores or members)[0]
     element = flowing[leader[0]]
     tied = {d for d, k in enumerate(leader[1]) if likeness.collapsed(leader, likeness.axis(leader[0], d)[0], k)}
     if any(_tied(cell, likeness) for cell, _ in members) and not likeness.extended(leader):
