@@ -113,8 +113,11 @@ def _ports(component: ComponentSymbol, s: syntax.Instance) -> dict[str, str] | i
         return 1 if name in ONE_PORTS else 2 if name in TWO_PORTS else None
     if not isinstance(symbol, ComponentSymbol):
         return None
-    ends = [b for b in symbol.body if isinstance(b, (syntax.Port, syntax.Branch))]
-    return {decl and decl.name: b.domain.name for b in ends for decl in (b.decls or ("",))}
+    found: dict[str, str] = {}
+    for b in symbol.body:
+        if isinstance(b, (syntax.Port, syntax.Branch)):
+            found |= {decl.name: b.domain.name for decl in b.decls} or {"": b.domain.name}
+    return found
 
 
 def _label(statement: syntax.Statement) -> str | None:
