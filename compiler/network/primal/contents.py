@@ -149,7 +149,7 @@ class Contents:
         elements: Sequence[Element],
         *,
         reflected: bool,
-        read: Container[str] = frozenset(),
+        read: frozenset[str] = frozenset(),
     ) -> None:
         """read: branches whose displacement a statement reads."""
         self.reader = reader
@@ -173,9 +173,12 @@ class Contents:
             box = reader.sizes.reach(initial.target.args, within, initial.place)
             self._given.setdefault(initial.target.data[0], []).append((initial, box))
         followers: dict[int, list[Member]] = {}
-        for m in members:
-            name = m.element.name
-            if not m.leads and (m.element.branch.kind == "potential" or name in read or name in self._given):
+        begin = [m for m in members if m.element.branch.kind == "potential" or m.element.name in {*read, *self._given}]
+        alike: dict[str, set[int]] = {}
+        for m in begin:
+            alike.setdefault(m.coordinate, set()).add(m.element.number)
+        for m in begin:
+            if not m.leads and (m.element.branch.kind == "potential" or len(alike[m.coordinate]) > 1):
                 followers.setdefault(m.element.number, []).append(m)
         for group in followers.values():
             self._follower(group[0].element, group)
