@@ -165,7 +165,7 @@ def _judged(
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
         switches.expanded(elaborator, known)
-    bound_values.run(elaborator, known, report)
+    bound_values.run(elaborator, known, report, reader.observations)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
         floating(elaborator, reader.observations, report)

@@ -15,6 +15,7 @@ from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared, place_at
 from sysdyn.cli.run.starting import Started
 from sysdyn.cli.run.targets import Target
+from sysdyn.dsl.model.expression import topological
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.judgement import Cancelled, NotMet
@@ -38,10 +39,11 @@ _CAUSES = {
     "chatter": ("E930", "events follow each other without end at one instant"),
     "complementarity": ("E930", "no set of constraints that hold fits: each one asks for another"),
     "slides": ("E930", "a law jumps there and both its branches drive it back: no motion follows either"),
+    "drives": ("E933", "the bound c of dry friction, c*setsign(u) or c*abs(u), falls below zero: it would drive"),
     "conflict": ("E704", "two events assign one variable at one instant"),
     "memory": ("E934", "there is no memory left"),
 }
-_OF_EVENTS = ("max_events", "chatter", "complementarity", "conflict", "slides")
+_OF_EVENTS = ("max_events", "chatter", "complementarity", "conflict", "slides", "drives")
 _REMEDIES = {
     "E704": "one event for both, or conditions that do not become true together",
     "E930": "another --method or --index, a looser --accuracy, or a smoother law there",
@@ -53,6 +55,7 @@ _REMEDIES = {
 
 _REMEDIES_OF_CAUSES = {
     "crawl": "an earlier end (--until), another --method, or a looser --accuracy",
+    "drives": "a bound of zero or more: abs(c), max(c, 0); or an earlier end: --until",
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",
     "chatter": "a condition and an action that do not undo each other: hysteresis, or an 'every' in place of a 'when'",
     "complementarity": "constraints that do not ask for opposites: a resistance or a clearance between these elements",
@@ -95,7 +98,8 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     if error.row is not None and found is None and not flat:
         text += f", in {_named(error.row)}"
     if error.unknown is not None:
-        text += f", {'of' if error.cause in _OF_EVENTS else 'unknown'} {error.unknown}"
+        name = re.sub(r" (sticking|set)( \d+)?(?=\[|$)", "", error.unknown)
+        text += f", {'of' if error.cause in _OF_EVENTS else 'unknown'} {name}"
     partial = error.partial
     linear = error.cause == "error_test" and isinstance(partial, Outcome) and partial.method == "rosenbrock"
     text += _BY_SLOPES if linear and not flat else ""
@@ -171,6 +175,11 @@ def _inaccurate(
 ) -> None:
     """E920; flat: laws by whose slopes the method steps, and that have none at the start."""
     where = next((o.place for o in prepared.network.observations if o.name == missed.element), place)
+    stops = _stops(prepared, missed.element) if missed.undefined else None
+    if stops is not None:
+        text = f"the argument of table {stops}, which {missed.element} reads, left its range at t = {missed.time:.9g} s"
+        report.error("E932", text, where, help=_REMEDIES["E932"])
+        return
     if missed.undefined:
         text = f"{missed.element} is no number from t = {missed.time:.9g} s on: a function is outside its domain"
         report.error("E920", f"the accuracy asked was not reached: {text}", where, help=_REMEDIES["E933"])
@@ -183,6 +192,13 @@ def _inaccurate(
         text += f"; {no_slope(flat, 'the start')}, by which rosenbrock steps"
         help_ = f"--method radau or bdf, or auto; {WITH_A_SLOPE}"
     report.error("E920", text, where, help=help_)
+
+
+def _stops(prepared: Prepared, quantity: str) -> str | None:
+    """A table that stops runs and that a traced quantity reads."""
+    stopping = {table.name for table in prepared.network.tables if table.outside == "stop"}
+    read = topological([o.expression for o in prepared.network.observations if o.name == quantity])
+    return next((str(n.data[0]) for n in read if n.op == "table" and n.data[0] in stopping), None)
 
 
 def _unbalanced(target: Target, prepared: Prepared, missed: NotMet, report: Report) -> None:
@@ -232,6 +248,11 @@ def _place(
         return driven
     if error.unknown is not None and error.cause not in _OF_EVENTS:
         return _declared(target, prepared, re.split(r"[^\w]", error.unknown, maxsplit=1)[0])
+    said = [s.place for s in prepared.network.switches if s.name == error.unknown]
+    said += [e.place for e in prepared.network.events if f"'{e.name}'" in (error.unknown or "")]
+    if said and error.cause in _OF_EVENTS:
+        label = re.split(r"[^\w]", str(error.unknown), maxsplit=1)[0]
+        return said[0] if said[0].source is own else _declared(target, prepared, label)
     if error.cause in ("max_steps", "max_wall", "max_events") and target.scene is not None:
         limits = [s for s in target.scene.body if isinstance(s, syntax.Limit) and error.cause == f"max_{s.name.name}"]
         return Place(own, limits[0].span if limits else target.scene.name.span)

@@ -173,14 +173,17 @@ def _floats(model: EnergyModel, group: _Anchors) -> bool:
 
 def _is_ignorable(model: EnergyModel, group: _Anchors) -> bool:
     """Whether nothing that makes a coordinate tangible, and no `init`, reads displacements but in differences, and what
-    reads flows does so linearly.
+    reads flows does so linearly; nor a trace, where an `init` moves some of them.
 
     Elements of the anchor that no potential energy reaches do not count.
     """
     m = model.mirror
     along = _Along(model, m.potential, m.coordinate, group)
-    said = ((i.target, i.nest) for i in model.initials)
+    said = [(i.target, i.nest) for i in model.initials]
     read = ((expression, loops) for expression, loops, _ in reading(model))
+    begun = any(n.data[0] in group for target, _ in said for n in local_variables(target, m.coordinate))
+    if begun and any(along.changes(q.expression, (), m.coordinate) for q in model.quantities):
+        return False  # where the group begins is seen: each coordinate is a guess of zero of its own
     if any(along.changes(expression, loops, m.coordinate) for expression, loops in (*read, *said)):
         return False
     linear = all(_is_linear_in_flows(root, group, m.rate) for root in _efforts_and_rows(model))

@@ -21,7 +21,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Domain, Energy, Network, Terminal, loop_indices
-from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
+from sysdyn.dsl.model.paynter import STATE_FUNCTIONS, StateFunction
 
 ALL = frozenset(STATE_FUNCTIONS)
 FOREIGN = frozenset(("T", "V*", "G"))
@@ -42,7 +42,7 @@ def as_elements(network: Network, functions: frozenset[str]) -> Network:
     for number, energy in enumerate(network.energies):
         for pieces in (summands(energy.expression), [energy.expression]) if energy.function in functions else ():
             names = [f"{energy.function} {number}.{k}" for k in range(len(pieces))]
-            found = [_element(energy, piece, name, nodes) for piece, name in zip(pieces, names, strict=True)]
+            found = [element(energy, piece, name, nodes) for piece, name in zip(pieces, names, strict=True)]
             branches = [b for b in found if b is not None]
             if len(branches) == len(pieces):
                 made += branches
@@ -52,10 +52,10 @@ def as_elements(network: Network, functions: frozenset[str]) -> Network:
     return replace(network, energies=tuple(kept), branches=(*network.branches, *made))
 
 
-def _element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
+def element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
     """The branch whose law is the slope of an energy over u = x(a) - x(b), or None."""
     function = STATE_FUNCTIONS[energy.function]
-    used = sorted((n for n in ex.variables(piece) if n.op == "var"), key=lambda n: n.number)
+    used = sorted((n for n in ex.variables(piece) if n.op == "var" and not _held(n, function)), key=lambda n: n.number)
     if not 1 <= len(used) <= 2 or any(n.data[1] != _AT_NODES[function.name] or n.data[2] for n in used):
         return None
     a, b = used[0], used[1] if len(used) == 2 else None
@@ -102,6 +102,11 @@ def _is_store(energy: Energy) -> bool:
     return STATE_FUNCTIONS[energy.function].edge != "dissipator"
 
 
+def _held(node: Node, function: StateFunction) -> bool:
+    """Whether an unknown stands in a state function as a parameter: signals, and in contents what gammas close."""
+    return node.data[1] == "s" or (node.data[1] == "e" and function.edge == "dissipator")
+
+
 def _owners(energy: Energy) -> list[str]:
     """The branches that an energy reads."""
     return list(dict.fromkeys(n.data[0] for n in _read(energy.expression)))
@@ -128,7 +133,7 @@ def _statements(network: Network, fields: dict[str, Branch]) -> dict[str, set[st
 def _over_fields(energy: Energy, fields: dict[str, Branch], said: dict[str, set[str]]) -> bool:
     """Whether an energy is a function of own variables of branches without a law, each at its own indices."""
     function = STATE_FUNCTIONS[energy.function]
-    unknowns = [n for n in ex.variables(energy.expression) if n.op == "var" and n.data[1] != "s"]
+    unknowns = [n for n in ex.variables(energy.expression) if n.op == "var" and not _held(n, function)]
     if not unknowns or any(n.data[1:] != (f"b{function.own}", 0) or n.data[0] not in fields for n in unknowns):
         return False
     branches = [fields[n.data[0]] for n in unknowns]

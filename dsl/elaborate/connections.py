@@ -151,7 +151,7 @@ class Connections(Statements):
                 root = root.base
             if isinstance(root, syntax.Name) and self.scope.find(root.name) is None:
                 raise self.resolver.unknown(root.name, root.span)
-            raise self.resolver.fail("E407", f"'{self._text(e)}' is no node", e.span)
+            raise self._no_node(e, None)
         match symbol:
             case PortSymbol():
                 if found.indices:
@@ -173,7 +173,12 @@ class Connections(Statements):
                 return self._node_end(node, found.indices, found.change, e)
             case Unsupported():
                 raise Failed
-        raise self.resolver.fail("E407", f"'{self._text(e)}' is no node", e.span)
+        raise self._no_node(e, symbol)
+
+    def _no_node(self, e: syntax.Expr, symbol: object) -> Failed:
+        text = self._text(e)
+        help_ = f"on {text}.q: the element shares the ends of '{text}'" if isinstance(symbol, BranchSymbol) else None
+        return self.resolver.fail("E407", f"'{text}' is no node", e.span, help=help_)
 
     def _node_end(
         self, symbol: NodeSymbol, indices: tuple[syntax.Index, ...], change: dict[Node, Node], e: syntax.Expr

@@ -313,15 +313,24 @@ def of_law(
     flow = ex.var(label, "bf", *at)
     if law.kind == "dissipator" and law.side == "e" and all(_steady(ex.sub(u, flow)) for u in terms):
         return sticking(frame, law.law, label, at, loops, place)
-    return relation(frame, law.law, ex.var(label, f"b{law.side}", *at), label, loops, place)
+    own = {"e": flow, "f": ex.var(label, "be", *at)}.get(law.side) if law.kind == "dissipator" else None
+    return relation(frame, law.law, ex.var(label, f"b{law.side}", *at), label, loops, place, absorbs=own)
 
 
 def relation(
-    frame: ElaborationContext, text: Node, given: Node, label: str, loops: tuple[Loop, ...], place: Place
+    frame: ElaborationContext,
+    text: Node,
+    given: Node,
+    label: str,
+    loops: tuple[Loop, ...],
+    place: Place,
+    *,
+    absorbs: Node | None = None,
 ) -> Node:
     """The text of a relation given = text with each term c*setsign(u) as c*s: s closes  u = 0  where that holds, else
-    s = sense, the sign of u.  It holds as long as c*s, what the others leave, is within c.  Where u moves at finite
-    rates alone it is a sign, which may slide (forms/corners).
+    s = sense, the sign of u.  It holds as long as c*s, what the others leave, is within abs(c): a relation may be
+    written with either sign of c.  Where u is what a dissipator `absorbs` by, c itself is the bound, which is not
+    negative.  Where u moves at finite rates alone it is a sign, which may slide (forms/corners).
     """
     at, shape = loop_indices(loops), loop_ranges(loops)
     change: dict[Node, Node] = {}
@@ -350,7 +359,7 @@ def relation(
         frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
         rest = ex.substitute(root, {s: ex.const(0.0)})
         left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
-        bound = ex.call("abs", factor)
+        bound = ex.neg(factor) if u is absorbs else ex.call("abs", factor)
         draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, holds=holds)
         frame.parts.drafts.append(draft)
     return text

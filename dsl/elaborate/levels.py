@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from sysdyn.dsl.elaborate.level_ports import level_ports
 from sysdyn.dsl.model.network import LevelChoice
 from sysdyn.dsl.names.failures import Failed
+from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
 from sysdyn.dsl.names.symbols import ComponentSymbol, nearest
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
@@ -82,11 +83,41 @@ def _extended(
         key = _label(statement)
         if key is None or key not in own:
             kept.append(statement)
-        elif type(own[key]) is not type(statement):
-            message = f"'{key}' replaces a statement of another kind"
+        elif type(own[key]) is not type(statement) or not _alike(component, own[key], statement):
+            ports = isinstance(own[key], syntax.Instance) and isinstance(statement, syntax.Instance)
+            what = "an element of other ports" if ports else "a statement of another kind"
+            message = f"'{key}' of level '{level.name.name}' replaces {what}"
             frame.report.error("E808", message, Place(component.source, own[key].span), help="a new label")
             raise Failed
     return (*kept, *level.body)
+
+
+def _alike(component: ComponentSymbol, one: syntax.Statement, other: syntax.Statement) -> bool:
+    """Whether two statements are no elements, or elements with the same ports and domains."""
+    if not isinstance(one, syntax.Instance) or not isinstance(other, syntax.Instance):
+        return True
+    first, second = (_ports(component, s) for s in (one, other))
+    if isinstance(first, int) or isinstance(second, int):  # built in: of any domain
+        numbers = [p if isinstance(p, int) else p and (len(p) if p.keys() == {""} else 0) for p in (first, second)]
+        return None in numbers or numbers[0] == numbers[1]
+    return first is None or second is None or first == second
+
+
+def _ports(component: ComponentSymbol, s: syntax.Instance) -> dict[str, str] | int | None:
+    """Domains of an element's ports and branches by their names, "" the one that has none; how many branches a built-in
+    element has; None of what nobody declares.
+    """
+    name = s.component.names[0]
+    symbol = component.file_scope.find(name)
+    if symbol is None:
+        return 1 if name in ONE_PORTS else 2 if name in TWO_PORTS else None
+    if not isinstance(symbol, ComponentSymbol):
+        return None
+    found: dict[str, str] = {}
+    for b in symbol.body:
+        if isinstance(b, (syntax.Port, syntax.Branch)):
+            found |= {decl.name: b.domain.name for decl in b.decls} or {"": b.domain.name}
+    return found
 
 
 def _label(statement: syntax.Statement) -> str | None:

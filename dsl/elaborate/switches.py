@@ -64,5 +64,5 @@ def _switch(frame: ElaborationContext, draft: Draft, change: dict[Node, Node], k
         name, draft.label, at, draft.kind, draft.place, value, rate, multiplier, draft.element,
         acceleration, bound, upper, lower, sense, seen(guard), restitution,
         tuple(watch(frame, of(n), NONE, draft.place) for n in draft.aim), tuple(of(n) for n in draft.direction),
-        None if draft.holds is None else of(draft.holds),
+        None if draft.holds is None else of(draft.holds), draft.bound is not None and bool(ex.variables(draft.bound)),
     )  # fmt: skip

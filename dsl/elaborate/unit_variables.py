@@ -71,12 +71,14 @@ def _solved(frame: Instances, s: syntax.Instance, names: set[str], equations: li
     """Gaussian elimination, one variable after the other."""
     rows = [(dict(e), d, n) for e, d, n in equations]
     solved: list[tuple[str, dict[str, Fraction], Dimension]] = []
+    told: dict[str, Equation] = {}
     for variable in sorted(names):
         pivot = next((r for r in rows if r[0].get(variable)), None)
         if pivot is None:
             message = f"unit variable {variable} of '{s.decl.name}' is not determined"
             raise frame.resolver.fail("E209", message, s.span, help="give an input or parameter that has it")
         rows.remove(pivot)
+        told[variable] = pivot
         factor = pivot[0][variable]
         exponents = {k: v / factor for k, v in pivot[0].items() if k != variable and v}
         value = raised(pivot[1], 1 / factor)
@@ -84,9 +86,7 @@ def _solved(frame: Instances, s: syntax.Instance, names: set[str], equations: li
         rows = [_without(r, variable, exponents, value) for r in rows]
     wrong = next((r for r in rows if r[1]), None)
     if wrong is not None:
-        message = (
-            f"the unit variables of '{s.decl.name}' contradict each other at '{wrong[2]}' (off by {dim.show(wrong[1])})"
-        )
+        message = _contradiction(s.decl.name, wrong, equations, told)
         raise frame.resolver.fail("E209", message, s.span)
     found: dict[str, Dimension] = {}
     for variable, exponents, value in reversed(solved):
@@ -94,6 +94,17 @@ def _solved(frame: Instances, s: syntax.Instance, names: set[str], equations: li
             value = multiply(value, found[other], -power)
         found[variable] = tuple((k, int(v) if v == int(v) else v) for k, v in value)
     return found
+
+
+def _contradiction(label: str, wrong: Equation, equations: list[Equation], told: dict[str, Equation]) -> str:
+    """What two arguments make of one unit variable; of several in one, by how much they differ."""
+    alone = next(e for e in equations if e[2] == wrong[2])
+    variable = next(iter(alone[0]))
+    first = told.get(variable)
+    if first is None or any(len(e[0]) > 1 or abs(e[0][variable]) != 1 for e in (first, alone)):
+        return f"the unit variables of '{label}' contradict each other at '{wrong[2]}' (off by {dim.show(wrong[1])})"
+    one, other = (dim.show(raised(e[1], 1 / e[0][variable])) for e in (first, alone))
+    return f"unit variable {variable} of '{label}' is {one} by '{first[2]}' and {other} by '{wrong[2]}'"
 
 
 def _without(row: Equation, variable: str, exponents: dict[str, Fraction], value: Dimension) -> Equation:

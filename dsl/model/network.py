@@ -327,7 +327,7 @@ class Switch:
     of the former; aim: names of both flows, both multipliers and the speed),
     follows (holds where the one before it does).
     at: indices in the family of the label.  value, rate, acceleration, multiplier, bound, bound - multiplier
-    (upper), bound + multiplier (lower), guard: names of observations.
+    (upper), bound + multiplier (lower), guard: names of observations.  moves: whether the bound changes between events.
     """
 
     name: str
@@ -349,6 +349,7 @@ class Switch:
     aim: tuple[str, ...] = ()
     direction: tuple[Node, ...] = ()
     holds: Node | None = None
+    moves: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -224,6 +224,71 @@ def chained(text: str, offset: int) -> Chained | None:
     return None
 
 
+UNGROUPED = "a unit has no parentheses: '.' multiplies, '/' divides the next factor only"
+_HEAD = re.compile(r"(?<![\w.])([0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?)[ \t]+(?=[^\W\d]|[1(])|:[ \t]*(?=[^\W\d]|\()")
+_TOKEN = re.compile(r"[ \t]*(?:([^\W\d_]+|1(?=[ \t]*/))|([(./*·)])|\^(-?[0-9]+))")
+
+
+def grouped(text: str, offset: int) -> Chained | None:
+    """The quantity (or the unit behind a colon) around an offset whose unit was written with parentheses:
+    `30 N/(m.s)`; None where none is.
+    """
+    first = text.rfind("\n", 0, offset) + 1
+    last = text.find("\n", offset)
+    line = text[first : last if last >= 0 else len(text)]
+    for head in _HEAD.finditer(line):
+        found = _ungrouped(line, head.end())
+        if found is None or not head.start() <= offset - first < found[0] or "(" not in line[head.end() : found[0]]:
+            continue
+        number, start = head.group(1), head.start() if head.group(1) else head.end()
+        return Chained(start + first, found[0] + first, f"{number} {found[1]}" if number else found[1])
+    return None
+
+
+def _ungrouped(line: str, at: int) -> tuple[int, str] | None:
+    """Where a unit with parentheses ends and how it is written without; None where a factor is no unit."""
+    factors: list[tuple[str, int]] = []
+    signs, sign, begun, end, starts = [1], 1, [0], at, True  # of each open parenthesis: its sign, its first factor
+    while (token := _TOKEN.match(line, at)) is not None:
+        name, mark, exponent = token.groups()
+        if name:
+            if known(name) is None and name != "1":
+                if len(signs) > 1:
+                    return None
+                break
+            factors.append((name, signs[-1] * sign))
+            sign = 1
+        elif mark == "(":
+            signs.append(signs[-1] * sign)
+            begun.append(len(factors))
+            sign = 1
+        elif mark == ")":
+            if len(signs) == 1 or starts:
+                break
+            signs.pop()
+            last = begun.pop()
+        elif mark:
+            if starts:
+                return None
+            sign = -1 if mark == "/" else 1
+        elif starts:
+            return None
+        else:
+            whole = len(factors) - 1 if line[at - 1 : at] != ")" else last
+            factors[whole:] = [(n, p * int(exponent)) for n, p in factors[whole:]]
+        at = token.end()
+        starts = bool(mark) and mark != ")"
+        end = at if len(signs) == 1 and not starts else end
+    if len(signs) > 1 or not factors:
+        return None
+    real = [(n, p) for n, p in factors if n != "1"]
+    above = ".".join(n if p == 1 else f"{n}^{p}" for n, p in real if p > 0)
+    below = [(n, -p) for n, p in real if p < 0]
+    if above:
+        return end, above + "".join(f"/{n}" if p == 1 else f"/{n}^{p}" for n, p in below)
+    return (end, ".".join(f"{n}^-{p}" for n, p in below)) if below else None
+
+
 _COMMON = [
     "N/m",
     "N.s/m",

@@ -6,7 +6,7 @@ import re
 import unicodedata
 from collections.abc import Callable
 
-from sysdyn.dsl.model.unit_habits import chained, common
+from sysdyn.dsl.model.unit_habits import UNGROUPED, chained, common, grouped
 from sysdyn.dsl.model.units import Dimension, known
 from sysdyn.values import dataclass
 
@@ -88,6 +88,10 @@ def name(word: str, text: str, offset: int, moves: Callable[[str], bool]) -> Rem
     if len(word) > 1 and word[0] == "d" and moves(word[1:]):
         return Remedy(f"{word[1:]}'")
     if known(word) is not None:
+        quantity = grouped(text, offset)
+        if quantity is not None:
+            said = f"{quantity.right}: {UNGROUPED}"
+            return Remedy(said, quantity.right, (quantity.start, quantity.end))
         quantity = chained(text, offset)
         if quantity is not None:
             said = f"{quantity.right}: a unit is written without spaces, its factors are joined by dots"

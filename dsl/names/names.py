@@ -145,6 +145,9 @@ class Names(Context):
             return Failed()
         if self.statics:
             return self.fail("E908", f"unknown static quantity '{name}'", span, help=f"one of {', '.join(STATICS)}")
+        if name == "ground":
+            text = "'ground' is not a value: it is the reference of every domain"
+            return self.fail("E104", text, span, help="0: its effort, flow and displacement are zero")
         code, message = self._unknown
         remedy = habits.name(name, self.source.text, span.start, self._moves)
         if remedy is not None:

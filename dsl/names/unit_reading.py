@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Container
 from fractions import Fraction
 
@@ -69,13 +70,17 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
             help="write the unit itself",
         )
         return
-    message = f"'{factor.name}' is not a unit, in '{unit.text}'"
+    beside = place.source.text[max(unit.span.start - 40, 0) : unit.span.start]
+    number = re.search(r"(?<![\w.])[0-9][\w.+-]*[ \t]+$", beside)
+    quantity = (number.group() if number else "") + unit.text
+    message = f"'{factor.name}' is not a unit, in '{quantity}'"
     help_: str | None
     edit = None
     before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
     if in_sight and before:
         sign = "/" if factor.op == "/" else "*"
         verb = "divide" if factor.op == "/" else "multiply"
+        before = quantity.removesuffix(unit.text) + before
         help_ = f"to {verb} by the variable {factor.name} write '{before} {sign} {factor.name}'"
     else:
         help_ = _meant(unit, factor)
@@ -83,6 +88,9 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
         if right is not None:
             edit = Edit(Place(place.source, unit.span), right)
     report.error("E201", message, place, help=help_, edit=edit)
+
+
+_PREFIXES = {"n": "1e-9", "u": "1e-6", "µ": "1e-6", "m": "1e-3", "c": "1e-2", "k": "1e3", "M": "1e6", "G": "1e9"}
 
 
 def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
@@ -99,5 +107,8 @@ def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     line = declaration(factor.name)
     if line is not None:
         return f"declare it at the top of the file: {line}"
+    prefix, base = factor.name[:1], factor.name[1:]
+    if prefix in _PREFIXES and known(base) is not None:
+        return f"{base} takes no prefix: {_PREFIXES[prefix]} {base}"
     near = nearest(factor.name, (*names(), "mm", "km", "kN", "kohm", "mA", "uF", "degC"))
     return f"nearest unit: '{near}'" if near and len(factor.name) > 1 else "sysdyn help units lists them"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from sysdyn.dsl.model.unit_habits import chained, respelled, scaled
+from sysdyn.dsl.model.unit_habits import UNGROUPED, chained, grouped, respelled, scaled
 from sysdyn.dsl.model.units import known
 from sysdyn.dsl.parser.complaints import Complaint
 from sysdyn.dsl.text.source import Span
@@ -72,6 +72,10 @@ def around(text: str, start: int, end: int, kind: str) -> Slip | None:
             either = f"{meant}, or {before.group()}{behind.group()}"
             return Slip(("E113", said, either))
         return Slip(("E113", said, meant), meant, span)
+    quantity = grouped(text, start) if kind in ("<name>", "<number>", "(") else None
+    if quantity is not None:
+        said = f"'{text[quantity.start : quantity.end]}': {UNGROUPED}"
+        return Slip(("E113", said, f"write '{quantity.right}'"), quantity.right, Span(quantity.start, quantity.end))
     quantity = chained(text, start)
     if quantity is not None and (kind == "<name>" or sign in ("·", "⋅", "×", "*")):
         written = text[quantity.start : quantity.end]

@@ -1,8 +1,8 @@
 """What a text asks of its numbers, for runs with other numbers: which of its conditions those break.
 
 Conditions: what `require` says (E322), linear laws of elements that do not fall (E321, E325), laws of dissipators
-that give no power (E313), whole sizes (E805).  They say whether numbers are refused; what is said of them the rules
-themselves say of the text under these numbers.
+that give no power, dry friction included (E313), whole sizes (E805).  They say whether numbers are refused; what is
+said of them the rules themselves say of the text under these numbers.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, ElementSetting, Loop, Parameter
 from sysdyn.dsl.model.values import Values
+from sysdyn.dsl.rules.bound_values import friction_bounds
 from sysdyn.dsl.rules.graph_checks import modulus
 from sysdyn.dsl.rules.passivity import active
 from sysdyn.values import dataclass
@@ -63,6 +64,8 @@ class Asked:
             slope = modulus(branch)
             if slope is not None:
                 conditions.append((ex.compare(">=", slope, ex.const(0.0)), branch.loops))
+        for bound, draft in friction_bounds(model):
+            conditions.append((ex.compare(">=", bound, ex.const(0.0)), draft.loops))
         for name in sorted(model.resolver.whole):
             parameter = model.parts.parameters.get(name)
             if parameter is not None and parameter.values and not parameter.shape:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.elaborate.events import Draft
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
@@ -22,6 +23,7 @@ from sysdyn.dsl.model.network import (
     Dynamic,
     Loop,
     NodeFamily,
+    Observation,
     Shape,
     State,
     Unknown,
@@ -37,8 +39,8 @@ LOOKED_AT = 1000
 """Elements of an array whose divisors are looked at."""
 
 
-def run(model: Elaborator, known: Values, report: Report) -> None:
-    """E119, E322, E324, E805 with the values bound."""
+def run(model: Elaborator, known: Values, report: Report, observations: Iterable[Observation] = ()) -> None:
+    """E119, E313 of dry friction, E322, E324, E805 with the values bound; observations: what is traced."""
     _allowances(model, known, report)
     for r in model.parts.requirements:
         read = min(map(str, ex.variables(r.condition)), default=None)
@@ -56,9 +58,11 @@ def run(model: Elaborator, known: Values, report: Report) -> None:
                 shown = shown or ", ".join(f"{i} = {v:g}" for i, v in at.items())
                 report.error("E322", f"require {text} fails: {shown}", r.place, help=f"values for which {text}")
                 break
-    for node, loops, place in looped_expressions_of(model):
+    traced = [(o.expression, (), o.place) for o in observations]
+    for node, loops, place in (*looped_expressions_of(model), *traced):
         if not _undefined(node, place, report):
             _divisions(model, node, tuple(loops), place, known, report)
+    _frictions(model, known, report)
     _sizes(model, known, report)
     _dynamics(model, known, report)
     _branches(model, known, report)
@@ -73,6 +77,31 @@ def _allowances(model: Elaborator, known: Values, report: Report) -> None:
     for within, place in allowed:
         if within is not None and known.number(within) < 0.0:
             report.error("E912", "what 'within' allows is negative: nothing could hold", place, help="within 1e-3")
+
+
+def friction_bounds(model: Elaborator) -> Iterable[tuple[Node, Draft]]:
+    """What dry friction, c*setsign(f) and c*abs(f), is at most: its c, where parameters alone tell it."""
+    for draft in model.parts.drafts:
+        bound = draft.bound
+        if bound is None or not _is_constant(bound):
+            continue
+        if not {n.data for n in _parameters(bound)} & model.parts.discretes:
+            yield bound, draft
+
+
+def _frictions(model: Elaborator, known: Values, report: Report) -> None:
+    """E313: dry friction that drives."""
+    for bound, draft in friction_bounds(model):
+        for at in known.cases(bound, draft.loops):
+            value = known.number(bound, at)
+            if value < 0.0:
+                of = f"'{draft.element}'" if draft.element else draft.label
+                names = {n: known.number(n, at) for n in _parameters(bound)}
+                shown = ", ".join(_valued(n, v, model) for n, v in names.items())
+                told = shown or f"{value:g} in SI units"
+                message = f"the dry friction of {of} is negative, it delivers power: {told} (active element)"
+                report.error("E313", message, draft.place, help="a bound of zero or more: abs(c), max(c, 0)")
+                break
 
 
 def _parameters(node: Node) -> list[Node]:

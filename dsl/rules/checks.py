@@ -146,6 +146,7 @@ def smoothness(model: Elaborator, report: Report) -> None:
         if constraint.kind == "gamma":
             _corner(constraint.expression, constraint.place, report)
     _set_valued(model, report)
+    _on_reactions(model, report)
     for energy in model.parts.energies:
         if energy.function != "D":
             continue
@@ -178,6 +179,19 @@ def set_valued_results(model: Elaborator, observations: Iterable[Observation], r
     said += [(i.place, node) for i in model.parts.initials for node in (i.target, i.value)]
     for place in dict.fromkeys(place for place, node in said if ex.calls(node, "setsign")):
         _no_set(place, report)
+
+
+def _on_reactions(model: Elaborator, report: Report) -> None:
+    """W705: dry friction whose bound a reaction tells (language, section 11, 4)."""
+    told: set[Place] = set()
+    for draft in model.parts.drafts:
+        read = [n for n in unknowns_of(draft.bound) if letter(n) in ("kappa", "mu")] if draft.bound is not None else []
+        if read and draft.place not in told:
+            told.add(draft.place)
+            of = f" of '{draft.element}'" if draft.element else ""
+            said = f"the dry friction{of} is bounded by {read[0]}, a reaction that it may change"
+            help_ = "a stiff spring and a damper in place of the constraint always have a motion"
+            report.warning("W705", f"{said}: a motion need not exist, nor be the only one", draft.place, help=help_)
 
 
 def _no_set(place: Place, report: Report) -> None:

@@ -14,6 +14,7 @@ from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, NodeFamily, Terminal
 from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.model.values import Values, as_constants
+from sysdyn.dsl.parser.notes import PREDEFINED
 from sysdyn.dsl.rules import lossless
 from sysdyn.dsl.rules.untouched import Box, shown, untouched
 from sysdyn.dsl.text.diagnostics import Report
@@ -66,7 +67,7 @@ def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report
         size = math.prod(known.number(b) - known.number(a) + 1 for a, b in node.shape)
         wanted = (2.0 if node.domain.common == "effort" else 1.0) * (size if not node.shape else 1.0)
         count = touched.get(node.name, 0.0)
-        if node.name in mentioned or not size > 0 or math.isnan(count):
+        if node.name in mentioned or node.name in PREDEFINED or not size > 0 or math.isnan(count):
             continue
         near = alike[_beginning(node)][: NEAR + 1]
         if count < wanted:

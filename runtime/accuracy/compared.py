@@ -128,7 +128,8 @@ class Compared:
         with np.errstate(all="ignore"):
             ratio = pairs.apart(one, two) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
-        ratio = np.where((one.own[0] == two.values) | pairs.zero(one, two, target), 0.0, ratio)
+        same = (one.own[0] == two.values) & np.isfinite(two.values)
+        ratio = np.where(same | pairs.zero(one, two, target), 0.0, ratio)
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)
         name, at = names[k], int(beyond[0]) if beyond.size else None

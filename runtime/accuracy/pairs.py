@@ -110,9 +110,11 @@ def zero(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
     """
     before, now = (np.abs(values).max(axis=0) for values in (coarse.own[0], fine.values))
     seen = np.maximum(before, now)
-    found = (seen <= fine.noise) | ((now <= FALLS * before) & (now <= FAINT * np.asarray(fine.noise)))
+    found = np.isfinite(seen)  # an infinite value is no zero beside an infinite noise
+    found &= (seen <= fine.noise) | ((now <= FALLS * before) & (now <= FAINT * np.asarray(fine.noise)))
     if fine.left_open is not None:
-        far = apart(coarse, fine).max(axis=0)
+        with np.errstate(invalid="ignore"):  # values that are no numbers
+            far = apart(coarse, fine).max(axis=0)
         lost = ~found & (far > target * fine.largest) & (far > LOST * seen)
         if lost.any():
             found |= lost & (seen <= fine.left_open())

@@ -34,6 +34,8 @@ __all__ = ["Handler", "Point", "Watched"]
 
 CASCADE = 100
 """Rounds of events at one instant: more will never end."""
+BOUNDED = ("friction", "planar")
+"""Kinds of contacts with a bound, below which no effort is within it."""
 STALLED = 200
 """Events in a row within NOTHING of the span: they chatter."""
 NOTHING = 1e-12
@@ -77,6 +79,7 @@ class Handler:
         self._stalled, self.last = 0, -np.inf
         self.simple, self.rounds = False, list[Round]()
         self._exact: list[int] = []
+        self._sinking: set[int] = set()
         self.back(begin)
         self.before = self.now()
 
@@ -130,6 +133,8 @@ class Handler:
                 found.append(Watched(-1, k, c.upper if sticks else c.value, 1))
             elif c.kind in ("phi", "psi"):
                 found.append(Watched(-1, k, c.multiplier if sticks else c.value, 1))
+            if c.moves and c.kind in BOUNDED:
+                found.append(Watched(-1, k, c.bound, 1))
         for k in range(len(self.plan.kinks)):
             found += [Watched(-1, -1, row, side, k) for row, side in self.kinks.rows(k)]
         return found
@@ -149,6 +154,7 @@ class Handler:
         values = self.observer(t, y, yd)
         for k, relation in enumerate(self.plan.relations):
             self.side[k] = self._side(k, values[relation.row], 1.0)
+        self._bounded(t, values)
         self.truth = self._true()
         due, anew = self.due(t), self.kinks.begin(values)
         if due:
@@ -258,6 +264,7 @@ class Handler:
         else:
             raise SolverFailure("chatter", t, 0.0, self._names())
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
+        self._sink(t, which)
         self.succession.blow = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
         self.simple &= not self.succession.blow and not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
         self.simple &= all(self.plan.contacts[k].kind != "phi" for k in touched)
@@ -380,9 +387,25 @@ class Handler:
             y = with_momenta(settled, t, y, yd)
         return y
 
+    def _sink(self, t: float, which: Sequence[Watched]) -> None:
+        """SolverFailure where bounds fall below zero, and nothing else happens there (the reaction that told one would
+        end) the second time.
+        """
+        sinking = {w.contact for w in which if w.contact >= 0 and w.row == self.plan.contacts[w.contact].bound}
+        if sinking & self._sinking and all(w.contact in sinking for w in which):
+            raise SolverFailure("drives", t, 0.0, self.plan.contacts[min(sinking)].name)
+        self._sinking = sinking
+
+    def _bounded(self, t: float, values: Floats) -> None:
+        """SolverFailure where the bound of dry friction is negative."""
+        for c in self.plan.contacts:
+            if c.kind in BOUNDED and values[c.bound] < -self.observer.zero(c.bound):
+                raise SolverFailure("drives", t, 0.0, c.name)
+
     def _renew(self, t: float, y: Floats, yd: Floats) -> None:
         """Sides after a jump."""
         values = self.observer(t, y, yd)
+        self._bounded(t, values)
         for k, relation in enumerate(self.plan.relations):
             self.side[k] = self._side(k, values[relation.row], self.side[k])
 

@@ -1,8 +1,10 @@
 """Laws whose branch follows the sign of a switching function: which branch holds from an instant on.
 
-The branch stands in p (forms/corners/frozen.py): LIVE as the text says, ABOVE and BELOW zero, SLIDES on zero.  A
-branch fits where its function has that sign, or is zero and does not move to the other side; where both branches drive
-it back, the law slides between them (Filippov 1988), and leaves by the side whose sense reaches 1.
+The branch stands in p (forms/corners/frozen.py): LIVE as the text says, ABOVE and BELOW zero, SLIDES on zero, RESTS
+on zero with the value of the law there.  A branch fits where its function has that sign, or is zero and does not move
+to the other side; where both branches drive it back, the law slides between them (Filippov 1988), and leaves by the
+side whose sense reaches 1.  Where a law that jumps is on zero, no branch drives it back, and its own value there (0 of
+sign) leaves the function without a rate, it rests.
 """
 
 from __future__ import annotations
@@ -14,8 +16,8 @@ from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Happened, Kink
 from sysdyn.runtime.model.description import Floats
 
-LIVE, ABOVE, BELOW, SLIDES = 0.0, 1.0, -1.0, 2.0
-WORDS = {LIVE: "= 0", ABOVE: "> 0", BELOW: "< 0", SLIDES: "slides"}
+LIVE, ABOVE, BELOW, SLIDES, RESTS = 0.0, 1.0, -1.0, 2.0, 3.0
+WORDS = {LIVE: "= 0", ABOVE: "> 0", BELOW: "< 0", SLIDES: "slides", RESTS: "= 0"}
 TURNS = 4
 """Of one kink at one instant: more, and its branches contradict each other."""
 FULL = 1e-9
@@ -36,6 +38,7 @@ class Kinks:
     def __init__(self, kinks: tuple[Kink, ...], observer: Observer, p: Floats) -> None:
         self.kinks, self.observer, self.p = kinks, observer, p
         self._turned: dict[int, list[float]] = {}
+        self._tried: set[int] = set()  # whether they rest, at this instant
 
     def state(self) -> list[float]:
         """The branches."""
@@ -46,7 +49,7 @@ class Kinks:
         kink, branch = self.kinks[k], self.p[self.kinks[k].branch]
         if branch == SLIDES:
             return ((kink.above, 1), (kink.below, 1))
-        return ((kink.value, int(branch)),) if branch else ((kink.value, 1), (kink.value, -1))
+        return ((kink.value, int(branch)),) if branch in (ABOVE, BELOW) else ((kink.value, 1), (kink.value, -1))
 
     def cross(self, k: int, row: int, side: int) -> None:
         """What kink k becomes where the row has changed its side."""
@@ -55,10 +58,11 @@ class Kinks:
         branch = (ABOVE if row == kink.above else BELOW) if sliding else float(-side)
         self.p[kink.branch] = branch
         self._turned[k] = [branch]
+        self._tried.add(k)
 
     def anew(self) -> None:
         """A new instant: nothing has turned yet."""
-        self._turned = {}
+        self._turned, self._tried = {}, set()
 
     def begin(self, values: Floats) -> bool:
         """Branches by the values of a start at which all are live; whether a law jumps, so that all is found anew."""
@@ -78,13 +82,17 @@ class Kinks:
         """Turns the first kink whose branch does not fit; whether there was one."""
         for k, kink in enumerate(self.kinks):
             better = self._better(k, kink, values)
-            if better is not None:
+            if better is None:
+                continue
+            if better == RESTS:
+                self._tried.add(k)
+            elif self.p[kink.branch] != RESTS:
                 seen = self._turned.setdefault(k, [])
                 seen.append(better)
                 if len(seen) > TURNS:
                     raise NoBranchError(self._named(), pushed=kink.jumps)
-                self.p[kink.branch] = better
-                return True
+            self.p[kink.branch] = better
+            return True
         return False
 
     def _named(self) -> tuple[str, ...]:
@@ -100,14 +108,22 @@ class Kinks:
             if values[kink.above] < -FULL:
                 return ABOVE
             return BELOW if values[kink.below] < -FULL else None
+        if branch == RESTS:
+            moves = value if abs(value) > zero(kink.value) else self._moves(kink, values)
+            return float(np.sign(moves)) if moves else None
         if branch * value > zero(kink.value):
             return None
         if branch * value >= -zero(kink.value):
             if kink.rate < 0 or branch * values[kink.rate] >= -zero(kink.rate):
-                return None
+                return RESTS if kink.jumps and k not in self._tried else None
             if kink.above >= 0 and branch in self._turned.get(k, ()):
                 return SLIDES  # it came from the other side, and is driven back to it
         return -branch
+
+    def _moves(self, kink: Kink, values: Floats) -> float:
+        """The rate of a function that has one, 0 where it is nothing."""
+        rate = float(values[kink.rate]) if kink.rate >= 0 else 0.0
+        return 0.0 if abs(rate) <= self.observer.zero(kink.rate) else rate
 
     def happened(self, t: float, before: Sequence[float]) -> list[Happened]:
         """What has changed."""

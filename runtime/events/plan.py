@@ -60,7 +60,8 @@ class Contact:
     rate that of the former, aim the rows of both flows, both multipliers and the speed; follows holds where the one
     before it does.
     value, rate, acceleration (of phi), multiplier, bound, bound - multiplier (upper),
-    bound + multiplier (lower), guard: rows; number: of its switch; restitution: of phi.
+    bound + multiplier (lower), guard: rows; number: of its switch; restitution: of phi; moves: whether the bound
+    changes between events (a negative one ends the run).
     """
 
     name: str
@@ -79,6 +80,7 @@ class Contact:
     aim: tuple[int, ...] = ()
     direction: tuple[int, ...] = ()
     hold: int = -1
+    moves: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -179,7 +179,7 @@ def test_a_unit_that_nobody_declared_is_told_with_what_is_near():
     report = Report()
     assert read_unit(unit, Scope(), source, report) is None
     (found,) = report
-    assert (found.code, found.message, found.help) == ("E201", "'kNm' is not a unit, in 'kNm'", "write 'kN.m'")
+    assert (found.code, found.message, found.help) == ("E201", "'kNm' is not a unit, in '1 kNm'", "write 'kN.m'")
 
 
 def test_a_unit_of_the_file_goes_before_those_that_are_known():

@@ -4,6 +4,7 @@ The branch is a parameter (a number that events set), so a row is smooth while a
 
     LIVE    as the text says               ABOVE, BELOW    the branch of u > 0, of u < 0
     SLIDES  u = 0 is held, and the value lies between its two branches: (1 + s)/2 of the one, (1 - s)/2 of the other
+    RESTS   as the text says at u = 0, whatever round-off is left of u: sign(u) is 0, u > 0 does not hold
 
 The sense s is an implicit unknown of its own, closed by the row  s - branch = 0, or u = 0 while it slides: the
 sliding of Filippov 1988 (Utkin's equivalent control, the same where rows are affine in s).  Only surfaces at which a
@@ -54,7 +55,7 @@ from sysdyn.dsl.model.network import Network, Parameter, Table
 from sysdyn.dsl.model.units import NONE, si
 from sysdyn.dsl.text.diagnostics import Place
 
-LIVE, ABOVE, BELOW, SLIDES = 0.0, 1.0, -1.0, 2.0
+LIVE, ABOVE, BELOW, SLIDES, RESTS = 0.0, 1.0, -1.0, 2.0, 3.0
 READ = ("observe", "observe_rate", "observe_scale", "initial")
 
 
@@ -162,12 +163,14 @@ class _Freezer:
         if node.op == "cmp":
             level = ABOVE if (found.above is YES) == mine else BELOW
             as_said = both(compare("==", self.branch[k], const(LIVE)), live)
-            return either(as_said, compare("==", self.branch[k], const(level)))
+            levels = (level, RESTS) if self.surfaces[k].jumps and node.data in (">=", "<=") else (level,)
+            return either(as_said, *(compare("==", self.branch[k], const(b)) for b in levels))
         above, below = (self._again(n) for n in ((found.above, found.below) if mine else (found.below, found.above)))
-        return self._branches(k, (above, below), live, held)
+        at_rest = const(0.0) if node.data == "sign" else self._again(found.above)
+        return self._branches(k, (above, at_rest, below), live, held)
 
-    def _branches(self, k: int, sides: tuple[Node, Node], live: Node, held: bool) -> Node:
-        (above, below), branch, sense = sides, self.branch[k], self.sense[k]
+    def _branches(self, k: int, sides: tuple[Node, Node, Node], live: Node, held: bool) -> Node:
+        (above, at_rest, below), branch, sense = sides, self.branch[k], self.sense[k]
         lower = below
         if sense is not None:
             part = linear(0.5, ((0.5, sense),))
@@ -175,6 +178,8 @@ class _Freezer:
             if held:
                 return between
             lower = conditional(compare("==", branch, const(BELOW)), below, between)
+        if self.surfaces[k].jumps:
+            lower = conditional(compare("==", branch, const(RESTS)), at_rest, lower)
         either_ = conditional(compare("==", branch, const(ABOVE)), above, lower)
         return conditional(compare("==", branch, const(LIVE)), live, either_)
 

@@ -1,12 +1,13 @@
 """Initial conditions of a network as those of its coordinates; stores whose contents these do not tell alone.
 
-Contents of potential stores are c = B x + k: x the coordinates, which are one choice of tree; k one constant for each
-store beside it (language, section 11, 11), a parameter `branch.content` where the text tells it, else a dynamic
-variable of rate zero, which the start chooses.
+Contents of potential stores, and other displacements that something reads (a memristor's charge), are c = B x + k: x
+the coordinates, which are one choice of tree; k one constant for each beside it (language, section 11, 11), a parameter
+`branch.content` where the text tells it, else a dynamic variable of rate zero, which the start chooses.
 
 In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + k, with k its own
 initial content less +- that of the first; it is chosen where not all of these are fixed and a loop of stores and
-efforts may ask for others.  A store between two nodes of the reflection (an inductor) holds their difference: where
+efforts may ask for others.  What is no store begins at what the text says of it, else at zero, whatever the first
+store holds.  A store between two nodes of the reflection (an inductor) holds their difference: where
 such stores close loops in which contents are said, each has its own initial content as k; it is chosen where
 nothing is said of it.
 """
@@ -32,7 +33,7 @@ from sysdyn.compiler.network.primal.incidence import (
     ranges_over,
 )
 from sysdyn.compiler.network.primal.integrals import line
-from sysdyn.compiler.network.primal.overlaps import initially, inside, meeting, narrowed, ranges_of
+from sysdyn.compiler.network.primal.overlaps import initially, inside, meeting, narrowed, ranges_of, untold
 from sysdyn.compiler.network.primal.reading import Ranges, Rewriter, touches_network
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
@@ -148,7 +149,9 @@ class Contents:
         elements: Sequence[Element],
         *,
         reflected: bool,
+        read: frozenset[str] = frozenset(),
     ) -> None:
+        """read: branches whose displacement a statement reads."""
         self.reader = reader
         self.initials = initials
         joining = [(e, e.branch.kind, e.branch.domain.common) for e in elements if len(e.ends) == 2]
@@ -162,13 +165,20 @@ class Contents:
         self.dynamics: list[Dynamic] = []
         self._given: dict[str, list[tuple[Initial, Box]]] = {}
         self._stems: list[str] = []
+        self._settled: set[int] = set()  # numbers of followers that are no stores, whose constant the text tells
+        self._free: list[Element] = []  # those whose constant follows from what they begin at
+        self._loose = any(not _is_content(i) and not _of_momenta(i) for i in initials)
         for initial in filter(_is_content, initials):
             within = ranges_of(initial.loops, reader.sizes, initial.place)
             box = reader.sizes.reach(initial.target.args, within, initial.place)
             self._given.setdefault(initial.target.data[0], []).append((initial, box))
         followers: dict[int, list[Member]] = {}
-        for m in members:
-            if not m.leads and m.element.branch.kind == "potential":
+        begin = [m for m in members if m.element.branch.kind == "potential" or m.element.name in {*read, *self._given}]
+        alike: dict[str, set[int]] = {}
+        for m in begin:
+            alike.setdefault(m.coordinate, set()).add(m.element.number)
+        for m in begin:
+            if not m.leads and (m.element.branch.kind == "potential" or len(alike[m.coordinate]) > 1):
                 followers.setdefault(m.element.number, []).append(m)
         for group in followers.values():
             self._follower(group[0].element, group)
@@ -187,6 +197,16 @@ class Contents:
             part = dict(zip(whole, m.box, strict=True))
             first = self.start(m.leader.name, m.leader_at(at), part)
             value = inside(part, whole, sub(self.start(element.name, at, part), scale(m.sign, first)), value)
+        if element.branch.kind != "potential":
+            led = all(self._fixed(m.leader.name, _led_by(m)) for m in members)
+            open_ = any(m.leader.branch.kind == "potential" for m in members) and not led
+            if open_ and (self._loose or any(m.leader.number in self.looped for m in members)):
+                self._free.append(element)
+                self._constant(element, None)
+            else:
+                self._settled.add(element.number)
+                self._constant(element, value)
+            return
         fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
         self._constant(element, value if fixed or element.number not in self.looped else None)
 
@@ -222,17 +242,20 @@ class Contents:
     def resolved(self, measured: Container[str]) -> Iterator[Initial]:
         """The initial conditions of coordinates and other unknowns; measured: stores whose guesses stand elsewhere."""
         known: set[tuple[Node, Node, tuple[Loop, ...], bool]] = set()
-        for initial in self.initials:
+        for initial in (*self.initials, *self._begun()):
             if not initial.fixed and initial.target.op == "var" and initial.target.data[0] in measured:
                 continue
             if not touches_network(initial.target) and not touches_network(initial.value):
                 yield initial
                 continue
-            for loops, (target, value) in self.reader.cut(
+            for loops, found in self.reader.cut(
                 initial.loops,
                 initial.place,
                 lambda ranges, i=initial: self._one(i, ranges),  # type: ignore[misc]
             ):
+                if found is None:
+                    continue
+                target, value = found
                 # stores of a class have one coordinate, of which the same is said once
                 over = topological((target, value, *(end for loop in loops for end in (loop.first, loop.last))))
                 own = tuple(loop for loop in loops if index(loop.index) in over)
@@ -240,11 +263,24 @@ class Contents:
                     known.add(said)
                     yield replace(initial, target=target, value=value, loops=own)
 
-    def _one(self, initial: Initial, ranges: Ranges) -> tuple[Node, Node]:
-        """Where one piece is read: target and value; of stores whose constant is told the coordinate of their class."""
+    def _begun(self) -> Iterator[Initial]:
+        """What those begin at whose constants follow from it."""
+        for e in self._free:
+            b, given = e.branch, [initial for initial, _ in self._given.get(e.name, ())]
+            within = ranges_of(b.loops, self.reader.sizes, b.place)
+            zero = Initial(var(e.name, "bq", *b.at), const(0.0), True, b.loops, b.place, said=False)
+            for ranges in untold(given, b.at, within, self.reader.sizes):
+                yield replace(zero, loops=narrowed(b.loops, ranges))
+
+    def _one(self, initial: Initial, ranges: Ranges) -> tuple[Node, Node] | None:
+        """Where one piece is read: target and value; of stores whose constant is told the coordinate of their class;
+        None where a constant says it.
+        """
         target = initial.target
         if _is_content(initial):
             piece = self.reader.piece(target.data[0], target.args, ranges)
+            if piece.element.number in self._settled:
+                return None
             m, (_, fixed) = piece.member, self.reader.book.contents.get(piece.element.number, ("", True))
             if m is not None and fixed and piece.element.branch.kind == "potential":
                 q = var(m.coordinate, "q", *m.indices(target.args))
@@ -259,6 +295,13 @@ class Contents:
 def _is_content(initial: Initial) -> bool:
     """Whether a statement tells a displacement of a branch by itself."""
     return initial.target.op == "var" and initial.target.data[1:] == ("bq", 0) and not variables(initial.value)
+
+
+def _of_momenta(initial: Initial) -> bool:
+    """Whether a statement tells a flow or a momentum by itself."""
+    target = initial.target
+    plain = target.op == "var" and not target.data[2] and not variables(initial.value)
+    return plain and target.data[1] in ("bf", "bp", "nf", "np")
 
 
 def _pin(target: Node, value: Node) -> tuple[Node, Node]:

@@ -25,6 +25,7 @@ from sysdyn.compiler.network.primal.series import Series, series
 from sysdyn.compiler.network.primal.unspecified import measured
 from sysdyn.dsl.model.expression import Node, variables
 from sysdyn.dsl.model.network import Constraint, Coordinate, Dynamic, Energy, Expectation, Network, Work
+from sysdyn.dsl.model.rewriting import EXPRESSIONS, expressions
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 
 
@@ -45,7 +46,8 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     book.sticking = _sticking(network)
     reader = Rewriter(sizes, book)
     initials = foremost(tuple(at_stores(network, incidence, reader)), network.branches, sizes)
-    contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected)
+    read = _charges(network)
+    contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected, read=read)
     guesses, stores = measured(network, initials, sizes, reader, reflected=reflected)
     found = replace(
         network,
@@ -64,6 +66,13 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     )
     found = replace(found, dynamics=(*found.dynamics, *contents.dynamics))
     return found, tuple(said.notes), account(network, classes, nodes)
+
+
+def _charges(network: Network) -> frozenset[str]:
+    """Branches whose displacement a statement reads."""
+    read = expressions(network, *(sort for sort in EXPRESSIONS if sort != "initials"))
+    found = (n for root in read for n in variables(root) if n.op == "var")
+    return frozenset(n.data[0] for n in found if n.data[1:] == ("bq", 0))
 
 
 def _sticking(network: Network) -> dict[str, tuple[str, ...]]:

@@ -205,11 +205,11 @@ class Rewriter:
             return var(name, kind[1], *node.args, order=order)
         if kind in CLASSES:
             return var(name, f"x{kind[1:]}", *node.args)
-        if kind == "ne":
-            return self.book.nodes(self, node, ranges, inside)
         if order:
             plain = self.resolve(var(name, kind, *node.args), ranges, active)
             return self._derivative(plain, node)
+        if kind == "ne":
+            return self.book.nodes(self, node, ranges, inside)
         piece = self.piece(name, node.args, ranges)
         if kind in ("bq", "bf"):
             return self._moving(node, piece, ranges, inside)

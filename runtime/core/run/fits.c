@@ -5,7 +5,8 @@
 
 #define FULL_SENSE 1e-9  /* of a sense: what it may pass its end by */
 #define SLIP 1e-9        /* of a bound of friction */
-#define SLIDES 2.0       /* a branch, as events/kinks.py names them */
+#define SLIDES 2.0       /* branches, as events/kinks.py names them */
+#define RESTS 3.0
 
 /* Whether an inequality, or a friction law, is as the mode says. */
 static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const double *v)
@@ -63,6 +64,8 @@ static int kink_fits(const sd_modes *m, const sd_kink *k, const double *v)
         return fabs(v[k->value]) <= small;
     if (branch == SLIDES)
         return v[k->above] >= -FULL_SENSE && v[k->below] >= -FULL_SENSE;
+    if (branch == RESTS)
+        return fabs(v[k->value]) <= small && (k->rate < 0 || fabs(v[k->rate]) <= sd_mode_zero(m, k->rate));
     if (branch * v[k->value] > small)
         return 1;
     return branch * v[k->value] >= -small && (k->rate < 0 || branch * v[k->rate] >= -sd_mode_zero(m, k->rate));
