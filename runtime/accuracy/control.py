@@ -18,7 +18,7 @@ from collections.abc import Callable
 
 import numpy as np
 from sysdyn.runtime.accuracy.laws import Law
-from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, parted
+from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, left_at_rest, parted
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -31,6 +31,8 @@ RETRIED = (1.0, 0.1, 1e-2)
 """Of the tolerance of a first run: the next ones where it fails."""
 WORTH = 0.3
 """Of the last tolerance: a run with more than that says little beside it."""
+ROOT = 0.5
+"""The most that is credited where a quantity ends as a root of the state."""
 SHORT = 60
 """Steps of a run below which its error does not follow its tolerance as theory says."""
 FIRST_DROP = 1e-2
@@ -182,6 +184,8 @@ class _Estimate:
         self.lost = lost
         shrink, luck = None, 1.0
         credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
+        left = left_at_rest(coarse, fine, self.target)
+        credit = min(credit, ROOT) if left else credit
         if shorter is not None:
             part = shorter**BY_STEPS
             shrink = self.law.safety * part / (1.0 - part)
@@ -201,6 +205,8 @@ class _Estimate:
         least = self.law.least * fine.tolerance
         shrink *= luck
         self.apart, self.over = max(apart * shrink, least), max(over * shrink, least / float(np.min(self.target)))
+        if left > self.over:
+            self.apart, self.over = self.apart * left / self.over, left
         return apart
 
     def shorter(self) -> float:

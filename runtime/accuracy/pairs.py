@@ -25,6 +25,8 @@ FALLS, FAINT = 0.3, 100.0
 """Of a quantity that is zero: of its largest in the run before at most; times what is round-off beside its unit."""
 PARTED, MUCH = 10.0, 0.3
 """Of all that a quantity was before, times; and of what it is: a difference by more is of runs that parted."""
+STILL = 3.0
+"""Times a difference: less than that is nothing beside it."""
 LOOSE = 1e-5
 """Tolerances above, with which two runs may run away alike (Robertson's falls through zero)."""
 ABOUT = 2
@@ -139,6 +141,27 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
         relative = apart(coarse, fine)[:, use].max(axis=0, initial=0.0) / size[use]
     relative = np.where(np.isfinite(relative) & ~unlike, relative, np.inf)
     return float(relative.max()), float((relative / target[use]).max())
+
+
+def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats) -> float:
+    """Where two runs are farthest apart where a quantity comes to rest at zero, from there to the end: the most that is
+    left of it in the finer one, over the accuracy wanted; 0 elsewhere.  What ends in finite time is a root of the state
+    (the flow of a vessel that runs empty), whose error is the root of the state's, and all that is left.
+    """
+    before, size = coarse.own[0], fine.largest
+    use = (size != 0.0) & np.isfinite(target)
+    if before.shape != fine.values.shape or len(before) < 2 or not use.any():
+        return 0.0
+    far = apart(coarse, fine)[:, use]
+    with np.errstate(all="ignore"):
+        over = far / (size * target)[use]
+    if not np.isfinite(over).all() or not over.any():
+        return 0.0
+    row, column = np.unravel_index(np.argmax(over), over.shape)
+    left, seen = (np.abs(values[row:, use][:, column]).max() for values in (fine.values, before))
+    if not max(left, seen) <= STILL * far[row, column] < MUCH * size[use][column]:
+        return 0.0
+    return float(left / (size * target)[use][column])
 
 
 def parted(coarse: Sampled, fine: Sampled, target: Floats) -> bool:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.accuracy.control import TAME, Lighter, control
 from sysdyn.runtime.accuracy.laws import LAWS, STEEP, law_of
-from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled
+from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, left_at_rest
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.failures import SolverFailure
 
@@ -222,3 +222,18 @@ def test_short_runs_on_steep_laws_are_not_believed_to_fall_fast():
     assert achieved.met
     assert achieved.tolerance < 1e-5
     assert achieved.error_estimate > 100.0 * achieved.tolerance
+
+
+@pytest.mark.parametrize(
+    ("coarse", "fine", "left"),
+    [
+        ([1.0, 0.5, -1.4e-3, 0.0], [1.0, 0.5, -2.8e-3, 1e-9], 2.8),  # the finer one is farther off
+        ([1.0, 0.5, 2e-2, 1e-6], [1.0, 0.5, 1e-4, 0.0], 0.1),
+        ([1.0, 0.5, 1e-3, 0.7], [1.0, 0.5, 2e-3, 0.7], 0.0),  # it only passes zero
+        ([1.0, 0.52, 1e-3, 0.0], [1.0, 0.5, 2e-3, 0.0], 0.0),  # they are farther apart elsewhere
+        ([1.0, 0.5, 0.5, 0.5], [1.0, 0.5, 0.0, 0.0], 0.0),  # they have nothing in common
+    ],
+)
+def test_what_is_left_where_a_quantity_comes_to_rest_is_error(coarse, fine, left):
+    one, two = (Sampled(1e-3, np.array(values)[:, None], np.ones(1), 100) for values in (coarse, fine))
+    assert left_at_rest(one, two, np.array([1e-3])) == pytest.approx(left)
