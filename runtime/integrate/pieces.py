@@ -36,6 +36,8 @@ PARTS = 8
 
 WIDER = 3.0
 """Times the stretch in which a change was seen, and was none once settled: the next one behind it that is searched."""
+SOON = 1e-2
+"""Of the first step behind an event: another one before that is of a dense output which knows nothing so near."""
 HALT = 1e-5
 """Of a step, before friction in the plane comes to rest: there a slip still has a direction."""
 FAINT = 1e3
@@ -59,7 +61,7 @@ class Pieces:
         n = run.system.form.written
         self._first(self.handler.begin(start.t, run.y[:n].copy(), run.start_rate[:n].copy()))
         self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
-        self._mode, self._open = -1, np.full(run.driver.observed, np.inf)
+        self._mode, self._open, self._begun = -1, np.full(run.driver.observed, np.inf), start.t
         self._watch()
 
     def _first(self, point: tuple[Floats, Floats] | None) -> None:
@@ -165,7 +167,7 @@ class Pieces:
         self.handler.before = self.handler.now()
         if stepper.refine:
             _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
-        end = method.t
+        end, begun = method.t, core.t_from == self._begun
         begin = max(self._from, min(core.t_clear, end))
         reach = core.t_seen
         while True:
@@ -187,7 +189,8 @@ class Pieces:
                 point = self._fire(t, before, [], which)
             if point is not None:
                 self._accept(t, TRACE, sink, which)
-                self._go_on(t, point, before, misled=end - core.t_from if self.handler.stands(which) else 0.0)
+                misled = self.handler.stands(which) or (begun and t - core.t_from < SOON * (end - core.t_from))
+                self._go_on(t, point, before, misled=end - core.t_from if misled else 0.0)
                 return time.process_time() - began
             begin = t
 
@@ -245,6 +248,7 @@ class Pieces:
         core = self.run.driver.run
         core.start_kind = TRACE
         self._bounce(t)
+        self._begun = t
         if misled:
             self._short(t, misled)
         self.run.driver.leave(*before)

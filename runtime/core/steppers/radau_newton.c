@@ -14,6 +14,7 @@
 #define FADING 0.3         /* a correction over the one before: what is borne and shrinks no faster is round-off */
 #define STAGNANT 0.1       /* of the tolerance: corrections of the state this small that do not shrink are round-off; that of
                             * what follows from rates grows as steps shrink, goes into no other step, and may be the method's */
+#define FAINTEST 1e-9      /* of magnitudes: what round-off may leave of what follows from rates */
 #define LAX 100.0          /* a steep row may be off by as many times Newton's tolerance times the method's */
 #define LEAST_PART 1e-7    /* of a correction that is still tried */
 #define FAINT_ROW 1e-6     /* the same where slopes are too faint to move an unknown */
@@ -171,7 +172,7 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
             double ratio = size / before;
             radau->theta = m == 2 ? ratio : sqrt(ratio * ratio_before);
             ratio_before = ratio;
-            const int borne = ratio > SLOW && size < 1.0 && sd_radau_state_moved(radau) < tolerance;
+            const int borne = ratio > SLOW && size < fmin(1.0, FAINTEST / radau->rtol) && sd_radau_state_moved(radau) < tolerance;
             converged = borne;
             if (!(radau->theta < SLOW) && !(full && m < PATIENT / 2)) {
                 if (size > STAGNANT * tolerance && !borne)
