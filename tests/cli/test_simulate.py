@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.runtime.integrate import integrate
+from sysdyn.runtime.integrate import creeping
 from sysdyn.runtime.trace.trace import Trace
 from texts import ARRAY, BROKEN, ENDLESS, PENDULUM, process, run_json, write
 
@@ -311,8 +311,8 @@ def test_the_span_is_told_where_a_run_does_not_begin_at_zero(tmp_path, capsys):
 
 def test_an_end_out_of_reach_is_said(tmp_path, monkeypatch, capsys):
     """A swing of a second can be followed for 1e12 s by nobody: not a matter of the resolution of time."""
-    monkeypatch.setattr(integrate, "CRAWL", 400)
-    monkeypatch.setattr(integrate, "DRAFT_CRAWL", 400)
+    for kind in ("RUN", "DRAFT"):
+        monkeypatch.setattr(creeping, kind, ((400, 1e-6),))
     path = write(tmp_path, PENDULUM.replace(" every 10 ms", ""))
     assert run(["simulate", "-q", path, "--until", "1e12"]) == 3
     err = capsys.readouterr().err
