@@ -66,7 +66,8 @@ class Compared:
         open_ = partial(self._open_quantities, finished, quantities)
         sizes, steps = quantities.of_run(finished), finished.statistics.steps
         between = self._between(rows, finished, quantities)
-        found = Sampled(tolerance, values, sizes, steps, noise, open_, between, late, there)
+        jumps = bool(finished.events)
+        found = Sampled(tolerance, values, sizes, steps, noise, open_, between, late, there, jumps)
         self.samplings = (*self.samplings[-1:], found)
         return found
 

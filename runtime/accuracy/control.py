@@ -184,7 +184,7 @@ class _Estimate:
         self.lost = lost
         shrink, luck = None, 1.0
         credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
-        left = left_at_rest(coarse, fine, self.target)
+        left, left_over = left_at_rest(coarse, fine, self.target)
         credit = min(credit, ROOT) if left else credit
         if shorter is not None:
             part = shorter**BY_STEPS
@@ -205,8 +205,7 @@ class _Estimate:
         least = self.law.least * fine.tolerance
         shrink *= luck
         self.apart, self.over = max(apart * shrink, least), max(over * shrink, least / float(np.min(self.target)))
-        if left > self.over:
-            self.apart, self.over = self.apart * left / self.over, left
+        self.apart, self.over = max(self.apart, left), max(self.over, left_over)
         return apart
 
     def shorter(self) -> float:

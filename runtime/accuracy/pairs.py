@@ -46,7 +46,8 @@ class Sampled:
     quantities]: what no difference counts more than, between an event of this run and the same one of the run before it
     (None: no instant is); late [instants, quantities]: what the dense
     output of each value moves by within the time tolerance (TIMING): on a steep front no more is asked; there: values
-    and late at instants of its own, for the run behind it (None: those are the same).
+    and late at instants of its own, for the run behind it (None: those are the same); jumps:
+    events happened.
     """
 
     tolerance: float
@@ -58,6 +59,7 @@ class Sampled:
     between: Floats | None = None
     late: Floats | float = 0.0
     there: tuple[Floats, Floats | float] | None = None
+    jumps: bool = False
 
     @property
     def own(self) -> tuple[Floats, Floats | float]:
@@ -143,25 +145,26 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     return float(relative.max()), float((relative / target[use]).max())
 
 
-def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats) -> float:
+def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
     """Where two runs are farthest apart where a quantity comes to rest at zero, from there to the end: the most that is
-    left of it in the finer one, over the accuracy wanted; 0 elsewhere.  What ends in finite time is a root of the state
-    (the flow of a vessel that runs empty), whose error is the root of the state's, and all that is left.
+    left of it in the finer one, relative to its size, and that over the accuracy wanted; zeros elsewhere.  What ends in
+    finite time is a root of the state (the flow of a vessel that runs empty), whose error is the root of the state's,
+    and all that is left.
     """
     before, size = coarse.own[0], fine.largest
     use = (size != 0.0) & np.isfinite(target)
-    if before.shape != fine.values.shape or len(before) < 2 or not use.any():
-        return 0.0
-    far = apart(coarse, fine)[:, use]
+    if before.shape != fine.values.shape or len(before) < 2 or not use.any() or fine.jumps:
+        return 0.0, 0.0  # what jumps may be nothing between its jumps
     with np.errstate(all="ignore"):
+        far = apart(coarse, fine)[:, use]
         over = far / (size * target)[use]
     if not np.isfinite(over).all() or not over.any():
-        return 0.0
+        return 0.0, 0.0
     row, column = np.unravel_index(np.argmax(over), over.shape)
     left, seen = (np.abs(values[row:, use][:, column]).max() for values in (fine.values, before))
     if not max(left, seen) <= STILL * far[row, column] < MUCH * size[use][column]:
-        return 0.0
-    return float(left / (size * target)[use][column])
+        return 0.0, 0.0
+    return float(left / size[use][column]), float(left / (size * target)[use][column])
 
 
 def parted(coarse: Sampled, fine: Sampled, target: Floats) -> bool:

@@ -236,4 +236,4 @@ def test_short_runs_on_steep_laws_are_not_believed_to_fall_fast():
 )
 def test_what_is_left_where_a_quantity_comes_to_rest_is_error(coarse, fine, left):
     one, two = (Sampled(1e-3, np.array(values)[:, None], np.ones(1), 100) for values in (coarse, fine))
-    assert left_at_rest(one, two, np.array([1e-3])) == pytest.approx(left)
+    assert left_at_rest(one, two, np.array([1e-3])) == pytest.approx((1e-3 * left, left))
