@@ -19,6 +19,7 @@ from sysdyn.compiler.model.energies import EnergyModel, Row
 from sysdyn.compiler.model.terms import Nest, local_variables
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node, div, neg, substitute, variables
+from sysdyn.dsl.model.network import loop_ranges
 from sysdyn.values import dataclass
 
 
@@ -74,5 +75,4 @@ def _told(model: EnergyModel) -> Iterator[tuple[str, _Told]]:
 
 def _whole(nest: Nest, at: tuple[Node, ...], shape: tuple[tuple[Node, Node], ...]) -> bool:
     """Whether the indices run over the whole of a family."""
-    runs = [(loop.first, loop.last) for loop in nest]
-    return list(shape) == runs and [n.data for n in at] == [loop.index for loop in nest]
+    return shape == loop_ranges(nest) and [n.data for n in at] == [loop.index for loop in nest]

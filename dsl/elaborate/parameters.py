@@ -189,9 +189,8 @@ class Parameters(ElaborationContext):
         self, code: str, message: str, statement: syntax.Param, given: Argument | None, help: str | None
     ) -> Failed:
         """Report an error in a default, or in what an instance gives instead; raise what is returned."""
-        here = self.place((statement.value or statement.decl).span)
         if given is None:
-            return self.resolver.fail(code, message, here.span, help=help)
+            return self.resolver.fail(code, message, (statement.value or statement.decl).span, help=help)
         where = Related(f"in component '{self.current.component}'", self.place(statement.decl.span))
         return self.resolver.fail(code, message, given.place, help=help, related=(where,))
 

@@ -53,7 +53,7 @@ class Compared:
         rows = np.concatenate(self._rows) if self._rows else np.zeros((0, width))
         if self.instants.open:
             self.instants.close(rows[:, 0])
-        instants, there, own = self.instants.common, None, rows
+        instants, there = self.instants.common, None
         if self.options.every is None:
             self.instants.common = common(self._thinned.time, self.options)
             own = self._thinned.rows(self.instants.common)
@@ -66,8 +66,9 @@ class Compared:
         open_ = partial(self._open_quantities, finished, quantities)
         sizes, steps = quantities.of_run(finished), finished.statistics.steps
         between = self._between(rows, finished, quantities)
-        jumps = bool(finished.events)
-        found = Sampled(tolerance, values, sizes, steps, noise, open_, between, late, there, jumps)
+        found = Sampled(
+            tolerance, values, sizes, steps, noise, open_, between, late, there, jumps=bool(finished.events)
+        )
         self.samplings = (*self.samplings[-1:], found)
         return found
 

@@ -162,7 +162,7 @@ def _no_heavier(g: Floats, units: Floats, moves: Mask) -> Floats:
     size = np.abs(g) * units
     largest = size[:, moves].max(axis=1, initial=0.0)[:, None]
     share = np.divide(largest, size, out=np.ones_like(size), where=(largest > 0.0) & (size > 0.0))
-    return np.where(moves, units, units * np.minimum(share.min(axis=0, initial=1.0), 1.0))
+    return np.where(moves, units, units * share.min(axis=0, initial=1.0))
 
 
 def _null_space(matrix: Floats) -> Floats:

@@ -279,6 +279,11 @@ static void show_nodes(sd_radau *radau)
  * shall fall like those of three, with rtol^0.85: the estimate counts within * rtol^(2/3 - 0.85) times. */
 static const double within[SD_METHODS] = {0.0, 0.2, 0.02};
 
+static double strict_by(const sd_radau *radau, double part)
+{
+    return fmax(1.0, fmin(part * pow(radau->rtol, WITHIN), radau->tolerance / FINEST));
+}
+
 /* what the estimate of a method counts beside that of three stages */
 double sd_radau_strictness(const sd_radau *radau, const sd_radau_method *method)
 {
@@ -308,8 +313,8 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
         radau->tested += radau->test[i] >= 0;
     radau->tolerance = fmax(0.1 * pow(radau->rtol, 2.0 / 3.0), 1e-13);
     for (int k = 0; k < SD_METHODS; k++)
-        radau->strict[k] = fmax(1.0, fmin(within[k] * pow(radau->rtol, WITHIN), radau->tolerance / FINEST));
-    radau->strict_first = fmax(1.0, fmin(pow(radau->rtol, WITHIN), radau->tolerance / FINEST));
+        radau->strict[k] = strict_by(radau, within[k]);
+    radau->strict_first = strict_by(radau, 1.0);
     memmove(radau->phi, y, size);
     memmove(radau->yd, yd, size);
     if (provide_room(radau)) /* which the first step tells */
