@@ -110,7 +110,7 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     if isinstance(partial, Outcome) and partial.reached > error.time:
         text += "; the trace is that of a coarser run to the end, its error is not known"
     usual = _REMEDIES_OF_CAUSES.get(error.cause, _REMEDIES[code])
-    usual = "--method radau or bdf, or auto" if linear or flat else usual
+    usual = _instead_of(partial.method if isinstance(partial, Outcome) else "") if linear or flat else usual
     usual += f"; {WITH_A_SLOPE}" if flat else ""
     if error.cause == "singular" and len(started.system.description.switches.places):
         usual = _TWICE
@@ -119,6 +119,12 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     help_ = "; ".join(filter(None, (remedy, known)))
     report.error(code, text, where, help=help_)
     return text
+
+
+def _instead_of(method: str) -> str:
+    """The methods that pass a law without a slope, but for the one that did not."""
+    *others, last = (name for name in ("radau", "bdf", "auto") if name != method)
+    return f"--method {', '.join(others)} or {last}"
 
 
 def _flat(prepared: Prepared, started: Started, error: SolverFailure) -> tuple[RowLabel, ...]:
@@ -190,7 +196,7 @@ def _inaccurate(
     help_ = "a looser accuracy, a shorter span, or what stands at the place"
     if flat:
         text += f"; {no_slope(flat, 'the start')}, by which rosenbrock steps"
-        help_ = f"--method radau or bdf, or auto; {WITH_A_SLOPE}"
+        help_ = f"{_instead_of('rosenbrock')}; {WITH_A_SLOPE}"
     report.error("E920", text, where, help=help_)
 
 

@@ -136,7 +136,7 @@ def test_an_accuracy_that_a_flat_law_costs_is_told_by_it(tmp_path, capsys):
     assert exit_ == 3
     assert "error E920" in said
     assert "the law at O has no slope at the start" in said
-    assert "help: --method radau or bdf, or auto" in said
+    assert "help: --method radau, bdf or auto" in said
 
 
 def rooted(x):

@@ -133,4 +133,4 @@ def test_rosenbrock_is_refused_there_with_the_reason(tmp_path, capsys):
     said = capsys.readouterr().err
     assert "E930" in said
     assert "slopes where a step begins" in said
-    assert "help: --method radau or bdf" in said
+    assert "help: --method radau, bdf or auto" in said
