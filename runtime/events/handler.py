@@ -301,7 +301,7 @@ class Handler:
 
     def anew(self, t: float, y: Floats, yd: Floats) -> Point:
         """The point behind an instant at which the text jumps, and behind the conditions that become true by it."""
-        stood = self.kinks.state()
+        self.simple, self.rounds, stood = not self.bounces, [], self.kinks.state()
         self.kinks.anew()
         point = self._followed(t, self.settled(t, y, yd, self._words()))
         self.happened += self.kinks.happened(t, stood)

@@ -285,10 +285,10 @@ class Integration:
             method.newton_failures,
         )
 
-    def _advance(self, sink: Sink, progress: Progress | None, began: float, segment_end: float) -> None:
-        """To the end of a segment."""
+    def _advance(self, sink: Sink, progress: Progress | None, began: float, at: int) -> int:
+        """To the end of the segment of number `at`, or of one behind it: its number."""
         if self.pieces is not None:
-            self.pieces.aim(segment_end)
+            self.pieces.aim()
         request, method = self.request, self.method.contents
         creeping = Creeping(request.t_end - self.start.t, method.t, self.statistics(), draft=request.draft)
         most, failed = CHUNK_STEPS, method.newton_failures
@@ -321,13 +321,13 @@ class Integration:
                 continue
             if state == 1 and self.pieces is not None:
                 before = time.process_time()
-                more = self.pieces.sample(segment_end, sink)
+                more = self.pieces.sample(sink)
                 self.cpu += time.process_time() - before
                 if more:
                     continue
                 self.driver.drain(sink)
             if state == 1:
-                break
+                return at if self.pieces is None else self.pieces.at
             if not creeping.goes_on(method.t, self.statistics()):
                 raise failure(self, "crawl")
 
@@ -354,16 +354,18 @@ class Integration:
         began = time.monotonic()
         self.stepped.core.residual_evaluations = self.stepped.core.jacobian_evaluations = 0
         method = self.method.contents
-        for segment in self.segments:
-            if segment is not self.segments[0]:
-                before = time.process_time()
-                cross(self, segment)
-                self._put_away()
-                self._spare()
-                self.system.trim(LARGE)
-                self.cpu += time.process_time() - before
+        at = 0
+        while True:
             self._rest_of_start()
-            self._advance(sink, progress, began, segment.end)
+            at = self._advance(sink, progress, began, at) + 1
+            if at == len(self.segments):
+                break
+            before = time.process_time()
+            cross(self, self.segments[at])
+            self._put_away()
+            self._spare()
+            self.system.trim(LARGE)
+            self.cpu += time.process_time() - before
         if spent:
             self.method.rest()
         last = self.method.last()

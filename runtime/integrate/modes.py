@@ -15,6 +15,7 @@ import numpy as np
 from sysdyn.runtime.events.handler import Handler, Watched
 from sysdyn.runtime.events.kinks import WORDS
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
+from sysdyn.runtime.integrate.crossing import JUMP
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN
 from sysdyn.runtime.start.restart import STILL
@@ -33,6 +34,8 @@ AGAIN = 3
 LOG = 1024
 """Events between two looks at them."""
 UNLIMITED = 1 << 62
+JUMPS = -1
+"""Samples due where the text jumps (core/run/modes.h)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +119,10 @@ class Modes:
             contacts[k] = lib.Contact(KINDS["follows" if k in handler.contacts.frozen else one.kind], *rows)
         for k, kink in enumerate(plan.kinks):
             kinks[k] = lib.Kink(kink.branch, kink.value, kink.rate, kink.above, kink.below)
+        pieces = (lib.Piece * len(self.run.segments))(*((s.begin, s.end, s.label) for s in self.run.segments))
         systems = (c.c_void_p * len(self._systems))(*(c.addressof(s.core) for s in self._systems))
-        self._keep += [contacts, kinks, systems]
+        self._keep += [contacts, kinks, systems, pieces]
+        core.piece, core.pieces, core.differs = c.addressof(pieces), len(pieces), max(self.run.request.rtol, JUMP)
         core.contact, core.kink = c.addressof(contacts), c.addressof(kinks)
         core.system = c.addressof(systems)
         core.period, core.next = self._array([s.period for s in plan.sampled]), lib.pointer(handler.next)
@@ -165,7 +170,7 @@ class Modes:
     # -- between the core and the handler ------------------------------------------------------------------------
 
     def told(self) -> bool:
-        """The handler stands where the core does, and knows what has happened; whether anything has."""
+        """The handler stands where the core does, and knows what has happened; whether any event has."""
         core, handler = self.core, self.handler
         for row in self._log[: core.logged].tolist():
             handler.happened += self._turned(row) if row[1] < 0.0 else self._told[int(row[1])].at(row[0], row[2:])
@@ -233,13 +238,15 @@ class Modes:
             held=c.addressof(held),
         )
 
-    def learn(self, begin: int, what: tuple[Sequence[int], Sequence[int]], moved: tuple[Any, Any, int]) -> None:
-        """The handler went from mode `begin`; what: watches that crossed, samples due; moved: sides once these had
-        changed, the point behind (None: nothing but sides changed), events before.
+    def learn(
+        self, begin: int, t: float, what: tuple[Sequence[int], Sequence[int] | None], moved: tuple[Any, Any, int]
+    ) -> None:
+        """The handler went from mode `begin` at t (s); what: watches that crossed, samples due, None: the text jumps;
+        moved: sides once these had changed, the point behind (None: nothing but sides changed), events before.
         """
         (crossed, due), (flipped, point, before) = what, moved
         handler, number = self.handler, len(self._told)
-        if begin < 0 or number >= MANY or not handler.simple or not self._determined(point):
+        if begin < 0 or number >= MANY or not handler.simple or not self._determined(t, point):
             return
         end = self.stands()
         groups = tuple(group for r in handler.rounds for group in r.groups)
@@ -255,11 +262,11 @@ class Modes:
             to=end,
             next=self._modes[begin].first,
             crossed=len(crossed),
-            due=len(due),
+            due=JUMPS if due is None else len(due),
             rounds=len(handler.rounds),
             moves=point is not None,
             which=self._array(sorted(crossed), np.int32),
-            sample=self._array(sorted(due), np.int32),
+            sample=self._array(sorted(due or ()), np.int32),
             kind=self._array([a.kind != "discrete" for a in flat], np.int32),
             place=self._array([a.place for a in flat], np.int32),
             read=self._array([a.row for a in flat], np.int32),
@@ -271,12 +278,12 @@ class Modes:
         self._modes[begin].first = number
         self._told.append(Told(groups, entries))
 
-    def _determined(self, point: Any) -> bool:
-        """Whether the mode leaves nothing open."""
+    def _determined(self, t: float, point: Any) -> bool:
+        """Whether the mode leaves nothing open at t (s)."""
         handler = self.handler
         if point is None or not handler.plan.contacts:
             return True
-        return bool(handler.determined.leaves(handler.last, *point) == 0)
+        return bool(handler.determined.leaves(t, *point) == 0)
 
     def places(self, which: Sequence[Watched]) -> list[int]:
         """Numbers of these among what is watched."""

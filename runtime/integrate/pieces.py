@@ -57,7 +57,9 @@ class Pieces:
         self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin, run.request.rtol)
         self.handler.restart = run.settlers.restart
         self.handler.contacts.size(run.sizes.magnitude, run.sizes.time)
-        self._longest, self._landing, self._end = run.method.contents.h_max, np.inf, run.segments[0].end
+        self._longest, self._landing = run.method.contents.h_max, np.inf
+        self.at = 0
+        """The number of the segment."""
         n = run.system.form.written
         self._first(self.handler.begin(start.t, run.y[:n].copy(), run.start_rate[:n].copy()))
         self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
@@ -86,9 +88,9 @@ class Pieces:
         """The handler knows what the core has done without it."""
         if self.modes is None:
             return
-        if self.modes.told():
+        if self.modes.told() or self.modes.core.at != self.at:
             self._landing = np.inf
-        self._mode = self.modes.core.now
+        self._mode, self.at = self.modes.core.now, self.modes.core.at
 
     def happened(self) -> tuple[Happened, ...]:
         """The events so far."""
@@ -107,15 +109,20 @@ class Pieces:
                 flipped[w.relation] = -float(w.side)
         point = handler.fire(t, *before, samples=due, which=which)
         if not (which and handler.stands(which)):
-            modes.learn(begin, (crossed, due), (flipped, point, events))
+            modes.learn(begin, t, (crossed, due), (flipped, point, events))
         self._mode = modes.stands()
         return point
 
-    def aim(self, end: float) -> None:
-        """The next step ends no later than at the next sample, or the end (s) of the segment; a sample due where
-        the text jumps reads what holds behind it.
+    @property
+    def _end(self) -> float:
+        """The end (s) of the segment."""
+        return self.run.segments[self.at].end
+
+    def aim(self) -> None:
+        """The next step ends no later than at the next sample, or the end of the segment; a sample due where the text
+        jumps reads what holds behind it.
         """
-        self._end, sample, near = end, self.handler.next_sample(), self.handler.nothing
+        end, sample, near = self._end, self.handler.next_sample(), self.handler.nothing
         if self.modes is not None:
             self.modes.core.segment = end
         self.run.method.contents.t_end = min(sample if sample < end - near else end, self._landing)
@@ -130,14 +137,14 @@ class Pieces:
             if np.isfinite(flight):
                 method.h_max, self._landing = min(flight / PARTS, self._longest), t + 2.0 * flight
         if self._landing != before:
-            self.aim(self._end)
+            self.aim()
 
     def _short(self, t: float, step: float) -> None:
         """Steps of an eighth of one that misled, until its end is passed."""
         method = self.run.method.contents
         method.h_max = max(min(step / PARTS, method.h_max), 16.0 * float(np.spacing(t)))
         self._landing = min(t + step, self._landing)
-        self.aim(self._end)
+        self.aim()
 
     # -- where a piece ends --------------------------------------------------------------------------------------
 
@@ -256,15 +263,16 @@ class Pieces:
         core.start_kind = 0
         self._watch()
 
-    def sample(self, end: float, sink: Sink) -> bool:
-        """What is due where a piece has met its end; whether the segment, which ends at `end` (s), goes on."""
+    def sample(self, sink: Sink) -> bool:
+        """What is due where a piece has met its end; whether the segment goes on."""
         run, method = self.run, self.run.method.contents
         self._told()
-        jumps = method.t >= end and end < run.segments[-1].end  # the text, which is first
+        end = self._end
+        jumps = method.t >= end and self.at + 1 < len(run.segments)  # the text, which is first
         due = [] if jumps else self.handler.due(method.t)
         if not due and method.t < end:  # a bounce that has not come back
             self._landing, method.h_max = np.inf, self._longest
-            self.aim(end)
+            self.aim()
             return True
         if due:
             n = run.system.form.written
@@ -274,24 +282,34 @@ class Pieces:
                 self.handler.before = self.handler.now()
                 point = self._fire(method.t, (y, yd), due, self._met(method.t, (y, yd)))
             run.driver.drain(sink)
-            self.aim(end)
+            self.aim()
             if point is not None:
                 self._go_on(method.t, point, (y, yd))
         return bool(due) and method.t < end
 
     def jump(self, segment: Segment, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
-        """The point behind the instant at which the text jumps, where a segment begins; what happens has its rows."""
+        """The point behind the instant at which the text jumps, where the next segment begins; what happens has its
+        rows.
+        """
         self._told()
-        handler, t = self.handler, segment.begin
-        handler.before, events = handler.now(), len(handler.happened)
+        handler, modes, t, begin = self.handler, self.modes, segment.begin, self._mode
+        handler.before, events, sides = handler.now(), len(handler.happened), handler.side.copy()
         due, which = handler.due(t), handler.turned(t, y, yd)
         which += self._met(self.run.method.contents.t, (y, yd), which)
+        crossed = modes.places(which) if modes is not None else []
+        for w in which:
+            sides[w.relation] = -float(w.side)
         found = handler.fire(t, y, yd, samples=due, which=which) if due or which else None
         point = found or handler.anew(t, y, yd)
+        if modes is not None and not due:
+            modes.learn(begin, t, (crossed, None), (sides, point, events))
         handler.happened[events:] = [replace(h, time=segment.label) for h in handler.happened[events:]]
         if len(handler.happened) > events:
             self.row_before()
         self.run.driver.run.start_kind = TRACE if due or len(handler.happened) > events else 0
+        self.at += 1
+        if modes is not None:
+            modes.core.at = self.at
         self._bounce(t)
         self._watch()
         return point

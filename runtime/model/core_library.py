@@ -26,6 +26,7 @@ from sysdyn.runtime.model.structures.run import (
     Run,
     RunClaim,
     RunSamples,
+    Piece,
     Transition,
     Watch,
 )
@@ -111,6 +112,7 @@ __all__ = [
     "Stepper",
     "Straight",
     "System",
+    "Piece",
     "Transition",
     "Underlying",
     "Watch",

@@ -340,6 +340,7 @@ scene s of lever {
 
 
 @pytest.mark.parametrize("formulation", [*PRIMAL, "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
 def test_a_two_port_absorbs_nothing(formulation, tmp_path):
     """Any element has a power and an energy; those of a transformer, however its ratio moves, are zero."""
     got = traced(write(tmp_path, LEVER), formulation=formulation, output=str(tmp_path / "o.h5"))

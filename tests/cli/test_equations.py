@@ -163,7 +163,7 @@ def test_thirteen_systems_in_two_formulations():
 
 
 @pytest.mark.parametrize("path", BOOK, ids=lambda p: p.stem)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_the_books_systems_are_printed_as_there(path, capsys):
     """Texts read by eye against (6.27), (6.40), Examples 3.1 to 3.4, 4.1, 4.2, 5.1 to 5.4, 6.6, 2.37 and 2.4.2."""
     system, formulation = path.name.split(".")[:2]
@@ -499,6 +499,7 @@ def test_a_law_that_is_not_linear_has_its_content_by_the_legendre_transform(caps
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("name", ["slider_crank", "two_link_arm", "dc_motor", "solenoid", "lcr_nonlinear"])
+@pytest.mark.one_in(2)
 def test_efforts_by_class_add_up_to_the_balance(name, formulation):
     """(2.10): inertial, potential, dissipative, source, implicit and constraint efforts against the balances' rows."""
     with ex.fresh():

@@ -224,6 +224,7 @@ def test_functions_of_sums_over_a_size_follow_the_size(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8])
+@pytest.mark.one_in(2)
 def test_a_ladder_of_another_length_is_that_ladder(tmp_path, n):
     """Of three sections the middle one is both the second and the last but one: no other length has its rows."""
     (tmp_path / "m.sd").write_text(LADDER)

@@ -205,6 +205,7 @@ RUN = ("E608", "W920", "E931", "E932", "E933", "E934")
 
 
 @pytest.mark.parametrize("code", RUN)
+@pytest.mark.one_in(2)
 def test_pages_of_what_a_run_finds_tell_the_truth(code, tmp_path, capsys):
     page = codes.codes()[code]
     path = tmp_path / "example.sd"
@@ -310,6 +311,7 @@ scene s of two {
         ),
     ],
 )
+@pytest.mark.one_in(2)
 def test_a_power_that_is_constant_is_no_constant_of_the_ledger(tmp_path, capsys, elements, end, formulation):
     path = tmp_path / "m.sd"
     scene = "scene s of m {\n  time 0 s to 50 s\n  trace C.e as e\n}\n"
@@ -336,6 +338,7 @@ scene s of light {
 
 @pytest.mark.parametrize("method", ["auto", "radau", "rosenbrock"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_a_motion_too_fast_for_the_resolution_of_time_is_not_met(tmp_path, capsys, formulation, method):
     """Of 1e-60 kg on 4 N/m a second is 3e29 periods: steps damp what they do not follow, 2 J, which round-off does not
     excuse.

@@ -47,6 +47,7 @@ def test_interrupt_leaves_what_was_computed(tmp_path):
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.4, 1.1, 1.9])
+@pytest.mark.one_in(2)
 def test_kill_leaves_a_readable_trace(tmp_path, seconds):
     child = started(write(tmp_path, ENDLESS), "--max-wall", "60")
     time.sleep(seconds)
@@ -88,6 +89,7 @@ def test_help_imports_nothing_heavy():
 
 
 @pytest.mark.parametrize("command", ["simulate", "verify", "report", "golden", "plot", "diff", "new", "doctor"])
+@pytest.mark.one_in(2)
 def test_help_of_a_command_costs_little(command):
     """0.07 s of CPU and 17 MB, start of Python included, while nothing heavy is imported."""
     assert not imported(command, "--help") & HEAVY

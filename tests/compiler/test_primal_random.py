@@ -21,6 +21,7 @@ def numbers(sizes):
 
 
 @pytest.mark.parametrize("block", range(10 * LONG))
+@pytest.mark.one_in(3)
 def test_scalar_networks(block):
     for seed in range(10 * block, 10 * block + 10):
         with x.fresh():
@@ -42,7 +43,7 @@ def or_refused(net, sizes, **more):
 
 
 @pytest.mark.parametrize("block", range(10 * LONG))
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_statements_over_loops(block):
     """Rarely one is refused, never wrong."""
     refused = 0

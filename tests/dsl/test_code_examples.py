@@ -59,6 +59,7 @@ def said_by(command, text, folder, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("code", [*RUN, "N101"])
+@pytest.mark.one_in(2)
 def test_bad_example_of_a_run_raises_its_code_alone(code, tmp_path, monkeypatch, capsys):
     raised = said_by(PAGES[code].by, PAGES[code].bad, tmp_path, monkeypatch, capsys)
     if code == "E901":  # a finding without a place

@@ -36,6 +36,7 @@ def test_a_store_whose_effort_a_law_reads(tmp_path, read, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_stores_that_stay_implicit(tmp_path, formulation):
     law, store = "f = 2 A/Wb*p + 3 A/Wb^3*p^3", "q = 0.7 F*e + 0.2 C/V^3*e^3"
     trace = trace_of(tmp_path, COIL.format(law=law, store=store, read="0.1 V"), formulation=formulation)
@@ -115,6 +116,7 @@ scene go of branches {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_what_dissipators_absorb_is_dissipated_whatever_form_their_laws_take(tmp_path, formulation):
     trace = trace_of(tmp_path, BRANCHES, formulation=formulation)
     lost = sum(trace[f"{name}.energy"].values for name in "RDM")

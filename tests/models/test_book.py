@@ -71,6 +71,7 @@ def test_a_flow_constraint_stays_where_the_scene_says_so(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
 def test_efforts_of_gyrators_are_unknowns_where_the_scene_keeps_them(formulation, tmp_path, capsys):
     """A motor with and without keep_implicit: (2.94)'s two gammas with their implicit efforts, and the same motion."""
     text = (ROOT / "models" / "seed" / "dc_motor.sd").read_text()

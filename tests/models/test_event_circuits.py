@@ -130,6 +130,7 @@ scene s of m {
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["radau", "bdf"])
+@pytest.mark.one_in(2)
 def test_a_buck_converter_against_its_exponentials(method, formulation, tmp_path):
     trace = run(BUCK, tmp_path, formulation, method=method)
     assert trace.statistics["error_estimate"] <= 1e-6

@@ -179,6 +179,7 @@ scene s of m { time 0 s to 1.5 s; trace b.e as u; init C.q = 0 C; accuracy 1e-6 
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
 def test_a_switch_with_memory_that_drives_what_it_reads(tmp_path, formulation):
     """R C(u) u' = E - u, C = 1 mF + 0.3 mF/V^2 u^2: what the instant assigns turns the law back that turned there."""
 
@@ -243,6 +244,7 @@ scene s of oven { time 0 s to 600 s; trace o.e in degC as T, H.y as P }
 
 @pytest.mark.parametrize("method", ["dopri", "energy", "rosenbrock"])
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-5])
+@pytest.mark.one_in(2)
 def test_a_thermostat_whose_temperature_is_a_multiplier(method, accuracy, tmp_path):
     """A heat flow is the difference of two temperatures: at 374 K it cannot be told to the last digit of 405 W.  At an
     edge the condition turns again at once, in one run and not in another: that is one event.

@@ -130,6 +130,7 @@ scene go of charged { time 0 s to 1 ms; trace C1.e, C2.e, L.f every 0.5 ms }
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
 def test_consistent_guesses_of_stores_come_back_in_both_families(tmp_path, capsys, formulation):
     path, out = tmp_path / "charged.sd", tmp_path / "t.h5"
     path.write_text(CHARGED)

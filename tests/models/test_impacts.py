@@ -152,6 +152,7 @@ scene pull of held {
 
 @FORMULATIONS
 @pytest.mark.parametrize(("pulled", "other", "bound", "inertia"), [("a", "b", 7.0, 2.0), ("b", "a", 8.0, 3.0)])
+@pytest.mark.one_in(2)
 def test_friction_that_holds_in_a_loop(tmp_path, formulation, pulled, other, bound, inertia):
     """Three joints hold two bodies: how they share the load is open, that one slides at the sum of its two is not."""
     trace = run(tmp_path, HELD.replace("ground -> a\n  init", f"ground -> {pulled}\n  init"), formulation)
@@ -279,6 +280,7 @@ scene slow of read {
         "implicit F: N ~ 1 N\n  gamma rub: F = 0.4*rail.multiplier*x'/(1 m/s)\n  work -F on x",
     ],
 )
+@pytest.mark.one_in(2)
 def test_a_law_reads_the_reaction_of_a_constraint_behind_it(tmp_path, formulation, law):
     """The order of statements does not matter: an element whose law read a later constraint was left out in silence."""
     trace = run(tmp_path, READ.replace("LAW", law), formulation)

@@ -55,6 +55,7 @@ BRIDGE = "\n  ".join(
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_a_bridge_of_resistors_between_two_stores(tmp_path, formulation):
     """Its currents follow from Kirchhoff's laws alone; against the exponential of the state's matrix."""
     trace = trace_of(tmp_path, HEAD + BRIDGE + SCENE, scene="run", formulation=formulation, method="dopri")
@@ -132,6 +133,7 @@ scene run of turned { time 0 s to 8 s; trace c, s every 50 ms }
 
 @pytest.mark.parametrize(("method", "accuracy"), [("radau", 1e-6), ("bdf", 1e-3)])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+@pytest.mark.one_in(2)
 def test_an_inertia_that_turns(tmp_path, formulation, method, accuracy):
     """Coordinates without inertia along themselves: at the start this is c alone, elsewhere both.  c = cos(t),
     s = sin(t); with roles as the start alone shows them radau stops and bdf takes 40 000 steps.

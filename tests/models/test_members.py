@@ -39,7 +39,7 @@ def integral(law, x):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(6)
 def test_state_functions_are_integrals_of_the_law(tmp_path, name, formulation):
     edge, side, text, law, start = LAWS[name]
     given = {"kinetic": "pf", "potential": "qe", "dissipator": "ef"}[edge].replace(side, "")
@@ -123,6 +123,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_without_a_closed_form_it_is_the_integral_of_the_power(tmp_path, formulation):
     trace = trace_of(tmp_path, TABLE, formulation=formulation, backend="numpy")
     np.testing.assert_allclose(trace["K.V"].values, trace["K.energy"].values, atol=1e-7)
@@ -278,6 +279,7 @@ def stages():
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_components_within_components_within_an_array(tmp_path, formulation):
     """Read from within by a law, a let, an output and an init, and from outside; against the circuit's own matrix."""
     trace = trace_of(tmp_path, CELLS, formulation=formulation)

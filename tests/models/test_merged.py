@@ -32,6 +32,7 @@ def test_a_sum_over_merged_nodes(tmp_path, backend):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_nodes_of_one_family_are_joined_each_in_its_way(tmp_path, formulation):
     """Two masses, each written by itself: the constants of their integrated rows stand side by side."""
     text = """

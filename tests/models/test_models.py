@@ -40,7 +40,7 @@ def test_reduced_sizes_are_of_models_that_exist():
 
 
 @pytest.mark.parametrize("name", FILES)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_check_is_clean(name, capsys):
     code = run(["check", "--json", "--strict", str(MODELS / f"{name}.sd")])
     found = result(capsys)
@@ -63,7 +63,7 @@ def scenes(name):
 @pytest.mark.parametrize(
     ("name", "scene"), [(name, scene) for name in FILES if not name.startswith("seed/") for scene in scenes(name)]
 )
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_scenes_run_and_hold_what_they_expect(name, scene, tmp_path, capsys):
     output = tmp_path / "trace.h5"
     options = ["--scene", scene, "--json", "-o", str(output), *settings(name), "--max-wall", "120"]

@@ -233,6 +233,7 @@ def test_coordinates_are_simulated_rightly(tmp_path, domain, place, transformed)
 
 @pytest.mark.parametrize("function", ["V", "V*"])
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_thermal_stores(tmp_path, function, formulation):
     """Entropy that flows into a store of a true thermal domain: e = dV/dq."""
     own = STATE_FUNCTIONS[function].own

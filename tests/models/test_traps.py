@@ -139,6 +139,7 @@ ROOTS = """implicit ex: N ~ F*cos(heading)
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.5 * np.pi, 2.4, -0.9, np.pi])
+@pytest.mark.one_in(2)
 def test_planar_friction_brakes(tmp_path, heading):
     """By its two roots and by the content F |v|, whose slope has no other root."""
     found = [
@@ -289,6 +290,7 @@ def test_the_tan_form_is_right_or_stops(tmp_path):
         ("lead_filter", (), 2),
     ],
 )
+@pytest.mark.one_in(2)
 def test_the_index_follows_from_the_values(tmp_path, model, settings, index):
     text = (SEED / f"{model}.sd").read_text()
     head, tail = text.split("\n}\n\nscene ")

@@ -71,6 +71,7 @@ scene shut of shorted {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
 def test_two_gyrators_that_short_each_other(tmp_path, formulation):
     """Two ratios at the same ends leave no voltage, no turning: the flux stays, the inertia has the damper alone."""
     (tmp_path / "model.sd").write_text(SHORTED)

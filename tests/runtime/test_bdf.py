@@ -28,6 +28,7 @@ def run(made, t_end, form="3", index=0, instants=(), **request):
     ("order", "tolerances"),
     [(1, (1e-4, 1e-6)), (2, (1e-5, 1e-8)), (3, (1e-6, 1e-9)), (4, (1e-7, 1e-10)), (5, (1e-10, 1e-11))],
 )
+@pytest.mark.one_in(2)
 def test_observed_order(order, tolerances):
     # error ~ steps^-order where no higher order is allowed
     t = np.linspace(0, 10, 21)
@@ -78,6 +79,7 @@ def test_stabilised_pendulum_keeps_its_constraints_and_energy():
 
 
 @pytest.mark.parametrize(("form", "index"), [("2", 2), ("2v", 2), ("1", 1), ("3", 3)])
+@pytest.mark.one_in(2)
 def test_every_index_form_of_the_pendulum(form, index):
     _, columns, _ = run(models.pendulum(), 4.0, form, index, [4.0], rtol=1e-7)
     assert abs(columns["q1"][-1] + 0.12866541720223088) < (1e-4 if form == "3" else 1e-5)

@@ -58,6 +58,7 @@ def test_what_is_made_once_is_made_again_once_it_was_let_go():
 
 @pytest.mark.parametrize("family", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("index", ["3", "2", "0", "settled"])
+@pytest.mark.one_in(2)
 def test_every_slope_stands_in_the_pattern(index, family):
     """Entries of the pattern are the slopes by central differences, and there is none beside them."""
     of, random = system(index, family), np.random.default_rng(3)

@@ -38,6 +38,7 @@ def integrated(made, method):
 
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.one_in(2)
 def test_the_unit_of_length_changes_nothing(form, method):
     one, counted = integrated(bar(1.0, form), method)
     other, again = integrated(bar(1024.0, form), method)

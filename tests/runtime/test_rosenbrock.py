@@ -88,6 +88,7 @@ def test_values_between_steps_have_order_five_too():
 
 @pytest.mark.parametrize("rate", [1.0, 1e3, 1e5])
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4])
+@pytest.mark.one_in(2)
 def test_error_within_steps_of_what_is_pulled_to_a_source(rate, rtol):
     # steps alone would not see it: whatever they are, their ends lie on the source
     t = np.linspace(0, 10, 501)

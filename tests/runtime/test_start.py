@@ -51,6 +51,7 @@ def started(made, t0=0.0):
 
 
 @pytest.mark.parametrize("name", REFERENCES)
+@pytest.mark.one_in(2)
 def test_consistent_values_of_the_seed(name):
     make, values, rates = REFERENCES[name]
     system, state = started(make())

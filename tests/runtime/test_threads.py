@@ -133,6 +133,7 @@ def test_a_forked_process_has_threads_of_its_own():
 
 
 @pytest.mark.parametrize(("said", "number"), [("1", 1), ("3", 3), ("1000", 8), ("", None), ("x", None)])
+@pytest.mark.one_in(2)
 def test_the_environment_says_how_many(said, number):
     """At most eight: memory feeds no more."""
     code = "from sysdyn.runtime.model.core_library import core; print(core.sd_threads())"

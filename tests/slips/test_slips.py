@@ -33,6 +33,7 @@ def test_every_class_has_slips():
 
 
 @pytest.mark.parametrize("name", STOPS)
+@pytest.mark.one_in(2)
 def test_a_run_that_stops_speaks_the_same_language(name, tmp_path, capsys):
     """One error with its code, at the author's line, the function or cause with its value, and the last good state."""
     stop = STOPS[name]

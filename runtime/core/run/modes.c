@@ -6,158 +6,9 @@
 
 #include "run/crossing.h"
 #include "run/fits.h"
+#include "run/landing.h"
 
-#define HELD 1e8         /* weight of the state across an event */
 #define ROWS_OF_EVENT 8  /* at most, beside those asked for */
-
-/* values [observed] at a point, whose sizes are kept */
-static void look(sd_run *run, double t, const double *y, const double *yd, double *values)
-{
-    sd_modes *m = run->modes;
-    double *scale = m->high;
-    memset(values, 0, (size_t)m->observed * sizeof(double));
-    memset(scale, 0, (size_t)m->observed * sizeof(double));
-    run->observe->rows(&run->observe->frame, t, y, yd, values);
-    if (run->observe_scale)
-        run->observe_scale->rows(&run->observe_scale->frame, t, y, yd, scale);
-    for (int32_t i = 0; i < m->observed; i++) {
-        double size = fmax(fabs(values[i]), fabs(scale[i]));
-        if (size > m->largest[i] && isfinite(size))
-            m->largest[i] = size;
-    }
-    for (int32_t g = 0, i = 0; g < m->alikes; g++) {
-        double most = 0.0;
-        for (int32_t k = i; k < m->alike_end[g]; k++)
-            most = fmax(most, m->largest[m->alike[k]]);
-        for (; i < m->alike_end[g]; i++)
-            m->largest[m->alike[i]] = most;
-    }
-}
-
-/* The parameters and the rows of a mode. */
-static void enter(sd_run *run, int32_t number)
-{
-    sd_modes *m = run->modes;
-    const sd_mode *mode = number == SD_OWN ? &m->own : &m->mode[number];
-    for (int32_t i = 0; i < m->places; i++)
-        m->p[m->place[i]] = mode->value[i];
-    for (int32_t i = 0; i < m->systems; i++) {
-        sd_system *system = m->system[i];
-        const sd_held *held = &mode->held[i];
-        system->held = held->held;
-        system->clear = held->clear;
-        system->held_row = held->row;
-        system->held_unknown = held->unknown;
-        system->held_slot = held->slot;
-        system->held_rate = held->rate;
-        system->cleared = held->cleared;
-    }
-    run->settle->ready = 0;
-    m->now = number;
-}
-
-/* The assignments of a transition at t, to m->p and m->y, and its row of the log; 0: they lead elsewhere. */
-static int assign(sd_run *run, const sd_transition *one, double t)
-{
-    sd_modes *m = run->modes;
-    double *row = &m->log[(size_t)m->logged * (size_t)m->width];
-    row[0] = t;
-    row[1] = (double)(one - m->transition);
-    look(run, t, m->y, m->yd, m->values);
-    for (int32_t k = 0; k < m->relations; k++)
-        m->exact[k] = one->sides[k] != sd_mode_now(m)->relation[k] && m->values[m->relation_row[k]] == 0.0;
-    for (int32_t r = 0, a = 0; r < one->rounds; r++) {
-        for (int32_t k = a; k < one->end[r]; k++) { /* all values are read, then all assigned */
-            row[2 + 2 * k] = (one->kind[k] ? m->y : m->p)[one->place[k]];
-            row[3 + 2 * k] = m->values[one->read[k]];
-        }
-        for (; a < one->end[r]; a++)
-            (one->kind[a] ? m->y : m->p)[one->place[a]] = row[3 + 2 * a];
-        look(run, t, m->y, m->yd, m->values);
-        if (!sd_mode_sides_fit(m, one->sides + (r + 1) * m->relations, one->sides + r * m->relations, m->values))
-            return 0;
-    }
-    return 1;
-}
-
-/* m->y, m->yd settled at t: 1, where no state moves for it */
-static int stays(sd_run *run, double t)
-{
-    sd_modes *m = run->modes;
-    int failed = sd_settle_point(run->settle, t, m->y, m->yd);
-    for (int32_t i = 0; i < run->written && !failed; i++)
-        failed = m->state[i] && !(fabs(m->y[i] - m->restart[i]) <= m->still * m->magnitude[i]);
-    return !failed;
-}
-
-/* The same with the state held: 1; 0: that fails, or moves the state.  Where constraints stay as they are a basis that moves
- * no state is enough. */
-static int keeps_state(sd_run *run, double t)
-{
-    sd_modes *m = run->modes;
-    sd_settle *settle = run->settle;
-    size_t written = (size_t)run->written * sizeof(double);
-    double slack = settle->slack;
-    memcpy(m->restart, m->y, written);
-    memcpy(m->restart_d, m->yd, written);
-    settle->slack = 0.0;
-    int done = settle->basis && !settle->determined && stays(run, t);
-    settle->slack = slack;
-    if (done)
-        return 1;
-    memcpy(m->y, m->restart, written);
-    memcpy(m->yd, m->restart_d, written);
-    settle->hold = HELD;
-    done = stays(run, t);
-    settle->hold = 1.0;
-    settle->ready = 0;
-    return done;
-}
-
-/* The point before an event, which is taken across it; the parameters there */
-static void leave(sd_run *run)
-{
-    sd_modes *m = run->modes;
-    size_t written = (size_t)run->written * sizeof(double);
-    memcpy(m->p_before, m->p, (size_t)m->parameters * sizeof(double));
-    memcpy(m->y, m->before, written);
-    memcpy(m->yd, m->before_d, written);
-}
-
-/* The point behind an event at t in m->restart and m->rate: 1, where the mode is what its values say; sides: from which its
- * relations come */
-static int arrives(sd_run *run, const double *sides, double t)
-{
-    sd_modes *m = run->modes;
-    size_t written = (size_t)run->written * sizeof(double);
-    if (!keeps_state(run, t))
-        return 0;
-    memset(m->restart, 0, (size_t)m->unknowns * sizeof(double));
-    memset(m->rate, 0, (size_t)m->unknowns * sizeof(double));
-    memcpy(m->restart, m->y, written);
-    memcpy(m->rate, m->yd, written);
-    look(run, t, m->y, m->yd, m->values);
-    return sd_mode_fits(m, sides, m->values) && sd_mode_sized(m);
-}
-
-/* The point behind a transition at t, from m->before; the model is then in its mode.  0: it does not lead there, and
- * nothing has changed. */
-static int lands(sd_run *run, const sd_transition *one, double t)
-{
-    sd_modes *m = run->modes;
-    int32_t from = m->now;
-    const sd_mode *before = sd_mode_now(m);
-    leave(run);
-    int done = assign(run, one, t);
-    enter(run, one->to);
-    done = done && arrives(run, one->sides + one->rounds * m->relations, t) && sd_mode_ordinary(m) &&
-           sd_mode_decided(m, before, one, m->values);
-    if (!done) {
-        memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
-        enter(run, from);
-    }
-    return done;
-}
 
 /* -- laws whose branch turns ------------------------------------------------------------------------------------- */
 
@@ -207,7 +58,7 @@ static void turn(sd_run *run, int32_t crossed)
             if (m->place[k] == m->kink[m->turning[i]].branch)
                 m->own.value[k] = -m->own.value[k];
     }
-    enter(run, SD_OWN);
+    sd_landing_enter(run, SD_OWN);
 }
 
 /* The branches of laws that crossed, and nothing else, turn at t, from m->before; the model is then in its mode, and the log
@@ -219,13 +70,13 @@ static int turns(sd_run *run, double t, int32_t crossed)
     int32_t from = m->now;
     if (m->contacts || m->logged + crossed > m->room || t - m->last <= m->nothing || m->left < crossed || !kinks_of(m, crossed))
         return 0;
-    leave(run);
+    sd_landing_leave(run);
     own(m);
     turn(run, crossed);
-    if (!arrives(run, m->own.relation, t)) {
+    if (!sd_landing_arrives(run, m->own.relation, t)) {
         turn(run, crossed);
         memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
-        enter(run, from);
+        sd_landing_enter(run, from);
         return 0;
     }
     for (int32_t i = 0; i < crossed; i++) {
@@ -251,8 +102,27 @@ static void watch(sd_run *run)
     run->watches = mode->watches;
 }
 
-/* On from the point behind an event, which counts as so many, and is told in so many rows of the log. */
-static void go_on(sd_run *run, double t, int32_t logged, int64_t entries)
+/* What stood before an event, in mode `from`, stands again: rows of before are written with it.  The mode behind it. */
+static int32_t back(sd_run *run, int32_t from)
+{
+    sd_modes *m = run->modes;
+    int32_t to = m->now;
+    memcpy(m->p_after, m->p, (size_t)m->parameters * sizeof(double));
+    sd_landing_enter(run, from);
+    memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
+    return to;
+}
+
+static void forth(sd_run *run, int32_t to)
+{
+    sd_modes *m = run->modes;
+    sd_landing_enter(run, to);
+    memcpy(m->p, m->p_after, (size_t)m->parameters * sizeof(double));
+}
+
+/* On from the point behind an event at t, whose row, of kind `kind`, is as of `label`; it counts as so many, and is told
+ * in so many rows of the log. */
+static void go_on(sd_run *run, double t, double label, int32_t kind, int32_t logged, int64_t entries)
 {
     sd_modes *m = run->modes;
     double sample = INFINITY;
@@ -263,9 +133,9 @@ static void go_on(sd_run *run, double t, int32_t logged, int64_t entries)
     run->end_kind = sample <= m->segment + m->nothing ? SD_TRACE : 0;
     for (int32_t i = 0; i < m->unknowns; i++)
         m->restart_d[i] = m->differential[i] ? m->rate[i] : 0.0;
-    run->start_kind = SD_TRACE;
+    run->start_kind = kind;
     sd_run_leave(run, m->before, m->before_d);
-    sd_run_restart(run, t, t, m->restart, m->restart_d);
+    sd_run_restart(run, t, label, m->restart, m->restart_d);
     run->start_kind = 0;
     m->logged += logged;
     m->left -= entries;
@@ -277,7 +147,7 @@ static int same(int32_t n, const int32_t *a, int32_t number, const int32_t *b)
     return n == number && !memcmp(a, b, (size_t)n * sizeof *a);
 }
 
-/* The transition that what crossed, or is due, takes at t; the model is then in its mode.  NULL: none. */
+/* The transition that what crossed, or is due (SD_JUMP: the text jumps), takes at t; the model is then in its mode.  NULL: none. */
 static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_t due)
 {
     sd_modes *m = run->modes;
@@ -285,13 +155,15 @@ static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_
         return NULL;
     for (int32_t k = sd_mode_now(m)->first; k >= 0; k = m->transition[k].next) {
         const sd_transition *one = &m->transition[k];
-        if (!same(one->crossed, one->which, crossed, m->which) || !same(one->due, one->sample, due, m->which))
+        if (!same(one->crossed, one->which, crossed, m->which))
+            continue;
+        if (due == SD_JUMP ? one->due != SD_JUMP : !same(one->due, one->sample, due, m->which))
             continue;
         if (one->entries > m->left)
             return NULL;
         if (!one->moves)
-            enter(run, one->to);
-        if (!one->moves || lands(run, one, t))
+            sd_landing_enter(run, one->to);
+        if (!one->moves || sd_landing_takes(run, one, t))
             return one;
     }
     return NULL;
@@ -347,20 +219,11 @@ static int event(sd_run *run, double enough)
             m->begin = t;
             continue;
         }
-        /* rows of before the event are written with the parameters of before */
-        int32_t to = m->now;
-        memcpy(m->p_after, m->p, (size_t)m->parameters * sizeof(double));
-        if (one)
-            enter(run, from);
-        memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
-        run->settle->ready = 0;
+        int32_t to = back(run, from);
         run->settle->enough = enough;
         sd_run_accept(run, t, SD_TRACE);
-        if (one)
-            enter(run, to);
-        memcpy(m->p, m->p_after, (size_t)m->parameters * sizeof(double));
-        run->settle->ready = 0;
-        go_on(run, t, one ? 1 : crossed, one ? one->entries : crossed);
+        forth(run, to);
+        go_on(run, t, t, SD_TRACE, one ? 1 : crossed, one ? one->entries : crossed);
         return SD_RUNNING;
     }
 }
@@ -377,31 +240,120 @@ int sd_modes_event(sd_run *run)
     return state;
 }
 
-int sd_modes_sample(sd_run *run)
+/* The relations that the text takes to their other side as it jumps to t, into m->which; -1: one is near zero.  Theirs are
+ * the first watches of a mode.  m->low := the values before it */
+static int32_t turned(sd_run *run, double t)
 {
     sd_modes *m = run->modes;
-    double t = *run->stepper->t, now = t + m->nothing;
+    const sd_mode *mode = sd_mode_now(m);
+    int32_t found = 0;
+    sd_landing_look(run, *run->stepper->t, m->before, m->before_d, m->low);
+    sd_landing_look(run, t, m->before, m->before_d, m->values);
+    for (int32_t k = 0, watch = 0; k < m->relations; k++) {
+        double value = m->values[m->relation_row[k]], small = sd_mode_zero(m, m->relation_row[k]);
+        if (!m->relation_moves[k])
+            continue;
+        if (mode->relation[k] != 0.0 && !(fabs(value) > small))
+            return -1;
+        for (int32_t sides = mode->relation[k] != 0.0 ? 1 : 2; sides; sides--, watch++)
+            if (mode->side[watch] * value < -small)
+                m->which[found++] = watch;
+    }
+    return found;
+}
+
+/* Whether what is observed, m->values, differs from what it was before a jump of the text, m->low. */
+static int jumped(const sd_modes *m)
+{
+    for (int32_t i = 0; i < m->observed; i++)
+        if (fabs(m->values[i] - m->low[i]) > m->differs * fmax(m->largest[i], fmax(fabs(m->values[i]), fabs(m->low[i]))))
+            return 1;
+    return 0;
+}
+
+/* The samples due at t, into m->which. */
+static int32_t due_at(const sd_modes *m, double t)
+{
     int32_t due = 0;
     for (int32_t k = 0; k < m->samples; k++)
-        if (m->first + (double)m->next[k] * m->period[k] <= now)
+        if (m->first + (double)m->next[k] * m->period[k] <= t + m->nothing)
             m->which[due++] = k;
-    if (!due || m->now < 0 || t >= m->segment)
-        return SD_FINISHED;
-    if (roomy(run, t) == 0)
-        return SD_FULL;
+    return due;
+}
+
+/* m->before := the end of the last step, to round-off */
+static void settle_end(sd_run *run)
+{
+    sd_modes *m = run->modes;
     memcpy(m->before, run->stepper->y, (size_t)m->unknowns * sizeof(double));
     memcpy(m->before_d, run->stepper->yd, (size_t)m->unknowns * sizeof(double));
-    double enough = run->settle->enough;
+    settled(run, *run->stepper->t);
+}
+
+static int sample(sd_run *run, int32_t due)
+{
+    sd_modes *m = run->modes;
+    double t = *run->stepper->t, enough = run->settle->enough;
     run->settle->enough = 0.0;
-    settled(run, t);
+    settle_end(run);
     const sd_transition *one = taken(run, t, 0, due);
     run->settle->enough = enough;
     if (!one)
         return SD_FINISHED;
     m->last = t;
     for (int32_t i = 0; i < due; i++)
-        while (m->first + (double)m->next[one->sample[i]] * m->period[one->sample[i]] <= now)
+        while (m->first + (double)m->next[one->sample[i]] * m->period[one->sample[i]] <= t + m->nothing)
             m->next[one->sample[i]]++;
-    go_on(run, t, 1, one->entries);
+    go_on(run, t, t, SD_TRACE, 1, one->entries);
     return SD_RUNNING;
+}
+
+/* Whether a jump of the text to `label`, with so many events, asks for a row before it that is not there yet. */
+static int lacks_row(const sd_run *run, double label, int64_t entries)
+{
+    if (run->every_step || run->end_kind & SD_TRACE)
+        return 0;
+    int asked = run->next < run->instants && run->instant[run->next] <= label && run->instant_kind[run->next] & SD_TRACE;
+    return entries || (asked && jumped(run->modes));
+}
+
+/* The text jumps where the step has met the end of its piece. */
+static int jump(sd_run *run)
+{
+    sd_modes *m = run->modes;
+    const sd_piece *next = &m->piece[m->at + 1];
+    double t = next->begin, enough = run->settle->enough;
+    int32_t from = m->now;
+    if (due_at(m, t))
+        return SD_FINISHED;
+    run->settle->enough = 0.0;
+    settle_end(run);
+    int32_t crossed = turned(run, t);
+    const sd_transition *one = crossed < 0 ? NULL : taken(run, t, crossed, SD_JUMP);
+    run->settle->enough = enough;
+    if (!one)
+        return SD_FINISHED;
+    if (lacks_row(run, next->label, one->entries)) {
+        int32_t to = back(run, from);
+        sd_run_row(run, SD_TRACE);
+        forth(run, to);
+    }
+    m->last = crossed ? t : m->last;
+    m->log[(size_t)m->logged * (size_t)m->width] = next->label;
+    m->at++;
+    m->segment = next->end;
+    go_on(run, t, next->label, one->entries ? SD_TRACE : 0, one->entries != 0, one->entries);
+    return SD_RUNNING;
+}
+
+int sd_modes_end(sd_run *run)
+{
+    const sd_modes *m = run->modes;
+    double t = *run->stepper->t;
+    int32_t jumps = t >= m->segment, due = jumps ? 0 : due_at(m, t);
+    if (m->now < 0 || (jumps ? m->at + 1 >= m->pieces : !due))
+        return SD_FINISHED;
+    if (roomy(run, t) == 0)
+        return SD_FULL;
+    return jumps ? jump(run) : sample(run, due);
 }

@@ -16,6 +16,7 @@
 struct sd_run;
 
 #define SD_OWN INT32_MAX /* the mode that the core has found by itself */
+#define SD_JUMP (-1)     /* in place of samples that are due: the text jumps */
 
 enum sd_contact_kind { SD_PSI, SD_FRICTION, SD_PHI, SD_GUARDED, SD_FOLLOWS };
 
@@ -42,7 +43,7 @@ typedef struct sd_mode {
 
 typedef struct sd_transition {
     int32_t to, next;                 /* next: transition from the same mode, -1: none */
-    int32_t crossed, due, rounds, moves; /* moves 0: nothing but sides change, the step goes on */
+    int32_t crossed, due, rounds, moves; /* due SD_JUMP: where the text jumps; moves 0: nothing but sides change, the step goes on */
     const int32_t *which, *sample;    /* [crossed] watches, [due] samples, both ascending */
     const int32_t *end;               /* [rounds] of its assignments */
     const int32_t *kind, *place, *read; /* [end of the last] 0: a parameter, 1: an unknown; place; row that it becomes */
@@ -59,6 +60,11 @@ typedef struct sd_kink {
     int32_t branch, value, rate, above, below;
 } sd_kink;
 
+/* A smooth piece of the text (s); label: of the row in which it begins. */
+typedef struct sd_piece {
+    double begin, end, label;
+} sd_piece;
+
 typedef struct sd_modes {
     const sd_mode *mode;
     const sd_transition *transition;
@@ -74,7 +80,8 @@ typedef struct sd_modes {
     sd_system *const *system;         /* [systems] whose rows follow */
     const double *period;             /* [samples] s */
     int64_t *next;                    /* [samples] number of the next one */
-    double first, segment;            /* s: of the samples, end of the segment */
+    const sd_piece *piece;            /* [pieces] of the text */
+    double first, segment;            /* s: of the samples, end of the piece of the text */
     double last, nothing;             /* s: the event before, what is no time behind it */
     double begin;                     /* s: from here on the last step has not been looked at */
     double longest;                   /* s: step */
@@ -98,12 +105,15 @@ typedef struct sd_modes {
     double *log;                      /* [room][width] t, transition, before and after of what was assigned; t, -1 - kink
                                        * and its branches */
     int64_t left;                     /* events that may still be */
+    double differs;                   /* of its size: what a value differs by that has jumped */
+    int32_t pieces, at;               /* number of the present piece */
     int32_t width, room, logged, waits; /* waits: an event has no room for its rows yet */
 } sd_modes;
 
 /* What changes within the last step: SD_RUNNING: done; SD_EVENT: the handler is asked; SD_FULL: no room for rows. */
 int sd_modes_event(struct sd_run *run);
-/* What is due where a step has met its end: the same, SD_FINISHED where nothing is due or the handler is asked. */
-int sd_modes_sample(struct sd_run *run);
+/* Samples due where a step has met its end, or the text that jumps there: the same, SD_FINISHED where there is nothing or
+ * the handler is asked. */
+int sd_modes_end(struct sd_run *run);
 
 #endif

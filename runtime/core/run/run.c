@@ -445,7 +445,7 @@ static int advance(sd_run *run)
 {
     double from = *run->stepper->t;
     if (from >= *run->stepper->t_end)
-        return run->modes && run->modes->samples ? sd_modes_sample(run) : SD_FINISHED;
+        return run->modes ? sd_modes_end(run) : SD_FINISHED;
     memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
     if (run->stepper->step(run->stepper->self))
         return SD_FAILED;

@@ -79,6 +79,12 @@ class Kink(c.Structure):
     _fields_ = [(name, I) for name in ["branch", "value", "rate", "above", "below"]]
 
 
+class Piece(c.Structure):
+    """sd_piece."""
+
+    _fields_ = [(name, D) for name in ["begin", "end", "label"]]
+
+
 class Modes(c.Structure):
     """sd_modes."""
 
@@ -88,7 +94,7 @@ class Modes(c.Structure):
         *[(name, I) for name in ["base", "now", "parameters", "places", "relations", "contacts", "kinks"]],
         *[(name, I) for name in ["systems", "samples", "observed", "alikes", "unknowns"]],
         *[(name, P) for name in ["p", "place", "relation_row", "relation_moves", "contact", "kink", "system"]],
-        *[(name, P) for name in ["period", "next"]],
+        *[(name, P) for name in ["period", "next", "piece"]],
         *[(name, D) for name in ["first", "segment", "last", "nothing", "begin", "longest"]],
         *[(name, P) for name in ["t_end", "h_max", "largest"]],
         *[(name, D) for name in ["small", "still"]],
@@ -99,6 +105,8 @@ class Modes(c.Structure):
         *[(name, P) for name in ["values", "low", "high", "p_before", "p_after"]],
         *[(name, P) for name in ["exact", "found", "which", "turning", "watch", "log"]],
         ("left", L),
+        ("differs", D),
+        *[(name, I) for name in ["pieces", "at"]],
         *[(name, I) for name in ["width", "room", "logged", "waits"]],
     ]
 

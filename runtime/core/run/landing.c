@@ -1,0 +1,151 @@
+/* The point behind an event: see landing.h. */
+#include "run/landing.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "run/fits.h"
+
+#define HELD 1e8 /* weight of the state across an event */
+
+void sd_landing_look(sd_run *run, double t, const double *y, const double *yd, double *values)
+{
+    sd_modes *m = run->modes;
+    double *scale = m->high;
+    memset(values, 0, (size_t)m->observed * sizeof(double));
+    memset(scale, 0, (size_t)m->observed * sizeof(double));
+    run->observe->rows(&run->observe->frame, t, y, yd, values);
+    if (run->observe_scale)
+        run->observe_scale->rows(&run->observe_scale->frame, t, y, yd, scale);
+    for (int32_t i = 0; i < m->observed; i++) {
+        double size = fmax(fabs(values[i]), fabs(scale[i]));
+        if (size > m->largest[i] && isfinite(size))
+            m->largest[i] = size;
+    }
+    for (int32_t g = 0, i = 0; g < m->alikes; g++) {
+        double most = 0.0;
+        for (int32_t k = i; k < m->alike_end[g]; k++)
+            most = fmax(most, m->largest[m->alike[k]]);
+        for (; i < m->alike_end[g]; i++)
+            m->largest[m->alike[i]] = most;
+    }
+}
+
+void sd_landing_enter(sd_run *run, int32_t number)
+{
+    sd_modes *m = run->modes;
+    const sd_mode *mode = number == SD_OWN ? &m->own : &m->mode[number];
+    for (int32_t i = 0; i < m->places; i++)
+        m->p[m->place[i]] = mode->value[i];
+    for (int32_t i = 0; i < m->systems; i++) {
+        sd_system *system = m->system[i];
+        const sd_held *held = &mode->held[i];
+        system->held = held->held;
+        system->clear = held->clear;
+        system->held_row = held->row;
+        system->held_unknown = held->unknown;
+        system->held_slot = held->slot;
+        system->held_rate = held->rate;
+        system->cleared = held->cleared;
+    }
+    run->settle->ready = 0;
+    m->now = number;
+}
+
+/* The assignments of a transition at t, to m->p and m->y, and its row of the log; 0: they lead elsewhere. */
+static int assign(sd_run *run, const sd_transition *one, double t)
+{
+    sd_modes *m = run->modes;
+    double *row = &m->log[(size_t)m->logged * (size_t)m->width];
+    row[0] = t;
+    row[1] = (double)(one - m->transition);
+    sd_landing_look(run, t, m->y, m->yd, m->values);
+    for (int32_t k = 0; k < m->relations; k++)
+        m->exact[k] = one->sides[k] != sd_mode_now(m)->relation[k] && m->values[m->relation_row[k]] == 0.0;
+    for (int32_t r = 0, a = 0; r < one->rounds; r++) {
+        for (int32_t k = a; k < one->end[r]; k++) { /* all values are read, then all assigned */
+            row[2 + 2 * k] = (one->kind[k] ? m->y : m->p)[one->place[k]];
+            row[3 + 2 * k] = m->values[one->read[k]];
+        }
+        for (; a < one->end[r]; a++)
+            (one->kind[a] ? m->y : m->p)[one->place[a]] = row[3 + 2 * a];
+        sd_landing_look(run, t, m->y, m->yd, m->values);
+        if (!sd_mode_sides_fit(m, one->sides + (r + 1) * m->relations, one->sides + r * m->relations, m->values))
+            return 0;
+    }
+    return 1;
+}
+
+/* m->y, m->yd settled at t: 1, where no state moves for it */
+static int stays(sd_run *run, double t)
+{
+    sd_modes *m = run->modes;
+    int failed = sd_settle_point(run->settle, t, m->y, m->yd);
+    for (int32_t i = 0; i < run->written && !failed; i++)
+        failed = m->state[i] && !(fabs(m->y[i] - m->restart[i]) <= m->still * m->magnitude[i]);
+    return !failed;
+}
+
+/* The same with the state held: 1; 0: that fails, or moves the state.  Where constraints stay as they are a basis that moves
+ * no state is enough. */
+static int keeps_state(sd_run *run, double t)
+{
+    sd_modes *m = run->modes;
+    sd_settle *settle = run->settle;
+    size_t written = (size_t)run->written * sizeof(double);
+    double slack = settle->slack;
+    memcpy(m->restart, m->y, written);
+    memcpy(m->restart_d, m->yd, written);
+    settle->slack = 0.0;
+    int done = settle->basis && !settle->determined && stays(run, t);
+    settle->slack = slack;
+    if (done)
+        return 1;
+    memcpy(m->y, m->restart, written);
+    memcpy(m->yd, m->restart_d, written);
+    settle->hold = HELD;
+    done = stays(run, t);
+    settle->hold = 1.0;
+    settle->ready = 0;
+    return done;
+}
+
+void sd_landing_leave(sd_run *run)
+{
+    sd_modes *m = run->modes;
+    size_t written = (size_t)run->written * sizeof(double);
+    memcpy(m->p_before, m->p, (size_t)m->parameters * sizeof(double));
+    memcpy(m->y, m->before, written);
+    memcpy(m->yd, m->before_d, written);
+}
+
+int sd_landing_arrives(sd_run *run, const double *sides, double t)
+{
+    sd_modes *m = run->modes;
+    size_t written = (size_t)run->written * sizeof(double);
+    if (!keeps_state(run, t))
+        return 0;
+    memset(m->restart, 0, (size_t)m->unknowns * sizeof(double));
+    memset(m->rate, 0, (size_t)m->unknowns * sizeof(double));
+    memcpy(m->restart, m->y, written);
+    memcpy(m->rate, m->yd, written);
+    sd_landing_look(run, t, m->y, m->yd, m->values);
+    return sd_mode_fits(m, sides, m->values) && sd_mode_sized(m);
+}
+
+int sd_landing_takes(sd_run *run, const sd_transition *one, double t)
+{
+    sd_modes *m = run->modes;
+    int32_t from = m->now;
+    const sd_mode *before = sd_mode_now(m);
+    sd_landing_leave(run);
+    int done = assign(run, one, t);
+    sd_landing_enter(run, one->to);
+    done = done && sd_landing_arrives(run, one->sides + one->rounds * m->relations, t) && sd_mode_ordinary(m) &&
+           sd_mode_decided(m, before, one, m->values);
+    if (!done) {
+        memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
+        sd_landing_enter(run, from);
+    }
+    return done;
+}
