@@ -38,6 +38,8 @@ PER_PIECE = 8
 """Samples at least between two instants of what stands inside an argument."""
 ROUND_OFF = 1e-14
 """Of the span: what begins nearer to t0 began at t0."""
+JUMP = 1e-9
+"""Of a value: what it differs by less right behind an instant is no jump."""
 _HALVINGS = 1100
 
 
@@ -74,7 +76,7 @@ def instants(
     tables: Sequence[Table] = (),
     read: Sequence[Node] = (),
 ) -> Instants:
-    """All instants in (t0, t1]; tables: of the network; read: what events read.  None of them, with a note, where they
+    """All instants in (t0, t1], and t0 where the text jumps behind it; tables: of the network; read: what events read.  None of them, with a note, where they
     are more than MOST.
     """
     search = _Search(binding, t0, t1)
@@ -211,8 +213,11 @@ class _Search:
         except KeyError:  # a constant that is known at the start only
             return
         found = labels.bisect(*brackets)
-        # the start lies on its own right side
-        found = distinct(found[(found > self.t0 + ROUND_OFF * (self.t1 - self.t0)) & (found <= self.t1)])
+        near = found <= self.t0 + ROUND_OFF * (self.t1 - self.t0)  # the start lies on its own right side
+        found = found[~near & (found <= self.t1)]
+        if near.any() and labels.jumps(np.arange(number), self.t0, self.t0 + 1e-6 * (self.t1 - self.t0)):
+            found = np.append(found, self.t0)
+        found = distinct(found)
         before = self._found.get(watched.node, found)
         self._found[watched.node] = distinct(before, found)
         self.times()
@@ -285,7 +290,8 @@ class _Labels:
     def __init__(self, watched: Watched, columns: dict[str, Array], lookup: Callable[..., Value]) -> None:
         self._watched, self._columns, self._lookup = watched, columns, lookup
 
-    def _values(self, index: Whole, t: Array) -> list[Array]:
+    def _values(self, index: Whole, t: Array, nodes: tuple[Node, ...] | None = None) -> list[Array]:
+        """Of the arguments, or of other nodes."""
         def look(node: Node, args: list[Value]) -> Value:
             if node.op == "time":
                 return t
@@ -293,13 +299,23 @@ class _Labels:
                 return self._columns[node.data][index]
             return self._lookup(node, args)
 
-        found = evaluate(self._watched.arguments, look)
+        found = evaluate(nodes or self._watched.arguments, look)
         return [np.broadcast_to(np.asarray(v, dtype=float), t.shape) for v in found]
 
     def at(self, index: Whole, t: Array) -> Array:
         """Labels [k] in iterations index [k] at t [k]."""
         with np.errstate(all="ignore"):
             return np.nan_to_num(self._watched.label(self._values(index, t)))
+
+    def jumps(self, index: Whole, t: float, later: float) -> bool:
+        """Whether the operation has another value right behind t (s), in any of the iterations; beside its value at
+        `later` (s).
+        """
+        if self._watched.node.op == "table":  # of those that jump, what holds behind an instant holds at it
+            return False
+        times = (np.full(index.size, instant) for instant in (t, np.nextafter(t, np.inf), later))
+        at, behind, beyond = (self._values(index, instants, (self._watched.node,))[0] for instants in times)
+        return bool((np.abs(behind - at) > JUMP * np.maximum(np.abs(at), np.abs(beyond))).any())
 
     def measure(self, index: Whole, t: Array, *, quotient: bool) -> Array:
         """What crosses the levels: the argument, the difference or the quotient of the two."""

@@ -27,7 +27,9 @@ def cross(run: Integration, segment: Segment) -> None:
     run.sizes.share(y)
     with run.settler.exactly():
         y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
-        before = run.system.observe(method.t, y, yd) if run.driver.asks(segment.label) else None
+        starts = segment.label == run.start.t
+        asked = run.driver.asks(segment.label) or starts
+        before = run.system.observe(method.t, y, yd) if asked else None
         if run.pieces is not None:
             found: tuple[Floats, Floats] | None = run.pieces.jump(segment, y, yd)
         else:
@@ -35,7 +37,10 @@ def cross(run: Integration, segment: Segment) -> None:
     if found is None:
         raise failure(run, "newton")
     if before is not None and _jumps(run, before, run.system.observe(segment.begin, *found)):
-        _row_before(run)
+        if starts:
+            run.driver.run.start_kind = TRACE
+        else:
+            _row_before(run)
     run.driver.leave(y, yd)
     run.settlers.rest()
     method.t_end = segment.end

@@ -317,7 +317,7 @@ class Pieces:
     def row_before(self) -> None:
         """The row of the end of the last step, with the parameters of before, where it has none in the trace."""
         core, after = self.run.driver.run, self.handler.now()
-        if core.every_step or core.end_kind & TRACE:
+        if core.every_step or core.end_kind & TRACE or self.run.method.contents.t == self.run.start.t:
             return
         self.handler.back(self.handler.before)
         lib.core.sd_run_row(self.run.driver.core, TRACE)

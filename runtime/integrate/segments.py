@@ -2,7 +2,8 @@
 
 A step ends just before such an instant and the next begins just after it, so that every residual sees one side
 (language, rule 17).  Instants nearer to each other than CLOSE of the span are passed as one.  Where the text jumps at
-the very end the last piece has no length: no step sees what holds from there on, and the row of the end does.
+the very end the last piece has no length: no step sees what holds from there on, and the row of the end does; nor has the
+first where it jumps right behind the start.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ class Segment:
 
 
 def segments(t0: float, t1: float, stops: Floats | None) -> tuple[Segment, ...]:
-    """The pieces of t0..t1; stops before and behind are left out."""
+    """The pieces of t0..t1; stops before and behind are left out, that at t0 is where the text jumps behind it."""
     if stops is None or not np.size(stops):
         return (Segment(t0, t1, t0),)
     inside = np.unique(np.asarray(stops, dtype=np.float64))
     inside = inside[np.isfinite(inside)]
     least = CLOSE * max(abs(t0), abs(t1), t1 - t0)
-    inside = inside[(inside > t0) & (inside <= t1)]
-    found: list[Segment] = []
+    found = [Segment(t0, t0, t0)] if (inside == t0).any() else []
+    inside = inside[(inside >= t0) & (inside <= t1)]
     begin, label = t0, t0
     k = 0
     while k < inside.size:
