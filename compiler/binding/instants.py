@@ -76,8 +76,8 @@ def instants(
     tables: Sequence[Table] = (),
     read: Sequence[Node] = (),
 ) -> Instants:
-    """All instants in (t0, t1], and t0 where the text jumps behind it; tables: of the network; read: what events read.  None of them, with a note, where they
-    are more than MOST.
+    """All instants in (t0, t1], and t0 where the text jumps behind it; tables: of the network; read: what events read.
+    None of them, with a note, where they are more than MOST.
     """
     search = _Search(binding, t0, t1)
     try:

@@ -119,7 +119,7 @@ class Modes:
             contacts[k] = lib.Contact(KINDS["follows" if k in handler.contacts.frozen else one.kind], *rows)
         for k, kink in enumerate(plan.kinks):
             kinks[k] = lib.Kink(kink.branch, kink.value, kink.rate, kink.above, kink.below)
-        pieces = (lib.Piece * len(self.run.segments))(*((s.begin, s.end, s.label) for s in self.run.segments))
+        pieces = (lib.Piece * len(self.run.segments))(*(lib.Piece(s.begin, s.end, s.label) for s in self.run.segments))
         systems = (c.c_void_p * len(self._systems))(*(c.addressof(s.core) for s in self._systems))
         self._keep += [contacts, kinks, systems, pieces]
         core.piece, core.pieces, core.differs = c.addressof(pieces), len(pieces), max(self.run.request.rtol, JUMP)

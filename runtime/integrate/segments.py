@@ -2,8 +2,8 @@
 
 A step ends just before such an instant and the next begins just after it, so that every residual sees one side
 (language, rule 17).  Instants nearer to each other than CLOSE of the span are passed as one.  Where the text jumps at
-the very end the last piece has no length: no step sees what holds from there on, and the row of the end does; nor has the
-first where it jumps right behind the start.
+the very end the last piece has no length: no step sees what holds from there on, and the row of the end does; nor has
+the first where it jumps right behind the start.
 """
 
 from __future__ import annotations

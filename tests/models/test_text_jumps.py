@@ -1,4 +1,4 @@
-"""Jumps of the text in time, those right behind the start among them, against closed forms; by the core and the handler."""
+"""Jumps of the text in time, one right behind the start too, against closed forms; by the core and the handler."""
 
 import numpy as np
 import pytest

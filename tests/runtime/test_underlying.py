@@ -160,8 +160,8 @@ def test_accepted_points_stay_on_the_constraints(name):
 
 
 def test_seed_models_meet_their_references(tmp_path):
-    """Texts of models/seed in a primal formulation (SYSDYN_LONG=1: all of them, in both): all but those of which a constraint
-    holds at times.
+    """Texts of models/seed in a primal formulation (SYSDYN_LONG=1: all of them, in both): all but those of which a
+    constraint holds at times.
     """
     references = load("references.json")
     explicit = {"lead_filter", "diode_circuit", "ebers_moll", "thermal_two_node"}
