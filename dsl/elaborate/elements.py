@@ -220,9 +220,8 @@ class Elements(Connections):
             symbol = space.scope.symbols[name]
             if name in space.laws or not isinstance(symbol, BranchSymbol):
                 continue
-            where = self.place(symbol.place.span)
             family, field = symbol.family.name, ("field", None, None)
-            branch = self.branch(family, symbol.domain, space.prefix, space.loops, field, ends, where)
+            branch = self.branch(family, symbol.domain, space.prefix, space.loops, field, ends, symbol.place)
             self.parts.branches.append(branch)
 
 

@@ -96,3 +96,17 @@ def findings(path):
     with ex.fresh():
         load.network(document, document.models["m"], None, report, required=False)
     return list(report)
+
+
+def test_a_branch_without_a_law_stands_where_its_element_does(tmp_path):
+    """The author's place was read in the text of the library."""
+    path = tmp_path / "m.sd"
+    text = HEAD.replace("voltage", "voltage, diode", 1)
+    rest = "  Y: resistor(R = 2 ohm) b -> c\n  Z: resistor(R = 3 ohm) c -> ground\n"
+    path.write_text(f"{text}  D: diode.complementary() a -> b\n{rest}}}\n")
+    report = Report()
+    with ex.fresh():
+        document = load.document(load.SourceText.read(path), report)
+        network = load.network(document, document.models["m"], None, report)
+        (branch,) = [b for b in network.branches if b.name == "D"]
+    assert (branch.place.file, text_of(branch.place)) == (str(path), "D")
