@@ -96,7 +96,7 @@ _UNITS: dict[str, tuple[Dimension, Fraction, bool]] = {
     "eV": (_ENERGY, Fraction("1.602176634e-19"), True),
     "t": (_dimension(kg=1), Fraction("1e3"), False),
 }
-_EXPONENTS = {
+PREFIXES = {
     "f": -15,
     "p": -12,
     "n": -9,
@@ -109,8 +109,9 @@ _EXPONENTS = {
     "k": 3,
     "M": 6,
     "G": 9,
+    "T": 12,
 }
-_PREFIXES = {name: Fraction(10) ** exponent for name, exponent in {**_EXPONENTS, "T": 12}.items()}
+"""Powers of ten."""
 DEGREE_CELSIUS = Unit(_dimension(K=1), _ONE, "degC", Fraction("273.15"))
 
 
@@ -120,9 +121,9 @@ def known(name: str) -> tuple[Dimension, Fraction] | None:
     if name in _UNITS:
         return _UNITS[name][:2]
     head, tail = name[:1], name[1:]
-    if head in _PREFIXES and tail in _UNITS and _UNITS[tail][2]:
+    if head in PREFIXES and tail in _UNITS and _UNITS[tail][2]:
         dimension, scale, _ = _UNITS[tail]
-        return dimension, _PREFIXES[head] * scale
+        return dimension, Fraction(10) ** PREFIXES[head] * scale
     return None
 
 

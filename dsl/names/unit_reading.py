@@ -7,7 +7,7 @@ from collections.abc import Container
 from fractions import Fraction
 
 from sysdyn.dsl.model.unit_habits import cased, declaration, respelled
-from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, Dimension, Unit, known, multiply, names, si_text
+from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, PREFIXES, Dimension, Unit, known, multiply, names, si_text
 from sysdyn.dsl.names.symbols import Scope, nearest
 from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
@@ -90,9 +90,6 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
     report.error("E201", message, place, help=help_, edit=edit)
 
 
-_PREFIXES = {"n": "1e-9", "u": "1e-6", "µ": "1e-6", "m": "1e-3", "c": "1e-2", "k": "1e3", "M": "1e6", "G": "1e9"}
-
-
 def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     """The unit as it is written here: by rewriting; else the line that would declare it, else the nearest name."""
     right = respelled(unit.text)
@@ -108,7 +105,7 @@ def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     if line is not None:
         return f"declare it at the top of the file: {line}"
     prefix, base = factor.name[:1], factor.name[1:]
-    if prefix in _PREFIXES and known(base) is not None:
-        return f"{base} takes no prefix: {_PREFIXES[prefix]} {base}"
+    if prefix in PREFIXES and known(base) is not None:
+        return f"{base} takes no prefix: 1e{PREFIXES[prefix]} {base}"
     near = nearest(factor.name, (*names(), "mm", "km", "kN", "kohm", "mA", "uF", "degC"))
     return f"nearest unit: '{near}'" if near and len(factor.name) > 1 else "sysdyn help units lists them"
