@@ -1,6 +1,7 @@
 /* Least change onto the equations and their hidden derivatives: see settle.h. */
 #include "system/settle.h"
 #include "system/condensed.h"
+#include "system/settle_basis.h"
 
 #include <float.h>
 #include <math.h>
@@ -16,17 +17,12 @@
 #define CLOSE 1e-9      /* scaled residual with which one may live */
 #define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
 #define HELD 1e8        /* weight of the state in a second attempt */
-#define LEAST_PIVOT 1e-11 /* part of its column below which a row of the basis follows from the others */
 #define STILL 1e-12     /* move of the state, in magnitudes, that is none */
-#define REFUSALS 3      /* of the basis in a row, behind which it is tried once in AGAIN points alone, */
-#define AGAIN 16
-#define OUT (1 << 20)   /* and behind these not any more */
-#define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
+#define REFUSALS 3      /* of the basis in a row, behind which it is tried once in AGAIN points alone, and */
+#define AGAIN 16        /* behind SD_BASIS_OUT of them not any more */
 #define BEYOND 1e3      /* times the point that was found, from which a magnitude was that of an iterate */
 #define SMALL_POINT 20000 /* unknowns and rates up to which room for slopes is kept */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
-
-enum { NONE, MATRIX, BASIS };
 
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
 {
@@ -114,12 +110,6 @@ static void leave_slopes(sd_settle *settle)
         free_slopes(settle);
 }
 
-/* 1 / weight of an unknown or rate; of a state that is to stay where it is 0 */
-static inline double lift(const sd_settle *settle, int32_t j)
-{
-    return settle->state[j] ? !settle->determined : 1.0 / settle->follows;
-}
-
 int sd_settle_take(sd_settle *settle, sd_linear *linear)
 {
     settle->taken = calloc((size_t)linear->entries + 1, sizeof(double));
@@ -145,19 +135,9 @@ void sd_settle_free(sd_settle *settle)
 
 int sd_settle_widen(sd_settle *settle, const int32_t *order, int32_t determined)
 {
-    const int32_t *column = settle->system->column;
-    sd_sparse_free(settle->basis);
-    settle->basis = sd_sparse_new(settle->unknowns + settle->rates, settle->rows, order);
-    if (!settle->basis)
-        return 2;
-    settle->basis_entries = settle->system->entries;
-    for (int32_t k = 0; k < settle->rates; k++)
-        settle->basis_entries += column[settle->rate[k] + 1] - column[settle->rate[k]];
-    settle->basis->null_pivot = LEAST_PIVOT;
-    settle->basis->most = 1000000 + (int64_t)FILL * settle->basis_entries;
     settle->determined = determined;
     free_slopes(settle); /* room for more is wanted */
-    return 0;
+    return sd_settle_basis_new(settle, order);
 }
 
 void sd_settle_rest(sd_settle *settle)
@@ -167,11 +147,6 @@ void sd_settle_rest(sd_settle *settle)
     free(settle->work);
     free(settle->x);
     settle->work = settle->x = NULL;
-}
-
-int *sd_settle_pivoted(sd_settle *settle)
-{
-    return settle->basis ? &settle->basis->pivoted : NULL;
 }
 
 /* largest scaled residual at (t, x) */
@@ -200,7 +175,7 @@ static int slopes(sd_settle *settle, double t, const double *y, const double *yd
 {
     sd_system *system = settle->system;
     int32_t n = settle->unknowns, rates = settle->rates;
-    settle->ready = NONE;
+    settle->ready = SD_BY_NONE;
     if (!provide_slopes(settle))
         return 0;
     sd_jacobian(system, t, y, yd, settle->scale, settle->jy, settle->jyd);
@@ -255,101 +230,16 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
     if (sd_first_bad(settle->linear->entries, settle->matrix) >= 0 ||
         sd_linear_factor(settle->linear, settle->matrix, NULL))
         return 1;
-    settle->ready = MATRIX;
+    settle->ready = SD_BY_MATRIX;
     return 0;
 }
 
-/* whether the basis leaves an unknown open that follows from the state; of rates that no row needs nobody asks */
-static int leaves_open(const sd_settle *settle)
-{
-    for (int32_t j = 0; j < settle->unknowns; j++)
-        if (!settle->state[j] && settle->basis->place[j] == settle->rows)
-            return 1;
-    return 0;
-}
-
-/* puts the scaled slopes [entries] by an unknown, or by a rate, behind what there is of the column of each row; number: of
- * it among unknowns and rates */
-static void add_to_basis(sd_settle *settle, int32_t unknown, int32_t number, const double *slope)
-{
-    const sd_system *system = settle->system;
-    double weight = lift(settle, number);
-    for (int32_t e = system->column[unknown]; e < system->column[unknown + 1]; e++) {
-        int32_t at = settle->basis_column[system->row[e] + 1]++; /* which is the end of that column at last */
-        settle->basis_row[at] = number;
-        settle->basis_value[at] = slope[e] * settle->row_scale[system->row[e]] * weight;
-    }
-}
-
-/* G^T in scaled unknowns and rows, whose columns ascend */
-static void lay_out_basis(sd_settle *settle)
-{
-    const sd_system *system = settle->system;
-    int32_t *begin = settle->basis_column + 1, before = 0;
-    memset(settle->basis_column, 0, ((size_t)settle->rows + 1) * sizeof *begin);
-    for (int32_t e = 0; e < system->entries; e++)
-        begin[system->row[e]]++;
-    for (int32_t k = 0; k < settle->rates; k++)
-        for (int32_t j = settle->rate[k], e = system->column[j]; e < system->column[j + 1]; e++)
-            begin[system->row[e]]++;
-    for (int32_t i = 0; i < settle->rows; i++) {
-        int32_t number = begin[i];
-        begin[i] = before;
-        before += number;
-    }
-    for (int32_t j = 0; j < settle->unknowns; j++)
-        add_to_basis(settle, j, j, settle->jy);
-    for (int32_t k = 0; k < settle->rates; k++)
-        add_to_basis(settle, settle->rate[k], settle->unknowns + k, settle->jyd);
-}
-
-/* the basis from slopes */
-static int choose_from(sd_settle *settle)
-{
-    const double *value = settle->basis_value;
-    lay_out_basis(settle);
-    if (sd_first_bad(settle->basis_entries, value) >= 0)
-        return 1;
-    sd_sparse *lu = settle->basis;
-    const sd_matrix matrix = {.column = settle->basis_column, .row = settle->basis_row, .value = value};
-    if (!lu->pivoted || sd_sparse_refactor(lu, &matrix)) {
-        int failed = sd_sparse_pivot(lu, &matrix);
-        if (failed > 1) /* it fills too much */
-            settle->refused = OUT;
-        if (failed || (settle->determined && leaves_open(settle)))
-            return 1;
-    }
-    settle->ready = BASIS;
-    return 0;
-}
-
-/* the same at (t, y, yd) */
+/* the basis at (t, y, yd) */
 static int choose(sd_settle *settle, double t, const double *y, const double *yd, int met)
 {
-    int failed = !slopes(settle, t, y, yd, met) || choose_from(settle);
+    int failed = !slopes(settle, t, y, yd, met) || sd_settle_choose(settle);
     leave_slopes(settle);
     return failed;
-}
-
-/* One Newton step within the basis; the largest moves of all and of the state, in magnitudes. */
-static double move_basic(sd_settle *settle, double *y, double *yd, double *state)
-{
-    int32_t n = settle->unknowns, moves = n + settle->rates;
-    double largest = 0.0, *b = settle->r; /* which is measured anew behind it */
-    for (int32_t i = 0; i < settle->rows; i++)
-        b[i] = -settle->r[i] * settle->row_scale[i];
-    sd_sparse_basic(settle->basis, b, settle->step, settle->step + moves);
-    for (int32_t j = 0; j < moves; j++) {
-        double move = settle->step[j] *= lift(settle, j);
-        largest = fmax(largest, fabs(move));
-        if (settle->state[j])
-            *state = fmax(*state, fabs(move));
-    }
-    for (int32_t j = 0; j < n; j++)
-        y[j] += settle->step[j] * settle->scale[j];
-    for (int32_t k = 0; k < settle->rates; k++)
-        yd[settle->rate[k]] += settle->step[n + k] * settle->scale[n + k];
-    return largest;
 }
 
 /* The iteration within the basis from (y, yd) = x0: 1 where it settled and the state stayed, the residual in `best`;
@@ -359,14 +249,14 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
     double limit = fmax(EXACT, settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
     /* near a law's flat place round-off leaves much; of steep ones the saddle-point matrix makes more */
     double bound = settle->system->scales > 0 ? FINE : CLOSE;
-    int fresh = settle->ready != BASIS, failed = fresh && choose(settle, t, y, yd, 1);
+    int fresh = settle->ready != SD_BY_BASIS, failed = fresh && choose(settle, t, y, yd, 1);
     double before = failed ? INFINITY : measure(settle, t, y, yd);
     settle->drift = settle->constraints;
     for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
         if (before <= limit && (m == 0 || moved < SMALL))
             break;
         double pulled = 0.0;
-        moved = move_basic(settle, y, yd, &pulled);
+        moved = sd_settle_move_basic(settle, y, yd, &pulled);
         state += pulled;
         double now = measure(settle, t, y, yd);
         failed = !isfinite(now) || state > still;
@@ -387,7 +277,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
     }
     settle->basis->pivoted = 0; /* another one may do */
     settle->refused++;
-    settle->ready = NONE;
+    settle->ready = SD_BY_NONE;
     return 0;
 }
 
@@ -436,7 +326,7 @@ static void put(const sd_settle *settle, const double *x, double *y, double *yd)
 /* The iteration from (y, yd) towards what is nearest to x0; the best point met, its residual in `best`, is left in x. */
 static void iterate(sd_settle *settle, double t, double *y, double *yd, int most, double *best)
 {
-    int fresh = settle->ready != MATRIX, failed = fresh && factorise(settle, t, y, yd);
+    int fresh = settle->ready != SD_BY_MATRIX, failed = fresh && factorise(settle, t, y, yd);
     double moved = 0.0, pulled = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
     double still = settle->hold == 1.0 ? settle->still : 0.0; /* one that is held stays where it is */
     *best = before;
@@ -538,7 +428,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     take(settle, y, yd, settle->x0);
     const size_t steep = settle->system->scales > 0 ? (size_t)(settle->unknowns + settle->rates) * sizeof(double) : 0;
     memcpy(settle->usual, settle->scale, steep);
-    int tried = settle->refused < REFUSALS || (settle->refused < OUT && settle->calls % AGAIN == 0);
+    int tried = settle->refused < REFUSALS || (settle->refused < SD_BASIS_OUT && settle->calls % AGAIN == 0);
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && tried) {
         if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, fmax(CLOSE, settle->enough))) {
             note_met(settle, y, yd);
@@ -552,7 +442,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
         return 1;
     }
     int plain = settle->hold == 1.0; /* else factors are of another weight, and serve once */
-    settle->ready = plain ? settle->ready : NONE;
+    settle->ready = plain ? settle->ready : SD_BY_NONE;
     iterate(settle, t, y, yd, ITERATIONS, &best);
     if (best > CLOSE) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
         put(settle, settle->x0, y, yd);
@@ -562,7 +452,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
         settle->hold = 1.0;
         settle->ready = 0;
     }
-    settle->ready = plain ? settle->ready : NONE;
+    settle->ready = plain ? settle->ready : SD_BY_NONE;
     int done = 0;
     if (best <= CLOSE) {
         put(settle, settle->x, y, yd);
@@ -571,7 +461,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     if (!done && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
         if (steep) {
             memcpy(settle->scale, settle->usual, steep);
-            settle->ready = NONE;
+            settle->ready = SD_BY_NONE;
         }
         put_near(settle, y, yd);
         iterate(settle, t, y, yd, PATIENT, &best);
