@@ -113,6 +113,7 @@ static int32_t back(sd_run *run, int32_t from)
     return to;
 }
 
+/* What stands behind it, in mode `to`, stands again. */
 static void forth(sd_run *run, int32_t to)
 {
     sd_modes *m = run->modes;
@@ -147,7 +148,8 @@ static int same(int32_t n, const int32_t *a, int32_t number, const int32_t *b)
     return n == number && !memcmp(a, b, (size_t)n * sizeof *a);
 }
 
-/* The transition that what crossed, or is due (SD_JUMP: the text jumps), takes at t; the model is then in its mode.  NULL: none. */
+/* The transition that what crossed, or is due (SD_JUMP: the text jumps), takes at t; the model is then in its mode.
+ * NULL: none. */
 static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_t due)
 {
     sd_modes *m = run->modes;
