@@ -189,10 +189,15 @@ def test_both_sides_of_a_jump_are_accepted_steps(tmp_path):
 def test_segments():
     inf = np.inf
     assert [(s.begin, s.end) for s in segments(0.0, 1.0, None)] == [(0.0, 1.0)]
-    parts = segments(0.0, 1.0, np.array([0.5, -1.0, 0.0, 2.0, np.nan]))
+    parts = segments(0.0, 1.0, np.array([0.5, -1.0, 2.0, np.nan]))
     assert [(s.begin, s.end, s.label) for s in parts] == [
         (0.0, np.nextafter(0.5, -inf), 0.0),
         (np.nextafter(0.5, inf), 1.0, 0.5),
+    ]
+    # what jumps right behind the start
+    assert [(s.begin, s.end, s.label) for s in segments(0.0, 1.0, np.zeros(1))] == [
+        (0.0, 0.0, 0.0),
+        (np.nextafter(0.0, inf), 1.0, 0.0),
     ]
     # the same instant by two formulas is one
     parts = segments(0.0, 1.0, np.array([0.3, 0.1 + 0.2, 0.6]))
