@@ -155,6 +155,7 @@ class FileScope:
                 self.scope.units[word.name] = unit
             elif symbol is not None:
                 self._imported[id(symbol)] = Place(source, word.span)
+                self._continued(symbol, word, source)
                 yield symbol
             else:
                 other = exported().get(word.name)
@@ -164,6 +165,14 @@ class FileScope:
                 help_ = f"from std.{other} import {word.name}" if other else help_
                 self.report.error("E103", f"'{word.name}' is not in {text}", Place(source, word.span), help=help_)
                 self.scope.broken |= {word.name} | ({near} - self.scope.symbols.keys() if near else set())
+
+    def _continued(self, symbol: Symbol, word: syntax.Word, source: SourceText) -> None:
+        """W302: a table that is read here, and that the text which holds its data continues beyond them."""
+        table = self.tables.get(symbol.key) if isinstance(symbol, TableSymbol) else None
+        if table is not None and table.outside == "extend" and source is self.file.source:
+            message = f"table '{word.name}' is extrapolated ('extend') beyond its data"
+            related = (Related(f"{Path(table.place.source.name).name} says so", table.place),)
+            self.report.warning("W302", message, Place(source, word.span), help="clamp or stop there", related=related)
 
     def _module(self, item: syntax.Import, source: SourceText) -> Scope | None:
         """The names of a module: std.x from the library, others from the folder of the importing file."""

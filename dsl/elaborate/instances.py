@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from itertools import pairwise
 
 from sysdyn.dsl.elaborate import bundles
 from sysdyn.dsl.elaborate.declarations import DECLARED
@@ -75,14 +76,27 @@ class Instances(Elements):
     def announce(self, body: Body) -> None:
         """Enter the labels of all instances, then elaborate each (or earlier, when another asks for it)."""
         waiting = []
+        unfinished = self._unfinished(body)
         for statement, loops in body.of(syntax.Instance):
             assert isinstance(statement, syntax.Instance)
             try:
+                if id(statement) in unfinished:
+                    raise Failed
                 waiting.append(self._announced(statement, loops))
             except Failed:
                 self.scope.broken.add(statement.decl.name)
         for do in waiting:
             do()
+
+    def _unfinished(self, body: Body) -> list[int]:
+        """Elements whose connections stand, indented, on a line that could not be read: nothing is said of them."""
+        if not body.of(syntax.Broken):
+            return []
+        text = self.current.source.text
+        pairs = pairwise(statement for statement, _ in body)
+        return [
+            id(s) for s, then in pairs if isinstance(then, syntax.Broken) and _column(text, then) > _column(text, s)
+        ]
 
     def _announced(self, s: syntax.Instance, loops: tuple[syntax.For, ...]) -> Callable[[], None]:
         """What is to be done of an instance when it is read or its turn comes: a builtin, or a component."""
@@ -466,3 +480,8 @@ class Instances(Elements):
             space.scope.symbols[name] = Definition(
                 name, "input", value, (), dimension, here, place, value.span, bound=bound, shape=shape
             )
+
+
+def _column(text: str, statement: syntax.Statement) -> int:
+    """How far from the left a statement begins."""
+    return statement.span.start - text.rfind("\n", 0, statement.span.start)

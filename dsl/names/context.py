@@ -11,7 +11,7 @@ from typing import Any
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.affine import not_affine
+from sysdyn.dsl.model.affine import index_text, not_affine
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Loop
 from sysdyn.dsl.model.unit_habits import common
@@ -323,7 +323,9 @@ class Context:
             raise self.fail("E805", f"{what} is in {dim.show(value.dimension)}, not a number", expression.span)
         for node in ex.topological([value.node]):
             if node.op in ("var", "time", "table"):
-                raise self.fail("E807", f"{what} depends on '{node}', which is no constant", expression.span)
+                raise self.fail(
+                    "E807", f"{what} depends on '{index_text(node)}', which is no constant", expression.span
+                )
             if node.op == "param" and node.data in self.inputs:
                 raise self.fail(
                     "E807",
@@ -373,7 +375,8 @@ class Context:
                 rest = ex.sub(node, n)
             if len(loops) > 1 or _loops(rest):
                 said = " in one loop variable: the array would have to be unrolled"
-                message, help_, _ = not_affine(node, said)
+                written = " ".join(self.source.text[index.span.start : index.span.end].split())
+                message, help_, _ = not_affine(node, said, written)
                 raise self.fail("E806", message, index.span, help=help_)
         return node
 

@@ -17,6 +17,7 @@ from sysdyn.dsl.parser.lexing import RESERVED, Bracket
 from sysdyn.dsl.parser.notes import MAX_TERMS
 from sysdyn.dsl.text.diagnostics import Related
 from sysdyn.dsl.text.source import Span
+from sysdyn.dsl.tree.syntax import Broken
 
 MAX_SKIPPED = 100_000
 """Tokens that are skipped for one error before the rest of the text is left unread."""
@@ -57,6 +58,7 @@ class Recovery:
         self.automaton = automaton
         self.scanner = automaton.scanner
         self.errors = 0
+        self.reserved: set[str] = set()  # reserved words that were told to be none of the author's names
 
     # --- slips that are mended ---
 
@@ -65,6 +67,8 @@ class Recovery:
         scanner, automaton = self.scanner, self.automaton
         if kind == "<quantity>" and scanner.glued:
             kind = self._glued()
+        elif kind in self.reserved and kind in ("true", "false"):
+            return "<name>" if automaton.accepts("<name>") else kind
         elif kind not in automaton.row or kind in _SLIPS:
             if automaton.accepts(kind):
                 return kind
@@ -78,7 +82,9 @@ class Recovery:
                 self._error(("E113", "an action assigns with ':='", ":="), self._token(), ":=")
                 kind = ":="
             elif kind in RESERVED and automaton.accepts("<name>") and not automaton.accepts("("):
-                self._error(("E115", f"'{kind}' is reserved and cannot be a name", f"{kind}_"), self._token())
+                if kind not in self.reserved:
+                    self._error(("E115", f"'{kind}' is reserved and cannot be a name", f"{kind}_"), self._token())
+                self.reserved.add(kind)
                 kind = "<name>"
             elif kind == "=" and automaton.accepts(">=") and self.scanner.text[self.scanner.end :][:1] in (">", "<"):
                 scanner = self.scanner
@@ -155,6 +161,9 @@ class Recovery:
         from sysdyn.dsl.parser import foreign
 
         automaton, scanner = self.automaton, self.scanner
+        ends_with = scanner.suspect is not None and scanner.text[scanner.dangling.start : scanner.dangling.end]
+        if kind in self.reserved or ends_with in self.reserved:
+            return  # a place where the word is read by its name
         size, body = automaton.body()
         text = scanner.text[scanner.start : scanner.end]
         start = self._statement_start()
@@ -196,8 +205,11 @@ class Recovery:
             netlist = foreign.spice(word, after) if body == "statement" and complaint[::2] == ("E113", None) else None
             if netlist is not None:
                 complaint = (complaint[0], "an element is written with its label, its parameters named", netlist)
-            if after.startswith("->") or (complaint[0] == "E113" and after[:1] in ("=", ",") and self._indented(start)):
+            continues = after[:1] in ("=", ",") or not after.strip()
+            if after.startswith("->") or (complaint[0] == "E113" and continues and self._indented(start)):
                 complaint = complaints.connection()
+                if self._told_above(start):
+                    return
             self._error(complaint, Span(start, start + len(word)))
         elif kind == ":" and after.startswith((":", "[")) and word in self._words_here(size):
             message = f"'{word}' begins a statement here and cannot be the label of an element"
@@ -220,8 +232,21 @@ class Recovery:
             return kind == "="
         return body == "scene_statement" and kind in ("{", "extends", "<name>")
 
+    def _told_above(self, start: int) -> bool:
+        """Whether the line above, as far to the right, was told to continue a statement already."""
+        size, _ = self.automaton.body()
+        said = self.automaton.notes.report.diagnostics
+        value = self.automaton.values[size - 2] if 3 <= size <= len(self.automaton.values) else None
+        last = value[-1] if isinstance(value, list) and value else None
+        return (
+            isinstance(last, Broken)
+            and bool(said)
+            and said[-1].code == "E109"
+            and self.scanner.column(start) == self.scanner.column(last.span.start)
+        )
+
     def _indented(self, start: int) -> bool:
-        """Whether the statement stands further right than the one before it."""
+        """Whether the statement stands further right than the one before it, those that continue it left out."""
         states, starts = self.automaton.states, self.automaton.starts
         size, _ = self.automaton.body()
         if size < 3 or size > len(states):
@@ -231,7 +256,8 @@ class Recovery:
             return False
         value = self.automaton.values[size - 2]
         if isinstance(value, list) and value:
-            before = value[-1].span.start
+            whole = [item for item in value if not isinstance(item, Broken)]
+            before = (whole or value)[-1].span.start
         return self.scanner.column(start) > self.scanner.column(before)
 
     # --- brackets ---
