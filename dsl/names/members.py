@@ -9,14 +9,14 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Constraint, Domain
-from sysdyn.dsl.model.paynter import EFFORT_CLASSES
+from sysdyn.dsl.model.paynter import EFFORT_CLASSES, MEMBERS
 from sysdyn.dsl.model.units import NONE, Dimension
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Value
 from sysdyn.dsl.names.failures import Failed, NotYetError
 from sysdyn.dsl.names.paths import Located
 from sysdyn.dsl.names.ports import Ports
-from sysdyn.dsl.names.quantities import BRANCH, branch_words
+from sysdyn.dsl.names.quantities import BRANCH, OF_ELEMENTS, branch_words
 from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
@@ -27,6 +27,7 @@ from sysdyn.dsl.names.symbols import (
     NodeSymbol,
     ParameterSymbol,
     PortSymbol,
+    Space,
     TwoPortSymbol,
     Typed,
     UnknownSymbol,
@@ -228,11 +229,26 @@ class Members(Ports):
             shown = self._shown(e.base)
             through = " + ".join(f"energy_through({shown}.{port})" for port in ports[:4])
             help_ = f"what goes in by its ports: {through}; or of an element inside, {shown}.LABEL.energy"
+        if branch is None and e.name in MEMBERS:
+            help_ = self._holders(space, self._shown(e.base), e.name)
         if branch is None and ports and e.name in ("e", "f", "q", "p"):  # several ends have one each
             shown, inside = self._shown(e.base), [n for n, s in space.scope.symbols.items() if isinstance(s, _ELEMENTS)]
             help_ = " or ".join(f"{shown}.{port}.{e.name}" for port in ports[:4])
             help_ += f"; of an element inside, {shown}.{inside[0]}.{e.name}" if inside else ""
         raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{e.name}'{level}", e.span, help=help_)
+
+    def _holders(self, space: Space, shown: str, name: str) -> str:
+        """The elements of an instance that have the state function `name`, to write."""
+        edge, found = MEMBERS[name].edge, []
+        for label, symbol in space.scope.symbols.items():
+            inner: object = symbol
+            if isinstance(symbol, InstanceSymbol) and symbol.spaces:
+                inner = symbol.spaces[0].scope.symbols.get("")
+            if isinstance(inner, BranchSymbol) and not inner.family.shape:
+                law = self.laws.get(inner.family.name)
+                found += [f"{shown}.{label}.{name}"] if law is not None and law.kind == edge else []
+        what = "dissipator" if edge == "dissipator" else f"{edge} store"
+        return f"of the elements inside, {' + '.join(found[:8])}" if found else f"{OF_ELEMENTS}; no {what} is inside"
 
     # -- constraints ---------------------------------------------------------------------------------------
 
