@@ -62,6 +62,14 @@ def _of_library(path: Path) -> tuple[syntax.File, tuple[Diagnostic, ...]]:
     return parse(SourceText.read(path, f"std/{path.name}"))
 
 
+def _stepped(table: Table, held: tuple[str, ...]) -> dict[str, Table]:
+    """The tables that stand for one: of two arguments that hold, each is taken down to its point of the grid, where
+    the bilinear table has the value itself.
+    """
+    axes = {n: replace(table, name=n, points=(x,), values=x) for n, x in zip(held, table.points, strict=False)}
+    return axes | {table.name: replace(table, method="linear") if held else table}
+
+
 class FileScope:
     """A file's own names on top of the prelude's, the values of its tables, and the modules that it imports."""
 
@@ -263,10 +271,12 @@ class FileScope:
         place = Place(source, item.name.span)
         arguments = tuple((name, unit.dimension) for (name, _), unit in zip(heads, units, strict=True))
         key = self._key(item.name.name, source)
-        yield TableSymbol(item.name.name, key, arguments, result.dimension, place)
+        several = len(arguments) > 1 and item.interpolation == "hold"
+        held = tuple(f"{key} along {name}" for name, _ in arguments) if several else ()
+        yield TableSymbol(item.name.name, key, arguments, result.dimension, place, held)
         table = read_table(item, units, result, source, self.report)
         if table is not None:
-            self.tables[key] = replace(table, name=key)
+            self.tables |= _stepped(replace(table, name=key), held)
 
     def _key(self, name: str, source: SourceText) -> str:
         """What a table is called among those of all files: by its own name in the model's, else with its module's."""

@@ -215,7 +215,9 @@ class Calls(Context):
 
     def _table(self, symbol: TableSymbol, e: syntax.Call) -> Value:
         heads = [(name, dimension, None) for name, dimension in symbol.arguments]
-        return Typed(ex.table(symbol.key, *_nodes(self._arguments(symbol.name, heads, e))), symbol.result)
+        nodes = _nodes(self._arguments(symbol.name, heads, e))
+        at = [ex.table(name, node) for name, node in zip(symbol.held, nodes, strict=False)] or nodes
+        return Typed(ex.table(symbol.key, *at), symbol.result)
 
     def _function(self, symbol: FunctionSymbol, e: syntax.Call) -> Value:
         """A function of the text: its body with the arguments in place; E105 where it calls itself."""

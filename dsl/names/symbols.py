@@ -55,13 +55,17 @@ class ComponentSymbol:
 
 @dataclass(frozen=True, slots=True)
 class TableSymbol:
-    """An interpolation table with the dimensions of its arguments and values; key: its name among all files' tables."""
+    """An interpolation table with the dimensions of its arguments and values; key: its name among all files' tables.
+
+    held: of a table of two arguments that holds its values, the tables that take each argument to its point of the grid.
+    """
 
     name: str
     key: str
     arguments: tuple[tuple[str, Dimension], ...]
     result: Dimension
     place: Place
+    held: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
