@@ -57,7 +57,7 @@ class ComponentSymbol:
 class TableSymbol:
     """An interpolation table with the dimensions of its arguments and values; key: its name among all files' tables.
 
-    held: of a table of two arguments that holds its values, the tables that take each argument to its point of the grid.
+    held: of a table of two arguments that holds its values, the tables that take each one to its point of the grid.
     """
 
     name: str
