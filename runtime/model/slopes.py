@@ -62,7 +62,7 @@ def rows_without_slope(system: System, t: float, y: Floats, yd: Floats) -> Ints:
 
 
 def _bent(system: System, t: float, y: Floats, yd: Floats, size: Floats | None) -> tuple[Ints, Ints]:
-    """Rows in which a slope vanishes, and in which one grows; size [unknowns]: of each, by default that of its group."""
+    """Rows in which a slope vanishes, and in which one grows; size [unknowns]: of each (its group)."""
     row, column = system.pattern.row, system.pattern.columns_of()
     algebraic = np.isin(system.kinds, ("f", "e"))
     algebraic[column[system.structural()[1]]] = False
