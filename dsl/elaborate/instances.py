@@ -116,6 +116,7 @@ class Instances(Elements):
             help_ = f"nearest name in scope: '{near}'" if near else "sysdyn std lists the library"
             if near in library and near not in components:
                 help_ = f"from std.{library[near]} import {near}"
+            self.scope.broken.add(name)
             raise self.resolver.fail("E101", f"unknown component '{name}'", s.component.span, help=help_)
         before = self.scope.symbols.get(label)
         if not isinstance(before, InstanceSymbol):
@@ -358,6 +359,9 @@ class Instances(Elements):
             near = nearest(name, (*head.ports, *head.inputs, *head.branches))
             names = ", ".join((*head.ports, *head.inputs, *filter(None, head.branches)))
             help_ = f"nearest: '{near}'" if near else f"it has {names or 'none'}"
+            if list(head.branches) == [""] and not head.ports and not head.inputs:  # its two ends have no names
+                ends = [self._text(c.value) for c in s.connections if isinstance(c, syntax.Bind)]
+                help_ = " -> ".join((*ends[:2], "ground")[:2])
             raise self.resolver.fail(
                 "E407", f"'{component.name}' has no port or input '{name}'", connection.span, help=help_
             )

@@ -62,7 +62,8 @@ class Settings:
             raise Failed
         near = nearest(shown, (*self.model.parts.parameters, *self.model.parts.inputs))
         message = f"'{shown}' is not a parameter or input of model '{self.model.model.name.name}'"
-        help_ = f"nearest: '{near}'" if near else "init sets initial values" if symbol is not None else None
+        started = f"init {shown} = ... sets an initial value" if symbol is not None else None
+        help_ = f"nearest: '{near}'" if near else started
         if name in self.model.parts.inputs:
             help_ = f"the whole: set {name} = [a, b, ...]"
         raise self.resolver.fail("E910", message, s.target.span, help=help_)

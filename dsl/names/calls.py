@@ -171,6 +171,8 @@ class Calls(Context):
             raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=divided)
         if help_ and dimension == dim.TIME:
             help_ += ", or the unit of a frequency: 50 Hz"
+        if name in ("sin", "cos") and dimension == dim.quotient(NONE, dim.TIME):
+            help_ = f"an angle: {name}({text}*t)" if "pi" in text else f"an angle: {name}(2*pi*{text}*t)"
         raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=help_)
 
     def _vector_call(self, e: syntax.Call) -> Value:

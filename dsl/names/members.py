@@ -20,6 +20,7 @@ from sysdyn.dsl.names.quantities import BRANCH, OF_ELEMENTS, branch_words
 from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
+    ComponentSymbol,
     ConstraintSymbol,
     Definition,
     End,
@@ -143,7 +144,10 @@ class Members(Ports):
             case Unsupported():
                 raise Failed
         kind = "parameter" if isinstance(symbol, ParameterSymbol) else "value"
-        raise self.fail("E102", f"'{shown}' has no member '{e.name}': it is a {kind}", e.span, help=self._beside(e))
+        help_ = self._beside(e)
+        if isinstance(symbol, ComponentSymbol) and (near := nearest(e.name, self.scope.names())):
+            kind, help_ = "component or model: its names are read by themselves", near
+        raise self.fail("E102", f"'{shown}' has no member '{e.name}': it is a {kind}", e.span, help=help_)
 
     def _beside(self, e: syntax.Member) -> str | None:
         """The elements that stand beside a name without members: one of them is meant."""
@@ -297,6 +301,10 @@ class Members(Ports):
             raise Failed  # its statement was told
         symbol = None if base is None else base.symbol
         wrong = not isinstance(symbol, ConstraintSymbol) or symbol.kind == "gamma"
+        if isinstance(symbol, ConstraintSymbol) and symbol.kind == "gamma" and e.name == "on":
+            message = f"gamma '{symbol.name}' acts along nothing: it closes an implicit unknown, and has no multiplier"
+            help_ = f"phi {symbol.name}: ... where it ties displacements, psi where it ties flows"
+            raise self.fail("E102", message, e.span, help=help_)
         if base is None or wrong or e.name != "on" or len(e.args) != 1:
             raise self.fail("E102", f"there is no '{e.name}(...)' here", e.span, help="label.on(expr) of a phi or psi")
         assert isinstance(symbol, ConstraintSymbol)

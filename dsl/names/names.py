@@ -156,7 +156,12 @@ class Names(Context):
             said = {"celsius": "celsius(20)"}.get(name, f"{name}(...)")
             return self.fail(code, message.format(name), span, help=f"a function: {said}")
         near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
+        near = None if code == "E905" and name in habits.RESULTS else near
         help_ = f"nearest name in scope: '{near}'" if near else f"declare it by param {name} = ..., let, coord or node"
+        if known(name) is not None:
+            help_ += f"; the unit stands behind a number, with a space: 1 {name}"
+        if code == "E905" and not near:
+            help_ = habits.RESULTS.get(name, f"let {name} = ... in the model; sysdyn list FILE shows what can be read")
         return self.fail(code, message.format(name), span, help=help_, subject=f"name {name}")
 
     def _moves(self, name: str) -> bool:

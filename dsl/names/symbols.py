@@ -333,7 +333,7 @@ class Scope:
         """Whether the name stands in a statement that could not be read."""
         scope: Scope | None = self
         while scope is not None:
-            if name in scope.broken:
+            if name in scope.broken or syntax.ANY in scope.broken:
                 scope.missed = True
                 return True
             scope = scope.outer

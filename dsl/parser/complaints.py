@@ -91,6 +91,9 @@ _OTHERS = {
     "initial": "init x = 1 m",
     "tran": "scene s of m { time 0 s to 1 s }",
     "simulate": "scene s of m { time 0 s to 1 s }",
+    **dict.fromkeys(("tspan", "duration", "tend", "tstop", "stoptime", "stop_time", "until"), "time 0 s to 5 s"),
+    **dict.fromkeys(("tolerance", "tol", "rtol", "reltol", "abstol", "precision"), "accuracy 1e-6, or of a run --rtol"),
+    **dict.fromkeys(("method", "integrator"), "solver radau"),
 }
 _SIGNS = {
     "&": "and",
@@ -139,6 +142,9 @@ _EXPRESSIONS = frozenset(
     {"energy", "content", "work", "let", "law", "phi", "psi", "gamma", "dynamic", "output", "const"}
 )
 """Statements that end with an expression."""
+
+MOTION = "energy T* = 1/2*m*x'^2, energy V, content D, work F on x: the equations of motion follow from them"
+"""In place of an equation of motion."""
 
 Complaint = tuple[str, str, str | None]
 """Code, message, help."""
@@ -202,7 +208,10 @@ def unknown(word: str, after: str, body: str) -> Complaint:
                 help_ = (
                     f"const NAME = ..., or move it {into}" if word == "param" and body == "item" else f"move it {into}"
                 )
-                help_ = "trace x in mm" if word == "output" and body == "scene_statement" else help_
+                if body == "scene_statement":
+                    named = re.match(r"\w+", after)
+                    given = f"set {named[0] if named else 'u'} = ..."
+                    help_ = {"output": "trace x in mm", "input": given}.get(word, help_)
                 return "E107", f"'{word}' belongs {place}, not {here}", help_
     if body == "action":
         return "E113", "an action assigns: name := expression", None
@@ -218,11 +227,19 @@ def unknown(word: str, after: str, body: str) -> Complaint:
             f"{wanted} {word} = ...",
         )
     if after.startswith("'"):
-        return "E113", f"no statement begins with '{word}''", f"dynamic {word}' = ..."
+        help_ = f"init {word}' = ... where it begins, dynamic {word}' = ... of a state"
+        help_ = f"names of a trace are joined by commas: trace x, {word}'" if body == "scene_statement" else help_
+        help_ = MOTION if after.startswith("''") else help_
+        return "E113", f"no statement begins with '{word}''", help_
+    if "''" in after.partition("=")[0] and "=" in after:
+        return "E113", f"no statement begins with '{word}'; equations of motion are not written", MOTION
     if after[:1] in "^*/+-" and after and "=" in after.partition("\n")[0]:
         return "E113", f"no statement begins with '{word}'; a constraint has a label", f"phi name: {word} ... = ..."
     from difflib import get_close_matches
 
+    named = re.match(r"(\w+)\s*([=~].*)", after.partition("#")[0])
+    if body == "statement" and named is not None and word in ("translation", "rotation"):
+        return "E113", f"no statement begins with '{word}'", f"coord {named[1]}: {word} {named[2].strip()}"
     near = get_close_matches(word, sorted(_OWN[body] | MODEL_WORDS | SCENE_WORDS | ITEM_WORDS), 1, 0.7)
     said = _OTHERS.get(word.lower(), "").replace("DOMAIN", word.lower())
     if after.startswith("(") and body == "statement" and not said and (not near or near[0] not in MODEL_WORDS):
@@ -274,6 +291,8 @@ _SHAPES = {
     "model": "model name { ... }",
     "component": "component name { ... }",
     "from": "from std.electrical import resistor, capacitor",
+    "formulation": "formulation hamiltonian",
+    "solver": "solver radau(order = 9)",
     "fn": "fn f(x: m) -> N = ...",
     "table": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
 }
@@ -284,10 +303,22 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
     """A token that does not fit, with what would; `line` is the line up to it, `word` begins the statement."""
     said = f"expected {_listed(accepted)}, found {quoted(text, kind)}"
     shape = _SHAPES.get(word)
+    if word == "let" and text in ("^", "*", "+", "-", "/") and "=" not in line:
+        return "E113", "a let names one value; a constraint has a label", "phi name: ... = ... of displacements"
     if text == "," and word in ("param", "state", "let", "input", "output", "const", "discrete"):
         shape = f"one name a statement: {_SHAPES.get(word, word + ' on = false')}"
-    if kind == "<name>" and word in _EXPRESSIONS and "*" in accepted:
+    if kind == "<name>" and "*" in accepted and (word in _EXPRESSIONS or ")" in accepted):
         shape = f"factors are joined by '*': ... * {text}"
+    unit = re.search(r"([\d.]+)\s+([^\W\d]\w*)$", line)
+    if text == "(" and "*" in accepted and unit is not None:
+        meant = f"factors are joined by '*': {unit[1]}*{unit[2]}(...)"
+        return "E113", f"'{unit[2]}' stands where a unit is read", meant
+    if word == "work" and line.split()[-1:] == ["on"]:
+        shape = _SHAPES["work"]
+    if word in ("param", "const", "coord", "state") and kind in ("<number>", "<quantity>") and line.endswith(": "):
+        shape = f"a value stands behind '=': {_SHAPES[word]}"
+    if word == "param" and text == "[":
+        shape = "a unit has no brackets: param k = 3 N/m"
     if word == "trace" and text == "in":
         shape = "the unit stands before the name: trace x in mm as pos"
     return "E113", said, _hint(kind, text, line, accepted) or shape

@@ -32,6 +32,7 @@ _WORD = re.compile(r"[^\W\d]\w*+")
 _TARGET = re.compile(r"[\w.]+(?:\[[^\]\n]*\])?'?[ \t]*+")
 """What stands before the sign of an assignment."""
 _BLANK = re.compile(r"[ \t]*+")
+_GAP = re.compile(r"\s*+(#[^\n]*+)?")
 _BEHIND = frozenset({"on", "within", "every", "while", "restitution", "to", "as", "->", "{", ":="})
 """Terminals that stand in no bracket, but may stand behind one."""
 
@@ -58,6 +59,7 @@ class Recovery:
         self.automaton = automaton
         self.scanner = automaton.scanner
         self.errors = 0
+        self.nameless = False  # the statement lacks its label: any name may be its own
         self.reserved: set[str] = set()  # reserved words that were told to be none of the author's names
 
     # --- slips that are mended ---
@@ -67,6 +69,8 @@ class Recovery:
         scanner, automaton = self.scanner, self.automaton
         if kind == "<quantity>" and scanner.glued:
             kind = self._glued()
+        elif kind == "<newline>" and automaton.accepts("{") and not automaton.accepts(kind):
+            return self._opened(kind)
         elif kind in self.reserved and kind in ("true", "false"):
             return "<name>" if automaton.accepts("<name>") else kind
         elif kind not in automaton.row or kind in _SLIPS:
@@ -97,6 +101,26 @@ class Recovery:
                 self._error(("E113", "'=' defines; a comparison is written with '=='", "=="), self._token(), "==")
                 kind = "=="
         return kind
+
+    def _opened(self, kind: str) -> str:
+        """A head without its brace, which stands on the next line or is missing before a block further right."""
+        scanner, automaton = self.scanner, self.automaton
+        start = self._statement_start()
+        ahead = _GAP.match(scanner.text, scanner.end)
+        while ahead is not None and ahead[1]:
+            ahead = _GAP.match(scanner.text, ahead.end())
+        first = len(scanner.text) if ahead is None else ahead.end()
+        if scanner.text[first : first + 1] == "{":
+            self._error(complaints.first_token("{", "{", ""), Span(first, first + 1))
+            return scanner.read(automaton.row)
+        word, _ = self._first_word(start)
+        if word not in _HEADS or scanner.column(first) <= scanner.column(start):
+            return kind
+        accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
+        line = scanner.text[start : scanner.start].rstrip()
+        self._error(complaints.expected(accepted, kind, "\n", line, word), self._token())
+        scanner.open_block()
+        return "{"
 
     def _glued(self) -> str:
         """A number with its unit grown to it: read as a quantity."""
@@ -185,6 +209,9 @@ class Recovery:
         elif kind == "<fault>":
             first = text in "%!" and not scanner.text[start : scanner.start].strip() and start == scanner.start
             complaint = complaints.first_token(text, kind, body) if first else complaints.character(text)
+            number = re.search(r"[0-9.]+$", scanner.text[start : scanner.start])
+            if text == "%" and number is not None:
+                complaint = (complaint[0], complaint[1], f"{number[0]} percent")
             self._error(complaint, self._token())
         elif scanner.suspect is not None:
             sign = scanner.text[scanner.dangling.start : scanner.dangling.end]
@@ -210,15 +237,21 @@ class Recovery:
                 complaint = complaints.connection()
                 if self._told_above(start):
                     return
+            self.nameless = "has a label" in complaint[1]
             self._error(complaint, Span(start, start + len(word)))
         elif kind == ":" and after.startswith((":", "[")) and word in self._words_here(size):
-            message = f"'{word}' begins a statement here and cannot be the label of an element"
-            self._error(("E113", message, f"{word}_: ..."), Span(start, start + len(word)))
+            message, help_ = f"'{word}' begins a statement here and cannot be the label of an element", f"{word}_: ..."
+            if word in ("phi", "psi", "gamma"):
+                message, help_ = f"a {word} has a label, by which its multiplier is read", f"{word} name: ... = ..."
+            self.nameless = True
+            self._error(("E113", message, help_), Span(start, start + len(word)))
         else:
             accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
             before = scanner.text[: scanner.start].rstrip()
             line = before[before.rfind("\n") + 1 :]
-            self._error(complaints.expected(accepted, kind, text, line, word), self._token())
+            complaint = complaints.expected(accepted, kind, text, line, word)
+            self.nameless = "has a label" in complaint[1]
+            self._error(complaint, self._token())
 
     def _words_here(self, size: int) -> dict[str, int]:
         """The terminals with which a statement may begin here."""
@@ -344,7 +377,8 @@ class Recovery:
         automaton.cut(size)
         if not self._skip(kind, start, base, body):
             span = Span(start, max(start, scanner.start))
-            automaton.push(body, automaton.broken(span), span)
+            automaton.push(body, automaton.broken(span, nameless=self.nameless), span)
+        self.nameless = False
 
     def _skip(self, kind: str, start: int, base: int, body: str) -> bool:
         """Read to the end of the statement; True where a block was found whose head is mended."""

@@ -101,7 +101,7 @@ def test_settings_replace_values_elements_and_inputs():
          "keep_flow changes which unknowns there are: it does not depend on values", "true or false", "n > 1"),
         ("limit cows 3", "E113", "there is no limit 'cows'", "limit steps, limit events", "cows"),
         ("set kk = 3", "E910", "'kk' is not a parameter or input of model 'm'", "nearest: 'k'", "kk"),
-        ("set x = 3 m", "E910", "'x' is not a parameter or input of model 'm'", "init sets initial values", "x"),
+        ("set x = 3 m", "E910", "'x' is not a parameter or input of model 'm'", "init x = ... sets an initial value", "x"),
         ("set k = 3 s", "E207", "'k' is in kg/s^2 but set to s", "write '3 N/m'", "3 s"),
         ("set k = -1/3", "E207", "'k' is in kg/s^2 but set to dimensionless", "(-1/3)*(1 kg/s^2)", "-1/3"),
         ("trace x.q in s every 1 s", "E208", "'x.q' is in m, not s", "in m", "s"),
