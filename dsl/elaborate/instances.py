@@ -324,12 +324,17 @@ class Instances(Elements):
         for c in s.connections:
             nodes += [c.plus, c.minus] if isinstance(c, syntax.Across) else []
             nodes += [c.node] if isinstance(c, syntax.Single) else []
-        left = [name for name in ports if all(getattr(c, "name", None) != name for c in s.connections)]
+        bound = {c.name.name for c in s.connections if isinstance(c, (syntax.Bind, syntax.BindAcross))}
+        across = [c for c in s.connections if isinstance(c, syntax.Across)]
+        if across and all(self.source_text(c.plus.span) in ports for c in across):  # `p -> a` for `p = a`
+            nodes = [c.minus for c in across]
+            bound |= set(ports) - {self.source_text(c.plus.span) for c in across}
+        left = [name for name in (*ports, *head.inputs) if name not in bound]
         texts = iter([self.source_text(node.span) for node in nodes])
         pairs = []
         for name, text in zip(left, texts, strict=False):
             pairs.append(f"{name} = {text}" + (f" -> {next(texts, 'ground')}" if name in head.branches else ""))
-        message = f"'{s.decl.name}: {component.name}' is connected by name: {', '.join(ports) or 'no connection'}"
+        message = f"'{s.decl.name}: {component.name}' is connected by name: {', '.join((*ports, *head.inputs))}"
         return self.resolver.fail("E402", message, connection.span, help=", ".join(pairs))
 
     def _bind(

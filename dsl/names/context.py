@@ -320,7 +320,10 @@ class Context:
         """An index or a bound: made of whole numbers, loop variables and dimensionless parameters."""
         value = self.scalar(expression)
         if value.dimension not in (None, NONE):
-            raise self.fail("E805", f"{what} is in {dim.show(value.dimension)}, not a number", expression.span)
+            message = f"{what} is in {dim.show(value.dimension)}, not a number"
+            text = " ".join(self.source.text[expression.span.start : expression.span.end].split())
+            help_ = f"a number without unit: param {text} = 3" if text.isidentifier() else "a number without unit"
+            raise self.fail("E805", message, expression.span, help=help_, subject=f"unit of {text}")
         for node in ex.topological([value.node]):
             if node.op in ("var", "time", "table"):
                 raise self.fail(

@@ -186,13 +186,9 @@ class Names(Context):
                 names = ", ".join(f"{symbol.name}.{m}" for m in symbol.members)
                 raise self.fail("E104", f"'{symbol.name}' is a bundle, not a value", span, help=f"its nodes: {names}")
             case NodeSymbol() | PortSymbol():
-                domain = symbol.domain if isinstance(symbol, NodeSymbol) else None
-                common = domain.common if domain else "effort"
-                help_ = (
-                    f"write {symbol.name}.e (potential)"
-                    if common == "effort"
-                    else f"write {symbol.name}.q or {symbol.name}.f"
-                )
+                domain = symbol.domain if isinstance(symbol, NodeSymbol) else symbol.end.domain
+                shown = " ".join(self.source.text[span.start : span.end].split())
+                help_ = f"write {shown}.e (potential)" if domain.common == "effort" else f"write {shown}.q or {shown}.f"
                 raise self.fail("E104", f"node '{symbol.name}' is not a value", span, help=help_)
             case ConstraintSymbol():
                 help_ = "write its member: multiplier, residual, on(...)"
@@ -339,7 +335,11 @@ class Names(Context):
     def index_count(self, name: str, count: int, given: int, span: syntax.Span) -> Failed:
         """Report E805: a wrong number of indices."""
         plural = "index" if count == 1 else "indices"
-        return self.fail("E805", f"'{name}' has {count or 'no'} {plural}, {given} given", span)
+        help_ = f"an element of it: {name}[{', '.join('ij'[k % 2] for k in range(count))}]"
+        if not count:
+            help_ = f"{name} as it is; or declare an array, {name}[1..3]"
+        message, subject = f"'{name}' has {count or 'no'} {plural}, {given} given", f"indices of {name}"
+        return self.fail("E805", message, span, help=help_, subject=subject)
 
     def own_element(
         self, symbol: ParameterSymbol | UnknownSymbol, indices: tuple[syntax.Index, ...], span: syntax.Span

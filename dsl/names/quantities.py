@@ -78,6 +78,10 @@ class Quantities(Paths):
             if end.node is None:
                 raise self.fail("E102", f"'{self._shown(e.base)}' stands still: no effort moves it", e.span)
             return self._effort(end.node.family.name, "n", end.at, domain.effort.dimension, e)
+        meant = habits.variable(domain.name, e.name)
+        if e.name not in kinds and meant is not None:
+            shown = self._shown(e.base)
+            raise self.fail("E102", f"'{shown}' has no member '{e.name}'", e.span, help=f"write {shown}.{meant}")
         if e.name not in kinds:
             raise self.no_member(self._shown(e.base), e, (*kinds, *EFFORT_CLASSES))
         kind, dimension = kinds[e.name]

@@ -366,6 +366,12 @@ def _hint(kind: str, text: str, line: str, accepted: Collection[str]) -> str | N
         return "a power is written a^b"
     if text == "(" and "on" in accepted:
         return "a -> b, without parentheses"
+    if text == "(" and "[" in accepted and "on" not in accepted and not {"*", "->"} & set(accepted):
+        return "an index, or a range 0..n, stands in square brackets: v[0..n]"
+    if text == ":" and ".." in accepted:
+        return "a range is written with two points: 0..n"
+    if text == "," and ":=" in line:
+        return "actions stand on lines of their own, or ';' between them"
     if text == "+" and "<number>" in accepted:
         return "a number has no leading '+'"
     if text == "." and "<number>" in accepted:

@@ -153,6 +153,12 @@ def _element_slip(text: str, span: Span, line: str) -> Complaint | None:
     if not parameters and re.fullmatch(r"\w+\s*=.*", behind) and sign[:1].isalpha():
         given = " ".join(behind.split())
         return "E113", "parameters stand in parentheses", f"{component}({given}) {sign} -> ..."
+    if parameters and sign == ":" and re.search(r"(^|,\s*)\w+$", behind):
+        name = re.findall(r"\w+", behind)[-1]
+        return "E113", "a port is bound by '='", f"{name} = {second}"
+    if parameters and sign == "(" and re.search(r"\w$", behind):
+        name = re.findall(r"\w+", behind)[-1]
+        return "E113", "an index stands in square brackets", f"{name}[...]"
     if sign == ":" and (inside := re.search(r"\(\s*(?:.*,\s*)?(\w+)\s*$", line)) is not None:
         return "E113", "a parameter is given by '='", f"{component}({inside[1]} = ...)"
     return None

@@ -85,6 +85,8 @@ class Recovery:
             elif kind == "=" and automaton.accepts(":="):
                 self._error(("E113", "an action assigns with ':='", ":="), self._token(), ":=")
                 kind = ":="
+            elif kind == "if" and automaton.body()[0] == len(automaton.states):
+                return kind  # a statement of other languages
             elif kind in RESERVED and automaton.accepts("<name>") and not automaton.accepts("("):
                 if kind not in self.reserved:
                     self._error(("E115", f"'{kind}' is reserved and cannot be a name", f"{kind}_"), self._token())
