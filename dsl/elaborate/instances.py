@@ -326,7 +326,7 @@ class Instances(Elements):
             nodes += [c.node] if isinstance(c, syntax.Single) else []
         bound = {c.name.name for c in s.connections if isinstance(c, (syntax.Bind, syntax.BindAcross))}
         across = [c for c in s.connections if isinstance(c, syntax.Across)]
-        if across and all(self.source_text(c.plus.span) in ports for c in across):  # `p -> a` for `p = a`
+        if len(across) > 1 and all(self.source_text(c.plus.span) in ports for c in across):  # `p -> a` for `p = a`
             nodes = [c.minus for c in across]
             bound |= set(ports) - {self.source_text(c.plus.span) for c in across}
         left = [name for name in (*ports, *head.inputs) if name not in bound]
@@ -364,6 +364,10 @@ class Instances(Elements):
             near = nearest(name, (*head.ports, *head.inputs, *head.branches))
             names = ", ".join((*head.ports, *head.inputs, *filter(None, head.branches)))
             help_ = f"nearest: '{near}'" if near else f"it has {names or 'none'}"
+            nodes = [s for s in component.body if isinstance(s, syntax.Node)]
+            inner = next((s.domain.name for s in nodes if any(d.name == name for d in s.decls)), None)
+            if inner is not None:
+                help_ = f"port {name}: {inner} in component '{component.name}': a node is of its inside alone"
             if list(head.branches) == [""] and not head.ports and not head.inputs:  # its two ends have no names
                 ends = [self._text(c.value) for c in s.connections if isinstance(c, syntax.Bind)]
                 help_ = " -> ".join((*ends[:2], "ground")[:2])

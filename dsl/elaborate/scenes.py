@@ -268,6 +268,8 @@ class SceneReader:
             message = f"'{format_expression(item.expr)}' is in {dim.show(value.dimension)}, not {unit.text}"
             missing = self.resolver.missing(value.dimension, unit.dimension, item.expr)
             help_ = missing if blamed(missing) else f"in {common(value.dimension)}"
+            help_ = "in rad or deg of an angle, in percent, or without 'in'" if value.dimension == NONE else help_
+            help_ = "in degC" if unit.text == "C" and help_ == "in K" else help_
             raise self.resolver.fail("E208", message, item.unit.span, help=help_)
         return unit
 

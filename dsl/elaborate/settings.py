@@ -62,6 +62,9 @@ class Settings:
             raise Failed
         near = nearest(shown, (*self.model.parts.parameters, *self.model.parts.inputs))
         message = f"'{shown}' is not a parameter or input of model '{self.model.model.name.name}'"
+        last = shown.rpartition(".")[2]
+        inside = [p for p in (*self.model.parts.parameters, *self.model.parts.inputs) if p.endswith(f".{last}")]
+        near = near or (inside[0] if inside and (symbol is None or "." in shown) else None)
         started = f"init {shown} = ... sets an initial value" if symbol is not None else None
         help_ = f"nearest: '{near}'" if near else started
         if name in self.model.parts.inputs:

@@ -67,7 +67,8 @@ def _written(item: syntax.Table, units: list[Unit], source: SourceText, report: 
     for row in item.rows or ():
         if len(row.numbers) != len(units):
             message = f"a row of table {item.name.name} has {len(units)} numbers, {len(row.numbers)} given"
-            report.error("E206", message, Place(source, row.span))
+            heads = ", ".join([*(p.name for p in item.params), "value"])
+            report.error("E206", message, Place(source, row.span), help=f"each row is ({heads})")
             raise Failed
         texts = [n.text.replace(" ", "") for n in row.numbers]
         rows.append(tuple(_scaled(t, u) for t, u in zip(texts, units, strict=True)))

@@ -100,9 +100,12 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
 _PREFIXES = {"n": "1e-9", "u": "1e-6", "µ": "1e-6", "m": "1e-3", "c": "1e-2", "k": "1e3", "M": "1e6", "G": "1e9"}
 
 
+_SPELLED = dict.fromkeys(("celsius", "Celsius", "centigrade"), "degC")
+
+
 def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     """The unit as it is written here: by rewriting; else the line that would declare it, else the nearest name."""
-    right = respelled(unit.text)
+    right = _SPELLED.get(unit.text) or respelled(unit.text)
     if right is not None:
         return f"write '{right}'"
     alone = respelled(factor.name)

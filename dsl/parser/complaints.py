@@ -53,6 +53,7 @@ _HERE = {
 }
 _CONTINUE = "end the line above with a comma, or break it inside the parentheses"
 _OTHERS = {
+    "default": "level name default { ... }",
     "connect": "ports are joined by naming nodes: label: component() a -> b",
     "parameter": "param k = 3 N/m",
     "var": "let x = ...",
@@ -221,6 +222,7 @@ def unknown(word: str, after: str, body: str) -> Complaint:
         return "E113", f"no statement begins with '{word}'; an element has a label", element
     if after.startswith("=") and not after.startswith("=="):
         wanted = "set" if body == "scene_statement" else "const" if body == "item" else "let"
+        wanted = "law" if body == "statement" and word in ("e", "f", "q", "p") else wanted
         return (
             "E113",
             f"no statement begins with '{word}'; a value is given by a word before it",
@@ -257,7 +259,7 @@ def _element(word: str, after: str) -> str | None:
     return None if declared is None else f"{declared[1]}: {word}({declared[2]}) {declared[3] or 'a -> b'}"
 
 
-_SHAPES = {
+SHAPES = {
     "param": "param k = 3 N/m",
     "const": "const c = 3 m/s",
     "node": "node a, b: electrical",
@@ -284,6 +286,7 @@ _SHAPES = {
     "for": "for i in 1..n { ... }",
     "time": "time 0 s to 5 s",
     "set": "set k = 3 N/m",
+    "level": "level M = thermal in a scene, level thermal { ... } in a component",
     "trace": "trace x in mm as pos, y every 1 ms",
     "expect": "expect always: a <= b",
     "accuracy": "accuracy 1e-6 on x",
@@ -302,11 +305,11 @@ _SHAPES = {
 def expected(accepted: Collection[str], kind: str, text: str, line: str, word: str = "") -> Complaint:
     """A token that does not fit, with what would; `line` is the line up to it, `word` begins the statement."""
     said = f"expected {_listed(accepted)}, found {quoted(text, kind)}"
-    shape = _SHAPES.get(word)
+    shape = SHAPES.get(word)
     if word == "let" and text in ("^", "*", "+", "-", "/") and "=" not in line:
         return "E113", "a let names one value; a constraint has a label", "phi name: ... = ... of displacements"
     if text == "," and word in ("param", "state", "let", "input", "output", "const", "discrete"):
-        shape = f"one name a statement: {_SHAPES.get(word, word + ' on = false')}"
+        shape = f"one name a statement: {SHAPES.get(word, word + ' on = false')}"
     if kind == "<name>" and "*" in accepted and (word in _EXPRESSIONS or ")" in accepted):
         shape = f"factors are joined by '*': ... * {text}"
     unit = re.search(r"([\d.]+)\s+([^\W\d]\w*)$", line)
@@ -314,9 +317,9 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
         meant = f"factors are joined by '*': {unit[1]}*{unit[2]}(...)"
         return "E113", f"'{unit[2]}' stands where a unit is read", meant
     if word == "work" and line.split()[-1:] == ["on"]:
-        shape = _SHAPES["work"]
-    if word in ("param", "const", "coord", "state") and kind in ("<number>", "<quantity>") and line.endswith(": "):
-        shape = f"a value stands behind '=': {_SHAPES[word]}"
+        shape = SHAPES["work"]
+    if word in ("param", "const", "coord", "state") and re.search(r":\s*[-+]?[\d.]+$", line):
+        shape = f"a value stands behind '=': {SHAPES[word]}"
     if word == "param" and text == "[":
         shape = "a unit has no brackets: param k = 3 N/m"
     if word == "trace" and text == "in":
@@ -357,10 +360,13 @@ def _listed(accepted: Collection[str]) -> str:
     return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " or " + parts[-1]
 
 
+_OPENS = {")": "(", "]": "["}
+
+
 def _hint(kind: str, text: str, line: str, accepted: Collection[str]) -> str | None:
     """The text to write for a slip that is easily named."""
     before = line[-1:]
-    if text in (")", "]") and text not in accepted:
+    if text in (")", "]") and text not in accepted and line.count(_OPENS[text]) <= line.count(text):
         return f"one '{'(' if text == ')' else '['}' more before it, or delete it"
     if text == "*" and before == "*":
         return "a power is written a^b"
@@ -380,6 +386,12 @@ def _hint(kind: str, text: str, line: str, accepted: Collection[str]) -> str | N
         return "bare numbers here: their units stand in the head of the table"
     if text in ("<", ">", "<=", ">=", "==", "!=") and "and" in accepted:
         return "comparisons do not chain: a < b and b < c"
+    if text in ("<", ">") and f"{text}=" in accepted:
+        return f"{text}=, which holds at the contact too"
+    if text == "," and "restitution" in accepted:
+        return "phi name: left >= right restitution 0.7, without a comma"
+    if text == "=" and line.rstrip().endswith("restitution"):
+        return "restitution 0.7, without a sign"
     if text == "-" and "->" in accepted:
         return "a -> b: the arrow is one sign"
     if text == "if":

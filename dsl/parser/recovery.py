@@ -33,6 +33,8 @@ _TARGET = re.compile(r"[\w.]+(?:\[[^\]\n]*\])?'?[ \t]*+")
 """What stands before the sign of an assignment."""
 _BLANK = re.compile(r"[ \t]*+")
 _GAP = re.compile(r"\s*+(#[^\n]*+)?")
+_UNLABELLED = frozenset({"law", "energy", "content", "work", "init", "let", "dynamic", "require", "expect"})
+_ELEMENT = re.compile(r":[ \t]*+[\w.]+[ \t]*+\(")
 _BEHIND = frozenset({"on", "within", "every", "while", "restitution", "to", "as", "->", "{", ":="})
 """Terminals that stand in no bracket, but may stand behind one."""
 
@@ -243,7 +245,10 @@ class Recovery:
             self._error(complaint, Span(start, start + len(word)))
         elif kind == ":" and after.startswith((":", "[")) and word in self._words_here(size):
             message, help_ = f"'{word}' begins a statement here and cannot be the label of an element", f"{word}_: ..."
-            if word in ("phi", "psi", "gamma"):
+            element = _ELEMENT.match(after) is not None
+            if not element and word in _UNLABELLED:
+                help_ = f"{complaints.SHAPES.get(word, word + ' ...')}, without ':'"
+            if not element and word in ("phi", "psi", "gamma"):
                 message, help_ = f"a {word} has a label, by which its multiplier is read", f"{word} name: ... = ..."
             self.nameless = True
             self._error(("E113", message, help_), Span(start, start + len(word)))
