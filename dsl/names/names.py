@@ -198,14 +198,14 @@ class Names(Context):
                 raise self.fail("E104", f"element '{symbol.name}' is not a value", span, help=help_)
             case DomainSymbol() | BundleSymbol() | ComponentSymbol() | TableSymbol() | FunctionSymbol():
                 remedy = habits.name(symbol.name, self.source.text, span.start, self._moves)
-                message, help_ = f"'{symbol.name}' is not a value", None
+                message, called = f"'{symbol.name}' is not a value", None
                 if isinstance(symbol, (TableSymbol, FunctionSymbol)):
                     heads = symbol.arguments if isinstance(symbol, TableSymbol) else symbol.definition.params
-                    names = [head[0] if isinstance(head, tuple) else head.name for head in heads]
-                    help_ = f"its value at an argument: {symbol.name}({', '.join(names)})"
+                    listed = ", ".join(head[0] if isinstance(head, tuple) else head.name for head in heads)
+                    called = f"its value at an argument: {symbol.name}({listed})"
                 if remedy:
                     raise self.remedied("E104", message, span, remedy)
-                raise self.fail("E104", message, span, help=help_)
+                raise self.fail("E104", message, span, help=called)
 
     def _implied(self, symbol: Definition, span: syntax.Span) -> tuple[Node, ...]:
         if not all(name in self._bound for name in symbol.at):
