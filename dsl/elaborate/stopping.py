@@ -1,4 +1,4 @@
-"""Tables that stop the run and that a trace or an expectation alone reads: the run must meet where they end.
+"""Tables that stop the run and that a trace, an expectation or an event alone reads: the run must meet where they end.
 
 No equation reads them, so no step would notice.  Each argument is handed to a table that is zero over the same range
 and no number beyond, and its integral is a dynamic variable: it stays zero, and the run ends where it has no rate
@@ -29,7 +29,7 @@ def watched(elaborator: Elaborator, observations: Iterable[Observation]) -> None
     if all(t.outside != "stop" for t in tables.values()):
         return
     moving = [e for e in parts.expectations if e.moment != "static"]
-    asked = [(o.expression, o.place) for o in observations]
+    asked = [(o.expression, o.place) for o in (*observations, *parts.watched)]
     asked += [(node, e.place) for e in moving for node in (e.left, e.right)]
     equations = expressions(parts, "energies", "constraints", "works", "dynamics", "branches.law", "couplings")
     met = {node for node in ex.topological(equations) if node.op == "table"}

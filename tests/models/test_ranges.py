@@ -102,3 +102,16 @@ def test_what_watches_a_table_is_no_part_of_the_model(tmp_path, capsys, command)
     path.write_text(READ.replace("SAID", ""), encoding="utf-8")
     assert run([command, str(path)]) == 0
     assert capsys.readouterr().out == with_table
+
+
+def test_a_table_that_only_a_condition_reads_ends_the_run_there_too(tmp_path, capsys):
+    """Beyond its data the condition held no number: it never became true, and nobody said so."""
+    path, out = tmp_path / "m.sd", tmp_path / "t.h5"
+    event = "discrete n = 0; when give(x.q) > 5 V { n := 1 }; init x.q"
+    path.write_text(READ.replace("init x.q", event).replace("SAID", "trace n"), encoding="utf-8")
+    assert run(["simulate", str(path), "-o", str(out)]) == 3
+    said = capsys.readouterr().err
+    assert "table give left its range" in said
+    assert float(re.search(r"stopped at t = (\S+) s", said)[1]) == pytest.approx(np.arcsin(1.0 / 1.5) / 2.0, abs=2e-3)
+    with h5py.File(out) as trace:
+        assert trace.attrs["final"] == 0
