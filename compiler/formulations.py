@@ -87,4 +87,4 @@ def _obstacle(network: Network, wanted: str, place: Place | None) -> Diagnostic 
         return None
     first = network.coordinates[0]
     message = f"{wanted} of a model with 'coord' ('{first.name}')"
-    return Diagnostic("E603", message, place or first.place, "network style expresses both")
+    return Diagnostic("E603", message, place or first.place, "lagrangian, hamiltonian; elements of nodes have both")

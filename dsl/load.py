@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysdyn.dsl.elaborate import switches
+from sysdyn.dsl.elaborate import stopping, switches
 from sysdyn.dsl.elaborate.authors import told
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
@@ -157,6 +157,7 @@ def _judged(
             reader.command(source, trace, SceneReader.trace)
     if _unread(elaborator, scene):
         return None  # what is missing would be found missing again, in other words
+    stopping.watched(elaborator, reader.observations)
     elaborator.quadratures()
     checks.run(elaborator, report, required=required)
     checks.set_valued_results(elaborator, reader.observations, report)

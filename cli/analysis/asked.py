@@ -18,6 +18,7 @@ from sysdyn.cli.run.targets import Target
 from sysdyn.cli.run.verdict import stopped
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
+from sysdyn.dsl.elaborate.stopping import unwatched
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
@@ -72,7 +73,7 @@ def compiled(
         network = second or network
     prepared: Prepared | None = None
     if network is not None:
-        network = replace(network, statics=(), expectations=(), goldens=())
+        network = replace(unwatched(network), statics=(), expectations=(), goldens=())
         prepared = prepare(
             network, inner, formulation=request.formulation, backend=request.backend, gather=False
         )

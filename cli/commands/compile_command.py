@@ -16,6 +16,7 @@ from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.program import program_text
 from sysdyn.dsl import load
+from sysdyn.dsl.elaborate.stopping import unwatched
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model import network_text
 from sysdyn.dsl.model.network import Event, Switch
@@ -64,6 +65,7 @@ def command(
         console.report.extend(inner if network else targets.unsupported(inner))
         if network is None:
             return console.finish(1)
+        network = unwatched(network)
         if dump == "network":
             console.result = {"stage": dump, "text": network_text.show(network)}
             console.data(console.result["text"])

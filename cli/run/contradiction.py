@@ -13,6 +13,7 @@ import numpy as np
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.flat_laws import by_element
 from sysdyn.cli.run.prepare import Prepared, place_at
+from sysdyn.dsl.model.expression import variables
 from sysdyn.dsl.model.network import Parameter
 from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.text.diagnostics import ModelError, Place, Related, Report
@@ -39,6 +40,8 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
     related = [Related("this value is fixed", place) for place in fixed_at]
     if where.source is not prepared.network.place.source and related:  # the law of an element of a library
         related, where = [*related[1:], Related(f"the law of {names}", where)], related[0].place
+    elif where == prepared.network.place and related:  # a row of no statement: what is fixed twice
+        related, where = related[1:], related[0].place
     match error.kind:
         case "gamma":
             left = f"the residual cannot fall below {_residual(prepared, error)}"
@@ -63,8 +66,17 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
         case _ if error.candidates:
             fixed = _listed(prepared, error)
             left = f"{names}: residual {_residual(prepared, error)}"
+            own = {r.label.rstrip("'") for r in error.rows} <= {c.label.rstrip("'") for c in error.candidates}
+            itself = own and all(not r.file for r in error.rows)
             message = f"fixed initial values of {fixed} contradict {left}"
-            report.error("E903", message, where, help=f"free one of {fixed}: '~' for '='", related=related)
+            if itself:
+                left = _residual(prepared, error)
+                message, fixed = f"fixed initial values contradict each other: {fixed}, residual {left}", "them"
+            among = "one of " if itself or len(set(fixed.split(", "))) > 1 else ""
+            free = f"free {among}{fixed}: '~' for '='"
+            still = [r.label for r in error.rows if r.kind == "dynamics" and _without_inertia(prepared, r.label)]
+            free += f"; or {still[0]} lacks an inertia: energy T* = 1/2*m*{still[0]}'^2" if still else ""
+            report.error("E903", message, where, help=free, related=related)
         case "fixed" if any(row.kind == "initial" for row in error.rows):
             message = f"an initial value contradicts the constraints: residual {_residual(prepared, error)}"
             report.error("E903", message, where, help="the value that they leave, or '~' for '='")
@@ -80,6 +92,15 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             given = f"a resistance in series with {one}, which passes or stops all that the others ask for"
             help_ = "guesses nearer to a solution: init ... ~ ..."
             report.error("E903", message, where, help=help_ if one is None else f"{given}; else {help_}")
+
+
+def _without_inertia(prepared: Prepared, name: str) -> bool:
+    """Whether a coordinate that the text declares moves nothing that has a kinetic energy."""
+    network = prepared.network
+    if all(c.name != name for c in network.coordinates) or network.branches:
+        return False
+    kinetic = [e.expression for e in network.energies if e.function in ("T*", "T")]
+    return all(n.op != "var" or n.data[0] != name for root in kinetic for n in variables(root))
 
 
 def _listed(prepared: Prepared, error: InconsistentStart) -> str:

@@ -13,6 +13,7 @@ from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES
+from sysdyn.dsl.elaborate.stopping import RANGE
 from sysdyn.dsl.model.expression import Node, topological
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.text.diagnostics import Place
@@ -65,7 +66,8 @@ def _told(prepared: Prepared, row: int, node: Node, arguments: list[float], last
     listed = ", ".join(f"{a:.9g}" for a in arguments)
     read = ", ".join(last.of(node)[:3])
     if node.op == "table":
-        said = f"the argument of table {node.data[0]} left its range: it is {read or listed}"
+        name = str(node.data[0]).partition(RANGE)[0]
+        said = f"the argument of table {name} left its range: it is {read or listed}"
         return Culprit("E932", said, label)
     text = to_text(node)
     function = re.match(r"\w+(?=\()", text)

@@ -38,5 +38,5 @@ def _laws(prepared: Prepared, row: RowLabel) -> Iterator[RowLabel]:
             bent = flow.op == "var" and flow.data[:2] == (owner, "f") and variables(derivative(effort, flow))
             if bent and place.element and row.kind == "dynamics":
                 label = re.sub(r"\[.*", "", place.element) + bracket + index
-                yield RowLabel(label, "law", place.file, place.start[0])
+                yield RowLabel(label, "law", place.file, place.start[0], row.slope)
                 break

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.model.interpret import evaluate
+from sysdyn.dsl.elaborate.stopping import RANGE
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
@@ -59,7 +60,8 @@ class LastState:
     def states(self) -> list[int]:
         """Places of the unknowns that make the state."""
         number = min(len(self.system.unknown_names), self.y.size)
-        return [k for k in range(number) if self.system.kinds[k] in STATE]
+        names = self.system.unknown_names
+        return [k for k in range(number) if self.system.kinds[k] in STATE and RANGE not in names[k]]
 
     def listed(self) -> str:
         """A few unknowns."""

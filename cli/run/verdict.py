@@ -20,6 +20,7 @@ from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.judgement import Cancelled, NotMet
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
+from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.slopes import WITH_A_SLOPE, no_slope, without_slope
 from sysdyn.runtime.simulate import Outcome
 from sysdyn.runtime.structure.structure import DENSE
@@ -43,6 +44,8 @@ _CAUSES = {
     "conflict": ("E704", "two events assign one variable at one instant"),
     "memory": ("E934", "there is no memory left"),
 }
+AT_REST = 1e-8
+"""Of what there was of its kind at the start: an unknown that has come to rest."""
 _OF_EVENTS = ("max_events", "chatter", "complementarity", "conflict", "slides", "drives")
 _REMEDIES = {
     "E704": "one event for both, or conditions that do not become true together",
@@ -134,7 +137,11 @@ def _flat(prepared: Prepared, started: Started, error: SolverFailure) -> tuple[R
         return ()
     t, y, yd = error.state
     rest = np.zeros(system.unknowns - y.size)
-    rows = without_slope(system, t, np.append(y, rest), np.append(np.where(np.isfinite(yd), yd, 0.0), rest))
+    y, yd = np.append(y, rest), np.append(np.where(np.isfinite(yd), yd, 0.0), rest)
+    rows = without_slope(system, t, y, yd)
+    if not rows:  # as near to rest as steps lead
+        size = group_maximum(system, np.abs(np.append(started.state.y[: y.size], rest)[: y.size]))
+        rows = without_slope(system, t, np.where(np.abs(y) < AT_REST * size, 0.0, y), yd, size)
     return by_element(prepared, rows)
 
 

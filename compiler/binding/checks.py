@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from sysdyn.compiler.forms.momenta import given, inertial, undefined
 from sysdyn.compiler.model.energies import EnergyModel, tangible
 from sysdyn.compiler.model.integers import Integers
+from sysdyn.dsl.model.affine import AFFINE
 from sysdyn.dsl.model.expression import Node, topological, variables
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place, Related
@@ -85,7 +86,7 @@ def _indices(model: EnergyModel) -> Iterator[Diagnostic]:
                 try:
                     Integers().index(at, defaultdict(int))
                 except ModelError as error:
-                    yield Diagnostic("E806", error.diagnostics[0].message, place, "a table over the index")
+                    yield Diagnostic("E806", error.diagnostics[0].message, place, AFFINE)
             seen.add(node)
 
 

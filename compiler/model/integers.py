@@ -16,8 +16,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from sysdyn.dsl.model.affine import index_text
 from sysdyn.dsl.model.expression import Node, linear, topological
-from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass
 
@@ -90,7 +90,7 @@ class Integers:
         rest = [(c, n) for c, n in parts if n.op != "index"]
         bad = len(counters) > 1 or any(c != 1.0 for c, _ in counters) or constant != int(constant)
         if bad or any(n.op not in ("const", "param", "sum", "mul", "call", "pow") for n in topological_of(rest)):
-            text = f"index {to_text(node)} is not affine: i + c with whole c is meant"
+            text = f"index {index_text(node)} is not affine: i + c with whole c is meant"
             raise ModelError([Diagnostic("E806", text, None)])
         loop = loops[counters[0][1].data] if counters else -1
         slot = self.value(linear(0.0, rest)) if rest else -1

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.dsl.model.network import Table
-from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
 Array = NDArray[np.float64]
 ROUND_OFF = 1e-12
@@ -27,10 +26,7 @@ def numbers(table: Table) -> Array:
     if len(axes) == 1:
         rows = coefficients(axes[0], values, table.method, table.outside)
         return np.concatenate((_closed(axes[0], table.outside), rows.ravel()))
-    if len(axes) == 2 and table.method == "linear":
-        return np.concatenate((axes[0], axes[1], values))
-    text = f"table '{table.name}': {len(axes)} arguments with {table.method} are not supported yet"
-    raise ModelError([Diagnostic("N608", text, table.place)])
+    return np.concatenate((axes[0], axes[1], values))
 
 
 def _closed(x: Array, outside: str) -> Array:

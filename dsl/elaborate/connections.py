@@ -17,6 +17,7 @@ from sysdyn.dsl.names.symbols import (
     Typed,
     UnknownSymbol,
     Unsupported,
+    nearest,
 )
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
@@ -150,7 +151,7 @@ class Connections(Statements):
             while isinstance(root, (syntax.Item, syntax.Member)):
                 root = root.base
             if isinstance(root, syntax.Name) and self.scope.find(root.name) is None:
-                raise self.resolver.unknown(root.name, root.span)
+                raise self._unknown_node(root, domain)
             raise self._no_node(e, None)
         match symbol:
             case PortSymbol():
@@ -174,6 +175,17 @@ class Connections(Statements):
             case Unsupported():
                 raise Failed
         raise self._no_node(e, symbol)
+
+    def _unknown_node(self, root: syntax.Name, domain: DomainSymbol | None) -> Failed:
+        """Report E101: a name that stands for nothing where a node is wanted."""
+        nodes = [n for n in self.scope.names() if isinstance(self.scope.find(n), (NodeSymbol, PortSymbol))]
+        near = nearest(root.name, nodes)
+        if near is not None or domain is None or nearest(root.name, ("ground", "gnd", "GND", "vss")):
+            return self.resolver.unknown(root.name, root.span)
+        if self.scope.is_broken(root.name):
+            return Failed()
+        message, help_ = f"unknown name '{root.name}': no node is called so", f"node {root.name}: {domain.name}"
+        return self.resolver.fail("E101", message, root.span, help=help_, subject=f"name {root.name}")
 
     def _no_node(self, e: syntax.Expr, symbol: object) -> Failed:
         text = self._text(e)

@@ -183,7 +183,7 @@ class Declarations(Parameters):
         if before is not initial:
             related = (Related("first here", before.place),)
             message = f"'{initial.target}' gets its initial value twice"
-            self.report.error("E106", message, initial.place, related=related)
+            self.report.error("E106", message, initial.place, help="one of the two", related=related)
             raise Failed
         self.parts.initials.append(initial)
 

@@ -141,7 +141,12 @@ def when(frame: ElaborationContext, s: syntax.When) -> None:
 def every(frame: ElaborationContext, s: syntax.Every) -> None:
     """`every period { target := value }`."""
     message = "the period of 'every' is in {}, wants s"
-    period = frame.resolver.wanted(s.period, dim.TIME, "E703", message)
+    value = frame.resolver.scalar(s.period)
+    if value.dimension == dim.quotient(NONE, dim.TIME):
+        text = " ".join(frame.resolver.source.text[s.period.span.start : s.period.span.end].split())
+        help_ = f"every 1/({text}) {{ ... }}"
+        raise frame.resolver.fail("E703", f"{message.format('1/s')}: a frequency", s.period.span, help=help_)
+    period = frame.resolver.fitting(value, s.period, dim.TIME, "E703", message)
     if ex.variables(period) or _discretes(frame, period) or (ex.is_const(period) and not period.data > 0.0):
         text = " ".join(frame.resolver.source.text[s.period.span.start : s.period.span.end].split())
         message = f"the period of 'every' must be a positive constant, not {text}"
@@ -207,7 +212,11 @@ def _actions(frame: ElaborationContext, actions: tuple[syntax.Action, ...]) -> t
         ):
             have = "a condition" if value.truth else dim.show(value.dimension)
             want = "a condition" if truth else dim.show(target.dimension)
-            raise frame.resolver.fail("E208", f"{target.node} := ...: {want} expected, {have} found", action.value.span)
+            help_ = "true, false or a comparison" if truth else None
+            if not truth and not value.truth:
+                help_ = frame.resolver.missing(value.dimension, target.dimension or NONE, action.value)
+            message = f"{target.node} := ...: {want} expected, {have} found"
+            raise frame.resolver.fail("E208", message, action.value.span, help=help_)
         if any(a.target is target.node for a in found):
             raise frame.resolver.fail("E704", f"the event assigns {target.node} twice", action.span)
         found.append(Assigned(target.node, _number(value), target.dimension, frame.place(action.span)))

@@ -62,6 +62,14 @@ def _of_library(path: Path) -> tuple[syntax.File, tuple[Diagnostic, ...]]:
     return parse(SourceText.read(path, f"std/{path.name}"))
 
 
+def _stepped(table: Table, held: tuple[str, ...]) -> dict[str, Table]:
+    """The tables that stand for one: of two arguments that hold, each is taken down to its point of the grid, where
+    the bilinear table has the value itself.
+    """
+    axes = {n: replace(table, name=n, points=(x,), values=x) for n, x in zip(held, table.points, strict=False)}
+    return axes | {table.name: replace(table, method="linear") if held else table}
+
+
 class FileScope:
     """A file's own names on top of the prelude's, the values of its tables, and the modules that it imports."""
 
@@ -155,6 +163,7 @@ class FileScope:
                 self.scope.units[word.name] = unit
             elif symbol is not None:
                 self._imported[id(symbol)] = Place(source, word.span)
+                self._continued(symbol, word, source)
                 yield symbol
             else:
                 other = exported().get(word.name)
@@ -164,6 +173,14 @@ class FileScope:
                 help_ = f"from std.{other} import {word.name}" if other else help_
                 self.report.error("E103", f"'{word.name}' is not in {text}", Place(source, word.span), help=help_)
                 self.scope.broken |= {word.name} | ({near} - self.scope.symbols.keys() if near else set())
+
+    def _continued(self, symbol: Symbol, word: syntax.Word, source: SourceText) -> None:
+        """W302: a table that is read here, and that the text which holds its data continues beyond them."""
+        table = self.tables.get(symbol.key) if isinstance(symbol, TableSymbol) else None
+        if table is not None and table.outside == "extend" and source is self.file.source:
+            message = f"table '{word.name}' is extrapolated ('extend') beyond its data"
+            related = (Related(f"{Path(table.place.source.name).name} says so", table.place),)
+            self.report.warning("W302", message, Place(source, word.span), help="clamp or stop there", related=related)
 
     def _module(self, item: syntax.Import, source: SourceText) -> Scope | None:
         """The names of a module: std.x from the library, others from the folder of the importing file."""
@@ -254,10 +271,12 @@ class FileScope:
         place = Place(source, item.name.span)
         arguments = tuple((name, unit.dimension) for (name, _), unit in zip(heads, units, strict=True))
         key = self._key(item.name.name, source)
-        yield TableSymbol(item.name.name, key, arguments, result.dimension, place)
+        several = len(arguments) > 1 and item.interpolation == "hold"
+        held = tuple(f"{key} along {name}" for name, _ in arguments) if several else ()
+        yield TableSymbol(item.name.name, key, arguments, result.dimension, place, held)
         table = read_table(item, units, result, source, self.report)
         if table is not None:
-            self.tables[key] = replace(table, name=key)
+            self.tables |= _stepped(replace(table, name=key), held)
 
     def _key(self, name: str, source: SourceText) -> str:
         """What a table is called among those of all files: by its own name in the model's, else with its module's."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from itertools import pairwise
 
 from sysdyn.dsl.elaborate import bundles
 from sysdyn.dsl.elaborate.declarations import DECLARED
@@ -75,14 +76,27 @@ class Instances(Elements):
     def announce(self, body: Body) -> None:
         """Enter the labels of all instances, then elaborate each (or earlier, when another asks for it)."""
         waiting = []
+        unfinished = self._unfinished(body)
         for statement, loops in body.of(syntax.Instance):
             assert isinstance(statement, syntax.Instance)
             try:
+                if id(statement) in unfinished:
+                    raise Failed
                 waiting.append(self._announced(statement, loops))
             except Failed:
                 self.scope.broken.add(statement.decl.name)
         for do in waiting:
             do()
+
+    def _unfinished(self, body: Body) -> list[int]:
+        """Elements whose connections stand, indented, on a line that could not be read: nothing is said of them."""
+        if not body.of(syntax.Broken):
+            return []
+        text = self.current.source.text
+        pairs = pairwise(statement for statement, _ in body)
+        return [
+            id(s) for s, then in pairs if isinstance(then, syntax.Broken) and _column(text, then) > _column(text, s)
+        ]
 
     def _announced(self, s: syntax.Instance, loops: tuple[syntax.For, ...]) -> Callable[[], None]:
         """What is to be done of an instance when it is read or its turn comes: a builtin, or a component."""
@@ -102,6 +116,7 @@ class Instances(Elements):
             help_ = f"nearest name in scope: '{near}'" if near else "sysdyn std lists the library"
             if near in library and near not in components:
                 help_ = f"from std.{library[near]} import {near}"
+            self.scope.broken.add(name)
             raise self.resolver.fail("E101", f"unknown component '{name}'", s.component.span, help=help_)
         before = self.scope.symbols.get(label)
         if not isinstance(before, InstanceSymbol):
@@ -309,12 +324,17 @@ class Instances(Elements):
         for c in s.connections:
             nodes += [c.plus, c.minus] if isinstance(c, syntax.Across) else []
             nodes += [c.node] if isinstance(c, syntax.Single) else []
-        left = [name for name in ports if all(getattr(c, "name", None) != name for c in s.connections)]
+        bound = {c.name.name for c in s.connections if isinstance(c, (syntax.Bind, syntax.BindAcross))}
+        across = [c for c in s.connections if isinstance(c, syntax.Across)]
+        if len(across) > 1 and all(self.source_text(c.plus.span) in ports for c in across):  # `p -> a` for `p = a`
+            nodes = [c.minus for c in across]
+            bound |= set(ports) - {self.source_text(c.plus.span) for c in across}
+        left = [name for name in (*ports, *head.inputs) if name not in bound]
         texts = iter([self.source_text(node.span) for node in nodes])
         pairs = []
         for name, text in zip(left, texts, strict=False):
             pairs.append(f"{name} = {text}" + (f" -> {next(texts, 'ground')}" if name in head.branches else ""))
-        message = f"'{s.decl.name}: {component.name}' is connected by name: {', '.join(ports) or 'no connection'}"
+        message = f"'{s.decl.name}: {component.name}' is connected by name: {', '.join((*ports, *head.inputs))}"
         return self.resolver.fail("E402", message, connection.span, help=", ".join(pairs))
 
     def _bind(
@@ -344,6 +364,13 @@ class Instances(Elements):
             near = nearest(name, (*head.ports, *head.inputs, *head.branches))
             names = ", ".join((*head.ports, *head.inputs, *filter(None, head.branches)))
             help_ = f"nearest: '{near}'" if near else f"it has {names or 'none'}"
+            nodes = [s for s in component.body if isinstance(s, syntax.Node)]
+            inner = next((s.domain.name for s in nodes if any(d.name == name for d in s.decls)), None)
+            if inner is not None:
+                help_ = f"port {name}: {inner} in component '{component.name}': a node is of its inside alone"
+            if list(head.branches) == [""] and not head.ports and not head.inputs:  # its two ends have no names
+                ends = [self._text(c.value) for c in s.connections if isinstance(c, syntax.Bind)]
+                help_ = " -> ".join((*ends[:2], "ground")[:2])
             raise self.resolver.fail(
                 "E407", f"'{component.name}' has no port or input '{name}'", connection.span, help=help_
             )
@@ -466,3 +493,8 @@ class Instances(Elements):
             space.scope.symbols[name] = Definition(
                 name, "input", value, (), dimension, here, place, value.span, bound=bound, shape=shape
             )
+
+
+def _column(text: str, statement: syntax.Statement) -> int:
+    """How far from the left a statement begins."""
+    return statement.span.start - text.rfind("\n", 0, statement.span.start)

@@ -112,7 +112,10 @@ class Parameters(ElaborationContext):
                 unit = self._values(statement, statement.value, self.resolver.resolve(statement.value), None, shape)[1]
             values, unit, truth = self._values(statement, given.written, given.value, unit, shape, given)
         if unit is None:
-            raise self.resolver.fail("E207", f"'{decl.name}' has neither a unit nor a default", decl.span)
+            help_ = f"param {decl.name} = 3 N/m, or param {decl.name}: N/m where somebody else sets it"
+            raise self.resolver.fail(
+                "E207", f"'{decl.name}' has neither a unit nor a default", decl.span, help=help_
+            )
         around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
         indices = (*around, *(loop.index for loop in own))
         self.enter(ParameterSymbol(decl.name, family, unit.dimension, truth, place))

@@ -212,7 +212,12 @@ class SceneReader:
     def trace(self, s: syntax.Trace) -> None:
         """`trace`: quantities by name, and how often."""
         if s.every is not None:
-            every = self._constant(s.every, dim.TIME, f"the interval '{self._text(s.every)}' of a trace")
+            what = f"the interval '{self._text(s.every)}' of a trace"
+            frequency = s.every if isinstance(s.every, syntax.Quantity) and s.every.value > 0.0 else None
+            if frequency is not None and frequency.unit.text in ("Hz", "kHz", "MHz", "1/s", "s^-1"):
+                help_ = f"every 1/({self._text(s.every)}): the time between two rows"
+                raise self.resolver.fail("E208", f"{what} is a frequency, wants s", s.every.span, help=help_)
+            every = self._constant(s.every, dim.TIME, what)
             if every.op == "const" and not every.data > 0.0:
                 message = f"the interval '{self._text(s.every)}' of a trace is not positive"
                 raise self.resolver.fail("E912", message, s.every.span, help="every 10 ms")
@@ -263,6 +268,8 @@ class SceneReader:
             message = f"'{format_expression(item.expr)}' is in {dim.show(value.dimension)}, not {unit.text}"
             missing = self.resolver.missing(value.dimension, unit.dimension, item.expr)
             help_ = missing if blamed(missing) else f"in {common(value.dimension)}"
+            help_ = "in rad or deg of an angle, in percent, or without 'in'" if value.dimension == NONE else help_
+            help_ = "in degC" if unit.text == "C" and help_ == "in K" else help_
             raise self.resolver.fail("E208", message, item.unit.span, help=help_)
         return unit
 

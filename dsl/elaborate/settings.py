@@ -62,7 +62,11 @@ class Settings:
             raise Failed
         near = nearest(shown, (*self.model.parts.parameters, *self.model.parts.inputs))
         message = f"'{shown}' is not a parameter or input of model '{self.model.model.name.name}'"
-        help_ = f"nearest: '{near}'" if near else "init sets initial values" if symbol is not None else None
+        last = shown.rpartition(".")[2]
+        inside = [p for p in (*self.model.parts.parameters, *self.model.parts.inputs) if p.endswith(f".{last}")]
+        near = near or (inside[0] if inside and (symbol is None or "." in shown) else None)
+        started = f"init {shown} = ... sets an initial value" if symbol is not None else None
+        help_ = f"nearest: '{near}'" if near else started
         if name in self.model.parts.inputs:
             help_ = f"the whole: set {name} = [a, b, ...]"
         raise self.resolver.fail("E910", message, s.target.span, help=help_)

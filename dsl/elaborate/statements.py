@@ -131,9 +131,11 @@ class Statements(Declarations):
         target = s.target.base if isinstance(s.target, syntax.Prime) else s.target
         value = self.resolver.scalar(target)
         if not isinstance(s.target, syntax.Prime) or value.node.op != "var" or value.node.data[1] != "s":
-            raise self.resolver.fail(
-                "E508", "a dynamic gives the rate of a state", s.target.span, help="dynamic s' = ..."
-            )
+            help_ = "dynamic s' = ..."
+            if value.node.op == "var" and value.node.data[1] == "s":
+                self.parts.given.add(value.node.data[0])  # what is meant
+                help_ = f"dynamic {self.source_text(target.span)}' = ..."
+            raise self.resolver.fail("E508", "a dynamic gives the rate of a state", s.target.span, help=help_)
         self.parts.given.add(value.node.data[0])
         rate = dim.quotient(value.dimension or NONE, dim.TIME)
         node = self._wants(f"dynamic {value.node}'", s.value, rate)

@@ -27,7 +27,7 @@ Row = tuple[float, ...]
 def read_table(
     item: syntax.Table, units: Sequence[Unit], result: Unit, source: SourceText, report: Report
 ) -> Table | None:
-    """The table's breakpoints and values; None after reporting E206 or W302."""
+    """The table's breakpoints and values; None after reporting E206."""
     name = item.name.name
     place = Place(source, item.name.span)
     try:
@@ -37,9 +37,6 @@ def read_table(
             rows = _from_file(item, [*units, result], source, report)
     except Failed:
         return None
-    if item.extrapolation == "extend":
-        message = f"table '{name}' is extrapolated ('extend') beyond its data"
-        report.warning("W302", message, place, help="clamp or stop")
     back = next((k for k, (a, b) in enumerate(pairwise(rows), 1) if a[0] >= b[0]), None) if len(units) == 1 else None
     if back is not None:
         where = place if item.rows is None else Place(source, item.rows[back].span)
@@ -70,7 +67,8 @@ def _written(item: syntax.Table, units: list[Unit], source: SourceText, report: 
     for row in item.rows or ():
         if len(row.numbers) != len(units):
             message = f"a row of table {item.name.name} has {len(units)} numbers, {len(row.numbers)} given"
-            report.error("E206", message, Place(source, row.span))
+            heads = ", ".join([*(p.name for p in item.params), "value"])
+            report.error("E206", message, Place(source, row.span), help=f"each row is ({heads})")
             raise Failed
         texts = [n.text.replace(" ", "") for n in row.numbers]
         rows.append(tuple(_scaled(t, u) for t, u in zip(texts, units, strict=True)))

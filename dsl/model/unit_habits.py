@@ -55,6 +55,8 @@ _STRONG = ("N", "V", "A", "W", "Pa", "kg", "J", "C", "Wb", "rad", "K")
 """Bases with which names that have grown together begin: `Nm`, `kgm`, `Vs`, `Ah`, `rads`."""
 _SUFFIXES = {"meg": "e6", "k": "e3", "K": "e3", "M": "e6", "G": "e9", "m": "e-3", "u": "e-6", "µ": "e-6", "n": "e-9"}
 _SUFFIXES |= {"p": "e-12", "f": "e-15", "T": "e12", "g": "e9", "t": "e12", "Meg": "e6", "MEG": "e6"}
+PREFIXED = {"e3": "kohm", "e6": "Mohm", "e-6": "uF", "e-3": "mH", "e-9": "nF", "e-12": "pF"}
+"""A unit with the prefix that stands for a power of ten."""
 
 
 def respelled(text: str) -> str | None:

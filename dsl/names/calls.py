@@ -171,6 +171,8 @@ class Calls(Context):
             raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=divided)
         if help_ and dimension == dim.TIME:
             help_ += ", or the unit of a frequency: 50 Hz"
+        if name in ("sin", "cos") and dimension == dim.quotient(NONE, dim.TIME):
+            help_ = f"an angle: {name}({text}*t)" if "pi" in text else f"an angle: {name}(2*pi*{text}*t)"
         raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=help_)
 
     def _vector_call(self, e: syntax.Call) -> Value:
@@ -215,7 +217,9 @@ class Calls(Context):
 
     def _table(self, symbol: TableSymbol, e: syntax.Call) -> Value:
         heads = [(name, dimension, None) for name, dimension in symbol.arguments]
-        return Typed(ex.table(symbol.key, *_nodes(self._arguments(symbol.name, heads, e))), symbol.result)
+        nodes = _nodes(self._arguments(symbol.name, heads, e))
+        at = [ex.table(name, node) for name, node in zip(symbol.held, nodes, strict=False)] or nodes
+        return Typed(ex.table(symbol.key, *at), symbol.result)
 
     def _function(self, symbol: FunctionSymbol, e: syntax.Call) -> Value:
         """A function of the text: its body with the arguments in place; E105 where it calls itself."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.affine import not_affine
+from sysdyn.dsl.model.affine import index_text, not_affine
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Constraint, Loop
 from sysdyn.dsl.model.unit_habits import common
@@ -320,10 +320,15 @@ class Context:
         """An index or a bound: made of whole numbers, loop variables and dimensionless parameters."""
         value = self.scalar(expression)
         if value.dimension not in (None, NONE):
-            raise self.fail("E805", f"{what} is in {dim.show(value.dimension)}, not a number", expression.span)
+            message = f"{what} is in {dim.show(value.dimension)}, not a number"
+            text = " ".join(self.source.text[expression.span.start : expression.span.end].split())
+            help_ = f"a number without unit: param {text} = 3" if text.isidentifier() else "a number without unit"
+            raise self.fail("E805", message, expression.span, help=help_, subject=f"unit of {text}")
         for node in ex.topological([value.node]):
             if node.op in ("var", "time", "table"):
-                raise self.fail("E807", f"{what} depends on '{node}', which is no constant", expression.span)
+                raise self.fail(
+                    "E807", f"{what} depends on '{index_text(node)}', which is no constant", expression.span
+                )
             if node.op == "param" and node.data in self.inputs:
                 raise self.fail(
                     "E807",
@@ -373,7 +378,8 @@ class Context:
                 rest = ex.sub(node, n)
             if len(loops) > 1 or _loops(rest):
                 said = " in one loop variable: the array would have to be unrolled"
-                message, help_, _ = not_affine(node, said)
+                written = " ".join(self.source.text[index.span.start : index.span.end].split())
+                message, help_, _ = not_affine(node, said, written)
                 raise self.fail("E806", message, index.span, help=help_)
         return node
 

@@ -19,6 +19,14 @@ _NAMES = {
     **dict.fromkeys(("Inf", "INF", "infinity", "Infinity", "oo"), "inf"),
     **dict.fromkeys(("g", "grav", "gravity", "g_n"), "g0"),
 }
+RESULTS = {
+    **dict.fromkeys(("T", "Ekin", "E_kin", "KE", "kinetic"), "audit.kinetic"),
+    **dict.fromkeys(("V", "Epot", "E_pot", "PE", "potential"), "audit.potential"),
+    **dict.fromkeys(("E", "H", "energy", "Etot"), "audit.kinetic + audit.potential, or audit.energy: the balance"),
+    **dict.fromkeys(("lambda", "lam", "kappa", "mu", "multiplier", "reaction"), "LABEL.multiplier of a phi or psi"),
+    **dict.fromkeys(("all", "everything"), "no trace at all: a scene without one traces every coordinate"),
+}
+"""What a run knows by another name."""
 _FUNCTIONS = {
     "log": "ln (the natural one), or log10",
     "loge": "ln",
@@ -51,6 +59,7 @@ _FUNCTIONS = {
     "interp": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
     "interp1": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
     "lookup": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
+    **dict.fromkeys(("db", "dB", "mag2db"), "20*log10(x)"),
     "edge": "when c { ... }",
     "pre": "the name itself: right-hand sides are read before anything changes",
     "sample": "every 5 ms { ... }",

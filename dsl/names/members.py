@@ -9,17 +9,18 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Constraint, Domain
-from sysdyn.dsl.model.paynter import EFFORT_CLASSES
+from sysdyn.dsl.model.paynter import EFFORT_CLASSES, MEMBERS
 from sysdyn.dsl.model.units import NONE, Dimension
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Value
 from sysdyn.dsl.names.failures import Failed, NotYetError
 from sysdyn.dsl.names.paths import Located
 from sysdyn.dsl.names.ports import Ports
-from sysdyn.dsl.names.quantities import BRANCH, branch_words
+from sysdyn.dsl.names.quantities import BRANCH, OF_ELEMENTS, branch_words
 from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
+    ComponentSymbol,
     ConstraintSymbol,
     Definition,
     End,
@@ -27,6 +28,7 @@ from sysdyn.dsl.names.symbols import (
     NodeSymbol,
     ParameterSymbol,
     PortSymbol,
+    Space,
     TwoPortSymbol,
     Typed,
     UnknownSymbol,
@@ -142,7 +144,10 @@ class Members(Ports):
             case Unsupported():
                 raise Failed
         kind = "parameter" if isinstance(symbol, ParameterSymbol) else "value"
-        raise self.fail("E102", f"'{shown}' has no member '{e.name}': it is a {kind}", e.span, help=self._beside(e))
+        help_ = self._beside(e)
+        if isinstance(symbol, ComponentSymbol) and (near := nearest(e.name, self.scope.names())):
+            kind, help_ = "component or model: its names are read by themselves", near
+        raise self.fail("E102", f"'{shown}' has no member '{e.name}': it is a {kind}", e.span, help=help_)
 
     def _beside(self, e: syntax.Member) -> str | None:
         """The elements that stand beside a name without members: one of them is meant."""
@@ -228,11 +233,26 @@ class Members(Ports):
             shown = self._shown(e.base)
             through = " + ".join(f"energy_through({shown}.{port})" for port in ports[:4])
             help_ = f"what goes in by its ports: {through}; or of an element inside, {shown}.LABEL.energy"
+        if branch is None and e.name in MEMBERS:
+            help_ = self._holders(space, self._shown(e.base), e.name)
         if branch is None and ports and e.name in ("e", "f", "q", "p"):  # several ends have one each
             shown, inside = self._shown(e.base), [n for n, s in space.scope.symbols.items() if isinstance(s, _ELEMENTS)]
             help_ = " or ".join(f"{shown}.{port}.{e.name}" for port in ports[:4])
             help_ += f"; of an element inside, {shown}.{inside[0]}.{e.name}" if inside else ""
         raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{e.name}'{level}", e.span, help=help_)
+
+    def _holders(self, space: Space, shown: str, name: str) -> str:
+        """The elements of an instance that have the state function `name`, to write."""
+        edge, found = MEMBERS[name].edge, []
+        for label, symbol in space.scope.symbols.items():
+            inner: object = symbol
+            if isinstance(symbol, InstanceSymbol) and symbol.spaces:
+                inner = symbol.spaces[0].scope.symbols.get("")
+            if isinstance(inner, BranchSymbol) and not inner.family.shape:
+                law = self.laws.get(inner.family.name)
+                found += [f"{shown}.{label}.{name}"] if law is not None and law.kind == edge else []
+        what = "dissipator" if edge == "dissipator" else f"{edge} store"
+        return f"of the elements inside, {' + '.join(found[:8])}" if found else f"{OF_ELEMENTS}; no {what} is inside"
 
     # -- constraints ---------------------------------------------------------------------------------------
 
@@ -281,6 +301,10 @@ class Members(Ports):
             raise Failed  # its statement was told
         symbol = None if base is None else base.symbol
         wrong = not isinstance(symbol, ConstraintSymbol) or symbol.kind == "gamma"
+        if isinstance(symbol, ConstraintSymbol) and symbol.kind == "gamma" and e.name == "on":
+            message = f"gamma '{symbol.name}' acts along nothing: it closes an implicit unknown, and has no multiplier"
+            help_ = f"phi {symbol.name}: ... where it ties displacements, psi where it ties flows"
+            raise self.fail("E102", message, e.span, help=help_)
         if base is None or wrong or e.name != "on" or len(e.args) != 1:
             raise self.fail("E102", f"there is no '{e.name}(...)' here", e.span, help="label.on(expr) of a phi or psi")
         assert isinstance(symbol, ConstraintSymbol)

@@ -156,7 +156,12 @@ class Names(Context):
             said = {"celsius": "celsius(20)"}.get(name, f"{name}(...)")
             return self.fail(code, message.format(name), span, help=f"a function: {said}")
         near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
+        near = None if code == "E905" and name in habits.RESULTS else near
         help_ = f"nearest name in scope: '{near}'" if near else f"declare it by param {name} = ..., let, coord or node"
+        if known(name) is not None:
+            help_ += f"; the unit stands behind a number, with a space: 1 {name}"
+        if code == "E905" and not near:
+            help_ = habits.RESULTS.get(name, f"let {name} = ... in the model; sysdyn list FILE shows what can be read")
         return self.fail(code, message.format(name), span, help=help_, subject=f"name {name}")
 
     def _moves(self, name: str) -> bool:
@@ -181,13 +186,9 @@ class Names(Context):
                 names = ", ".join(f"{symbol.name}.{m}" for m in symbol.members)
                 raise self.fail("E104", f"'{symbol.name}' is a bundle, not a value", span, help=f"its nodes: {names}")
             case NodeSymbol() | PortSymbol():
-                domain = symbol.domain if isinstance(symbol, NodeSymbol) else None
-                common = domain.common if domain else "effort"
-                help_ = (
-                    f"write {symbol.name}.e (potential)"
-                    if common == "effort"
-                    else f"write {symbol.name}.q or {symbol.name}.f"
-                )
+                domain = symbol.domain if isinstance(symbol, NodeSymbol) else symbol.end.domain
+                shown = " ".join(self.source.text[span.start : span.end].split())
+                help_ = f"write {shown}.e (potential)" if domain.common == "effort" else f"write {shown}.q or {shown}.f"
                 raise self.fail("E104", f"node '{symbol.name}' is not a value", span, help=help_)
             case ConstraintSymbol():
                 help_ = "write its member: multiplier, residual, on(...)"
@@ -197,8 +198,14 @@ class Names(Context):
                 raise self.fail("E104", f"element '{symbol.name}' is not a value", span, help=help_)
             case DomainSymbol() | BundleSymbol() | ComponentSymbol() | TableSymbol() | FunctionSymbol():
                 remedy = habits.name(symbol.name, self.source.text, span.start, self._moves)
-                message = f"'{symbol.name}' is not a value"
-                raise self.remedied("E104", message, span, remedy) if remedy else self.fail("E104", message, span)
+                message, called = f"'{symbol.name}' is not a value", None
+                if isinstance(symbol, (TableSymbol, FunctionSymbol)):
+                    heads = symbol.arguments if isinstance(symbol, TableSymbol) else symbol.definition.params
+                    listed = ", ".join(head[0] if isinstance(head, tuple) else head.name for head in heads)
+                    called = f"its value at an argument: {symbol.name}({listed})"
+                if remedy:
+                    raise self.remedied("E104", message, span, remedy)
+                raise self.fail("E104", message, span, help=called)
 
     def _implied(self, symbol: Definition, span: syntax.Span) -> tuple[Node, ...]:
         if not all(name in self._bound for name in symbol.at):
@@ -334,7 +341,11 @@ class Names(Context):
     def index_count(self, name: str, count: int, given: int, span: syntax.Span) -> Failed:
         """Report E805: a wrong number of indices."""
         plural = "index" if count == 1 else "indices"
-        return self.fail("E805", f"'{name}' has {count or 'no'} {plural}, {given} given", span)
+        help_ = f"an element of it: {name}[{', '.join('ij'[k % 2] for k in range(count))}]"
+        if not count:
+            help_ = f"{name} as it is; or declare an array, {name}[1..3]"
+        message, subject = f"'{name}' has {count or 'no'} {plural}, {given} given", f"indices of {name}"
+        return self.fail("E805", message, span, help=help_, subject=subject)
 
     def own_element(
         self, symbol: ParameterSymbol | UnknownSymbol, indices: tuple[syntax.Index, ...], span: syntax.Span

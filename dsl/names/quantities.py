@@ -20,6 +20,11 @@ from sysdyn.dsl.tree import syntax
 RATES = ("dot", "der", "d", "dt", "prime")
 """Members by which other languages write a rate."""
 BRANCH = ("e", "f", "q", "p", "power", "energy", *MEMBERS)
+_WHOLE = {"kinetic": "audit.kinetic", "potential": "audit.potential", "dissipator": "audit.dissipated"}
+"""What of the whole model an edge's state functions are, or add up to."""
+
+OF_ELEMENTS = "stores have T, Tstar or V, Vstar, dissipators D, G"
+"""Who has state functions."""
 
 
 def branch_words(domain: Domain) -> tuple[str, ...]:
@@ -41,6 +46,9 @@ class Quantities(Paths):
             return self.fail("E102", f"'{owner}' has no member '{e.name}'", e.span, help=f"{owner}'")
         near = nearest(e.name, names)
         help_ = f"nearest: '{near}'" if near else f"it has {', '.join(names[:20])}" if names else None
+        if e.name in MEMBERS and e.name not in names:
+            edge = MEMBERS[e.name].edge
+            help_ = f"{OF_ELEMENTS}: LABEL.{e.name}; of the whole model {_WHOLE[edge]}"
         return self.fail("E102", f"'{owner}' has no member '{e.name}'", e.span, help=help_)
 
     def _effort(self, family: str, kind: str, at: tuple[Node, ...], dimension: Dimension, e: syntax.Member) -> Typed:
@@ -52,8 +60,14 @@ class Quantities(Paths):
         domain = end.domain
         if domain.common == "effort":
             if e.name != "e":
-                help_ = "a common-effort node has e; flows belong to elements"
-                raise self.fail("E102", f"node '{self._shown(e.base)}' has no member '{e.name}'", e.span, help=help_)
+                shown = self._shown(e.base)
+                if habits.variable(domain.name, e.name) == "e":
+                    help_ = f"write {shown}.e"
+                elif e.name in MEMBERS:
+                    help_ = f"{OF_ELEMENTS}: LABEL.{e.name}; the node has e"
+                else:
+                    help_ = "a common-effort node has e; flows belong to elements"
+                raise self.fail("E102", f"node '{shown}' has no member '{e.name}'", e.span, help=help_)
             if end.node is None:
                 return Typed(ex.const(0.0), domain.effort.dimension)
             return Typed(ex.var(end.node.family.name, "ne", *end.at), domain.effort.dimension)
@@ -64,6 +78,10 @@ class Quantities(Paths):
             if end.node is None:
                 raise self.fail("E102", f"'{self._shown(e.base)}' stands still: no effort moves it", e.span)
             return self._effort(end.node.family.name, "n", end.at, domain.effort.dimension, e)
+        meant = habits.variable(domain.name, e.name)
+        if e.name not in kinds and meant is not None:
+            shown = self._shown(e.base)
+            raise self.fail("E102", f"'{shown}' has no member '{e.name}'", e.span, help=f"write {shown}.{meant}")
         if e.name not in kinds:
             raise self.no_member(self._shown(e.base), e, (*kinds, *EFFORT_CLASSES))
         kind, dimension = kinds[e.name]
@@ -143,7 +161,10 @@ class Quantities(Paths):
         law = self.laws.get(symbol.family.name)
         if law is None or law.kind != function.edge:
             what = "a dissipator" if function.edge == "dissipator" else f"a {function.edge} store"
-            raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{name}': it is not {what}", e.span)
+            own = [m for m, f in MEMBERS.items() if law is not None and f.edge == law.kind]
+            shown = self._shown(e.base)
+            help_ = " or ".join(f"{shown}.{member}" for member in (*own, "power", "energy"))
+            raise self.fail("E102", f"'{shown}' has no member '{name}': it is not {what}", e.span, help=help_)
         dimension = power if function.edge == "dissipator" else multiply(power, dim.TIME)
         return Typed(ex.var(symbol.family.name, f"b{function.name}", *at), dimension)
 

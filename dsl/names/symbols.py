@@ -55,13 +55,17 @@ class ComponentSymbol:
 
 @dataclass(frozen=True, slots=True)
 class TableSymbol:
-    """An interpolation table with the dimensions of its arguments and values; key: its name among all files' tables."""
+    """An interpolation table with the dimensions of its arguments and values; key: its name among all files' tables.
+
+    held: of a table of two arguments that holds its values, the tables that take each one to its point of the grid.
+    """
 
     name: str
     key: str
     arguments: tuple[tuple[str, Dimension], ...]
     result: Dimension
     place: Place
+    held: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -329,7 +333,7 @@ class Scope:
         """Whether the name stands in a statement that could not be read."""
         scope: Scope | None = self
         while scope is not None:
-            if name in scope.broken:
+            if name in scope.broken or syntax.ANY in scope.broken:
                 scope.missed = True
                 return True
             scope = scope.outer

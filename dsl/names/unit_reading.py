@@ -6,7 +6,7 @@ import re
 from collections.abc import Container
 from fractions import Fraction
 
-from sysdyn.dsl.model.unit_habits import cased, declaration, respelled
+from sysdyn.dsl.model.unit_habits import PREFIXED, cased, declaration, respelled, scaled
 from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, PREFIXES, Dimension, Unit, known, multiply, names, si_text
 from sysdyn.dsl.names.symbols import Scope, nearest
 from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
@@ -76,12 +76,19 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
     message = f"'{factor.name}' is not a unit, in '{quantity}'"
     help_: str | None
     edit = None
+    alone = number is not None and len(unit.factors) == 1 and factor.exponent == 1
+    plain = scaled("1" + factor.name) if alone and factor.name.isalpha() else None
     before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
     if in_sight and before:
         sign = "/" if factor.op == "/" else "*"
         verb = "divide" if factor.op == "/" else "multiply"
         before = quantity.removesuffix(unit.text) + before
         help_ = f"to {verb} by the variable {factor.name} write '{before} {sign} {factor.name}'"
+    elif number is not None and alone and (in_sight or factor.name == "pi"):
+        help_ = f"factors are joined by '*': {number.group().strip()}*{factor.name}"
+    elif number is not None and plain is not None:
+        example = PREFIXED.get(plain[1:], "kohm")
+        help_ = f"{number.group().strip()}{plain[1:]}, or with its unit, as in '1 {example}'"
     else:
         help_ = _meant(unit, factor)
         right = respelled(unit.text)
@@ -90,9 +97,12 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
     report.error("E201", message, place, help=help_, edit=edit)
 
 
+_SPELLED = dict.fromkeys(("celsius", "Celsius", "centigrade"), "degC")
+
+
 def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     """The unit as it is written here: by rewriting; else the line that would declare it, else the nearest name."""
-    right = respelled(unit.text)
+    right = _SPELLED.get(unit.text) or respelled(unit.text)
     if right is not None:
         return f"write '{right}'"
     alone = respelled(factor.name)

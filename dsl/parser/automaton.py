@@ -15,7 +15,7 @@ from sysdyn.dsl.parser.lexing import Scanner
 from sysdyn.dsl.parser.notes import MAX_TERMS, Notes
 from sysdyn.dsl.parser.table import FINAL, GOTOS, LOOKAHEADS, ROWS, RULES
 from sysdyn.dsl.text.source import SourceText, Span
-from sysdyn.dsl.tree.syntax import Broken, Text, Word
+from sysdyn.dsl.tree.syntax import ANY, Broken, Text, Word
 
 Build = Callable[[list[Any], Span, Notes], Any]
 
@@ -242,9 +242,10 @@ class Automaton:
                     return index + 1, left
         return 1, "item"
 
-    def broken(self, span: Span) -> Broken:
-        """A statement that could not be read."""
-        return Broken(frozenset(_names(self.source.text[span.start : span.end])), span)
+    def broken(self, span: Span, *, nameless: bool = False) -> Broken:
+        """A statement that could not be read; nameless: any name may be that which it declares."""
+        names = frozenset(_names(self.source.text[span.start : span.end]))
+        return Broken(names | {ANY} if nameless else names, span)
 
 
 def _names(text: str) -> Iterator[str]:

@@ -53,6 +53,7 @@ _HERE = {
 }
 _CONTINUE = "end the line above with a comma, or break it inside the parentheses"
 _OTHERS = {
+    "default": "level name default { ... }",
     "connect": "ports are joined by naming nodes: label: component() a -> b",
     "parameter": "param k = 3 N/m",
     "var": "let x = ...",
@@ -91,6 +92,9 @@ _OTHERS = {
     "initial": "init x = 1 m",
     "tran": "scene s of m { time 0 s to 1 s }",
     "simulate": "scene s of m { time 0 s to 1 s }",
+    **dict.fromkeys(("tspan", "duration", "tend", "tstop", "stoptime", "stop_time", "until"), "time 0 s to 5 s"),
+    **dict.fromkeys(("tolerance", "tol", "rtol", "reltol", "abstol", "precision"), "accuracy 1e-6, or of a run --rtol"),
+    **dict.fromkeys(("method", "integrator"), "solver radau"),
 }
 _SIGNS = {
     "&": "and",
@@ -139,6 +143,9 @@ _EXPRESSIONS = frozenset(
     {"energy", "content", "work", "let", "law", "phi", "psi", "gamma", "dynamic", "output", "const"}
 )
 """Statements that end with an expression."""
+
+MOTION = "energy T* = 1/2*m*x'^2, energy V, content D, work F on x: the equations of motion follow from them"
+"""In place of an equation of motion."""
 
 Complaint = tuple[str, str, str | None]
 """Code, message, help."""
@@ -202,7 +209,10 @@ def unknown(word: str, after: str, body: str) -> Complaint:
                 help_ = (
                     f"const NAME = ..., or move it {into}" if word == "param" and body == "item" else f"move it {into}"
                 )
-                help_ = "trace x in mm" if word == "output" and body == "scene_statement" else help_
+                if body == "scene_statement":
+                    named = re.match(r"\w+", after)
+                    given = f"set {named[0] if named else 'u'} = ..."
+                    help_ = {"output": "trace x in mm", "input": given}.get(word, help_)
                 return "E107", f"'{word}' belongs {place}, not {here}", help_
     if body == "action":
         return "E113", "an action assigns: name := expression", None
@@ -212,17 +222,26 @@ def unknown(word: str, after: str, body: str) -> Complaint:
         return "E113", f"no statement begins with '{word}'; an element has a label", element
     if after.startswith("=") and not after.startswith("=="):
         wanted = "set" if body == "scene_statement" else "const" if body == "item" else "let"
+        wanted = "law" if body == "statement" and word in ("e", "f", "q", "p") else wanted
         return (
             "E113",
             f"no statement begins with '{word}'; a value is given by a word before it",
             f"{wanted} {word} = ...",
         )
     if after.startswith("'"):
-        return "E113", f"no statement begins with '{word}''", f"dynamic {word}' = ..."
+        help_ = f"init {word}' = ... where it begins, dynamic {word}' = ... of a state"
+        help_ = f"names of a trace are joined by commas: trace x, {word}'" if body == "scene_statement" else help_
+        help_ = MOTION if after.startswith("''") else help_
+        return "E113", f"no statement begins with '{word}''", help_
+    if "''" in after.partition("=")[0] and "=" in after:
+        return "E113", f"no statement begins with '{word}'; equations of motion are not written", MOTION
     if after[:1] in "^*/+-" and after and "=" in after.partition("\n")[0]:
         return "E113", f"no statement begins with '{word}'; a constraint has a label", f"phi name: {word} ... = ..."
     from difflib import get_close_matches
 
+    named = re.match(r"(\w+)\s*([=~].*)", after.partition("#")[0])
+    if body == "statement" and named is not None and word in ("translation", "rotation"):
+        return "E113", f"no statement begins with '{word}'", f"coord {named[1]}: {word} {named[2].strip()}"
     near = get_close_matches(word, sorted(_OWN[body] | MODEL_WORDS | SCENE_WORDS | ITEM_WORDS), 1, 0.7)
     said = _OTHERS.get(word.lower(), "").replace("DOMAIN", word.lower())
     if after.startswith("(") and body == "statement" and not said and (not near or near[0] not in MODEL_WORDS):
@@ -240,7 +259,7 @@ def _element(word: str, after: str) -> str | None:
     return None if declared is None else f"{declared[1]}: {word}({declared[2]}) {declared[3] or 'a -> b'}"
 
 
-_SHAPES = {
+SHAPES = {
     "param": "param k = 3 N/m",
     "const": "const c = 3 m/s",
     "node": "node a, b: electrical",
@@ -267,6 +286,7 @@ _SHAPES = {
     "for": "for i in 1..n { ... }",
     "time": "time 0 s to 5 s",
     "set": "set k = 3 N/m",
+    "level": "level M = thermal in a scene, level thermal { ... } in a component",
     "trace": "trace x in mm as pos, y every 1 ms",
     "expect": "expect always: a <= b",
     "accuracy": "accuracy 1e-6 on x",
@@ -274,6 +294,8 @@ _SHAPES = {
     "model": "model name { ... }",
     "component": "component name { ... }",
     "from": "from std.electrical import resistor, capacitor",
+    "formulation": "formulation hamiltonian",
+    "solver": "solver radau(order = 9)",
     "fn": "fn f(x: m) -> N = ...",
     "table": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
 }
@@ -283,11 +305,23 @@ _SHAPES = {
 def expected(accepted: Collection[str], kind: str, text: str, line: str, word: str = "") -> Complaint:
     """A token that does not fit, with what would; `line` is the line up to it, `word` begins the statement."""
     said = f"expected {_listed(accepted)}, found {quoted(text, kind)}"
-    shape = _SHAPES.get(word)
+    shape = SHAPES.get(word)
+    if word == "let" and text in ("^", "*", "+", "-", "/") and "=" not in line:
+        return "E113", "a let names one value; a constraint has a label", "phi name: ... = ... of displacements"
     if text == "," and word in ("param", "state", "let", "input", "output", "const", "discrete"):
-        shape = f"one name a statement: {_SHAPES.get(word, word + ' on = false')}"
-    if kind == "<name>" and word in _EXPRESSIONS and "*" in accepted:
+        shape = f"one name a statement: {SHAPES.get(word, word + ' on = false')}"
+    if kind == "<name>" and "*" in accepted and (word in _EXPRESSIONS or ")" in accepted):
         shape = f"factors are joined by '*': ... * {text}"
+    unit = re.search(r"([\d.]+)\s+([^\W\d]\w*)$", line)
+    if text == "(" and "*" in accepted and unit is not None:
+        meant = f"factors are joined by '*': {unit[1]}*{unit[2]}(...)"
+        return "E113", f"'{unit[2]}' stands where a unit is read", meant
+    if word == "work" and line.split()[-1:] == ["on"]:
+        shape = SHAPES["work"]
+    if word in ("param", "const", "coord", "state") and re.search(r":\s*[-+]?[\d.]+$", line):
+        shape = f"a value stands behind '=': {SHAPES[word]}"
+    if word == "param" and text == "[":
+        shape = "a unit has no brackets: param k = 3 N/m"
     if word == "trace" and text == "in":
         shape = "the unit stands before the name: trace x in mm as pos"
     return "E113", said, _hint(kind, text, line, accepted) or shape
@@ -326,15 +360,24 @@ def _listed(accepted: Collection[str]) -> str:
     return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " or " + parts[-1]
 
 
+_OPENS = {")": "(", "]": "["}
+
+
 def _hint(kind: str, text: str, line: str, accepted: Collection[str]) -> str | None:
     """The text to write for a slip that is easily named."""
     before = line[-1:]
-    if text in (")", "]") and text not in accepted:
+    if text in (")", "]") and text not in accepted and line.count(_OPENS[text]) <= line.count(text):
         return f"one '{'(' if text == ')' else '['}' more before it, or delete it"
     if text == "*" and before == "*":
         return "a power is written a^b"
     if text == "(" and "on" in accepted:
         return "a -> b, without parentheses"
+    if text == "(" and "[" in accepted and "on" not in accepted and not {"*", "->"} & set(accepted):
+        return "an index, or a range 0..n, stands in square brackets: v[0..n]"
+    if text == ":" and ".." in accepted:
+        return "a range is written with two points: 0..n"
+    if text == "," and ":=" in line:
+        return "actions stand on lines of their own, or ';' between them"
     if text == "+" and "<number>" in accepted:
         return "a number has no leading '+'"
     if text == "." and "<number>" in accepted:
@@ -343,6 +386,12 @@ def _hint(kind: str, text: str, line: str, accepted: Collection[str]) -> str | N
         return "bare numbers here: their units stand in the head of the table"
     if text in ("<", ">", "<=", ">=", "==", "!=") and "and" in accepted:
         return "comparisons do not chain: a < b and b < c"
+    if text in ("<", ">") and f"{text}=" in accepted:
+        return f"{text}=, which holds at the contact too"
+    if text == "," and "restitution" in accepted:
+        return "phi name: left >= right restitution 0.7, without a comma"
+    if text == "=" and line.rstrip().endswith("restitution"):
+        return "restitution 0.7, without a sign"
     if text == "-" and "->" in accepted:
         return "a -> b: the arrow is one sign"
     if text == "if":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from sysdyn.dsl.model.unit_habits import UNGROUPED, chained, grouped, respelled, scaled
+from sysdyn.dsl.model.unit_habits import PREFIXED, UNGROUPED, chained, grouped, respelled, scaled
 from sysdyn.dsl.model.units import known
 from sysdyn.dsl.parser.complaints import Complaint
 from sysdyn.dsl.text.source import Span
@@ -16,7 +16,6 @@ _DIGITS = re.compile(r"[0-9]+")
 _SPICE = re.compile(r"(?:[\w.+-]+[ \t]+){2,}[\w.+-]+[ \t]*(?:[#;].*)?$")
 _PARTS = {"R": "resistor(R = 1 kohm)", "C": "capacitor(C = 1 uF)", "L": "inductor(L = 1 mH)", "V": "voltage(v = 5 V)"}
 _PARTS |= {"I": "current(i = 1 A)", "D": "diode()", "K": "spring(k = 1 N/m)", "M": "mass(m = 1 kg)"}
-_EXAMPLES = {"e3": "kohm", "e6": "Mohm", "e-6": "uF", "e-3": "mH", "e-9": "nF", "e-12": "pF"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +32,7 @@ def glued(number: str, unit: str) -> tuple[str, str | None]:
     plain = scaled(number + unit)
     if plain is not None and known(unit) is None:
         digits, _, exponent = plain.partition("e")
-        example = _EXAMPLES.get(f"e{exponent}")
+        example = PREFIXED.get(f"e{exponent}")
         return f"{plain}, or with its unit, as in '{digits} {example}'" if example else plain, None
     if re.fullmatch(r"(_[0-9]{3})+", unit):
         whole = number + unit.replace("_", "")
@@ -77,7 +76,8 @@ def around(text: str, start: int, end: int, kind: str) -> Slip | None:
         said = f"'{text[quantity.start : quantity.end]}': {UNGROUPED}"
         return Slip(("E113", said, f"write '{quantity.right}'"), quantity.right, Span(quantity.start, quantity.end))
     quantity = chained(text, start)
-    if quantity is not None and (kind == "<name>" or sign in ("·", "⋅", "×", "*")):
+    apart = quantity is not None and text[quantity.start : quantity.end] != quantity.right
+    if quantity is not None and apart and (kind == "<name>" or sign in ("·", "⋅", "×", "*")):
         written = text[quantity.start : quantity.end]
         said = f"'{written}': a unit is written without spaces, its factors are joined by dots"
         return Slip(("E113", said, f"write '{quantity.right}'"), quantity.right, Span(quantity.start, quantity.end))
@@ -92,6 +92,9 @@ def _known_sign(text: str, span: Span, kind: str, line: str) -> Slip | None:
         return Slip(("E113", f"'/{sign}': a remark is no part of a statement", "a comment begins with '#'"))
     if sign == "*" and line.endswith("*"):
         return Slip(("E113", "'**': a power is written with '^'", "a^b"), "^", Span(span.start - 1, span.end))
+    found = _element_slip(text, span, line)
+    if found is not None:
+        return Slip(found)
     if sign == "0" and line.rstrip().endswith("->"):
         return Slip(("E113", "the reference of every domain has a name", "ground"), "ground")
     if kind == "<name>" and line.rstrip().endswith((")", "]")) and known(sign) is not None:
@@ -116,4 +119,46 @@ def _known_sign(text: str, span: Span, kind: str, line: str) -> Slip | None:
         return Slip(("E113", "the condition of a choice comes first", "if c then a else b"))
     if sign == "." and before and not text[span.end : span.end + 1].isdigit():
         return Slip(("E113", "a number ends with a digit", f"{before.group()}.0"), ".0")
+    return None
+
+
+_ELEMENT = re.compile(r"\s*[\w\[\], +-]+:\s*([\w.]+)\s*(\(.*\))?\s*(.*)$")
+"""An element's line up to a token: component, parameters, what stands behind them."""
+
+
+def _element_slip(text: str, span: Span, line: str) -> Complaint | None:
+    """What does not fit in `label: component(name = value) a -> b`."""
+    sign = text[span.start : span.end]
+    found = _ELEMENT.match(line)
+    if found is None:
+        return None
+    component, parameters, behind = found[1], found[2], found[3].strip()
+    rest = text[span.end : text.find("\n", span.end) if "\n" in text[span.end :] else len(text)]
+    other = re.match(r"[-=~]*>?\s*([\w\[\]]+)", rest)
+    second = other[1] if other else "b"
+    if parameters and re.fullmatch(r"[\w\[\]]+\s*=", behind) and sign == ">":
+        return "E113", "'=>' joins no nodes", f"{behind[:-1].strip()} -> {second}"
+    if parameters and re.fullmatch(r"[\w\[\]]+", behind) and sign == "<" and rest.startswith("-"):
+        return "E113", "'<-' joins no nodes: the arrow goes from plus to minus", f"{second} -> {behind}"
+    if parameters and sign == "->" and "->" in behind:
+        said = "an element has two ends; those in series are elements of their own"
+        return "E113", said, f"{behind}, and another element {behind.rpartition('->')[2].strip()} -> {second}"
+    if parameters and not behind and sign.isdigit():
+        to = re.match(r"[\w\s]*->\s*(\w+)", rest)
+        end = f"n{to[1]}" if to and to[1].isdigit() else "ground"
+        named = f"n{sign} -> {end}, and node n{sign}: DOMAIN"
+        return "E113", "nodes have names, which begin with a letter", named
+    if sign == "{" and not parameters and not behind:
+        return "E113", "parameters stand in parentheses", f"{component}(name = value) a -> b"
+    if not parameters and re.fullmatch(r"\w+\s*=.*", behind) and sign[:1].isalpha():
+        given = " ".join(behind.split())
+        return "E113", "parameters stand in parentheses", f"{component}({given}) {sign} -> ..."
+    if parameters and sign == ":" and re.search(r"(^|,\s*)\w+$", behind):
+        name = re.findall(r"\w+", behind)[-1]
+        return "E113", "a port is bound by '='", f"{name} = {second}"
+    if parameters and sign == "(" and re.search(r"\w$", behind):
+        name = re.findall(r"\w+", behind)[-1]
+        return "E113", "an index stands in square brackets", f"{name}[...]"
+    if sign == ":" and (inside := re.search(r"\(\s*(?:.*,\s*)?(\w+)\s*$", line)) is not None:
+        return "E113", "a parameter is given by '='", f"{component}({inside[1]} = ...)"
     return None

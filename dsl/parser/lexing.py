@@ -244,6 +244,12 @@ class Scanner:
                 self.docs[start] = "\n".join(self._doc)
             self._doc = []
 
+    def open_block(self) -> None:
+        """A `{` that is missing where the token just read stands."""
+        self.brackets.append(Bracket("{", self.start))
+        self.last = "{"
+        self._fresh = True
+
     def _bracket(self, sign: str) -> str:
         """Keep the stack of open brackets."""
         brackets = self.brackets

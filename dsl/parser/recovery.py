@@ -17,6 +17,7 @@ from sysdyn.dsl.parser.lexing import RESERVED, Bracket
 from sysdyn.dsl.parser.notes import MAX_TERMS
 from sysdyn.dsl.text.diagnostics import Related
 from sysdyn.dsl.text.source import Span
+from sysdyn.dsl.tree.syntax import Broken
 
 MAX_SKIPPED = 100_000
 """Tokens that are skipped for one error before the rest of the text is left unread."""
@@ -31,6 +32,9 @@ _WORD = re.compile(r"[^\W\d]\w*+")
 _TARGET = re.compile(r"[\w.]+(?:\[[^\]\n]*\])?'?[ \t]*+")
 """What stands before the sign of an assignment."""
 _BLANK = re.compile(r"[ \t]*+")
+_GAP = re.compile(r"\s*+(#[^\n]*+)?")
+_UNLABELLED = frozenset({"law", "energy", "content", "work", "init", "let", "dynamic", "require", "expect"})
+_ELEMENT = re.compile(r":[ \t]*+[\w.]+[ \t]*+\(")
 _BEHIND = frozenset({"on", "within", "every", "while", "restitution", "to", "as", "->", "{", ":="})
 """Terminals that stand in no bracket, but may stand behind one."""
 
@@ -57,6 +61,8 @@ class Recovery:
         self.automaton = automaton
         self.scanner = automaton.scanner
         self.errors = 0
+        self.nameless = False  # the statement lacks its label: any name may be its own
+        self.reserved: set[str] = set()  # reserved words that were told to be none of the author's names
 
     # --- slips that are mended ---
 
@@ -65,6 +71,10 @@ class Recovery:
         scanner, automaton = self.scanner, self.automaton
         if kind == "<quantity>" and scanner.glued:
             kind = self._glued()
+        elif kind == "<newline>" and automaton.accepts("{") and not automaton.accepts(kind):
+            return self._opened(kind)
+        elif kind in self.reserved and kind in ("true", "false"):
+            return "<name>" if automaton.accepts("<name>") else kind
         elif kind not in automaton.row or kind in _SLIPS:
             if automaton.accepts(kind):
                 return kind
@@ -77,8 +87,12 @@ class Recovery:
             elif kind == "=" and automaton.accepts(":="):
                 self._error(("E113", "an action assigns with ':='", ":="), self._token(), ":=")
                 kind = ":="
+            elif kind == "if" and automaton.body()[0] == len(automaton.states):
+                return kind  # a statement of other languages
             elif kind in RESERVED and automaton.accepts("<name>") and not automaton.accepts("("):
-                self._error(("E115", f"'{kind}' is reserved and cannot be a name", f"{kind}_"), self._token())
+                if kind not in self.reserved:
+                    self._error(("E115", f"'{kind}' is reserved and cannot be a name", f"{kind}_"), self._token())
+                self.reserved.add(kind)
                 kind = "<name>"
             elif kind == "=" and automaton.accepts(">=") and self.scanner.text[self.scanner.end :][:1] in (">", "<"):
                 scanner = self.scanner
@@ -91,6 +105,26 @@ class Recovery:
                 self._error(("E113", "'=' defines; a comparison is written with '=='", "=="), self._token(), "==")
                 kind = "=="
         return kind
+
+    def _opened(self, kind: str) -> str:
+        """A head without its brace, which stands on the next line or is missing before a block further right."""
+        scanner, automaton = self.scanner, self.automaton
+        start = self._statement_start()
+        ahead = _GAP.match(scanner.text, scanner.end)
+        while ahead is not None and ahead[1]:
+            ahead = _GAP.match(scanner.text, ahead.end())
+        first = len(scanner.text) if ahead is None else ahead.end()
+        if scanner.text[first : first + 1] == "{":
+            self._error(complaints.first_token("{", "{", ""), Span(first, first + 1))
+            return scanner.read(automaton.row)
+        word, _ = self._first_word(start)
+        if word not in _HEADS or scanner.column(first) <= scanner.column(start):
+            return kind
+        accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
+        line = scanner.text[start : scanner.start].rstrip()
+        self._error(complaints.expected(accepted, kind, "\n", line, word), self._token())
+        scanner.open_block()
+        return "{"
 
     def _glued(self) -> str:
         """A number with its unit grown to it: read as a quantity."""
@@ -155,6 +189,9 @@ class Recovery:
         from sysdyn.dsl.parser import foreign
 
         automaton, scanner = self.automaton, self.scanner
+        ends_with = scanner.suspect is not None and scanner.text[scanner.dangling.start : scanner.dangling.end]
+        if kind in self.reserved or ends_with in self.reserved:
+            return  # a place where the word is read by its name
         size, body = automaton.body()
         text = scanner.text[scanner.start : scanner.end]
         start = self._statement_start()
@@ -176,6 +213,9 @@ class Recovery:
         elif kind == "<fault>":
             first = text in "%!" and not scanner.text[start : scanner.start].strip() and start == scanner.start
             complaint = complaints.first_token(text, kind, body) if first else complaints.character(text)
+            number = re.search(r"[0-9.]+$", scanner.text[start : scanner.start])
+            if text == "%" and number is not None:
+                complaint = (complaint[0], complaint[1], f"{number[0]} percent")
             self._error(complaint, self._token())
         elif scanner.suspect is not None:
             sign = scanner.text[scanner.dangling.start : scanner.dangling.end]
@@ -196,17 +236,29 @@ class Recovery:
             netlist = foreign.spice(word, after) if body == "statement" and complaint[::2] == ("E113", None) else None
             if netlist is not None:
                 complaint = (complaint[0], "an element is written with its label, its parameters named", netlist)
-            if after.startswith("->") or (complaint[0] == "E113" and after[:1] in ("=", ",") and self._indented(start)):
+            continues = after[:1] in ("=", ",") or not after.strip()
+            if after.startswith("->") or (complaint[0] == "E113" and continues and self._indented(start)):
                 complaint = complaints.connection()
+                if self._told_above(start):
+                    return
+            self.nameless = "has a label" in complaint[1]
             self._error(complaint, Span(start, start + len(word)))
         elif kind == ":" and after.startswith((":", "[")) and word in self._words_here(size):
-            message = f"'{word}' begins a statement here and cannot be the label of an element"
-            self._error(("E113", message, f"{word}_: ..."), Span(start, start + len(word)))
+            message, help_ = f"'{word}' begins a statement here and cannot be the label of an element", f"{word}_: ..."
+            element = _ELEMENT.match(after) is not None
+            if not element and word in _UNLABELLED:
+                help_ = f"{complaints.SHAPES.get(word, word + ' ...')}, without ':'"
+            if not element and word in ("phi", "psi", "gamma"):
+                message, help_ = f"a {word} has a label, by which its multiplier is read", f"{word} name: ... = ..."
+            self.nameless = True
+            self._error(("E113", message, help_), Span(start, start + len(word)))
         else:
             accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
             before = scanner.text[: scanner.start].rstrip()
             line = before[before.rfind("\n") + 1 :]
-            self._error(complaints.expected(accepted, kind, text, line, word), self._token())
+            complaint = complaints.expected(accepted, kind, text, line, word)
+            self.nameless = "has a label" in complaint[1]
+            self._error(complaint, self._token())
 
     def _words_here(self, size: int) -> dict[str, int]:
         """The terminals with which a statement may begin here."""
@@ -220,8 +272,21 @@ class Recovery:
             return kind == "="
         return body == "scene_statement" and kind in ("{", "extends", "<name>")
 
+    def _told_above(self, start: int) -> bool:
+        """Whether the line above, as far to the right, was told to continue a statement already."""
+        size, _ = self.automaton.body()
+        said = self.automaton.notes.report.diagnostics
+        value = self.automaton.values[size - 2] if 3 <= size <= len(self.automaton.values) else None
+        last = value[-1] if isinstance(value, list) and value else None
+        return (
+            isinstance(last, Broken)
+            and bool(said)
+            and said[-1].code == "E109"
+            and self.scanner.column(start) == self.scanner.column(last.span.start)
+        )
+
     def _indented(self, start: int) -> bool:
-        """Whether the statement stands further right than the one before it."""
+        """Whether the statement stands further right than the one before it, those that continue it left out."""
         states, starts = self.automaton.states, self.automaton.starts
         size, _ = self.automaton.body()
         if size < 3 or size > len(states):
@@ -231,7 +296,8 @@ class Recovery:
             return False
         value = self.automaton.values[size - 2]
         if isinstance(value, list) and value:
-            before = value[-1].span.start
+            whole = [item for item in value if not isinstance(item, Broken)]
+            before = (whole or value)[-1].span.start
         return self.scanner.column(start) > self.scanner.column(before)
 
     # --- brackets ---
@@ -318,7 +384,8 @@ class Recovery:
         automaton.cut(size)
         if not self._skip(kind, start, base, body):
             span = Span(start, max(start, scanner.start))
-            automaton.push(body, automaton.broken(span), span)
+            automaton.push(body, automaton.broken(span, nameless=self.nameless), span)
+        self.nameless = False
 
     def _skip(self, kind: str, start: int, base: int, body: str) -> bool:
         """Read to the end of the statement; True where a block was found whose head is mended."""

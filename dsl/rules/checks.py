@@ -92,7 +92,7 @@ def states(model: Elaborator, report: Report) -> None:
         if not places and state.name in model.parts.given:
             continue
         if not places:
-            help_ = f"dynamic {state.name}' = ..."
+            help_ = f"dynamic {state.name}' = ...; what forces move is a coord {state.name}: translation"
             report.error("E507", f"state {state.name} has no dynamic", state.place, help=help_)
         elif len(places) > 1 and not state.shape:
             related = (Related("and here", places[1]),)

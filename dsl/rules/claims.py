@@ -1,7 +1,7 @@
 """W909: numbers of a run that a claim compares exactly.
 
-An integration gives each number within an accuracy: `==` without `within` asks for the last bit.  What changes at
-events alone (discrete variables), counts, signs and conditions may be compared exactly.
+An integration gives each number within an accuracy: `==` without `within` asks for the last bit (a `=` in its place has
+been told).  What changes at events alone (discrete variables), counts, signs and conditions may be compared exactly.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def exact_claims(model: Elaborator, report: Report) -> None:
     for e in model.parts.expectations:
         if e.moment == "static" or e.operator != "==" or e.within is not None:
             continue
-        if _varies(ex.sub(e.left, e.right), still):
+        if "==" in e.text and _varies(ex.sub(e.left, e.right), still):
             message = f"{e.text}: a number of the run is compared to the last bit"
             unit = "" if e.unit.text == "1" else f" {e.unit.text}"
             report.warning("W909", message, e.place, help=f"{e.text} within 1e-6{unit}, or what accuracy it is worth")

@@ -14,10 +14,16 @@ _PLURAL = {"e": "efforts", "f": "flows", "p": "momenta", "q": "displacements"}
 def state_functions(network: Network, report: Report) -> None:
     """Each energy and content holds its own variable and none that the table keeps from it."""
     diagram = Diagram(network)
+    moved = {d.state.data[0] for d in network.dynamics}
     for energy in network.energies:
         unknowns = unknowns_of(energy.expression)
         rates = [n for n in unknowns if n.data[2]]
-        if rates:
+        if rates and rates[0].data[1] == "s":
+            if rates[0].data[0] in moved:  # else it has no dynamic: that is told
+                message = f"{energy.function} contains {rates[0]}, the rate of a state"
+                help_ = f"the right side of its dynamic, or a coord {rates[0].data[0]}: what forces move"
+                report.error("E518", message, energy.place, help=help_)
+        elif rates:
             message = f"{energy.function} contains {rates[0]}, a second derivative: accelerations are results, not data"
             report.error("E518", message, energy.place)
         elif not _misplaced(energy, unknowns, diagram, report):

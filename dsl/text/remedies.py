@@ -103,7 +103,7 @@ REMEDIES = {
     "E803": "mark one of them 'default', or choose one where it is used",
     "E804": "declare it in each level, or outside of them",
     "E805": "an index within the bounds, or other bounds",
-    "E806": "i + c, or a table over the index",
+    "E806": "i + c, or a statement for each element",
     "E807": "numbers and parameters alone",
     "E808": "a new label",
     "E901": "--scene NAME",

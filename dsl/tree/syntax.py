@@ -77,6 +77,7 @@ from sysdyn.dsl.tree.syntax_scenes import (
     TraceItem,
 )
 from sysdyn.dsl.tree.syntax_statements import (
+    ANY,
     Across,
     Action,
     Bind,
@@ -119,6 +120,7 @@ from sysdyn.dsl.tree.syntax_statements import (
 )
 
 __all__ = [
+    "ANY",
     "Accuracy",
     "Across",
     "Action",

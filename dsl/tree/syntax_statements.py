@@ -383,10 +383,14 @@ class Instance:
     doc: str | None = None
 
 
+ANY = "*"
+"""Stands for every name."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Broken:
     """A statement that could not be read; `names` are the names in it, so that later stages can spare
-    the author errors that only follow from this one.
+    the author errors that only follow from this one: all names, where ANY is among them.
     """
 
     names: frozenset[str]

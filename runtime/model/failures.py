@@ -13,12 +13,16 @@ from sysdyn.values import dataclass
 
 @dataclass(frozen=True, slots=True)
 class RowLabel:
-    """Where a row or an initial value stands in the author's text: label, kind, element index, file, line."""
+    """Where a row or an initial value stands in the author's text: label, kind, element index, file, line.
+
+    slope: what the slope of its law does at a point at which it has none: vanishes, or grows without bound.
+    """
 
     label: str
     kind: str = ""
     file: str = ""
     line: int = 0
+    slope: str = ""
 
     def __str__(self) -> str:
         place = f" ({self.file}:{self.line})" if self.file else ""

@@ -7,7 +7,8 @@ slope of a power falls, or grows, with each of them, that of a law which is but 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints
@@ -22,20 +23,29 @@ FALLS = 0.1
 NONE = 1e-30
 """Of any unit: an unknown that is no size."""
 
+_FALLS, _RISES = "vanishes", "grows without bound"
+"""What a slope does."""
+
 WITH_A_SLOPE = "a law with a slope at rest, as of a laminar part (f*hypot(f, f0) for f*abs(f)), or a start in motion"
 """What would help."""
 
 
-def no_slope(rows: Iterable[RowLabel], where: str = "this state") -> str:
+def no_slope(rows: Sequence[RowLabel], where: str = "this state") -> str:
     """That these laws have no slope there, for a reader."""
     names = list(dict.fromkeys(row.label.removesuffix(".law") for row in rows))
     laws = f"the law at {names[0]} has" if len(names) == 1 else f"the laws at {', '.join(names[:3])} have"
-    return f"{laws} no slope at {where} (it vanishes, or grows without bound, where nothing flows): no rate follows"
+    does = {row.slope for row in rows}
+    what = does.pop() if len(does) == 1 and "" not in does else "vanishes, or grows without bound,"
+    return f"{laws} no slope at {where} (it {what} where nothing flows): no rate follows"
 
 
-def without_slope(system: System, t: float, y: Floats, yd: Floats) -> tuple[RowLabel, ...]:
-    """Labels of `rows_without_slope`."""
-    return labels(system, rows_without_slope(system, t, y, yd))
+def without_slope(system: System, t: float, y: Floats, yd: Floats, size: Floats | None = None) -> tuple[RowLabel, ...]:
+    """Labels of `rows_without_slope`, with what each slope does."""
+    falls, rises = _bent(system, t, y, yd, size)
+    found = {row: replace(system.row_label(row), slope=_FALLS) for row in falls.tolist()}
+    for row in rises.tolist():
+        found[row] = replace(system.row_label(row), slope="" if row in found else _RISES)
+    return tuple(dict.fromkeys(found[row] for row in sorted(found)))
 
 
 def labels(system: System, rows: Ints) -> tuple[RowLabel, ...]:
@@ -48,10 +58,15 @@ def rows_without_slope(system: System, t: float, y: Floats, yd: Floats) -> Ints:
 
     y, yd [unknowns] of the system.
     """
+    return np.union1d(*_bent(system, t, y, yd, None))
+
+
+def _bent(system: System, t: float, y: Floats, yd: Floats, size: Floats | None) -> tuple[Ints, Ints]:
+    """Rows in which a slope vanishes, and in which one grows; size [unknowns]: of each (its group)."""
     row, column = system.pattern.row, system.pattern.columns_of()
     algebraic = np.isin(system.kinds, ("f", "e"))
     algebraic[column[system.structural()[1]]] = False
-    size = group_maximum(system, np.abs(y))
+    size = group_maximum(system, np.abs(y)) if size is None else size
     size = np.where(size > NONE, size, 1.0) * (1.0 + 0.1 * (np.arange(y.size) % 7))
     seen = np.zeros(row.size, dtype=np.int64)
     falls = rises = algebraic[column]
@@ -65,5 +80,4 @@ def rows_without_slope(system: System, t: float, y: Floats, yd: Floats) -> Ints:
                 rises = rises & (~beyond | ((slope > before / FALLS) & (before > 0.0)))
             seen += beyond
             before = slope
-    bent = (falls | rises) & (seen > 1)
-    return np.unique(row[bent])
+    return np.unique(row[falls & (seen > 1)]), np.unique(row[rises & (seen > 1)])

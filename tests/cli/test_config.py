@@ -7,9 +7,7 @@ from sysdyn.cli.main import group, run
 from sysdyn.cli.project.config import KEYS
 from texts import PENDULUM, write
 
-WARNED = "table f(x: m) -> N linear extend [\n  (0, 0), (1, 2)\n]\n" + PENDULUM.replace(
-    "energy V = m*g0*y", "energy V = m*g0*y\n  work f(x) on x"
-)
+WARNED = PENDULUM.replace("energy V = m*g0*y", "energy V = m*g0*y\n  work -(1 N)*sign(x') on x")
 
 
 def said(capsys, *command):

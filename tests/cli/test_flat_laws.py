@@ -5,6 +5,8 @@ import math
 import pytest
 from scipy.integrate import solve_ivp
 from sysdyn.cli.main import run
+from sysdyn.runtime.model.failures import RowLabel
+from sysdyn.runtime.model.slopes import no_slope
 from sysdyn.runtime.trace.trace import Trace
 
 VESSELS = """
@@ -164,3 +166,41 @@ scene s of m { time 0 s to 1 ms; trace D.e }
 """)
     assert run(["simulate", str(tmp_path / "m.sd")]) in (1, 3)
     assert "no slope" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("law", ["f*abs(f)", "f*abs(f) + 1e8 s/m^3*f^3"])
+def test_what_a_slope_does_at_rest_is_told(tmp_path, capsys, law):
+    given = ["--formulation", "co_lagrangian", "--method", "dopri"]
+    exit_, said = simulated(tmp_path, capsys, f"dissipator(e = 1e11 Pa.s^2/m^6*({law}))", *given)
+    assert exit_ in (1, 3), said
+    assert "no slope at this state (it vanishes where nothing flows)" in said
+
+
+def test_what_a_slope_does_is_said_where_it_is_known_of_all():
+    falls, rises = RowLabel("A.law", slope="vanishes"), RowLabel("B", slope="grows without bound")
+    assert "the law at A has no slope at this state (it vanishes where" in no_slope((falls,))
+    assert "the law at B has no slope at the start (it grows without bound where" in no_slope((rises,), "the start")
+    for unknown in ((falls, rises), (RowLabel("C"),)):
+        assert "(it vanishes, or grows without bound, where nothing flows)" in no_slope(unknown)
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+def test_a_vessel_that_runs_empty_names_the_law_that_is_flat_there(tmp_path, capsys, formulation):
+    """A square law: the slope vanishes as the flow does (E930 of a tank without a reason, or 'grows without bound')."""
+    (tmp_path / "m.sd").write_text("""from std.fluid import tank, valve
+model vessel {
+  node a: hydraulic
+  A: tank(A = 1 m^2) a
+  O: valve(Cr = 1e11 Pa.s^2/m^6) a -> ground
+  init a.e = 1e4 Pa
+}
+scene s of vessel { time 0 s to 3 h; trace a.e }
+""")
+    given = ["--formulation", formulation, "--method", "dopri", "-o", str(tmp_path / "t.h5")]
+    assert run(["simulate", str(tmp_path / "m.sd"), *given]) == 3
+    said = capsys.readouterr().err
+    assert "error E931" in said
+    assert "the law at O has no slope at this state (it vanishes where nothing flows)" in said
+    assert "m.sd:5" in said
+    assert "--method radau, bdf or auto" in said
+    assert run(["simulate", str(tmp_path / "m.sd"), *given, "--method", "radau"]) == 0

@@ -15,14 +15,10 @@ WRONG = """model m {
   energy V = 1/2*k*x^2,
 }
 """
-WARNED = """table f(x: m) -> N linear extend [
-  (0, 0), (1, 2)
-]
-
-model w {
+WARNED = """model w {
   coord x: translation = 1 m
   energy T* = 1/2*(1 kg)*x'^2
-  work -f(x) on x
+  work -(1 N)*sign(x') on x
 }
 """
 RIGHT = """model r {

@@ -144,7 +144,7 @@ def test_e806_an_index_that_is_not_affine():
             Energy("T*", square(f("b")), (), PLACE),
         ),
     )
-    assert findings(net) == [("E806", "index #0^2 is not affine: i + c with whole c is meant")]
+    assert findings(net) == [("E806", "index i^2 is not affine: i + c with whole c is meant")]
 
 
 @pytest.mark.parametrize(("literal", "codes"), [(False, ["N608"]), (True, [])])

@@ -3,6 +3,7 @@
 import pytest
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.text.codes import codes
 from sysdyn.dsl.text.diagnostics import Report
 
 HEAD = """from std.electrical import resistor, capacitor, voltage
@@ -84,6 +85,29 @@ def test_a_library_of_ones_own_is_a_library(tmp_path):
     assert error.place.file == str(path)
     assert error.place.start[0] == 5
     assert error.related[0].place.file.endswith("parts.sd")
+
+
+@pytest.mark.parametrize("outside", ["extend", "clamp", "stop", ""])
+def test_only_who_did_not_write_extend_is_warned_of_it(tmp_path, outside):
+    """W302 of a table of another file; never in the text that says so itself, nor where that file alone reads it."""
+    table = f"table pull(x: m) -> N linear {outside} [ (0, 0), (1, 4) ]\n"
+    holder = "component spring {\n  branch: translation\n  law e = pull(q)\n}\n"
+    page = codes()["W302"].bad
+    path = tmp_path / "m.sd"
+    path.write_text(table + page.partition("\n\n")[2])
+    assert findings(path) == []
+    (tmp_path / "curves.sd").write_text(table + holder)
+    path.write_text(page)
+    found = findings(path)
+    assert [d.code for d in found] == ["W302"] * (outside == "extend")
+    for warning in found:
+        assert (warning.place.file, text_of(warning.place)) == (str(path), "pull")
+        assert warning.related[0].place.file.endswith("curves.sd")
+    path.write_text(
+        "from curves import spring\n\nmodel m {\n  coord x: translation = 1 m\n"
+        "  energy T* = 1/2*(1 kg)*x'^2\n  S: spring() x\n}\n"
+    )
+    assert findings(path) == []
 
 
 def text_of(place):

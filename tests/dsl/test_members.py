@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from sysdyn import api
 from sysdyn.dsl import load
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
@@ -14,6 +15,7 @@ from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.members import Members
 from sysdyn.dsl.names.names import STATICS, Names, pick
+from sysdyn.dsl.names.quantities import OF_ELEMENTS
 from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import Typed, Vector
 from sysdyn.dsl.rules import laws
@@ -295,3 +297,48 @@ def told_of(network):
     report = Report()
     laws.run(network, Values(network.parameters, []), report)
     return [d.code for d in report]
+
+
+STORES = """component box {
+  port p, m: electrical
+  L: kinetic(p = 1 H*f) p -> m
+  C: potential(q = 1 F*e) p -> m
+}
+model m {
+  node a: electrical
+  coord x: translation = 1 m
+  energy T* = 1/2*(1 kg)*x'^2
+  V: effort(e = 1 V) a -> ground
+  R: dissipator(e = 1 ohm*f) a -> ground
+  B: box() p = a, m = ground
+}
+scene s of m {
+  time 0 s to 1 s
+  trace READ as z
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("read", "help_", "right"),
+    [
+        ("B.V", "of the elements inside, B.C.V", "B.C.V"),
+        ("B.Tstar", "of the elements inside, B.L.Tstar", "B.L.Tstar"),
+        ("B.D", "stores have T, Tstar or V, Vstar, dissipators D, G; no dissipator is inside", None),
+        ("R.T", "R.D or R.G or R.power or R.energy", "R.G"),
+        ("V.Tstar", "V.power or V.energy", "V.energy"),
+        ("B.L.D", "B.L.Tstar or B.L.T or B.L.power or B.L.energy", "B.L.T"),
+        ("x.T", f"{OF_ELEMENTS}: LABEL.T; of the whole model audit.kinetic", "audit.kinetic"),
+        ("x.V", f"{OF_ELEMENTS}: LABEL.V; of the whole model audit.potential", "audit.potential"),
+        ("a.D", f"{OF_ELEMENTS}: LABEL.D; the node has e", "R.D"),
+        ("a.V", "write a.e", "a.e"),
+    ],
+)
+def test_who_has_no_state_function_is_told_who_has(read, help_, right):
+    (error,) = _errors(STORES.replace("READ", read))
+    assert (error.code, error.help) == ("E102", help_)
+    assert right is None or _errors(STORES.replace("READ", right)) == []
+
+
+def _errors(text):
+    return [d for d in api.check(text) if d.severity == "error"]

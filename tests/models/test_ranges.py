@@ -46,3 +46,72 @@ def test_the_run_ends_where_the_argument_leaves_the_data(tmp_path, capsys, formu
         assert trace["R.e"][()] + trace["C.e"][()] == pytest.approx(source, abs=1e-3)
     assert run(["diff", "-q", str(out), str(out)]) == 1
     assert "did not end as asked" in capsys.readouterr().err
+
+
+READ = """table give(x: m) -> V pchip stop [ (-1, 0), (0, 1), (1, 3) ]
+table pull(x: m, s: 1) -> V linear stop [ (-9, 0, 1), (9, 0, 2), (-9, 1, 3), (9, 1, 5) ]
+model m {
+  node x: translation
+  M: kinetic(p = 2 kg*f) x
+  S: potential(e = 8 N/m*q) x
+  init x.q = 0 m
+  init M.f = 3 m/s
+}
+scene s of m {
+  time 0 s to 4 s
+  trace x.q
+  SAID
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.parametrize(
+    ("said", "table", "end"),
+    [
+        ("trace give(x.q) as u every 10 ms", "give", np.arcsin(1.0 / 1.5) / 2.0),
+        ("trace 2*give(x.q + 0.2 m)^2 as u", "give", np.arcsin(0.8 / 1.5) / 2.0),
+        ("expect always: give(x.q) <= 9 V", "give", np.arcsin(1.0 / 1.5) / 2.0),
+        ("trace pull(x.q, t/(3 s)) as u", "pull", 3.0),
+    ],
+)
+@pytest.mark.one_in(2)
+def test_a_table_that_only_a_trace_reads_ends_the_run_there_too(tmp_path, capsys, formulation, said, table, end):
+    """x = 1.5 m sin(2 t/s)."""
+    path, out = tmp_path / "m.sd", tmp_path / "t.h5"
+    path.write_text(READ.replace("SAID", said), encoding="utf-8")
+    assert run(["simulate", str(path), "--formulation", formulation, "-o", str(out)]) == 3
+    heard = capsys.readouterr().err
+    assert "error E932" in heard
+    assert f"table {table} left its range" in heard
+    assert said.partition("(")[2] in heard
+    assert "range" not in heard.partition("last good state")[2]
+    with h5py.File(out) as trace:
+        assert trace.attrs["final"] == 0
+        assert float(re.search(r"stopped at t = (\S+) s", heard)[1]) == pytest.approx(end, abs=2e-3)
+        assert trace["time"][-1] <= end + 2e-3
+        assert all(np.isfinite(trace[name]).all() for name in trace if isinstance(trace[name], h5py.Dataset))
+
+
+@pytest.mark.parametrize("command", ["equations", "linearize"])
+def test_what_watches_a_table_is_no_part_of_the_model(tmp_path, capsys, command):
+    path = tmp_path / "m.sd"
+    path.write_text(READ.replace("SAID", "trace give(x.q) as u"), encoding="utf-8")
+    assert run([command, str(path)]) == 0
+    with_table = capsys.readouterr().out
+    path.write_text(READ.replace("SAID", ""), encoding="utf-8")
+    assert run([command, str(path)]) == 0
+    assert capsys.readouterr().out == with_table
+
+
+def test_a_table_that_only_a_condition_reads_ends_the_run_there_too(tmp_path, capsys):
+    """Beyond its data the condition held no number: it never became true, and nobody said so."""
+    path, out = tmp_path / "m.sd", tmp_path / "t.h5"
+    event = "discrete n = 0; when give(x.q) > 5 V { n := 1 }; init x.q"
+    path.write_text(READ.replace("init x.q", event).replace("SAID", "trace n"), encoding="utf-8")
+    assert run(["simulate", str(path), "-o", str(out)]) == 3
+    said = capsys.readouterr().err
+    assert "table give left its range" in said
+    assert float(re.search(r"stopped at t = (\S+) s", said)[1]) == pytest.approx(np.arcsin(1.0 / 1.5) / 2.0, abs=2e-3)
+    with h5py.File(out) as trace:
+        assert trace.attrs["final"] == 0

@@ -4,7 +4,7 @@
     pchip, cubic     the table between its ends, held outside
 
 A method of higher order crosses a corner at the cost of many small steps; kinks.py watches each node instead.  Tables
-of many nodes stay tables, as do those of two arguments and those that stop a run.
+of many nodes stay tables, as do bilinear ones and those that stop a run.
 """
 
 from __future__ import annotations
@@ -38,8 +38,25 @@ def broken(root: Node, tables: Mapping[str, Table]) -> Node:
         args = tuple(done[a] for a in node.args)
         table = tables.get(node.data[0]) if node.op == "table" else None
         apart = table is not None and _apart(table, node)
-        done[node] = _pieces(table, args[0], node.data[1]) if table and apart else rebuild(node, args)
+        if table is not None and apart:
+            done[node] = _pieces(table, args[0], node.data[1])
+        elif table is not None and len(args) > 1 and len(table.values) <= MOST:
+            done[node] = _spread(table, node, args)
+        else:
+            done[node] = rebuild(node, args)
     return done[root]
+
+
+def _spread(table: Table, node: Node, args: tuple[Node, ...]) -> Node:
+    """A table of two arguments of which some are choices between points of its grid: a choice between its values."""
+    for k, choice in enumerate(args):
+        if choice.op == "cond":
+            condition, *branches = choice.args
+            return conditional(condition, *(_spread(table, node, (*args[:k], b, *args[k + 1 :])) for b in branches))
+    if node.data[1] != 0 or any(a.op != "const" or a.data not in p for a, p in zip(args, table.points, strict=True)):
+        return rebuild(node, args)
+    at = [p.index(a.data) for a, p in zip(args, table.points, strict=True)]
+    return const(table.values[at[0] * len(table.points[1]) + at[1]])
 
 
 def _apart(table: Table, node: Node) -> bool:

@@ -1,0 +1,80 @@
+"""Tables that stop the run and that a trace, an expectation or an event alone reads: the run must meet where they end.
+
+No equation reads them, so no step would notice.  Each argument is handed to a table that is zero over the same range
+and no number beyond, and its integral is a dynamic variable: it stays zero, and the run ends where it has no rate
+(language, section 11, 39).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.network import Dynamic, Initial, Network, Observation, State
+from sysdyn.dsl.model.rewriting import expressions
+from sysdyn.dsl.model.units import NONE, si
+from sysdyn.dsl.text.diagnostics import Place
+
+RANGE = " range"
+"""Ends the name of the table that is zero over a table's range."""
+_PASSED = 1e-12
+"""Of the range: what the argument of a table of one argument may pass the end by, and that of a map may not."""
+
+
+def watched(elaborator: Elaborator, observations: Iterable[Observation]) -> None:
+    """Adds the states, and what keeps them from being pruned, to the elaborator's parts."""
+    tables, parts = elaborator.files.tables, elaborator.parts
+    if all(t.outside != "stop" for t in tables.values()):
+        return
+    moving = [e for e in parts.expectations if e.moment != "static"]
+    asked = [(o.expression, o.place) for o in (*observations, *parts.watched)]
+    asked += [(node, e.place) for e in moving for node in (e.left, e.right)]
+    equations = expressions(parts, "energies", "constraints", "works", "dynamics", "branches.law", "couplings")
+    met = {node for node in ex.topological(equations) if node.op == "table"}
+    for root, place in asked:
+        for node in ex.topological([root]):
+            table = tables.get(node.data[0]) if node.op == "table" and node not in met else None
+            met.add(node)
+            for k, argument in enumerate(node.args if table is not None and table.outside == "stop" else ()):
+                if table is None or not _a_rate(argument):
+                    continue
+                name = f"{table.name}{RANGE}" + (f" {k + 1}" if k else "")
+                first, last = table.points[k][0], table.points[k][-1]
+                ends = (first, last if len(node.args) == 1 else last - _PASSED * (last - first))
+                tables[name] = replace(table, name=name, method="linear", points=(ends,), values=(0.0, 0.0))
+                _integrated(elaborator, ex.table(name, argument), place)
+
+
+def unwatched(network: Network) -> Network:
+    """The network without these states: for whom no time passes."""
+    names = {s.name for s in network.states if RANGE in s.name}
+    if not names:
+        return network
+    return replace(
+        network,
+        states=tuple(s for s in network.states if s.name not in names),
+        dynamics=tuple(d for d in network.dynamics if d.state.data[0] not in names),
+        initials=tuple(i for i in network.initials if i.target.op != "var" or i.target.data[0] not in names),
+        observations=tuple(o for o in network.observations if o.name not in names),
+    )
+
+
+def _integrated(elaborator: Elaborator, rate: ex.Node, place: Place) -> None:
+    """A state with this rate, zero at the start, that something reads."""
+    parts = elaborator.parts
+    name = f"{rate.data[0]} {len(parts.watched)}"
+    state = ex.var(name, "s")
+    parts.states.append(State(name, (), si(NONE), place))
+    parts.dynamics.append(Dynamic(state, rate, (), place))
+    parts.given.add(name)
+    parts.initials.append(Initial(state, ex.const(0.0), True, (), place))
+    parts.watched.append(Observation(name, state, si(NONE), name, place, stored=False))
+
+
+def _a_rate(argument: ex.Node) -> bool:
+    """Whether a rate may read it: no second derivative, no loop variable of a sum around it."""
+    nodes = ex.topological([argument])
+    second = any(n.op == "var" and n.data[2] + (n.data[1] == "f") > 1 for n in nodes)
+    return not second and all(n.op != "index" for n in nodes)
