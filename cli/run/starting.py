@@ -10,6 +10,7 @@ from sysdyn.cli.run.contradiction import inconsistent, place_of
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared, prepare
+from sysdyn.dsl.elaborate.stopping import RANGE
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Expectation
@@ -222,7 +223,8 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
     if any(n.data in ("static order", "static manifold") for c in prepared.network.statics for n in _names(c)):
         tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
         counted = order_and_manifold(system, state, tangible)
-        known |= {"order": counted[0], "manifold": counted[1]} if counted else {}
+        watched = sum(RANGE in s.name for s in prepared.network.states)
+        known |= {"order": counted[0] - watched, "manifold": counted[1]} if counted else {}
     for claim in prepared.network.statics:
         _static(prepared, claim, known, report)
 

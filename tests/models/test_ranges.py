@@ -115,3 +115,17 @@ def test_a_table_that_only_a_condition_reads_ends_the_run_there_too(tmp_path, ca
     assert float(re.search(r"stopped at t = (\S+) s", said)[1]) == pytest.approx(np.arcsin(1.0 / 1.5) / 2.0, abs=2e-3)
     with h5py.File(out) as trace:
         assert trace.attrs["final"] == 0
+
+
+def test_what_watches_a_range_is_no_part_of_the_order(tmp_path, capsys):
+    (tmp_path / "m.sd").write_text("""table k(x: m) -> N linear stop [ (0, 0), (1, 5) ]
+model m {
+  coord x: translation = 0 m
+  energy T* = 1/2*1 kg*x'^2
+  energy V = 1/2*1 N/m*x^2
+  init x' = 0.5 m/s
+  expect static: order == 2
+}
+scene s of m { time 0 s to 0.3 s; trace x, k(x) every 0.1 s }
+""")
+    assert run(["check", str(tmp_path / "m.sd")]) == 0, capsys.readouterr().err
