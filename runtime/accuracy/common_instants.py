@@ -198,7 +198,7 @@ class Instants:
 
     def take(self, own: Floats) -> None:
         """The next run is compared at these (s) of a run's own rows: steps are shorter than those of the draft."""
-        self.common = self.known if np.array_equal(own, self.known) else own
+        self.common = self.known if self.known is not None and np.array_equal(own, self.known) else own
 
     def rows(self, *, compared: bool, draft: bool) -> tuple[Floats, Ints]:
         """Instants and kinds of a run's rows; compared: with those of comparison, of a draft these alone."""

@@ -45,9 +45,9 @@ class Compared:
         """Keeps what runs are compared by: rows at the instants of the run before, and its own, thinned."""
         if self.options.every is None:
             self._thinned.take(rows[(kind & TRACE) > 0])
-        elif self.instants.common is not self.instants.known:  # those of a draft, which steps of this run may pass by
-            traced = rows[(kind & TRACE) > 0]
-            self._traced.append(traced[np.isin(traced[:, 0], self.instants.known)])
+        elif (known := self.instants.known) is not None and self.instants.common is not known:
+            traced = rows[(kind & TRACE) > 0]  # beside rows at instants of a draft, which this run's steps may pass by
+            self._traced.append(traced[np.isin(traced[:, 0], known)])
         if (kind & COMPARED).any():
             self._rows.append(rows[(kind & COMPARED) > 0])
 
