@@ -58,7 +58,7 @@ class Compared:
         if self.instants.open:
             self.instants.close(rows[:, 0])
         instants, there = self.instants.common, None
-        own = self._of_its_own()
+        own = self._of_its_own(finished)
         if own is not None:
             there = _values(own, finished, quantities), self._late(own, quantities, steps=True)
         self._at = instants if instants is not None else self.instants.common
@@ -75,14 +75,14 @@ class Compared:
         self.samplings = (*self.samplings[-1:], found)
         return found
 
-    def _of_its_own(self) -> Floats | None:
-        """Rows of the run at which the next one is compared with it; None: those of the run before serve, as they do
-        behind a draft, which has no others.
+    def _of_its_own(self, finished: Finished) -> Floats | None:
+        """Rows of the run at which the next one is compared with it; None: those of the run before serve.  So do those
+        of a draft, which has no others, and of runs with events, near which two runs differ by their instants.
         """
         if self.options.every is None:
             self.instants.common = common(self._thinned.time, self.options)
             return self._thinned.rows(self.instants.common)
-        if not any(map(len, self._traced)):
+        if finished.events or not any(map(len, self._traced)):
             return None
         own = np.concatenate(self._traced)
         own = own[np.diff(own[:, 0], prepend=-np.inf) > 0.0]  # before a jump, as rows of comparison are
