@@ -1,8 +1,8 @@
 """Integration of psi rows that touch a tangible displacement (language, section 5, I1-I4; book, section 2.4).
 
-A row B f + b = 0 with B and b of parameters alone has the primitive B q + b t.  Where it touches a tangible coordinate
-it is replaced by  phi: B q + b t - c = 0,  c = B q0 + b t0  at the initial displacements, a parameter that the binding
-computes.  The label keeps its name: its multiplier becomes kappa.
+A row B f + b = 0 with B and b of constant parameters alone has the primitive B q + b t.  Where it touches a tangible
+coordinate it is replaced by  phi: B q + b t - c = 0,  c = B q0 + b t0  at the initial displacements, a parameter that
+the binding computes.  The label keeps its name: its multiplier becomes kappa.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from sysdyn.compiler.model.energies import EnergyModel, Offset, Row
 from sysdyn.compiler.model.mirror import Mirror
 from sysdyn.compiler.model.terms import Nest, Term, local_variables
 from sysdyn.dsl.model.calculus import derivative
-from sysdyn.dsl.model.expression import Node, add, const, mul, neg, param, substitute, time, var, variables
+from sysdyn.dsl.model.expression import Node, add, const, mul, neg, param, substitute, time, topological, var, variables
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.text.diagnostics import Diagnostic
 
@@ -50,8 +50,11 @@ def _touches(rows: list[Row], tangible: frozenset[str], mirror: Mirror) -> bool:
 
 
 def _all_exact(rows: list[Row], model: EnergyModel) -> bool:
-    """I1: coefficients and the free part of parameters alone."""
-    return all(_exact(term, model.mirror) for row in rows for term in row.terms)
+    """I1: coefficients and the free part of parameters alone that no event assigns: with b the primitive would jump."""
+    terms = [term for row in rows for term in row.terms]
+    if any(n.op == "param" and n.data in model.discretes for term in terms for n in topological([term.expression])):
+        return False
+    return all(_exact(term, model.mirror) for term in terms)
 
 
 def _exact(term: Term, mirror: Mirror) -> bool:

@@ -128,6 +128,7 @@ class EnergyModel:
     quasis: tuple[str, ...] = ()
     speeds: tuple[Quantity, ...] = ()
     switched: frozenset[str] = frozenset()  # labels of constraints that hold at times
+    discretes: frozenset[str] = frozenset()  # parameters that events assign
     solved: Mapping[str, tuple[Node, Node]] = field(default_factory=dict)  # 0 = dT/dp - f where T* stays; its rate
 
     def function(self, name: str) -> tuple[Term, ...]:
@@ -192,6 +193,7 @@ def energies(network: Network) -> EnergyModel:
         quasis=network.quasis,
         speeds=tuple(Quantity(o.name, flows(o.expression), False, o.unit.text, o.place) for o in network.speeds),
         switched=frozenset(s.label for s in network.switches if s.holds is None),
+        discretes=frozenset(network.discretes),
     )
     touched = tangible(model)
     coordinates = tuple(replace(c, tangible=c.name in touched) for c in model.coordinates)

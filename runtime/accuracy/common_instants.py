@@ -168,8 +168,9 @@ class _Joined:
 
 
 class Instants:
-    """Where the runs of a simulation write rows and are compared: times [s] and kinds of rows as asked; common [s]: of
-    comparison, None while they are not known; open: while those are of the trace, from which a draft takes its own.
+    """Where the runs of a simulation write rows and are compared: times [s] and kinds of rows as asked; known [s]: of
+    comparison, where the trace says (None: they are steps); common [s]: of the last run, at which the next one is
+    compared with it (None: not known yet); open: while a draft takes its own from those of the trace.
     """
 
     def __init__(self, options: Options, kept: dict[str, Any], quantities: int) -> None:
@@ -185,14 +186,19 @@ class Instants:
                 kept["instants"] = before
         self.times: Floats
         self.kinds: Ints
-        self.common: Floats | None
+        self.known: Floats | None
         self._joined: _Joined | None
-        self.times, self.kinds, self.common, self._joined = before[1]
+        self.times, self.kinds, self.known, self._joined = before[1]
+        self.common = self.known
         self.open = options.every is not None
 
     def close(self, common: Floats | None) -> None:
         """From now on runs are compared at these (s)."""
         self.common, self.open = common, False
+
+    def take(self, own: Floats) -> None:
+        """The next run is compared at these (s) of a run's own rows: steps are shorter than those of the draft."""
+        self.common = self.known if self.known is not None and np.array_equal(own, self.known) else own
 
     def rows(self, *, compared: bool, draft: bool) -> tuple[Floats, Ints]:
         """Instants and kinds of a run's rows; compared: with those of comparison, of a draft these alone."""

@@ -38,12 +38,16 @@ class Compared:
     def begin(self) -> None:
         """A run begins."""
         self._rows: list[Floats] = []
+        self._traced: list[Floats] = []
         self._thinned = Thinned()
 
     def take(self, rows: Floats, kind: Ints) -> None:
         """Keeps what runs are compared by: rows at the instants of the run before, and its own, thinned."""
         if self.options.every is None:
             self._thinned.take(rows[(kind & TRACE) > 0])
+        elif (known := self.instants.known) is not None and self.instants.common is not known:
+            traced = rows[(kind & TRACE) > 0]  # beside rows at instants of a draft, which this run's steps may pass by
+            self._traced.append(traced[np.isin(traced[:, 0], known)])
         if (kind & COMPARED).any():
             self._rows.append(rows[(kind & COMPARED) > 0])
 
@@ -54,9 +58,8 @@ class Compared:
         if self.instants.open:
             self.instants.close(rows[:, 0])
         instants, there = self.instants.common, None
-        if self.options.every is None:
-            self.instants.common = common(self._thinned.time, self.options)
-            own = self._thinned.rows(self.instants.common)
+        own = self._of_its_own(finished)
+        if own is not None:
             there = _values(own, finished, quantities), self._late(own, quantities, steps=True)
         self._at = instants if instants is not None else self.instants.common
         values = there[0] if there is not None and instants is None else _values(rows, finished, quantities)
@@ -71,6 +74,20 @@ class Compared:
         )
         self.samplings = (*self.samplings[-1:], found)
         return found
+
+    def _of_its_own(self, finished: Finished) -> Floats | None:
+        """Rows of the run at which the next one is compared with it; None: those of the run before serve.  So do those
+        of a draft, which has no others, and of runs with events, near which two runs differ by their instants.
+        """
+        if self.options.every is None:
+            self.instants.common = common(self._thinned.time, self.options)
+            return self._thinned.rows(self.instants.common)
+        if finished.events or not any(map(len, self._traced)):
+            return None
+        own = np.concatenate(self._traced)
+        own = own[np.diff(own[:, 0], prepend=-np.inf) > 0.0]  # before a jump, as rows of comparison are
+        self.instants.take(own[:, 0])
+        return own
 
     def _between(self, rows: Floats, finished: Finished, quantities: Quantities) -> Floats | None:
         """What the compared quantities move by [k, quantities], as fast as at these rows, from an event of this run to

@@ -32,7 +32,7 @@ RETRIED = (1.0, 0.1, 1e-2)
 WORTH = 0.3
 """Of the last tolerance: a run with more than that says little beside it."""
 ROOT = 0.5
-"""The most that is credited where a quantity ends as a root of the state."""
+"""Part of what is credited where a quantity ends as a root of the state, from the pair on that shows it."""
 SHORT = 60
 """Steps of a run below which its error does not follow its tolerance as theory says."""
 FIRST_DROP = 1e-2
@@ -161,7 +161,8 @@ def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
 class _Estimate:
     """The estimate of the last of two runs, and the power with which the errors fall.
 
-    alone: no pair before says how they do.
+    alone: no pair before says how they do; root: a quantity ends as a root of the state: what
+    tolerances do for it comes before shorter steps.
     """
 
     def __init__(self, law: Law, target: Floats) -> None:
@@ -170,6 +171,7 @@ class _Estimate:
         self._deep, self.lost, self._unknown, self.alone = 1.0, False, False, True
         self._before: tuple[float, float] | None = None
         self._power: float | None = None
+        self.root = False
 
     def compare(self, coarse: Sampled, fine: Sampled, shorter: float | None = None) -> float:
         """Takes the pair in; returns the plain difference.  shorter: the longest step of the finer over that of the
@@ -177,6 +179,10 @@ class _Estimate:
         """
         step = float(np.log10(coarse.tolerance / fine.tolerance))
         apart, over = difference(coarse, fine, self.target)
+        left, left_over = left_at_rest(coarse, fine, self.target, known=self.root)
+        self.root |= left > 0.0
+        if self.root and step > 0.0:
+            shorter = None
         self.alone = shorter is None and self._before is None
         lost = apart > DIFFER and over > FAR_OFF
         self._unknown = lost and (step >= DEEP or self.lost)
@@ -184,10 +190,9 @@ class _Estimate:
         self.lost = lost
         shrink, luck = None, 1.0
         credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
-        left, left_over = left_at_rest(coarse, fine, self.target)
-        credit = min(credit, ROOT) if left else credit
+        credit *= ROOT if self.root else 1.0
         if shorter is not None:
-            part = shorter**BY_STEPS
+            part = shorter ** (ROOT * BY_STEPS if self.root else BY_STEPS)
             shrink = self.law.safety * part / (1.0 - part)
         elif self._before is not None:
             over_before, step_before = self._before
@@ -309,11 +314,11 @@ def control(
         if law.brief and dear and now.steps < LENGTHY:
             return _achieved(estimate.apart, False, number, now.tolerance, lost=estimate.lost)
         before, still = still, _held(now, longest)
-        held = before and still
-        if now.tolerance <= 1.01 * law.finest and not held:
+        held, finest = before and still, now.tolerance <= 1.01 * law.finest
+        if finest and not held:
             last = now
             break
-        shorter = estimate.shorter() if held else None
+        shorter = estimate.shorter() if held and (finest or not estimate.root) else None
         last, longest = now, longest * (shorter or 1.0 / STRETCH)
         tolerance = min(estimate.next_tolerance(now.tolerance), TAME if away else 1.0)
     if estimate.over <= 1.0 and not away:  # doubted, and no finer run can tell: one with other steps can

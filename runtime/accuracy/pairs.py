@@ -145,11 +145,12 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     return float(relative.max()), float((relative / target[use]).max())
 
 
-def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
+def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats, *, known: bool = False) -> tuple[float, float]:
     """Where two runs are farthest apart where a quantity comes to rest at zero, from there to the end: the most that is
     left of it in the finer one, relative to its size, and that over the accuracy wanted; zeros elsewhere.  What ends in
     finite time is a root of the state (the flow of a vessel that runs empty), whose error is the root of the state's,
-    and all that is left.
+    and all that is left.  known: a pair before showed that something does; then two runs may by chance be as far from
+    zero, and what they hardly share a digit of is left.
     """
     before, size = coarse.own[0], fine.largest
     use = (size != 0.0) & np.isfinite(target)
@@ -162,7 +163,8 @@ def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float,
         return 0.0, 0.0
     row, column = np.unravel_index(np.argmax(over), over.shape)
     left, seen = (np.abs(values[row:, use][:, column]).max() for values in (fine.values, before))
-    if not max(left, seen) <= STILL * far[row, column] < MUCH * size[use][column]:
+    still = (1.0 / LOST if known else STILL) * far[row, column]
+    if not (max(left, seen) <= still and max(left, seen, STILL * far[row, column]) < MUCH * size[use][column]):
         return 0.0, 0.0
     return float(left / size[use][column]), float(left / (size * target)[use][column])
 

@@ -455,7 +455,7 @@ class _Condenser:
         large, zero = whole.unknowns > LARGE, np.zeros(whole.unknowns)
         constant = whole.residual(t, zero, zero)
         jy = None if large else whole.slopes(t, y, yd, rate=False)
-        allowed = definable(whole, whole.slopes(t, y, yd, rate=False) if jy is None else jy, constant)
+        allowed = definable(whole, whole.slopes(t, y, yd, rate=False) if jy is None else jy, constant, y)
         if self._found is None or not np.array_equal(allowed, self._allowed):
             self._allowed, self._found, self._forms = allowed, eliminate(whole, allowed), None
         found = self._found

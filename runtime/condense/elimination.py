@@ -28,6 +28,8 @@ HEALTHY = 1e-7
 """Least pivot, in the largest entry of its row with equilibrated columns: what it defines has these digits less.  Where
 a row reads one unknown else, which carries the state, and no constant, it is a multiple of that and has all its digits
 (the voltage of a capacitor of 1 pF, whose charge stays)."""
+NOISE = 1e-13
+"""Of the largest term of a row at the start: what is less there may be round-off, and nothing is said by it."""
 OBSERVERS = ("observe", "observe_rate", "observe_scale", "audit", "ledger", "initial")
 LONGEST = 12
 """Definitions one after the other: through more of them the rest would read everything (a chain of scalars)."""
@@ -97,9 +99,10 @@ def _candidates(system: System) -> tuple[Ints, Mask, Mask]:
     return places_of(usable[rows]), gone, carried & ~gone
 
 
-def definable(system: System, jy: Floats, constant: Floats) -> Mask:
+def definable(system: System, jy: Floats, constant: Floats, y: Floats) -> Mask:
     """Entries [entries] through which a row can define an unknown, by their values jy at any point; constant [rows]:
-    what is left of each row where all unknowns are zero.
+    what is left of each row where all unknowns are zero; y [unknowns]: of the start, at which what is defined must not
+    be the small difference of large ones.
     """
     columns, rows = system.pattern.columns_of(), system.pattern.row
     size = np.abs(jy)
@@ -108,6 +111,11 @@ def definable(system: System, jy: Floats, constant: Floats) -> Mask:
     by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
     here, gone, carried = system.once("may leave", lambda: _candidates(system))
     i, j = rows[here], columns[here]
+    term = size[here] * np.abs(y[j])
+    terms = np.abs(constant)
+    np.fmax.at(terms, i, term)
+    cancels = (term < HEALTHY * terms[i]) & (term > NOISE * terms[i])
+    del term, terms
     weight = size[here]
     weight *= by_row[i]
     weight *= by_column[j]
@@ -118,7 +126,7 @@ def definable(system: System, jy: Floats, constant: Floats) -> Mask:
     multiple = (np.bincount(i[reads], minlength=system.rows) == 2) & (constant == 0.0)
     multiple &= np.bincount(i[reads & carried[j]], minlength=system.rows) == 1
     found = np.zeros(rows.size, dtype=bool)
-    found[here] = ~(carried | gone)[j] & reads & ((weight >= HEALTHY * largest[i]) | multiple[i])
+    found[here] = ~(carried | gone)[j] & reads & ~cancels & ((weight >= HEALTHY * largest[i]) | multiple[i])
     return found
 
 

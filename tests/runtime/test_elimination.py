@@ -20,9 +20,9 @@ def system_of(*parts, bent=(), **more):
 
 
 def defining(system, y):
-    """`definable` at a point."""
+    """`definable` at a point, of a run that starts at zero."""
     zero = np.zeros(y.size)
-    return definable(system, system.jacobian(0.0, y, zero)[0], system.residual(0.0, zero, zero))
+    return definable(system, system.jacobian(0.0, y, zero)[0], system.residual(0.0, zero, zero), zero)
 
 
 def eliminated(system, y):
