@@ -127,7 +127,7 @@ class _Planner:
             s.name, kind, number, row(s.value), row(s.rate), row(s.multiplier), row(s.acceleration), row(s.bound),
             row(s.upper), row(s.lower), sense, row(s.guard), restitution,
             tuple(self.row[name] for name in s.aim), tuple(self.prepared.place(n) for n in s.direction),
-            -1 if s.holds is None else self.prepared.place(s.holds), s.moves,
+            -1 if s.holds is None else self.prepared.place(s.holds), s.moves, s.dual,
         )  # fmt: skip
 
 

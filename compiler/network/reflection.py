@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from sysdyn.compiler.network.along import along
+from sysdyn.compiler.network.complements import complements
 from sysdyn.compiler.network.positions import from_stores, with_positions
 from sysdyn.compiler.network.primal.reading import KINDS
 from sysdyn.compiler.network.quadratures import from_masses, massive, with_quadratures
@@ -47,7 +48,7 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    bare = from_masses(from_stores(grounded(as_elements(as_relations(network), ALL))))
+    bare = from_masses(from_stores(grounded(as_elements(as_relations(complements(network)), ALL))))
     network = with_positions(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
@@ -123,14 +124,16 @@ def _read(network: Network) -> Iterable[str]:
 
 def unreflectable(network: Network) -> Diagnostic | None:
     """The first statement that reads a displacement or flow where only momenta and efforts may stand (E602)."""
-    network = as_elements(along(as_relations(network), complementary=True), ALL)
+    network = as_elements(along(as_relations(complements(network)), complementary=True), ALL)
     help_ = "formulation lagrangian, hamiltonian"
     statements: list[tuple[str, tuple[ex.Node, ...], Place]] = [
         (f"energy {e.function}", (e.expression,), e.place) for e in network.energies if e.function in ALL
     ]
     statements += [("work", (w.effort, w.on), w.place) for w in network.works]
     gammas = [(f"gamma {c.name}", (c.expression,), c.place) for c in network.constraints if c.kind == "gamma"]
-    statements += [(f"{c.kind} {c.name}", (c.expression,), c.place) for c in network.constraints if c.kind != "gamma"]
+    dual = {s.label for s in network.switches if s.dual}
+    rest = [c for c in network.constraints if c.kind != "gamma" and c.name not in dual]
+    statements += [(f"{c.kind} {c.name}", (c.expression,), c.place) for c in rest]
     laws = [(f"law of {b.name}", (b.law,), b.place) for b in network.branches if b.law is not None]
     moduli = [(f"ratio of {c.first.partition('#')[0]}", (c.ratio,), c.place) for c in network.couplings]
     for what, roots, place in statements:

@@ -328,6 +328,7 @@ class Switch:
     follows (holds where the one before it does).
     at: indices in the family of the label.  value, rate, acceleration, multiplier, bound, bound - multiplier
     (upper), bound + multiplier (lower), guard: names of observations.  moves: whether the bound changes between events.
+    dual: what holds of the effort is free of the flow, of which the text says it.
     """
 
     name: str
@@ -350,6 +351,7 @@ class Switch:
     direction: tuple[Node, ...] = ()
     holds: Node | None = None
     moves: bool = False
+    dual: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -127,7 +127,7 @@ class Contacts:
             return "sticks" if self.active[k] else f"slips {'+' if self.p[contact.sense] > 0.0 else '-'}"
         if contact.kind == "planar":
             return "sticks" if self.active[k] else "slips"
-        return "holds" if self.active[k] else "free"
+        return "holds" if bool(self.active[k]) is not contact.dual else "free"
 
     # -- what does not fit ---------------------------------------------------------------------------------------
 

@@ -61,7 +61,7 @@ class Contact:
     before it does.
     value, rate, acceleration (of phi), multiplier, bound, bound - multiplier (upper),
     bound + multiplier (lower), guard: rows; number: of its switch; restitution: of phi; moves: whether the bound
-    changes between events (a negative one ends the run).
+    changes between events (a negative one ends the run); dual: what holds here is free in the text.
     """
 
     name: str
@@ -81,6 +81,7 @@ class Contact:
     direction: tuple[int, ...] = ()
     hold: int = -1
     moves: bool = False
+    dual: bool = False
 
 
 @dataclass(frozen=True, slots=True)

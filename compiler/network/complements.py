@@ -1,0 +1,82 @@
+"""Ideal diodes and switches in the complementary family, which has no rows in flows.
+
+A branch without a law carries no effort but the reaction of its constraint: of `f >= 0` (f = 0 while g) either the flow
+or the effort is zero.  The same is said of the effort: `-e >= 0` (e = 0 while not g), whose reaction is the flow.  What
+holds of the one is free of the other (`Switch.dual`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import derivative, time_derivative
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Constraint, Network, Switch
+from sysdyn.dsl.model.rewriting import expressions, rewritten
+
+
+def complements(network: Network) -> Network:
+    """The network with what holds at times of the flow of a branch said of its effort."""
+    found = {row.name: (row, effort) for row, effort in _of_effort(network)}
+    if not found:
+        return network
+
+    def felt(root: Node) -> Node:
+        """Reactions as the effort that they are a part of."""
+        read = [n for n in ex.topological([root]) if n.op == "var" and n.data[0] in found and n.data[1] == "mu"]
+        return ex.substitute(root, {n: _at(found[n.data[0]], n.args)[1] for n in read}) if read else root
+
+    guards = {o.name: o.expression for o in network.observations}
+    dual = [s for s in network.switches if s.label in found]
+    watched = dict(pair for s in dual for pair in _watched(s, found[s.label], guards))
+    network = rewritten(network, felt)
+    return replace(
+        network,
+        constraints=tuple(found[c.name][0] if c.name in found else c for c in network.constraints),
+        observations=tuple(replace(o, expression=watched.get(o.name, o.expression)) for o in network.observations),
+        switches=tuple(replace(s, dual=True) if s in dual else s for s in network.switches),
+    )
+
+
+def _of_effort(network: Network) -> Iterator[tuple[Constraint, Node]]:
+    """Constraints of an effort for those of the flow of a branch that nothing else holds, with the reactions of these."""
+    free = {b.name for b in network.branches if b.law is None and b.kind == "field"}
+    kinds = {s.label: s.kind for s in network.switches}
+    held = Counter(n.data[0] for c in network.constraints for n in ex.variables(c.expression) if n.data[1] == "bf")
+    said = ex.topological(expressions(network, "energies", "works"))
+    stored = {n.data[0] for n in said if n.op == "var" and n.data[1] in ("bf", "bq", "be", "bp")}
+    for c in network.constraints:
+        flows = [n for n in ex.variables(c.expression) if n.op == "var" and n.data[1:] == ("bf", 0)]
+        if c.kind != "psi" or kinds.get(c.name) not in ("psi", "guarded") or len(flows) != 1:
+            continue
+        (flow,), factor = flows, derivative(c.expression, flows[0])
+        alone = ex.is_const(factor) and c.expression is ex.mul(factor, flow)
+        if alone and flow.data[0] in free - stored and held[flow.data[0]] == 1:
+            effort = ex.var(flow.data[0], "be", *flow.args)
+            sign = ex.const(-1.0 if factor.data > 0.0 else 1.0)
+            yield replace(c, expression=ex.mul(sign, effort)), ex.div(effort, factor)
+
+
+def _at(what: tuple[Constraint, Node], at: tuple[Node, ...]) -> tuple[Node, Node]:
+    """The expression of a row, and the reaction, of one element of an array."""
+    row, reaction = what
+    change = dict(zip(row.at, at, strict=True))
+    expression, effort = (ex.substitute(n, change) for n in (row.expression, reaction))
+    return expression, effort
+
+
+def _watched(
+    s: Switch, what: tuple[Constraint, Node], guards: Mapping[str, Node]
+) -> Iterator[tuple[str, Node]]:
+    """What events read of the effort: of an inequality what is not negative while it is free."""
+    at = tuple(ex.const(float(k)) for k in s.at)
+    row, _ = _at(what, at)
+    value = row if s.kind == "guarded" else ex.neg(row)
+    yield s.value, value
+    yield s.rate, time_derivative(value)
+    yield s.multiplier, ex.var(s.label, "mu", *at)
+    if s.guard is not None:
+        yield s.guard, ex.sub(ex.const(1.0), guards[s.guard])
