@@ -42,7 +42,7 @@ def complements(network: Network) -> Network:
 
 
 def _of_effort(network: Network) -> Iterator[tuple[Constraint, Node]]:
-    """Constraints of an effort for those of the flow of a branch that nothing else holds, with the reactions of these."""
+    """Constraints of an effort for those of a flow of a branch that nothing else holds, and the reactions of these."""
     free = {b.name for b in network.branches if b.law is None and b.kind == "field"}
     kinds = {s.label: s.kind for s in network.switches}
     held = Counter(n.data[0] for c in network.constraints for n in ex.variables(c.expression) if n.data[1] == "bf")
