@@ -47,7 +47,8 @@ class Compared:
             self._thinned.take(rows[(kind & TRACE) > 0])
         elif (known := self.instants.known) is not None and self.instants.common is not known:
             traced = rows[(kind & TRACE) > 0]  # beside rows at instants of a draft, which this run's steps may pass by
-            self._traced.append(traced[np.isin(traced[:, 0], known)])
+            at = np.minimum(np.searchsorted(known, traced[:, 0]), known.size - 1)
+            self._traced.append(traced[known[at] == traced[:, 0]])
         if (kind & COMPARED).any():
             self._rows.append(rows[(kind & COMPARED) > 0])
 
@@ -77,7 +78,8 @@ class Compared:
 
     def _of_its_own(self, finished: Finished) -> Floats | None:
         """Rows of the run at which the next one is compared with it; None: those of the run before serve.  So do those
-        of a draft, which has no others, and of runs with events, near which two runs differ by their instants.
+        of a draft, which has no others, of runs with events, near which two runs differ by their instants, and of a
+        trace of few rows.
         """
         if self.options.every is None:
             self.instants.common = common(self._thinned.time, self.options)
@@ -86,6 +88,8 @@ class Compared:
             return None
         own = np.concatenate(self._traced)
         own = own[np.diff(own[:, 0], prepend=-np.inf) > 0.0]  # before a jump, as rows of comparison are
+        if self.instants.known is None or len(own) < self.instants.known.size:  # a trace of few rows: others are known
+            return None
         self.instants.take(own[:, 0])
         return own
 
