@@ -7,6 +7,7 @@ followed from an active set and what touched it is remembered, and tried first w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,12 +91,26 @@ class Succession:
             if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
                 self.contacts.turn(k, values)
         self.contacts.apply()
-        found = self.determined.fit(t, y, yd, restart.struck, touched)
+        found = self._fitting(t, y, yd, touched)
         if self._tied(t, found, touched if self.contacts.state() == stood else ()):
             found = self._ahead(t, found, self.contacts.state()) or found
         if not self._impacts:
             self._follows[stood, tuple(touched)] = self.contacts.state()
         return self._closed(t, found), True
+
+    def _quickly(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+        """The point of a set that has one without a search."""
+        return self._restart.struck(t, y, yd, quickly=True)
+
+    def _fitting(self, t: float, y: Floats, yd: Floats, touched: Sequence[int]) -> Point:
+        """The point with a set that fits.  Sets that contradict themselves have none, which takes long to be sure of:
+        first those are tried that have one at once.
+        """
+        stood = self.contacts.state()
+        with suppress(NoActiveSetError):
+            return self.determined.fit(t, y, yd, self._quickly, touched)
+        self.contacts.become(stood)
+        return self.determined.fit(t, y, yd, self._restart.struck, touched)
 
     def _let_through(self, k: int, t: float, y: Floats, yd: Floats) -> None:
         """Whether the value of a relation goes through zero: neither it nor its rate follows the sense at once."""
@@ -187,14 +202,16 @@ class Succession:
         return open_[0]
 
     def _later(self, t: float, time: float, point: Point, stood: tuple[float, ...]) -> Point | None:
-        """The point at t with the active set that fits `time` (s) later; None where that is the one that stood."""
+        """The point at t with the active set that fits `time` (s) later; None where that is the one that stood, or
+        none is found without a search: it only tells sets apart.
+        """
         y, yd = point
         found = self._restart.struck(t + time, y + time * yd, yd)
         # a flow that begins at rest moves by time^2 alone; a gap that such a move closes is another event's
         straight = self._restart.settler.system.are("q")
         mean = yd if found is None else np.where(straight, yd, 0.5 * (yd + found[1]))
         try:
-            self.determined.fit(t + time, y + time * mean, yd, self._restart.struck)
+            self.determined.fit(t + time, y + time * mean, yd, self._quickly)
         except NoActiveSetError:
             return None
         found = self._restart.struck(t, y, yd) if self.contacts.state() != stood else None

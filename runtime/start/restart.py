@@ -54,12 +54,15 @@ class Restart:
         found = self._struck(t, y, yd, self.magnitude(y.size))
         return None if found is None else found[:2]
 
-    def struck(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+    def struck(
+        self, t: float, y: Floats, yd: Floats, *, quickly: bool = False
+    ) -> tuple[Floats, Floats, Floats] | None:
         """The same with the impulses [unknowns as written] that took the flows there, of a set of constraints that is
-        tried.  Sizes stay as they were: where it has no rank its multipliers are without bound.
+        tried; quickly: without a search.  Sizes stay as they were: where it has no rank its multipliers are without
+        bound.
         """
         known = self.magnitude(y.size)
-        found = self._struck(t, y, yd, known)
+        found = self._struck(t, y, yd, known, quickly=quickly)
         lib.reader(self.settler.core.contents.scale, y.size)[:] = known
         return found
 
@@ -68,7 +71,9 @@ class Restart:
         core = self.settler.core.contents
         return lib.reader(core.scale, core.unknowns + core.rates)[core.unknowns :]
 
-    def _struck(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats, Floats] | None:
+    def _struck(
+        self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, quickly: bool = False
+    ) -> tuple[Floats, Floats, Floats] | None:
         """The same; magnitude [unknowns as written] before it."""
         before = y
         same, moved = _held(self.settler, t, (y, yd), magnitude)
@@ -87,6 +92,8 @@ class Restart:
         found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
         if done and self._stays(found, y, magnitude):
             return found, rate, impulse
+        if quickly:
+            return None
         # what follows is sought from where it was: impulses move it along slopes that steep laws had before the jump
         searched = self._search(t, np.where(self.state, y, before), yd)
         return (*searched, impulse) if searched is not None and self._stays(searched[0], y, magnitude) else None
