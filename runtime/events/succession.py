@@ -7,7 +7,6 @@ followed from an active set and what touched it is remembered, and tried first w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +90,7 @@ class Succession:
             if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
                 self.contacts.turn(k, values)
         self.contacts.apply()
-        found = self._fitting(t, y, yd, touched)
+        found = self.determined.fit(t, y, yd, restart.struck, touched)
         if self._tied(t, found, touched if self.contacts.state() == stood else ()):
             found = self._ahead(t, found, self.contacts.state()) or found
         if not self._impacts:
@@ -101,16 +100,6 @@ class Succession:
     def _quickly(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         """The point of a set that has one without a search."""
         return self._restart.struck(t, y, yd, quickly=True)
-
-    def _fitting(self, t: float, y: Floats, yd: Floats, touched: Sequence[int]) -> Point:
-        """The point with a set that fits.  Sets that contradict themselves have none, which takes long to be sure of:
-        first those are tried that have one at once.
-        """
-        stood = self.contacts.state()
-        with suppress(NoActiveSetError):
-            return self.determined.fit(t, y, yd, self._quickly, touched)
-        self.contacts.become(stood)
-        return self.determined.fit(t, y, yd, self._restart.struck, touched)
 
     def _let_through(self, k: int, t: float, y: Floats, yd: Floats) -> None:
         """Whether the value of a relation goes through zero: neither it nor its rate follows the sense at once."""
