@@ -103,15 +103,20 @@ class Pieces:
         if modes is None:
             return handler.fire(t, *before, samples=due, which=which)
         crossed, begin, events = modes.places(which), self._mode, len(handler.happened)
-        flipped = handler.side.copy()
-        for w in which:
-            if w.relation >= 0:
-                flipped[w.relation] = -float(w.side)
+        flipped = self._flipped(which)
         point = handler.fire(t, *before, samples=due, which=which)
         if not (which and handler.stands(which)):
             modes.learn(begin, t, (crossed, due), (flipped, point, events))
         self._mode = modes.stands()
         return point
+
+    def _flipped(self, which: Sequence[Watched]) -> Floats:
+        """The sides of all relations, of those that cross the other ones [relations]."""
+        flipped = self.handler.side.copy()
+        for w in which:
+            if w.relation >= 0:
+                flipped[w.relation] = -float(w.side)
+        return flipped
 
     @property
     def _end(self) -> float:
@@ -293,16 +298,14 @@ class Pieces:
         """
         self._told()
         handler, modes, t, begin = self.handler, self.modes, segment.begin, self._mode
-        handler.before, events, sides = handler.now(), len(handler.happened), handler.side.copy()
+        handler.before, events = handler.now(), len(handler.happened)
         due, which = handler.due(t), handler.turned(t, y, yd)
         which += self._met(self.run.method.contents.t, (y, yd), which)
-        crossed = modes.places(which) if modes is not None else []
-        for w in which:
-            sides[w.relation] = -float(w.side)
+        crossed, flipped = modes.places(which) if modes is not None else [], self._flipped(which)
         found = handler.fire(t, y, yd, samples=due, which=which) if due or which else None
         point = found or handler.anew(t, y, yd)
         if modes is not None and not due:
-            modes.learn(begin, t, (crossed, None), (sides, point, events))
+            modes.learn(begin, t, (crossed, None), (flipped, point, events))
         handler.happened[events:] = [replace(h, time=segment.label) for h in handler.happened[events:]]
         if len(handler.happened) > events:
             self.row_before()
