@@ -298,7 +298,7 @@ def _consistent(
         system.description.p[places] += starter.residual(t0, best.x)[integrated]
     starter.spare()
     largest = np.maximum(starter.scale(t0, guess), starter.largest_alike(best.x))
-    zeros = (np.abs(best.x) <= EXACT * largest)[: system.form.written].copy()
+    zeros = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: system.form.written]
     del largest
     moved = tuple(moved_guesses(starter, t0, best.x, starter.scale(t0, best.x)))
     y, yd = (np.where(np.abs(values) < NOTHING, 0.0, values) for values in starter.expand(best.x))

@@ -191,6 +191,15 @@ class Starter:
         x[missed] = self.residual(t, x)[rows]
         return x
 
+    @functools.cached_property
+    def pinned(self) -> Mask:
+        """Fixed values whose rows all hold unknowns beside them, which answer to these values however small they are
+        beside their like [unknowns]; a row of fixed values alone may miss by their round-off.
+        """
+        answers = np.bincount(self.rows, self.free[self.columns], self.settled.rows) > 0.0
+        bound = np.bincount(self.columns, ~answers[self.rows], self.free.size) > 0.0
+        return ~self.free & ~bound
+
     def residual(self, t: float, x: Floats) -> Floats:
         """All rows [rows]."""
         rows = np.zeros(self.settled.rows)
@@ -341,8 +350,9 @@ class Starter:
         return np.append(of_y, np.full(self.rates.size, len(number), dtype=np.int32))
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
-        """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit."""
-        return np.where(np.abs(x) > NOISE * np.maximum(scale, self.largest_alike(x)), x, 0.0)
+        """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit; what the
+        text fixes is as it says."""
+        return np.where((np.abs(x) > NOISE * np.maximum(scale, self.largest_alike(x))) | self.pinned, x, 0.0)
 
     def largest_alike(self, x: Floats) -> Floats:
         """Of each unknown the largest magnitude of its kind and unit."""
@@ -389,6 +399,7 @@ def problem_of(
         levels = said & ~placed, said & placed, unsaid & ~starter.idle, unsaid & starter.idle
         scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
     weight = starter.weights(t, x, scale)
+    scale = np.where(starter.pinned & ~free, np.abs(x), scale)
     starter.spare()
     return Problem(
         residual=lambda z: starter.residual(t, z),

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define ROUND_OFF 1e-12 /* of the largest of the same unit: smaller ones are what is left of a zero */
-#define NOTHING 1e-14   /* of the largest of the same kind and unit: less is what arithmetic leaves of a zero */
+#define NOTHING 1e-18   /* of the largest of the same kind and unit: less was written as a zero (starts clean what they leave) */
 #define FRESH 1e-9      /* of what a rate makes of a quantity in the time scale so far: a start below it is round-off */
 #define OUTLYING 1e3    /* times the largest of its like: a state that begins at zero and gets so far is none of them */
 #define UNKNOWN 1.0     /* magnitude of what is zero with all that could size it (scales.py) */
