@@ -351,7 +351,8 @@ class Starter:
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit; what the
-        text fixes is as it says."""
+        text fixes is as it says.
+        """
         return np.where((np.abs(x) > NOISE * np.maximum(scale, self.largest_alike(x))) | self.pinned, x, 0.0)
 
     def largest_alike(self, x: Floats) -> Floats:

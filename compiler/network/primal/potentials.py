@@ -1,7 +1,8 @@
 """Efforts of common-effort nodes: multipliers, zero at a reference, and walks along series classes for merged nodes.
 
 A merged node lies between two branches.  From there the walk goes through branches and merged nodes until it meets one
-whose effort is known; the way without a kinetic store is preferred (rule P3).  Where a walk comes back to nodes of the
+whose effort is known; the way without a kinetic store is preferred (rule P3), then that of the fewest efforts: the
+voltage of a large capacitor behind 1 Mohm is its own, not what the resistor leaves of a source's.  Where a walk comes back to nodes of the
 same cell one index further, it is a run: the steps in between are summed over the run at once.
 """
 
@@ -68,7 +69,7 @@ class Potentials:
         if effort.how == ZERO:
             return const(0.0)
         paths = [self._path(reader, effort, at, touch, ranges) for touch in effort.cell.touches]
-        best = min(paths, key=lambda p: (p.kinetic, len(p.terms)))
+        best = min(paths, key=lambda p: (p.kinetic, len(p.terms) + (p.base != const(0.0))))
         return add(best.base, *best.terms)
 
     def _path(self, reader: Rewriter, effort: Effort, at: tuple[Node, ...], touch: Touch, ranges: Ranges) -> _Path:
