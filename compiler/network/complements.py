@@ -45,7 +45,8 @@ def _of_effort(network: Network) -> Iterator[tuple[Constraint, Node]]:
     """Constraints of an effort for those of a flow of a branch that nothing else holds, and the reactions of these."""
     free = {b.name for b in network.branches if b.law is None and b.kind == "field"}
     kinds = {s.label: s.kind for s in network.switches}
-    held = Counter(n.data[0] for c in network.constraints for n in ex.variables(c.expression) if n.data[1] == "bf")
+    read = (n for c in network.constraints for n in ex.variables(c.expression) if n.op == "var")
+    held = Counter(n.data[0] for n in read if n.data[1] == "bf")
     said = ex.topological(expressions(network, "energies", "works"))
     stored = {n.data[0] for n in said if n.op == "var" and n.data[1] in ("bf", "bq", "be", "bp")}
     for c in network.constraints:

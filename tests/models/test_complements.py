@@ -56,6 +56,18 @@ component freewheel {
 }
 scene s of m { time 0 s to 12 s; trace Ja.f, Jb.f, W.one_way.multiplier every 0.1 s; accuracy 1e-6 }
 """
+DRIVEN = """from std.electrical import capacitor, resistor
+model m {
+  node a, b: electrical
+  implicit u: V ~ 0 V
+  S: effort(e = u) a -> ground
+  R: resistor(R = 1 kohm) a -> b
+  C: capacitor(C = 2 mF) b -> ground
+  gamma drive: u = 5 V*sin(t/(1 s))
+  init C.e = 1 V
+}
+scene s of m { time 0 s to 3 s; trace b.e as v every 0.1 s; accuracy 1e-6 }
+"""
 
 
 def run(text, folder, formulation):
@@ -87,3 +99,12 @@ def test_a_capacitor_behind_a_diode_holds_the_peak(tmp_path, formulation):
     exact = 5.0 * np.sin(w * leaves) * np.exp(-(trace.time[inside] - leaves) / tau)
     assert np.abs(trace["v"].values[inside] - exact).max() < 1e-5 * 5.0
     assert np.abs(trace["r"].values[inside] - (exact - 5.0 * np.sin(w * trace.time[inside]))).max() < 1e-5 * 10.0
+
+
+@pytest.mark.parametrize("formulation", FOUR[2:])
+def test_a_constraint_reads_the_time(tmp_path, formulation):
+    """A first-order lag behind a sine: v = A exp(-t/T) + 5 V (sin t - T cos t)/(1 + T^2), T = 2 s."""
+    found = run(DRIVEN, tmp_path, formulation)
+    t = np.asarray(found.time)
+    wanted = 3.0 * np.exp(-t / 2.0) + np.sin(t) - 2.0 * np.cos(t)
+    assert np.abs(np.asarray(found["v"]) - wanted).max() < 5e-6

@@ -1,9 +1,9 @@
 """Efforts of common-effort nodes: multipliers, zero at a reference, and walks along series classes for merged nodes.
 
-A merged node lies between two branches.  From there the walk goes through branches and merged nodes until it meets one
+A merged node lies between two branches. From there the walk goes through branches and merged nodes until it meets one
 whose effort is known; the way without a kinetic store is preferred (rule P3), then that of the fewest efforts: the
-voltage of a large capacitor behind 1 Mohm is its own, not what the resistor leaves of a source's.  Where a walk comes back to nodes of the
-same cell one index further, it is a run: the steps in between are summed over the run at once.
+voltage of a large capacitor behind 1 Mohm is its own, not what the resistor leaves of a source's. Where a walk comes
+back to nodes of the same cell one index further, it is a run: the steps in between are summed over the run at once.
 """
 
 from __future__ import annotations
