@@ -136,6 +136,14 @@ def _numbered(places: Any, used: Mask) -> Any:
     return number[places]
 
 
+def _graded(a: Floats, aim: Floats, noise: Floats | None, step: Floats) -> int:
+    """What core/linear/graded.h answers."""
+    failed: int = lib.core.sd_graded(*a.shape, *map(lib.pointer, (a, aim, noise, step)))
+    if failed < 0:
+        raise MemoryError
+    return failed
+
+
 class _Linear:
     """The linearised rows at a point: A [used rows, free unknowns] in scaled unknowns and rows."""
 
@@ -200,16 +208,31 @@ class _Linear:
 
     def determined(self, u: Floats, r: Floats, *, beside: bool) -> Floats | None:
         """The same where the rows, as they are, determine the step (core/linear/graded.h); None where they do not."""
+        a, columns = self._full()
+        step, stands = np.zeros(u.size), np.zeros(u.size, dtype=bool)
+        stands[columns] = True
+        if _graded(a, -r / self.row_scale[self.problem.use], None, step):
+            return None
+        return np.where(stands | beside, u + step / self.unit, 0.0)
+
+    def _full(self) -> tuple[Floats, Any]:
+        """The rows as they are [used rows, free unknowns], and the columns of their entries."""
         rows, columns, values = self._taken()
         rows, columns = _numbered(rows, self.problem.use), _numbered(columns, self.problem.free)
-        a, step = np.zeros(self.shape), np.zeros(u.size)
+        a = np.zeros(self.shape)
         np.add.at(a, (rows, columns), values)
-        aim, stands = -r / self.row_scale[self.problem.use], np.zeros(u.size, dtype=bool)
-        stands[columns] = True
-        failed = lib.core.sd_graded(*a.shape, lib.pointer(a), lib.pointer(aim), lib.pointer(step))
-        if failed < 0:
-            raise MemoryError
-        return None if failed else np.where(stands | beside, u + step / self.unit, 0.0)
+        return a, columns
+
+    def correction(self) -> tuple[Floats, bool] | None:
+        """By how much the rows, as they are, miss what they determine [free unknowns], what they do not staying as it
+        is; whether all of them agree to round-off.  None where nothing is determined.
+        """
+        problem, x, step = self.problem, self._x, np.zeros(self.shape[1])
+        noise = np.zeros(problem.number)
+        add_sizes(problem.rows, problem.columns, problem.jacobian(x), np.abs(x), noise)
+        noise *= np.finfo(float).eps
+        failed = _graded(self._full()[0], -problem.residual(x)[problem.use], noise[problem.use], step)
+        return None if failed == 1 or not np.isfinite(step).all() else (step, not failed)
 
     def nearest(self, x: Floats, r: Floats, *, beside: bool) -> Floats:
         """The least u with A u = A u_now - r at x; beside it, the least step: its round-off is its own.  r is spent."""
@@ -326,18 +349,19 @@ def stepped(problem: Problem, x: Floats) -> Floats:
     return found
 
 
-def corrected(problem: Problem, x: Floats) -> Floats | None:
-    """The point one step from x where the rows determine it; None where they do not, or the problem is no small one."""
-    linear, free = _Linear(problem, x), problem.free
+def corrected(problem: Problem, x: Floats) -> tuple[Floats, bool] | None:
+    """The point one step from x in what the rows determine, and whether all rows agree to round-off; None where they
+    determine nothing, or the problem is no small one.
+    """
+    linear = _Linear(problem, x)
     if max(linear.shape) > SINGULAR_VALUES:
         return None
-    r = (problem.residual(x) * linear.row_scale)[problem.use]
-    step = linear.determined(np.zeros(linear.shape[1]), r, beside=True)
-    found = x.copy()
-    if step is None or not np.isfinite(step).all():
+    answer = linear.correction()
+    if answer is None:
         return None
-    found[free] += step * linear.unit
-    return found
+    found = x.copy()
+    found[problem.free] += answer[0]
+    return found, answer[1]
 
 
 def least_residual(problem: Problem, x: Floats) -> Floats:

@@ -134,22 +134,33 @@ def _anew(
     return best, False
 
 
-def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution:
-    """The solution with what follows from its state by corrections that vanish, where rows determine them: what only
-    leakage ties moves by volts under rows that hold to round-off of the largest current.
+def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | None:
+    """The solution with what follows from its state by corrections that vanish, where rows determine them, first those
+    as written: what only leakage ties moves by volts under rows that hold to round-off of the largest current.  None
+    where rows with steep laws do not come to hold to their own round-off: it is no solution.
     """
     if best.x.size > SINGULAR_VALUES:
         return best
-    x, follows = best.x, free & starter.following(t, best.x)
-    for k in range(SHARPER):
-        problem = problem_of(starter, t, x, x, rows=starter.every, free=follows)
-        near = corrected(problem, x)
-        if near is None or starter.work.done:
-            break
-        if (np.abs(near - x) <= EXACT * np.maximum(problem.scale, np.abs(x))).all():
-            return solve(problem, x, 1) if k else best
-        x = near
-    return best
+    follows, steep = free & starter.following(t, best.x), bool(starter.system.form.scales)
+    written = starter.every & ~starter.groups(*HIDDEN), follows & (np.arange(follows.size) < starter.n)
+    x, corrections = best.x, 0
+    for rows, may in (written, (starter.every, follows)):
+        for _ in range(SHARPER):
+            problem = problem_of(starter, t, x, x, rows=rows, free=may)
+            near = corrected(problem, x)
+            if near is None:  # these rows do not determine so many unknowns
+                break
+            if starter.work.done:
+                return None if steep else best
+            size = np.maximum(problem.scale, np.abs(x))
+            if (np.abs(near[0] - x) <= EXACT * np.maximum(size, NOISE * starter.largest_alike(size))).all():
+                break
+            x, corrections = near[0], corrections + 1
+        else:
+            return None if steep else best
+        if steep and near is not None and not near[1]:
+            return None
+    return solve(problem, x, 1) if corrections else best
 
 
 def _attempt(
@@ -163,8 +174,9 @@ def _attempt(
     for name, strategy in itertools.islice(applicable(starter, t, x), most):
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = _anew(starter, t, found, x, guess, free)
-        if holds or sure:
-            return _sharp(starter, t, again, free), name
+        sharp = _sharp(starter, t, again, free) if holds or sure else None
+        if sharp is not None:
+            return sharp, name
         best = found if found.residual < best.residual else best
     return best, ""
 

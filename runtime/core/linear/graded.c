@@ -8,6 +8,7 @@
 #define NONE (1 << 28)   /* the cost of an entry that is zero: no sum of others reaches it */
 #define AGREES 1e-10     /* of the largest aim: what a row in excess may be missed by */
 #define CERTAIN 1e8      /* bounds of its round-off that a pivot is above: half of its digits are known */
+#define LIKELY 1e3       /* the same, where the step is a correction that is asked for again */
 #define LARGE 0.25       /* of the largest entries at first: an exact pivot */
 
 /* Powers of two [m], [n] for the rows and columns, and the cost of each entry: of the entries of its row the largest has
@@ -90,8 +91,8 @@ static int assign(scales *s)
     return 1;
 }
 
-/* a, b scaled; 1: done, 0: some columns have no row of their own, -2: no memory */
-static int scaled(int32_t m, int32_t n, double *a, double *b, int32_t *column)
+/* a, b and its round-off (NULL: not asked for) scaled; 1: done, 0: some columns have no row of their own, -2: no memory */
+static int scaled(int32_t m, int32_t n, double *a, double *b, double *noise, int32_t *column)
 {
     size_t rows = (size_t)m + 1, full = (size_t)m * (size_t)n;
     int32_t *memory = malloc((full + 5 * rows) * sizeof *memory + rows);
@@ -105,6 +106,8 @@ static int scaled(int32_t m, int32_t n, double *a, double *b, int32_t *column)
         for (int32_t j = 0; j < n; j++)
             a[(size_t)i * n + j] = ldexp(a[(size_t)i * n + j], s.row[i] + column[j]);
         b[i] = ldexp(b[i], s.row[i]);
+        if (noise)
+            noise[i] = ldexp(noise[i], s.row[i]);
     }
     free(memory);
     return done;
@@ -151,9 +154,10 @@ static void subtract(int32_t k, int32_t n, double factor, double open, const dou
 }
 
 /* a := its factors, lines moved so that pivots stand on the diagonal, b := L^-1 b; place [n]: the column that was there;
- * open [m, n]: bounds of round-off.  Returns 1 where a pivot may be no more than that. */
-static int eliminate(int32_t m, int32_t n, double *a, double *open, double *b, int32_t *place)
+ * open [m, n], noise [m]: bounds of round-off.  Returns the number of pivots that are more than that. */
+static int32_t eliminate(int32_t m, int32_t n, double *a, double *open, double *b, double *noise, int32_t *place)
 {
+    double certain = noise ? LIKELY : CERTAIN;
     for (int32_t j = 0; j < n; j++)
         place[j] = j;
     for (size_t e = 0; e < (size_t)m * (size_t)n; e++)
@@ -175,12 +179,14 @@ static int eliminate(int32_t m, int32_t n, double *a, double *open, double *b, i
         swap_lines(m, n, a, row, column, k);
         swap_lines(m, n, open, row, column, k);
         swap(b + row, b + k);
+        if (noise)
+            swap(noise + row, noise + k);
         int32_t kept = place[k];
         place[k] = place[column];
         place[column] = kept;
         const double *pivot = a + (size_t)k * n, *pivot_open = open + (size_t)k * n;
-        if (!(fabs(pivot[k]) > CERTAIN * pivot_open[k]))
-            return 1;
+        if (!(fabs(pivot[k]) > certain * pivot_open[k]))
+            return k;
         for (int32_t i = k + 1; i < m; i++) {
             double *line = a + (size_t)i * n, *line_open = open + (size_t)i * n, factor = line[k] / pivot[k];
             if (factor == 0.0)
@@ -190,9 +196,11 @@ static int eliminate(int32_t m, int32_t n, double *a, double *open, double *b, i
                 unsure += DBL_EPSILON * fabs(factor);
             subtract(k + 1, n, factor, unsure, pivot, pivot_open, line, line_open);
             b[i] -= factor * b[k];
+            if (noise)
+                noise[i] += fabs(factor) * noise[k] + unsure * fabs(b[k]);
         }
     }
-    return 0;
+    return n;
 }
 
 /* the columns that have entries, moved together in a: their number; place [n] */
@@ -220,7 +228,16 @@ static double largest(int32_t number, const double *b)
     return most;
 }
 
-int sd_graded(int32_t m, int32_t n, double *a, double *b, double *x)
+/* whether a row that is left misses by more than round-off [number] */
+static int missed(int32_t number, const double *b, const double *noise)
+{
+    for (int32_t i = 0; i < number; i++)
+        if (!(fabs(b[i]) <= LIKELY * noise[i]))
+            return 1;
+    return 0;
+}
+
+int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double *x)
 {
     int32_t *own = malloc((3 * (size_t)n + 1) * sizeof *own);
     double *open = malloc(((size_t)m * (size_t)n + 1) * sizeof *open);
@@ -233,22 +250,25 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *x)
     memset(x, 0, (size_t)n * sizeof *x);
     int failed = 1;
     if (k <= m) {
-        failed = scaled(m, k, a, b, column);
+        failed = scaled(m, k, a, b, noise, column);
         failed = failed < 0 ? failed : !failed;
     }
+    int32_t pivots = k, left = 0;
     if (!failed) {
         double most = largest(m, b);
-        failed = eliminate(m, k, a, open, b, place) || !(largest(m - k, b + k) <= AGREES * most);
+        pivots = eliminate(m, k, a, open, b, noise, place);
+        failed = !noise && (pivots < k || !(largest(m - k, b + k) <= AGREES * most));
+        left = noise && missed(m - pivots, b + pivots, noise + pivots);
     }
     if (!failed)
-        for (int32_t i = k - 1; i >= 0; i--) {
+        for (int32_t i = pivots - 1; i >= 0; i--) {
             const double *line = a + (size_t)i * k;
-            for (int32_t j = i + 1; j < k; j++)
+            for (int32_t j = i + 1; j < pivots; j++)
                 b[i] -= line[j] * b[j];
             b[i] /= line[i];
             x[own[place[i]]] = ldexp(b[i], column[place[i]]);
         }
     free(open);
     free(own);
-    return failed;
+    return failed ? failed : 2 * left;
 }
