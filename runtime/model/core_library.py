@@ -251,7 +251,7 @@ def _load() -> Any:
         "sd_factors": (None, [_I, _I, _P, _P, _P, _P]),
         "sd_rank": (c.c_int, [_I, _I, _P, _D]),
         "sd_nearest": (c.c_int, [_I, _I, _P, _P, _D, _P]),
-        "sd_graded": (c.c_int, [_I, _I, _P, _P, _P, _P]),
+        "sd_graded": (c.c_int, [_I, _I, _P, _P, _P, _P, _P]),
         "sd_regular": (c.c_int, [_I, _P, _P, _P, _D]),
         "sd_pencil_index": (c.c_int, [_I, _P, _P, _P, _P, _I]),
         "sd_start_residual": (c.c_int, [_P, _D, _P, _P]),

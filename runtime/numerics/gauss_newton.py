@@ -127,6 +127,17 @@ class Solution:
     residual: float
 
 
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """x [unknowns] after one step in what rows determine, what they do not staying as it is; open_ [unknowns]: what
+    round-off leaves open of it; whether rows that are left agree to round-off.
+    """
+
+    x: Floats
+    open_: Floats
+    agrees: bool
+
+
 def _numbered(places: Any, used: Mask) -> Any:
     """Places by their numbers among those in use."""
     if used.all():
@@ -136,9 +147,11 @@ def _numbered(places: Any, used: Mask) -> Any:
     return number[places]
 
 
-def _graded(a: Floats, aim: Floats, noise: Floats | None, step: Floats) -> int:
+def _graded(
+    a: Floats, aim: Floats, step: Floats, noise: Floats | None = None, doubt: Floats | None = None
+) -> int:
     """What core/linear/graded.h answers."""
-    failed: int = lib.core.sd_graded(*a.shape, *map(lib.pointer, (a, aim, noise, step)))
+    failed: int = lib.core.sd_graded(*a.shape, *map(lib.pointer, (a, aim, noise, step, doubt)))
     if failed < 0:
         raise MemoryError
     return failed
@@ -211,7 +224,7 @@ class _Linear:
         a, columns = self._full()
         step, stands = np.zeros(u.size), np.zeros(u.size, dtype=bool)
         stands[columns] = True
-        if _graded(a, -r / self.row_scale[self.problem.use], None, step):
+        if _graded(a, -r / self.row_scale[self.problem.use], step):
             return None
         return np.where(stands | beside, u + step / self.unit, 0.0)
 
@@ -223,16 +236,20 @@ class _Linear:
         np.add.at(a, (rows, columns), values)
         return a, columns
 
-    def correction(self) -> tuple[Floats, bool] | None:
-        """By how much the rows, as they are, miss what they determine [free unknowns], what they do not staying as it
-        is; whether all of them agree to round-off.  None where nothing is determined.
-        """
-        problem, x, step = self.problem, self._x, np.zeros(self.shape[1])
+    def correction(self) -> Correction | None:
+        """By how much the rows, as they are, miss what they determine; None where that is nothing."""
+        problem, x, step, doubt = self.problem, self._x, np.zeros(self.shape[1]), np.zeros(self.shape[1])
         noise = np.zeros(problem.number)
         add_sizes(problem.rows, problem.columns, problem.jacobian(x), np.abs(x), noise)
         noise *= np.finfo(float).eps
-        failed = _graded(self._full()[0], -problem.residual(x)[problem.use], noise[problem.use], step)
-        return None if failed == 1 or not np.isfinite(step).all() else (step, not failed)
+        aim = -problem.residual(x)[problem.use]
+        failed = _graded(self._full()[0], aim, step, noise[problem.use], doubt)
+        if failed == 1 or not np.isfinite(step).all():
+            return None
+        found, open_ = x.copy(), np.zeros(x.size)
+        found[problem.free] += step
+        open_[problem.free] = doubt
+        return Correction(found, open_, not failed)
 
     def nearest(self, x: Floats, r: Floats, *, beside: bool) -> Floats:
         """The least u with A u = A u_now - r at x; beside it, the least step: its round-off is its own.  r is spent."""
@@ -349,19 +366,10 @@ def stepped(problem: Problem, x: Floats) -> Floats:
     return found
 
 
-def corrected(problem: Problem, x: Floats) -> tuple[Floats, bool] | None:
-    """The point one step from x in what the rows determine, and whether all rows agree to round-off; None where they
-    determine nothing, or the problem is no small one.
-    """
+def corrected(problem: Problem, x: Floats) -> Correction | None:
+    """One step from x in what the rows determine; None where that is nothing, or the problem is no small one."""
     linear = _Linear(problem, x)
-    if max(linear.shape) > SINGULAR_VALUES:
-        return None
-    answer = linear.correction()
-    if answer is None:
-        return None
-    found = x.copy()
-    found[problem.free] += answer[0]
-    return found, answer[1]
+    return linear.correction() if max(linear.shape) <= SINGULAR_VALUES else None
 
 
 def least_residual(problem: Problem, x: Floats) -> Floats:

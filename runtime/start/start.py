@@ -145,20 +145,19 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution |
     written = starter.every & ~starter.groups(*HIDDEN), follows & (np.arange(follows.size) < starter.n)
     x, corrections = best.x, 0
     for rows, may in (written, (starter.every, follows)):
-        for _ in range(SHARPER):
+        for k in range(SHARPER):
             problem = problem_of(starter, t, x, x, rows=rows, free=may)
             near = corrected(problem, x)
             if near is None:  # these rows do not determine so many unknowns
                 break
-            if starter.work.done:
-                return None if steep else best
-            size = np.maximum(problem.scale, np.abs(x))
-            if (np.abs(near[0] - x) <= EXACT * np.maximum(size, NOISE * starter.largest_alike(size))).all():
+            step = np.abs(near.x - x)
+            vanished = step <= EXACT * np.maximum(problem.scale, np.abs(x))
+            if vanished.all():
                 break
-            x, corrections = near[0], corrections + 1
-        else:
-            return None if steep else best
-        if steep and near is not None and not near[1]:
+            if starter.work.done or (k == SHARPER - 1 and not (vanished | (step <= near.open_)).all()):
+                return None if steep else best
+            x, corrections = near.x, corrections + 1
+        if steep and near is not None and not near.agrees:
             return None
     return solve(problem, x, 1) if corrections else best
 

@@ -35,7 +35,7 @@ def test_rank_and_nearest_solution(shape, spread):
 def graded(a, b):
     """x, or None where the core says that a x = b does not determine it."""
     a, b, x = np.array(a, dtype=float), np.array(b, dtype=float), np.zeros(np.shape(a)[1])
-    failed = lib.core.sd_graded(*a.shape, lib.pointer(a), lib.pointer(b), None, lib.pointer(x))
+    failed = lib.core.sd_graded(*a.shape, lib.pointer(a), lib.pointer(b), None, lib.pointer(x), None)
     assert failed in (0, 1)
     return None if failed else x
 

@@ -237,7 +237,7 @@ static int missed(int32_t number, const double *b, const double *noise)
     return 0;
 }
 
-int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double *x)
+int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double *x, double *doubt)
 {
     int32_t *own = malloc((3 * (size_t)n + 1) * sizeof *own);
     double *open = malloc(((size_t)m * (size_t)n + 1) * sizeof *open);
@@ -248,6 +248,8 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
     }
     int32_t *column = own + n, *place = own + 2 * (size_t)n, k = used(m, n, a, own);
     memset(x, 0, (size_t)n * sizeof *x);
+    if (noise)
+        memset(doubt, 0, (size_t)n * sizeof *doubt);
     int failed = 1;
     if (k <= m) {
         failed = scaled(m, k, a, b, noise, column);
@@ -263,10 +265,17 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
     if (!failed)
         for (int32_t i = pivots - 1; i >= 0; i--) {
             const double *line = a + (size_t)i * k;
-            for (int32_t j = i + 1; j < pivots; j++)
+            for (int32_t j = i + 1; j < pivots; j++) {
                 b[i] -= line[j] * b[j];
+                if (noise)
+                    noise[i] += fabs(line[j]) * noise[j];
+            }
             b[i] /= line[i];
             x[own[place[i]]] = ldexp(b[i], column[place[i]]);
+            if (noise) {
+                noise[i] /= fabs(line[i]);
+                doubt[own[place[i]]] = ldexp(noise[i], column[place[i]]);
+            }
         }
     free(open);
     free(own);

@@ -152,7 +152,7 @@ static int determined(const sd_search *s, room *w, int beside)
     for (int32_t r = 0; r < m->rows; r++)
         if (w->row_at[r] >= 0)
             w->aim[w->row_at[r]] = -w->r[r];
-    int failed = sd_graded(w->rows, n, w->work, w->aim, NULL, w->target);
+    int failed = sd_graded(w->rows, n, w->work, w->aim, NULL, w->target, NULL);
     for (int32_t c = 0; c < m->unknowns && !failed; c++) {
         int32_t j = w->column_at[c];
         if (j >= 0)
