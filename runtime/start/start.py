@@ -141,25 +141,37 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution |
     """
     if best.x.size > SINGULAR_VALUES:
         return best
-    follows, steep = free & starter.following(t, best.x), bool(starter.system.form.scales)
+    follows = free & starter.following(t, best.x)
     written = starter.every & ~starter.groups(*HIDDEN), follows & (np.arange(follows.size) < starter.n)
-    x, corrections = best.x, 0
-    for rows, may in (written, (starter.every, follows)):
-        for k in range(SHARPER):
-            problem = problem_of(starter, t, x, x, rows=rows, free=may)
-            near = corrected(problem, x)
-            if near is None:  # these rows do not determine so many unknowns
-                break
-            step = np.abs(near.x - x)
-            vanished = step <= EXACT * np.maximum(problem.scale, np.abs(x))
-            if vanished.all():
-                break
-            if starter.work.done or (k == SHARPER - 1 and not (vanished | (step <= near.open_)).all()):
-                return None if steep else best
-            x, corrections = near.x, corrections + 1
-        if steep and near is not None and not near.agrees:
-            return None
-    return solve(problem, x, 1) if corrections else best
+    x, held = _corrected(starter, t, best.x, *written)
+    if not held and starter.system.form.scales:
+        return None
+    x = x if held else best.x
+    near, held = _corrected(starter, t, x, starter.every, follows)
+    x = near if held else x
+    if x is best.x:
+        return best
+    return solve(problem_of(starter, t, x, x, rows=starter.every, free=follows), x, 1)
+
+
+def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> tuple[Floats, bool]:
+    """X after corrections that vanish, or get no less than round-off, and whether the rows hold to theirs then and
+    leave no state or effort open by more than the largest of its like; as it was where they do not determine them.
+    """
+    told, begun = starter.moves(*STATE, "e"), x
+    for k in range(SHARPER):
+        problem = problem_of(starter, t, x, x, rows=rows, free=free)
+        near = corrected(problem, x)
+        if near is None:
+            return begun, True
+        step, size = np.abs(near.x - x), np.maximum(problem.scale, np.abs(x))
+        vanished = step <= EXACT * size
+        if vanished.all() or (k == SHARPER - 1 and (vanished | (step <= near.open_)).all()):
+            return x, near.agrees and not (near.open_ > starter.largest_alike(size))[told].any()
+        if starter.work.done:
+            break
+        x = near.x
+    return x, False
 
 
 def _attempt(

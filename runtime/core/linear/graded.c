@@ -8,7 +8,7 @@
 #define NONE (1 << 28)   /* the cost of an entry that is zero: no sum of others reaches it */
 #define AGREES 1e-10     /* of the largest aim: what a row in excess may be missed by */
 #define CERTAIN 1e8      /* bounds of its round-off that a pivot is above: half of its digits are known */
-#define LIKELY 1e3       /* the same, where the step is a correction that is asked for again */
+#define LIKELY 16.0      /* the same, where the step is a correction that is asked for again */
 #define LARGE 0.25       /* of the largest entries at first: an exact pivot */
 
 /* Powers of two [m], [n] for the rows and columns, and the cost of each entry: of the entries of its row the largest has
@@ -232,8 +232,18 @@ static double largest(int32_t number, const double *b)
 static int missed(int32_t number, const double *b, const double *noise)
 {
     for (int32_t i = 0; i < number; i++)
-        if (!(fabs(b[i]) <= LIKELY * noise[i]))
+        if (!(fabs(b[i]) <= noise[i]))
             return 1;
+    return 0;
+}
+
+/* whether columns from k on have no pivot for round-off alone: what incidences leave of nothing is nothing */
+static int doubtful(int32_t m, int32_t n, const double *a, int32_t k)
+{
+    for (int32_t i = k; i < m; i++)
+        for (int32_t j = k; j < n; j++)
+            if (a[(size_t)i * n + j] != 0.0)
+                return 1;
     return 0;
 }
 
@@ -260,7 +270,7 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
         double most = largest(m, b);
         pivots = eliminate(m, k, a, open, b, noise, place);
         failed = !noise && (pivots < k || !(largest(m - k, b + k) <= AGREES * most));
-        left = noise && missed(m - pivots, b + pivots, noise + pivots);
+        left = noise && (missed(m - pivots, b + pivots, noise + pivots) || doubtful(m, k, a, pivots));
     }
     if (!failed)
         for (int32_t i = pivots - 1; i >= 0; i--) {
