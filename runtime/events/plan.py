@@ -89,7 +89,8 @@ class Kink:
     """A switching function: where it is zero, a law changes its branch.
 
     value, rate: rows (rate -1 where it has none); branch: place in p, see kinks.py; above, below: rows 1 - sense and
-    1 + sense of a law that jumps and may slide between its branches (else -1); element: whose law.
+    1 + sense of a law that jumps and may slide between its branches (else -1); element: whose law; inner: whether
+    coordinates move it, so that what is stored is the same on both sides.
     """
 
     name: str
@@ -100,6 +101,7 @@ class Kink:
     above: int = -1
     below: int = -1
     jumps: bool = False
+    inner: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -263,10 +263,21 @@ class Pieces:
         self._begun = t
         if misled:
             self._short(t, misled)
-        self.run.driver.leave(*before)
+        self.leave(*before)
         go_on(self.run, t, t, [*point])
         core.start_kind = 0
         self._watch()
+
+    def leave(self, y: Floats, yd: Floats) -> None:
+        """What was stored at y, yd [unknowns as written] before an event, by the parameters of before; branches that
+        coordinates turn are those of behind it: a store that gains there gains it from nowhere.
+        """
+        after = self.handler.p.copy()
+        inner = [kink.branch for kink in self.handler.plan.kinks if kink.inner]
+        self.handler.p[:] = self.handler.before[0]
+        self.handler.p[inner] = after[inner]
+        self.run.driver.leave(y, yd)
+        self.handler.p[:] = after
 
     def sample(self, sink: Sink) -> bool:
         """What is due where a piece has met its end; whether the segment goes on."""
