@@ -28,7 +28,6 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 
-
 STEPS = ("sign", "step", "floor", "ceil", "mod")
 """Functions that jump."""
 

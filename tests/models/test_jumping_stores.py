@@ -90,7 +90,7 @@ def test_an_inertia_that_jumps_pulls_along_what_hangs_on_it(tmp_path, row, formu
 
 
 def _held(times):
-    """Content of the store (in units of 10 of its effort at c = 1): it approaches 10 c with the time constant 1 ms c."""
+    """Content of the store, of unit c = 1: it approaches 10 c with the time constant 1 ms c."""
     found, held, c, begin = np.zeros(times.size), 0.0, 40.0, 0.0
     for _ in range(20):
         inside = times >= begin - 1e-9
