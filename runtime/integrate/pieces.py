@@ -34,6 +34,8 @@ UNSEEN = 100.0
 PARTS = 8
 """Steps at least that such a bounce takes (radau and dopri follow a parabola in one), or after one that misled."""
 
+FOLLOWED = 16.0
+"""Times a signal that events read may turn within a step: each way has SD_FINEST / FOLLOWED parts (core/run/run.h)."""
 WIDER = 3.0
 """Times the stretch in which a change was seen, and was none once settled: the next one behind it that is searched."""
 SOON = 1e-2
@@ -57,7 +59,10 @@ class Pieces:
         self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin, run.request.rtol)
         self.handler.restart = run.settlers.restart
         self.handler.contacts.size(run.sizes.magnitude, run.sizes.time)
-        self._longest, self._landing = run.method.contents.h_max, np.inf
+        method = run.method.contents
+        if np.isfinite(plan.turns):
+            run.driver.run.turns, method.h_max = plan.turns, min(method.h_max, FOLLOWED * plan.turns)
+        self._longest, self._landing = method.h_max, np.inf
         self.at = 0
         """The number of the segment."""
         n = run.system.form.written

@@ -171,6 +171,7 @@ class Run(c.Structure):
         ("modes", P),
         ("t_clear", D),
         ("t_seen", D),
+        ("turns", D),
         ("looked", P),
     ]
 
