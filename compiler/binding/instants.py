@@ -1,11 +1,12 @@
 """Instants at which a model's text jumps or has a kink in time alone: where a step ends and the integration restarts.
 
 Watched are the arguments of step, sign, abs, min, max, floor, ceil, mod, of comparisons and of tables, where they
-depend on time, parameters and loop variables and on no unknown (language, rule 17), and conditions of events that do.  Each has a label that is constant
-on smooth pieces: the sign of its argument, the whole number below it, the piece of its table.  Where the argument is
-affine in time the candidates are computed; otherwise it is sampled ever more densely, between the instants of what
-stands inside it, until the number of changes stays.  Bisection then ends at two neighbouring doubles, evaluated by the
-operations that the generated code does, so that the instant is the very double at which the text changes.
+depend on time, parameters and loop variables and on no unknown (language, rule 17), and conditions of events that do.
+Each has a label that is constant on smooth pieces: the sign of its argument, the whole number below it, the piece of
+its table.  Where the argument is affine in time the candidates are computed; otherwise it is sampled ever more
+densely, between the instants of what stands inside it, until the number of changes stays.  Bisection then ends at two
+neighbouring doubles, evaluated by the operations that the generated code does, so that the instant is the very double
+at which the text changes.
 
 Received: a descriptor form and a binding; returned: `Instants`.
 """
