@@ -9,7 +9,7 @@ from typing import Any
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request, options_of, rest, stops
+from sysdyn.cli.run.asked import Request, options_of, rest, stops, turning
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.flat_laws import impossible
 from sysdyn.cli.run.prepare import Prepared, prepare
@@ -126,7 +126,8 @@ def arrived(found: Found, request: Request, report: Report) -> tuple[Found | Non
     if options is None:
         return None, None
     options = replace(options, stops=stops(found.prepared, options, report))
-    options = replace(options, events=plan(found.prepared, found.system, rest=rest(options)))
+    events = plan(found.prepared, found.system, rest=rest(options))
+    options = replace(options, events=replace(events, turns=turning(found.prepared, options)))
     assert found.started is not None
     try:
         system, state = arrival(found.system, found.state, found.started.facts, options)

@@ -17,7 +17,7 @@ from sysdyn.cli.run.scene_numbers import INSTANTS, beyond, wrong_numbers
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.binding.columns import Read, value_of
 from sysdyn.compiler.binding.instants import distinct, instants
-from sysdyn.compiler.binding.pulses import pulses
+from sysdyn.compiler.binding.pulses import pulses, quickest
 from sysdyn.compiler.network.pruning import listed
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.scenes import FINEST_ACCURACY
@@ -200,8 +200,12 @@ def _stops(prepared: Prepared, t0: float, t1: float) -> tuple[np.ndarray, str | 
         return before[0]  # type: ignore[no-any-return]
     read = Read(binding.parameters)
     text = prepared.compiled.form, replace(binding, parameters=read), t0, t1, prepared.network.tables
-    found = instants(*text, [o.expression for o in prepared.network.observations if not o.stored])
-    answer = distinct(found.times, pulses(*text)), found.note
+    network = prepared.network
+    conditions = {n.data[0] for e in network.events if e.condition is not None for n in ex.variables(e.condition)}
+    unseen = [o.expression for o in network.observations if not o.stored]
+    crossed = [o.expression for o in network.observations if not o.stored and o.name in conditions]
+    found = instants(*text, unseen, crossed)
+    answer = distinct(found.times, pulses(*text, crossed)), found.note
     kept.clear()
     kept[t0, t1] = answer, {name: value_of(binding, name) for name in read.read}
     return answer
@@ -212,6 +216,14 @@ def _timeless(prepared: Prepared) -> bool:
     if "timeless" not in prepared.layouts:
         prepared.layouts["timeless"] = {"so": timeless(prepared)}
     return bool(prepared.layouts["timeless"]["so"])
+
+
+def turning(prepared: Prepared, options: Options) -> float:
+    """The least time (s) in which a signal that an event reads goes from one extreme to the next."""
+    if _timeless(prepared):
+        return math.inf
+    read = [o.expression for o in prepared.network.observations if not o.stored]
+    return quickest(prepared.binding, options.t_start, options.t_end, read)
 
 
 def timeless(prepared: Prepared) -> bool:

@@ -13,9 +13,10 @@ import numpy as np
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.flat_laws import by_element
 from sysdyn.cli.run.prepare import Prepared, place_at
+from sysdyn.dsl.model.dimensions import TIME
 from sysdyn.dsl.model.expression import variables
 from sysdyn.dsl.model.network import Parameter
-from sysdyn.dsl.model.units import quantity
+from sysdyn.dsl.model.units import multiply, quantity, si
 from sysdyn.dsl.text.diagnostics import ModelError, Place, Related, Report
 from sysdyn.runtime.events.start import eventful_start
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
@@ -25,6 +26,9 @@ from sysdyn.runtime.numerics.rank import NotFiniteError
 
 MOST = 20
 """Zeros that are tried out: more are values of a table, not slips."""
+
+RATES = {"phi_rate": 1, "psi_rate": 1, "phi_acceleration": 2}
+"""Rows that are derivatives of what the text says: how often by time."""
 
 
 def place_of(prepared: Prepared, label: RowLabel) -> Place:
@@ -119,6 +123,8 @@ def _residual(prepared: Prepared, error: InconsistentStart) -> str:
     label = re.sub(r"\[.*", "", error.rows[0].label) if error.rows else ""
     units = {c.name: c.effort for c in network.coordinates} | {c.name: c.unit for c in network.constraints}
     unit = units.get(label)
+    if unit is not None and (times := RATES.get(error.rows[0].kind)):
+        unit = si(multiply(unit.dimension, TIME, -times))
     return f"{error.residual:.3g}{f' {unit.text}' if unit is not None and unit.text != '1' else ''}"
 
 

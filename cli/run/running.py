@@ -11,7 +11,7 @@ from typing import Any
 from sysdyn import __version__
 from sysdyn.cli.failures import OF_RUNS, UsageError
 from sysdyn.cli.run import lock, targets
-from sysdyn.cli.run.asked import Request, check_tolerances, default_output, options_of, rest, stops
+from sysdyn.cli.run.asked import Request, check_tolerances, default_output, options_of, rest, stops, turning
 from sysdyn.cli.run.events import plan, zeno
 from sysdyn.cli.run.expectations import Claim, judge
 from sysdyn.cli.run.flat_laws import impossible
@@ -150,6 +150,7 @@ def run_from(target: Target, prepared: Prepared, started: Started, options: Opti
     """From a start to the trace; None where the report says why not.  One without events may serve several runs."""
     events, times = plan(prepared, started.system, rest=rest(options)), stops(prepared, options, report)
     if events or times.size:
+        events = replace(events, turns=turning(prepared, options)) if events else events
         options = replace(options, stops=times, events=events)
     return _ran(target, prepared, started, options, report)
 

@@ -1,11 +1,12 @@
 """Instants at which a model's text jumps or has a kink in time alone: where a step ends and the integration restarts.
 
 Watched are the arguments of step, sign, abs, min, max, floor, ceil, mod, of comparisons and of tables, where they
-depend on time, parameters and loop variables and on no unknown (language, rule 17).  Each has a label that is constant
-on smooth pieces: the sign of its argument, the whole number below it, the piece of its table.  Where the argument is
-affine in time the candidates are computed; otherwise it is sampled ever more densely, between the instants of what
-stands inside it, until the number of changes stays.  Bisection then ends at two neighbouring doubles, evaluated by the
-operations that the generated code does, so that the instant is the very double at which the text changes.
+depend on time, parameters and loop variables and on no unknown (language, rule 17), and conditions of events that do.
+Each has a label that is constant on smooth pieces: the sign of its argument, the whole number below it, the piece of
+its table.  Where the argument is affine in time the candidates are computed; otherwise it is sampled ever more
+densely, between the instants of what stands inside it, until the number of changes stays.  Bisection then ends at two
+neighbouring doubles, evaluated by the operations that the generated code does, so that the instant is the very double
+at which the text changes.
 
 Received: a descriptor form and a binding; returned: `Instants`.
 """
@@ -75,19 +76,34 @@ def instants(
     t1: float,
     tables: Sequence[Table] = (),
     read: Sequence[Node] = (),
+    crossed: Sequence[Node] = (),
 ) -> Instants:
-    """All instants in (t0, t1], and t0 where the text jumps behind it; tables: of the network; read: what events read.
-    None of them, with a note, where they are more than MOST.
+    """All instants in (t0, t1], and t0 where the text jumps behind it; tables: of the network; read: what events read;
+    crossed: whose zeros are events, which no step may pass over twice.  None of them, with a note, where they are more
+    than MOST.
     """
     search = _Search(binding, t0, t1)
     try:
         for watched in _watched(form, {t.name: t for t in tables}, read):
             search.add(watched)
+        for node in crossed:
+            if _in_time_alone(node) and _degree((node,)) > 1:
+                search.add(Watched(node, (node,), lambda v: np.sign(v[0]), np.zeros(1), ()))
         times = search.times()
     except _TooManyError:
         text = f"the text jumps or has kinks at more than {MOST} instants: they are integrated through"
         return Instants(np.zeros(0), text)
     return Instants(times, search.note)
+
+
+def turns(binding: Binding, t0: float, t1: float, slope: Node) -> Array:
+    """Instants (s) in (t0, t1], ascending, at which an expression of time alone passes zero; none beyond MOST."""
+    search = _Search(binding, t0, t1)
+    try:
+        search.add(Watched(slope, (slope,), lambda v: np.sign(v[0]), np.zeros(1), ()))
+        return search.times()
+    except _TooManyError:
+        return np.zeros(0)
 
 
 def _watched(form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node]) -> Iterator[Watched]:

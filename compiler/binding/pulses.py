@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.enclosures import Array, Bounds, Outline, Values, enclose
-from sysdyn.compiler.binding.instants import distinct
+from sysdyn.compiler.binding.instants import distinct, turns
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, DescriptorForm
 from sysdyn.compiler.model.interpret import Value, evaluate, grid
 from sysdyn.compiler.model.terms import Nest
@@ -40,13 +40,24 @@ MOST = 32768
 ELEMENTS = 32
 """Iterations of loops that are looked at one by one."""
 PULSES = 1000
+TURNS = 1e-5
+"""Of the span: between two extremes of a signal that may be followed."""
 
 
-def pulses(form: DescriptorForm, binding: Binding, t0: float, t1: float, tables: Sequence[Table] = ()) -> Array:
-    """Instants [s] in (t0, t1), ascending, at which steps should end so that no pulse is passed over."""
+def pulses(
+    form: DescriptorForm,
+    binding: Binding,
+    t0: float,
+    t1: float,
+    tables: Sequence[Table] = (),
+    crossed: Sequence[Node] = (),
+) -> Array:
+    """Instants [s] in (t0, t1), ascending, at which steps should end so that no pulse is passed over; crossed: whose
+    zeros are events.
+    """
     outlines = {t.name: _outline(t) for t in tables if len(t.points) == 1}
     found: list[Array] = []
-    for root, nest in _signals(form):
+    for root, nest in _signals(form, crossed):
         columns = grid(nest, binding.parameters.lookup)
         number = len(next(iter(columns.values()))) if columns else 1
         for k in range(min(number, ELEMENTS)):
@@ -60,6 +71,19 @@ def pulses(form: DescriptorForm, binding: Binding, t0: float, t1: float, tables:
     return times if times.size <= 5 * PULSES else times[:0]
 
 
+def quickest(binding: Binding, t0: float, t1: float, read: Sequence[Node]) -> float:
+    """The least time [s] in which a signal of time alone in any of these expressions goes from one extreme to the next,
+    TURNS of the span at least; infinite where none turns twice.
+    """
+    found = np.inf
+    for root, _ in _signals(None, read):
+        slope = differential(root, {leaf: const(1.0) for leaf in variables(root)})
+        times = np.concatenate([[t0], turns(binding, t0, t1, slope), [t1]])
+        apart = np.diff(times)[1:-1]  # the ends are no extremes
+        found = min(found, float(apart[apart > TURNS * (t1 - t0)].min(initial=np.inf)))
+    return found
+
+
 def _fixed(binding: Binding, held: Mapping[str, float]) -> Values:
     """Values of what does not depend on time, in one iteration of the loops around it."""
 
@@ -70,10 +94,10 @@ def _fixed(binding: Binding, held: Mapping[str, float]) -> Values:
     return lambda nodes: evaluate(nodes, look)
 
 
-def _signals(form: DescriptorForm) -> Iterator[tuple[Node, Nest]]:
+def _signals(form: DescriptorForm | None, crossed: Sequence[Node]) -> Iterator[tuple[Node, Nest]]:
     """The largest expressions of time alone, with the loops around them."""
-    stack: list[tuple[Node, Nest]] = []
-    for block in form.blocks:
+    stack: list[tuple[Node, Nest]] = [(node, ()) for node in crossed]
+    for block in form.blocks if form is not None else ():
         if block.name not in WITHOUT_ENTRIES and block.name != "initial" and not block.name.endswith("_rate"):
             stack += [(row.expression, kernel.nest) for kernel in block.kernels for row in kernel.rows]
     seen: set[tuple[Node, Nest]] = set()

@@ -116,7 +116,7 @@ class Pin:
 class Frozen:
     """A switching function whose branch events set (frozen.py): the parameter that holds it, its text, the row that it
     stands in; rows of block observe: value, rate, 1 - sense and 1 + sense (() where it does not slide); jumps: whether
-    a row does at its zero.
+    a row does at its zero; inner: whether coordinates, rates or momenta move it, so that stores gain nothing there.
     """
 
     branch: str
@@ -127,6 +127,7 @@ class Frozen:
     rate: str | None
     slide: tuple[str, ...]
     jumps: bool
+    inner: bool
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,8 @@
 """Momenta and kinetic stores: which coordinates carry a momentum, and what `x.p` means where it is no unknown.
 
-A coordinate carries a momentum as unknown where the author gave T(p) for it, and in the Hamiltonian form where T* has a
-structurally nonzero second derivative by its flow.  Elsewhere its momentum is the expression dT*/df.
+A coordinate carries a momentum as unknown where the author gave T(p) for it, where T* jumps between two instants (a
+discrete mass, `if t < 1 s`): no impulse acts there, so p stays and the flow jumps; and in the Hamiltonian form where T*
+has a structurally nonzero second derivative by its flow.  Elsewhere its momentum is the expression dT*/df.
 """
 
 from __future__ import annotations
@@ -23,7 +24,12 @@ from sysdyn.dsl.model.expression import (
     is_const,
     reduction,
     substitute,
+    topological,
+    variables,
 )
+
+STEPS = ("sign", "step", "floor", "ceil", "mod")
+"""Functions that jump."""
 
 
 def given(model: EnergyModel) -> frozenset[str]:
@@ -38,6 +44,26 @@ def moved(model: EnergyModel) -> frozenset[str]:
     rate = model.mirror.rate
     pieces = model.function(model.mirror.coenergy)
     return given(model) | frozenset(n.data[0] for t in pieces for n in local_variables(t.expression, rate))
+
+
+def jumping(model: EnergyModel) -> frozenset[str]:
+    """Coordinates whose inertia may jump: it reads what events assign, or steps with time or states."""
+    found = set()
+    for term in model.function(model.mirror.coenergy):
+        if any(_jumps(model, n) for n in topological([term.expression])):
+            found |= {rate.data[0] for rate in local_variables(term.expression, model.mirror.rate)}
+    return frozenset(found) & inertial(model)
+
+
+def _jumps(model: EnergyModel, node: Node) -> bool:
+    """Whether an operation may change its value at one instant where coordinates and rates do not."""
+    if node.op == "param":
+        return node.data in model.discretes
+    if node.op == "var":
+        return node.data[1] == "s" and node.data[0] in model.assigned
+    if node.op in ("cmp", "table") or (node.op == "call" and node.data in STEPS):
+        return any(n.op == "time" or (n.op == "var" and n.data[1] in ("s", "e")) for n in variables(node))
+    return False
 
 
 def inertial(model: EnergyModel) -> frozenset[str]:

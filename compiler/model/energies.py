@@ -18,7 +18,7 @@ from sysdyn.compiler.model.mirror import PRIMAL, Mirror
 from sysdyn.compiler.model.terms import Nest, Term, canonical, counter, local_variables, split, without_nested
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.dimensions import TIME
-from sysdyn.dsl.model.expression import Node, substitute, topological, var
+from sysdyn.dsl.model.expression import Node, substitute, topological, var, variables
 from sysdyn.dsl.model.network import Loop, Network, Shape
 from sysdyn.dsl.model.units import multiply, si_text
 from sysdyn.dsl.text.diagnostics import Place
@@ -129,6 +129,7 @@ class EnergyModel:
     speeds: tuple[Quantity, ...] = ()
     switched: frozenset[str] = frozenset()  # labels of constraints that hold at times
     discretes: frozenset[str] = frozenset()  # parameters that events assign
+    assigned: frozenset[str] = frozenset()  # states that events assign
     solved: Mapping[str, tuple[Node, Node]] = field(default_factory=dict)  # 0 = dT/dp - f where T* stays; its rate
 
     def function(self, name: str) -> tuple[Term, ...]:
@@ -194,6 +195,7 @@ def energies(network: Network) -> EnergyModel:
         speeds=tuple(Quantity(o.name, flows(o.expression), False, o.unit.text, o.place) for o in network.speeds),
         switched=frozenset(s.label for s in network.switches if s.holds is None),
         discretes=frozenset(network.discretes),
+        assigned=frozenset(_assigned(network)),
     )
     touched = tangible(model)
     coordinates = tuple(replace(c, tangible=c.name in touched) for c in model.coordinates)
@@ -256,6 +258,13 @@ def _dynamics(network: Network) -> Iterator[Row]:
         nest, (expression, state) = canonical(d.loops, flows(d.expression), d.state)
         pieces = without_nested(split(expression, nest, d.place), f"the dynamic of '{state.data[0]}'")
         yield Row("lambda", state.data[0], state.args, pieces, nest, d.place)
+
+
+def _assigned(network: Network) -> Iterator[str]:
+    """States that events assign."""
+    for event in network.events:
+        for action in event.actions:
+            yield from (n.data[0] for n in variables(action.target) if n.op == "var" and n.data[1] == "s")
 
 
 def _initials(network: Network) -> Iterator[Target]:

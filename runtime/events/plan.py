@@ -5,6 +5,7 @@ Rows are places in block observe: a relation a > b is the row a - b.  Made by wh
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from sysdyn.values import dataclass
@@ -89,7 +90,8 @@ class Kink:
     """A switching function: where it is zero, a law changes its branch.
 
     value, rate: rows (rate -1 where it has none); branch: place in p, see kinks.py; above, below: rows 1 - sense and
-    1 + sense of a law that jumps and may slide between its branches (else -1); element: whose law.
+    1 + sense of a law that jumps and may slide between its branches (else -1); element: whose law; inner: whether
+    coordinates move it, so that what is stored is the same on both sides.
     """
 
     name: str
@@ -100,12 +102,14 @@ class Kink:
     above: int = -1
     below: int = -1
     jumps: bool = False
+    inner: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
     """limit: of events; rest: an impact left slower than this part of the fastest is the last; plain: row families that
-    are sums of unknowns, with factors that are numbers, and of nothing else.
+    are sums of unknowns, with factors that are numbers, and of nothing else; turns (s): the least time in which a
+    signal that an event reads goes from one extreme to the next.
     """
 
     relations: tuple[Relation, ...] = ()
@@ -116,6 +120,7 @@ class Plan:
     limit: int | None = None
     rest: float = 1e-6
     plain: frozenset[int] = frozenset()
+    turns: float = math.inf
 
     def __bool__(self) -> bool:
         return bool(self.whens or self.sampled or self.contacts or self.kinks)

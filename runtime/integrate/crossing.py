@@ -41,7 +41,7 @@ def cross(run: Integration, segment: Segment) -> None:
             run.driver.run.start_kind = TRACE
         else:
             _row_before(run)
-    run.driver.leave(y, yd)
+    (run.pieces or run.driver).leave(y, yd)
     run.settlers.rest()
     method.t_end = segment.end
     point = [*found]

@@ -34,6 +34,8 @@ UNSEEN = 100.0
 PARTS = 8
 """Steps at least that such a bounce takes (radau and dopri follow a parabola in one), or after one that misled."""
 
+FOLLOWED = 16.0
+"""Times a signal that events read may turn within a step: each way has SD_FINEST / FOLLOWED parts (core/run/run.h)."""
 WIDER = 3.0
 """Times the stretch in which a change was seen, and was none once settled: the next one behind it that is searched."""
 SOON = 1e-2
@@ -57,7 +59,10 @@ class Pieces:
         self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin, run.request.rtol)
         self.handler.restart = run.settlers.restart
         self.handler.contacts.size(run.sizes.magnitude, run.sizes.time)
-        self._longest, self._landing = run.method.contents.h_max, np.inf
+        method = run.method.contents
+        if np.isfinite(plan.turns):
+            run.driver.run.turns, method.h_max = plan.turns, min(method.h_max, FOLLOWED * plan.turns)
+        self._longest, self._landing = method.h_max, np.inf
         self.at = 0
         """The number of the segment."""
         n = run.system.form.written
@@ -263,10 +268,21 @@ class Pieces:
         self._begun = t
         if misled:
             self._short(t, misled)
-        self.run.driver.leave(*before)
+        self.leave(*before)
         go_on(self.run, t, t, [*point])
         core.start_kind = 0
         self._watch()
+
+    def leave(self, y: Floats, yd: Floats) -> None:
+        """What was stored at y, yd [unknowns as written] before an event, by the parameters of before; branches that
+        coordinates turn are those of behind it: a store that gains there gains it from nowhere.
+        """
+        after = self.handler.p.copy()
+        inner = [kink.branch for kink in self.handler.plan.kinks if kink.inner]
+        self.handler.p[:] = self.handler.before[0]
+        self.handler.p[inner] = after[inner]
+        self.run.driver.leave(y, yd)
+        self.handler.p[:] = after
 
     def sample(self, sink: Sink) -> bool:
         """What is due where a piece has met its end; whether the segment goes on."""

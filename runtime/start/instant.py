@@ -68,6 +68,7 @@ class Instant:
         pattern, form = settled.pattern, settled.another("3").form
         self._row, self._column = pattern.row.astype(np.int64), pattern.columns_of()
         self._balances = settled.of_groups("dynamics")
+        self._momenta = settled.of_groups("momentum")
         self._states, self._constraints = settled.of_groups("momentum", "gamma"), settled.of_groups("phi_rate", "psi")
         self._moving, self._force = np.isin(kinds, ("f", "p", "e")), np.isin(kinds, FORCES)
         self._told, self._struck = self._reacting()
@@ -96,10 +97,11 @@ class Instant:
         return told, follows
 
     def broken(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> bool:
-        """Whether a constraint on flows does not hold at the point."""
+        """Whether a constraint on flows does not hold at the point, or where there are any, a momentum's."""
         flows = self._now(self._constraints)
         if not flows.any():
             return False
+        flows |= self._momenta
         jy, _ = self.system.jacobian(t, y, yd)
         size = np.zeros(self.system.rows)
         np.add.at(size, self._row, np.abs(jy) * np.maximum(magnitude, np.abs(y))[self._column])

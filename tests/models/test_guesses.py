@@ -5,6 +5,7 @@ import math
 
 import pytest
 from model_runs import attempt, trace_of
+from sysdyn import api
 from sysdyn.cli.main import run
 
 CRANK = """
@@ -165,3 +166,14 @@ scene s of held {{ time 0 s to 1 s; trace a.e, R.f }}
     assert [(d.code, d.message) for d in report] == [
         ("E903", "an initial value contradicts the constraints: residual 4")
     ]
+
+
+def test_what_is_left_of_a_velocity_has_the_unit_of_one(tmp_path):
+    """A ball that begins on the floor and into it; it was 4 m."""
+    path = tmp_path / "ball.sd"
+    path.write_text(
+        "model ball {\n coord y: translation = 0 m\n energy T* = 1/2*(2 kg)*y'^2\n phi floor: y >= 0 m\n"
+        " init y' = -4 m/s\n}\nscene fall of ball { time 0 s to 1 s }\n"
+    )
+    with pytest.raises(api.ModelError, match=r"floor: residual 4 m/s$"):
+        api.simulate(path, output=tmp_path / "ball.h5")

@@ -50,6 +50,7 @@ from sysdyn.dsl.model.expression import (
     sub,
     topological,
     var,
+    variables,
 )
 from sysdyn.dsl.model.network import Network, Parameter, Table
 from sysdyn.dsl.model.units import NONE, si
@@ -126,7 +127,8 @@ class _Freezer:
         text = repr(lettered(self.before.formulation, s.u))
         rate = f"#rate {k}" if self._rate(k) is not None else None
         slide = (f"#above {k}", f"#below {k}") if self.sense[k] is not None else ()
-        return Frozen(f"#branch {k}", text, row.label, row.place, f"#value {k}", rate, slide, s.jumps)
+        inner = any(n.op == "var" and n.data[1] in ("q", "f", "p") for n in variables(s.u))
+        return Frozen(f"#branch {k}", text, row.label, row.place, f"#value {k}", rate, slide, s.jumps, inner)
 
     def _rate(self, k: int) -> Node | None:
         try:

@@ -121,6 +121,20 @@ static void forth(sd_run *run, int32_t to)
     memcpy(m->p, m->p_after, (size_t)m->parameters * sizeof(double));
 }
 
+/* What was stored before an event, by the parameters of before; branches that coordinates turn are those of behind it. */
+static void leave(sd_run *run)
+{
+    sd_modes *m = run->modes;
+    size_t size = (size_t)m->parameters * sizeof(double);
+    memcpy(m->p_after, m->p, size);
+    memcpy(m->p, m->p_before, size);
+    for (int32_t k = 0; k < m->kinks; k++)
+        if (m->kink[k].inner)
+            m->p[m->kink[k].branch] = m->p_after[m->kink[k].branch];
+    sd_run_leave(run, m->before, m->before_d);
+    memcpy(m->p, m->p_after, size);
+}
+
 /* On from the point behind an event at t, whose row, of kind `kind`, is as of `label`; it counts as so many, and is told
  * in so many rows of the log. */
 static void go_on(sd_run *run, double t, double label, int32_t kind, int32_t logged, int64_t entries)
@@ -135,7 +149,7 @@ static void go_on(sd_run *run, double t, double label, int32_t kind, int32_t log
     for (int32_t i = 0; i < m->unknowns; i++)
         m->restart_d[i] = m->differential[i] ? m->rate[i] : 0.0;
     run->start_kind = kind;
-    sd_run_leave(run, m->before, m->before_d);
+    leave(run);
     sd_run_restart(run, t, label, m->restart, m->restart_d);
     run->start_kind = 0;
     m->logged += logged;

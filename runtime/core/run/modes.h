@@ -57,7 +57,7 @@ typedef struct sd_contact {
 } sd_contact;
 
 typedef struct sd_kink {
-    int32_t branch, value, rate, above, below;
+    int32_t branch, value, rate, above, below, inner; /* inner: coordinates move it, and nothing is supplied at its zero */
 } sd_kink;
 
 /* A smooth piece of the text (s); label: of the row in which it begins. */

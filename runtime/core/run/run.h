@@ -21,7 +21,7 @@
 #define SD_ROW_HEAD 8
 #define SD_TRACE 1    /* kind of a row of the trace */
 #define SD_PARTS 4    /* of a step, at whose ends what is watched is looked at */
-#define SD_FINEST 256 /* parts of a step that what is watched does not follow in fewer */
+#define SD_FINEST 1024 /* parts of a step that what is watched does not follow in fewer */
 #define SD_COMPARED 4 /* kind of a row that runs are compared by (integrate/request.py) */
 
 enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3, SD_EVENT = 4 };
@@ -75,6 +75,7 @@ typedef struct sd_run {
     const double *projected;          /* drift of the last step before the method itself projected it; NULL: it does not */
     sd_modes *modes;                  /* NULL: every event goes to its handler */
     double t_clear, t_seen;           /* within the last step, between which something watched has been seen to change */
+    double turns;                     /* s: in which something that is read turns; 0: nothing does */
     double *looked;                   /* [SD_PARTS + 1][observed] values at the ends of parts */
 } sd_run;
 

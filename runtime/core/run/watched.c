@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define NARROWER 20   /* times the part of a step within which something changes is parted again */
+#define A_TURN 0.5     /* from one extreme to the next: a part at most */
 #define SHIFT 0.13    /* of a part, by which every other one is longer */
 #define SECOND (1.0 + SHIFT)
 #define FOURTH (3.0 + SHIFT)
@@ -109,8 +110,11 @@ int sd_run_changes(sd_run *run, double from)
         return 0;
     if (!run->looked && !(run->looked = malloc((SD_PARTS + 1) * (size_t)run->observed * sizeof(double))))
         return 1; /* it is sought without */
+    while (run->turns > 0.0 && parts < SD_FINEST && to - from > (double)parts * A_TURN * run->turns)
+        parts *= SD_PARTS; /* of what turns several times between two looks they may say nothing */
+    const int known = parts > SD_PARTS;
     int more = scan(run, from, to, parts, &fell);
-    const int parted = more;
+    const int parted = more || known;
     for (; more && parts < SD_FINEST; more = scan(run, from, end, parts, &fell)) {
         end = fell ? run->t_seen : end;
         parts *= SD_PARTS;

@@ -76,7 +76,7 @@ class Contact(c.Structure):
 class Kink(c.Structure):
     """sd_kink."""
 
-    _fields_ = [(name, I) for name in ["branch", "value", "rate", "above", "below"]]
+    _fields_ = [(name, I) for name in ["branch", "value", "rate", "above", "below", "inner"]]
 
 
 class Piece(c.Structure):
@@ -171,6 +171,7 @@ class Run(c.Structure):
         ("modes", P),
         ("t_clear", D),
         ("t_seen", D),
+        ("turns", D),
         ("looked", P),
     ]
 
