@@ -589,3 +589,97 @@ def test_a_flow_that_is_given_hides_no_balance(formulation, tmp_path, capsys):
     slope = 60e5 * 0.6e-3 / 0.45e-3**2  # of the pressure by the volume
     at = 2.0j
     assert complex((c @ np.linalg.solve(at * np.eye(len(a)) - a, b) + d)[0, 0]) == pytest.approx(slope / at, rel=CLOSE)
+
+
+BIASED = """
+model coil {
+  input u: H = 0.1 H
+  node a, b: electrical
+  V: effort(e = 10 V) a -> ground
+  R: dissipator(e = 5 ohm*f) a -> b
+  L: kinetic(p = u*f) b -> ground
+}
+model gap {
+  input u: F = 1 mF
+  node a, b: electrical
+  V: effort(e = 10 V) a -> ground
+  R: dissipator(e = 5 ohm*f) a -> b
+  L: potential(q = u*e) b -> ground
+}
+scene coil_s of coil { time 0 s to 1 s
+  trace L.f as i, L.e as v }
+scene gap_s of gap { time 0 s to 1 s
+  trace L.f as i, L.e as v }
+"""
+"""L i0 = 0.1 H x 2 A, q0 = 1 mF x 10 V: what moves the inductance or the gap of a loaded store moves it by its rate."""
+
+
+@pytest.mark.parametrize("formulation", ALL)
+@pytest.mark.parametrize("index", ["3", "1", "0"])
+@pytest.mark.parametrize("scene", ["coil_s", "gap_s"])
+def test_an_input_in_a_loaded_store_acts_by_its_rate(scene, index, formulation, tmp_path, capsys):
+    options = ("--scene", scene, "--equilibrium", "--formulation", formulation, "--index", index)
+    found = linear(capsys, write(tmp_path, BIASED), *options)
+    for s in (3j, 70.0 + 1j):
+        current = -s * 2 / (0.1 * s + 5) if scene == "coil_s" else s * 10 / (1e-3 * s + 0.2) / 5
+        expected = np.array([current, -5 * current])
+        assert _descriptor(found, s)[:, 0] == pytest.approx(expected, rel=CLOSE)
+        assert _reduction(found, s)[:, 0] == pytest.approx(expected, rel=CLOSE)
+
+
+BASE = """
+model base {
+  input v: m/s = 0 m/s
+  input u: m = 0.2 m
+  node b, x: translation
+  F: flow(f = v) b -> ground
+  K: potential(e = 100 N/m*q) b -> x
+  D: dissipator(e = 1 N.s/m*f) b -> x
+  M: kinetic(p = 1 kg*f) x
+  Mb: kinetic(p = 2 kg*f) b
+}
+scene base_s of base { time 0 s to 1 s
+  trace x.f as vx, F.e as F }
+model frame {
+  input u: m = 0.2 m
+  coord x: translation = 0 m
+  let z = x + u
+  let y = 2*x + u^2/(1 m)
+  energy T* = 1/2*(1 kg)*z'^2
+  energy V = 1/2*(9 N/m)*x^2
+  work -(0.5 N.s/m)*x' on x
+}
+scene frame_s of frame { time 0 s to 1 s
+  trace x, x'' as a, y, y' as yd }
+"""
+
+
+@pytest.mark.parametrize("index", ["3", "2", "2v", "1", "0"])
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+def test_matrices_of_every_index_hold_the_rates_of_inputs(formulation, index, tmp_path, capsys):
+    """The base moved with v: x'' + x' + 100 x = v' + ...; in the frame x'' + u'' + x'/2 + 9 x = 0."""
+    path = write(tmp_path, BASE)
+    options = ("--formulation", formulation, "--index", index)
+    for s in (3j, 2.0 + 11j):
+        found = linear(capsys, path, "--scene", "base_s", "--inputs", "v", *options)
+        speed = (100 + s) / (s * s + s + 100)
+        expected = np.array([speed, -(2 * s + (100 + s) * (1 - speed) / s)])
+        assert _descriptor(found, s)[:, 0] == pytest.approx(expected, rel=CLOSE)
+        assert _reduction(found, s)[:, 0] == pytest.approx(expected, rel=CLOSE)
+        found = linear(capsys, path, "--scene", "frame_s", *options)
+        x = -s * s / (s * s + s / 2 + 9)
+        expected = np.array([x, s * s * x, 2 * x + 0.4, s * (2 * x + 0.4)])
+        assert _descriptor(found, s)[:, 0] == pytest.approx(expected, rel=CLOSE)
+        assert _reduction(found, s)[:, 0] == pytest.approx(expected, rel=CLOSE)
+
+
+def _descriptor(found, s):
+    e, a, b, c, d = (np.array(found[k]) for k in "EABCD")
+    return (c + s * np.array(found.get("Cd", 0.0 * c))) @ np.linalg.solve(s * e - a, b) + d
+
+
+def _reduction(found, s):
+    small = found["reduced"]
+    a, b, c, d = (np.array(small[k]) for k in "ABCD")
+    rates = s * np.array(small.get("D1", 0.0 * d)) + s * s * np.array(small.get("D2", 0.0 * d))
+    return c @ np.linalg.solve(s * np.eye(len(a)) - a, b) + d + rates
