@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,8 +21,8 @@ from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.stopping import unwatched
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.calculus import moving, rate_name, time_derivative
-from sysdyn.dsl.model.expression import Node, topological
-from sysdyn.dsl.model.network import Network, Parameter
+from sysdyn.dsl.model.expression import topological
+from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.arrival import arrival
@@ -84,7 +84,7 @@ def compiled(
                 )
                 network = second or network
             network = replace(unwatched(network), statics=(), expectations=(), goldens=())
-            network = replace(network, parameters=(*network.parameters, *_rates(network, moves)))
+            network = _with_rates(network, moves)
             prepared = prepare(
                 network, inner, formulation=request.formulation, backend=request.backend, gather=False
             )
@@ -101,24 +101,25 @@ def own_inputs(target: Target, network: Network) -> tuple[str, ...]:
 def _moving(network: Network, target: Target, inputs: Inputs) -> tuple[str, ...]:
     """The parameters that move with the inputs: these, and those whose values are formulas in them."""
     asked = own_inputs(target, network) if inputs is None else {text.partition("[")[0].strip() for text in inputs}
-    found = [p.name for p in network.parameters if p.name in asked]
-    for name in found:
-        read = (p.name for p in network.parameters if any(_reads(v, name) for v in p.values))
-        found += [other for other in read if other not in found]
-    return tuple(found)
+    given = [(p.name, v) for p in network.parameters for v in p.values] + [(s.name, s.value) for s in network.elements]
+    read = [(name, {n.data for n in topological([value]) if n.op == "param"}) for name, value in given]
+    found = {p.name for p in network.parameters if p.name in asked}
+    while more := {name for name, names in read if name not in found and names & found}:
+        found |= more
+    return tuple(p.name for p in network.parameters if p.name in found)
 
 
-def _reads(value: Node, name: str) -> bool:
-    return any(n.op == "param" and n.data == name for n in topological([value]))
-
-
-def _rates(network: Network, moves: Sequence[str]) -> Iterator[Parameter]:
-    """First and second rates of parameters that move: zero, and of formulas those of the formula."""
+def _with_rates(network: Network, moves: Sequence[str]) -> Network:
+    """With first and second rates of the parameters that move: zero, and of formulas those of the formula."""
+    parameters, elements = list(network.parameters), list(network.elements)
     for p in network.parameters:
-        if p.name in moves:
-            once = tuple(time_derivative(v) for v in p.values)
-            yield replace(p, name=rate_name(p.name), values=once)
-            yield replace(p, name=rate_name(p.name, 2), values=tuple(time_derivative(v) for v in once))
+        values, apart = p.values, [s for s in network.elements if s.name == p.name]
+        for order in (1, 2) if p.name in moves else ():
+            values = tuple(map(time_derivative, values))
+            apart = [replace(s, name=rate_name(p.name, order), value=time_derivative(s.value)) for s in apart]
+            parameters.append(replace(p, name=rate_name(p.name, order), values=values))
+            elements += apart
+    return replace(network, parameters=tuple(parameters), elements=tuple(elements))
 
 
 def contents(network: Network) -> tuple[tuple[str, str, str], ...]:

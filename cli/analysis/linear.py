@@ -26,7 +26,7 @@ from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.linear.modes import Mode, Transfer, modes, stored, transfer, wide_transfer
 from sysdyn.runtime.linear.pencil import Descriptor
 from sysdyn.runtime.linear.states import constant, moving, quadratures
-from sysdyn.runtime.linear.tangent import Given, Outputs, Reduced, Wide, integral, rows_at
+from sysdyn.runtime.linear.tangent import Given, NoLinearisation, Outputs, Reduced, Wide, integral, rows_at
 from sysdyn.runtime.linear.witnessed import witnessed
 from sysdyn.runtime.model.forms import FORMS, Form
 from sysdyn.runtime.model.system import System
@@ -96,7 +96,7 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     state, system = found.state, found.system
     rows = rows_at(system, state)
     slopes = [
-        Sensitivity(found.prepared.compiled.form, found.binding, found.prepared.network.parameters, name, at)
+        Sensitivity(found.prepared.compiled.form, found.binding, found.prepared.network, name, at)
         for name, at in inputs
     ]
     labels = tuple(name + (f"[{','.join(map(str, at))}]" if at else "") for name, at in inputs)

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,8 @@ from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Kernel
 from sysdyn.dsl.model.calculus import differential, rate_name
-from sysdyn.dsl.model.expression import Node, compare, conditional, const, is_const, mul, topological
-from sysdyn.dsl.model.network import Parameter
+from sysdyn.dsl.model.expression import Node, compare, conditional, const, index, is_const, substitute, topological
+from sysdyn.dsl.model.network import Network
 
 Array = NDArray[np.float64]
 RATES = {
@@ -49,10 +50,10 @@ class Sensitivity:
     """Slopes of the rows of a form by one parameter, or one element of it."""
 
     def __init__(
-        self, form: DescriptorForm, binding: Binding, parameters: Sequence[Parameter], name: str, at: tuple[int, ...]
+        self, form: DescriptorForm, binding: Binding, network: Network, name: str, at: tuple[int, ...]
     ) -> None:
-        """at: the index of an element; parameters: those whose values may be formulas in others."""
-        slopes = [_Slope(parameters, rate_name(name, order), at) for order in range(LAST + 1)]
+        """at: the index of an element; network: its parameters may be formulas in others."""
+        slopes = [_Slope(network, binding, rate_name(name, order), at) for order in range(LAST + 1)]
         blocks = _by_order(form, [{b.name: _changed(b, slope) for b in form.blocks} for slope in slopes])
         self._oracles = [
             Oracle(replace(form, blocks=tuple(Block(n, tuple(k)) for n, k in blocks.get(order, {}).items())), binding)
@@ -69,35 +70,56 @@ class Sensitivity:
 class _Slope:
     """The derivative of expressions by a parameter, formulas of other parameters followed."""
 
-    def __init__(self, parameters: Sequence[Parameter], name: str, at: tuple[int, ...]) -> None:
-        self._name, self._at = name, at
-        self._follow: dict[str, Node] = {}
-        self._follow = self._following(parameters)
+    def __init__(self, network: Network, binding: Binding, name: str, at: tuple[int, ...]) -> None:
+        self._name, self._at, self._binding = name, at, binding
+        self._known = {p.name: p for p in network.parameters}
+        self._apart = [(s.name, s) for s in network.elements]
+        self._follow = self._following(name)
 
     def __call__(self, expression: Node) -> Node:
+        return differential(expression, seeds) if (seeds := self._seeds(expression)) else const(0.0)
+
+    def _following(self, name: str) -> frozenset[str]:
+        """The parameters whose value is a formula in one, by others too."""
+        roots = {p.name: [*p.values, *(s.value for n, s in self._apart if n == p.name)] for p in self._known.values()}
+        read = {n: {m.data for m in topological(values) if m.op == "param"} for n, values in roots.items()}
+        found = {name}
+        while more := {n for n, names in read.items() if n not in found and names & found}:
+            found |= more
+        return frozenset(found - {name})
+
+    def _seeds(self, expression: Node) -> dict[Node, Node]:
         nodes = [n for n in topological([expression]) if n.op == "param"]
         seeds = {n: self._own(n) for n in nodes if n.data == self._name}
-        seeds |= {n: self._follow[n.data] for n in nodes if n.data in self._follow and not n.args}
-        return differential(expression, seeds) if seeds else const(0.0)
-
-    def _following(self, parameters: Sequence[Parameter]) -> dict[str, Node]:
-        """Slopes of the parameters whose value is a formula in this one."""
-        found: dict[str, Node] = {}
-        for _ in parameters:
-            self._follow = dict(found)
-            for p in parameters:
-                if not p.shape and len(p.values) == 1 and p.name != self._name:
-                    slope = self(p.values[0])
-                    if not is_const(slope, 0.0):
-                        found[p.name] = slope
-            if found == self._follow:
-                break
-        return found
+        return seeds | {n: self._of(n) for n in nodes if n.data in self._follow}
 
     def _own(self, node: Node) -> Node:
         """1 where the indices are those of the element."""
-        pairs = zip(node.args, self._at, strict=True)
-        return mul(const(1.0), *(conditional(compare("==", i, const(k)), const(1.0), const(0.0)) for i, k in pairs))
+        return _where(node.args, self._at, const(1.0), const(0.0))
+
+    def _of(self, node: Node) -> Node:
+        """The slope of a parameter by its formula: over its indices, element by element, or of an element apart."""
+        p = self._known[node.data]
+        loops = {index(name): at for name, at in zip(p.indices, node.args, strict=False)}
+        slopes = [substitute(self(v), loops) for v in p.values]
+        inner = node.args[len(p.indices) :]
+        boxes = self._binding.parameters.boxes.get(p.name, ())[len(p.indices) :]
+        found = slopes[0] if len(slopes) == 1 else const(0.0)
+        if len(slopes) > 1:
+            for at, slope in zip(product(*(range(a, b + 1) for a, b in boxes)), slopes, strict=True):
+                found = _where(inner, at, slope, found)
+        for name, apart in self._apart:
+            if name == p.name:
+                at = tuple(round(self._binding.evaluate(node)) for node in apart.at)
+                found = _where(node.args, at, self(apart.value), found)
+        return found
+
+
+def _where(indices: Sequence[Node], at: Sequence[int], there: Node, elsewhere: Node) -> Node:
+    """One value where the indices are these, the other elsewhere."""
+    for i, k in zip(indices, at, strict=True):
+        there = conditional(compare("==", i, const(k)), there, elsewhere)
+    return there
 
 
 def _by_order(form: DescriptorForm, by: Sequence[dict[str, list[Kernel]]]) -> dict[int, Blocks]:

@@ -683,3 +683,30 @@ def _reduction(found, s):
     a, b, c, d = (np.array(small[k]) for k in "ABCD")
     rates = s * np.array(small.get("D1", 0.0 * d)) + s * s * np.array(small.get("D2", 0.0 * d))
     return c @ np.linalg.solve(s * np.eye(len(a)) - a, b) + d + rates
+
+
+ROW = """
+model row {
+  param u = 10 N/m
+  param n = 3
+  param c = 2
+  for i in 1..n { param k[i] = u*i }
+  param kk[1..3] = [u, c*u, 5*u]
+  coord x[1..n]: translation = 0 m
+  energy T* = sum(i in 1..n: 1/2*(1 kg)*x[i]'^2)
+  energy V = sum(i in 1..n: 1/2*(k[i] + kk[i])*x[i]^2)
+  for i in 1..n { work 5 N - (0.3 N.s/m)*x[i]' on x[i] }
+}
+scene s of row { time 0 s to 1 s
+  set kk[3] = 40 N/m
+  trace x[1], x[2], x[3] }
+"""
+
+
+@pytest.mark.parametrize(("asked", "slopes"), [("u", (2, 4, 3)), ("c", (0, 10, 0)), ("kk[2]", (0, 1, 0))])
+def test_arrays_by_formula_follow_an_input(asked, slopes, tmp_path, capsys):
+    found = linear(capsys, write(tmp_path, ROW), "--equilibrium", "--inputs", asked)
+    s, stiffness = 3j, (20, 40, 70)
+    expected = [-m * 5 / k / (s * s + 0.3 * s + k) for m, k in zip(slopes, stiffness, strict=True)]
+    assert _descriptor(found, s)[:, 0] == pytest.approx(expected, rel=CLOSE)
+    assert _reduction(found, s)[:, 0] == pytest.approx(expected, rel=CLOSE)
