@@ -91,8 +91,11 @@ def loose_of(found: Found) -> NDArray[np.bool_]:
     return quadratures(found.system, tangible)
 
 
-def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linear:
-    """The linearisation at the state of `found`.  Raises NoLinearisation."""
+def linearised(found: Found, inputs: Sequence[Input], index: str = "3", watched: Sequence[int] = ()) -> Linear:
+    """The linearisation at the state of `found`; watched: places of unknowns that are outputs too, the last ones.
+
+    Raises NoLinearisation.
+    """
     state, system = found.state, found.system
     rows = rows_at(system, state)
     slopes = [
@@ -102,7 +105,7 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     labels = tuple(name + (f"[{','.join(map(str, at))}]" if at else "") for name, at in inputs)
     if deeper := [label for label, slope in zip(labels, slopes, strict=True) if slope.deeper]:
         raise NoLinearisation(f"the equations need a third rate of {', '.join(deeper)}")
-    names, out = _outputs(found, slopes)
+    names, out = _with(_outputs(found, slopes), system, watched)
     by_input = tuple(
         _columns(rows.starter.settled.form, found, [(s, order) for s in slopes]) for order in range(FIRST, LAST + 1)
     )
@@ -122,6 +125,18 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     return Linear(
         state.t, state.y, descriptor, small, own, transfers, labels, names, moves, steady, stores, energies
     )
+
+
+def _with(
+    seen: tuple[tuple[str, ...], Outputs], system: System, watched: Sequence[int]
+) -> tuple[tuple[str, ...], Outputs]:
+    """The outputs, and unknowns behind them."""
+    names, out = seen
+    own = np.eye(out.by_y.shape[1])[list(watched)]
+    still, none = 0.0 * own, np.zeros((len(watched), out.by_input[0].shape[1]))
+    one, rate, twice = (np.vstack([part, none]) for part in out.by_input)
+    both = np.vstack([out.by_y, own]), np.vstack([out.by_rate, still])
+    return (*names, *(system.name(int(k)) for k in watched)), Outputs(*both, (one, rate, twice))
 
 
 def _asked(found: Found, names: Sequence[str]) -> list[int]:
