@@ -22,7 +22,7 @@ from sysdyn.compiler.forms.descriptor import AUDIT, DescriptorForm, Equations, U
 from sysdyn.compiler.forms.efforts import Effort, efforts
 from sysdyn.compiler.forms.meters.audit import add_audit
 from sysdyn.compiler.forms.meters.observing import add_initials, add_observations, missing, observed, pins_and_equations
-from sysdyn.compiler.forms.momenta import given, inertial, resolved, shared
+from sysdyn.compiler.forms.momenta import given, inertial, jumping, resolved, shared
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.calculus import derivative, differential, gradient, moved, moving, time_derivative
@@ -42,7 +42,7 @@ PARALLEL = 1e-9
 def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> DescriptorForm:
     """The descriptor form; `legendre`: every inertial coordinate carries its momentum as an unknown."""
     stores = given(model)
-    carriers = stores | inertial(model) if legendre else stores
+    carriers = stores | (inertial(model) if legendre else jumping(model))
     model = resolved(model, frozenset(carriers))
     form = _Lowering(model, stores, frozenset(carriers))
     form.declare()

@@ -23,7 +23,11 @@ from sysdyn.dsl.model.expression import (
     is_const,
     reduction,
     substitute,
+    topological,
 )
+
+JUMPING = ("step", "sign", "setsign", "floor", "ceil", "mod", "frac")
+"""Functions whose values jump."""
 
 
 def given(model: EnergyModel) -> frozenset[str]:
@@ -50,6 +54,34 @@ def inertial(model: EnergyModel) -> frozenset[str]:
             if any(not is_const(derivative(slope, b), 0.0) for b in rates):
                 found.add(a.data[0])
     return frozenset(found)
+
+
+def jumping(model: EnergyModel) -> frozenset[str]:
+    """Coordinates whose momentum dT*/df may jump with time or signals at given flows, and those whose inertia is theirs
+    too: momenta keep their values there, flows do not, so these carry their momentum in every form.
+    """
+    pairs: list[tuple[str, str]] = []
+    found = set[str]()
+    for term in model.function(model.mirror.coenergy):
+        rates = local_variables(term.expression, model.mirror.rate)
+        for a in rates:
+            slope = derivative(term.expression, a)
+            joined = [b.data[0] for b in rates if not is_const(derivative(slope, b), 0.0)]
+            pairs += [(a.data[0], b) for b in joined]
+            if joined and any(_jumps(n) for n in topological([slope])):
+                found.add(a.data[0])
+    while more := {a for a, b in pairs if b in found} - found:
+        found |= more
+    return frozenset(found)
+
+
+def _jumps(node: Node) -> bool:
+    """Whether an operation may jump with time, or with dynamic variables, alone."""
+    if node.op not in ("cond", "table") and not (node.op == "call" and node.data in JUMPING):
+        return False
+    moving = topological([node.args[0]] if node.op == "cond" else node.args)
+    read = [n for n in moving if n.op in ("time", "var")]
+    return bool(read) and all(n.op == "time" or n.data[1] == "s" for n in read)
 
 
 def shared(model: EnergyModel) -> frozenset[str]:

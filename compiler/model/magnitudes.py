@@ -14,7 +14,7 @@ from sysdyn.compiler.model.interpret import Lookup, Value, evaluate
 from sysdyn.dsl.model.calculus import partials
 from sysdyn.dsl.model.expression import Node, add, call, compare, conditional, const, linear, mul, topological_unbound
 
-EXACT = ("const", "param", "var", "time", "index", "reduce")
+EXACT = ("const", "param", "var", "time", "index", "reduce", "cmp", "and", "or", "not")
 """What `rounding` takes as it is."""
 
 
