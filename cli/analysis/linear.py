@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,10 +61,15 @@ class Linear:
 
 
 def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -> tuple[Input, ...]:
-    """Parameters and inputs by name and index; the model's own inputs where none is asked.  Raises UsageError."""
+    """Parameters and inputs by name and index; where none is asked the model's own inputs, element by element.
+
+    Raises UsageError.
+    """
     known = {p.name: p for p in prepared.network.parameters}
     if asked is None:
-        return tuple((name, ()) for name in own_inputs(target, prepared.network))
+        boxes = prepared.binding.parameters.boxes
+        ranges_of = {n: [range(a, b + 1) for a, b in boxes.get(n, ())] for n in own_inputs(target, prepared.network)}
+        return tuple((name, at) for name, ranges in ranges_of.items() for at in product(*ranges))
     own = [s.decl.name for s in target.model.body if isinstance(s, syntax.Input)]
     found: list[Input] = []
     for text in asked:

@@ -34,6 +34,8 @@ from sysdyn.runtime.linear.tangent import NoLinearisation
 from sysdyn.runtime.model.system import System
 from sysdyn.values import dataclass
 
+ROUND_OFF = 1e-13
+"""Of its terms: what is left of a slope that cancels."""
 MOST = 400
 """Row families that are printed."""
 
@@ -146,6 +148,9 @@ def _linear(target: Target, prepared: Prepared, request: Request, report: Report
     own = [tuple(map(const, map(float, at))) for _, at in inputs]
     controls = [var(name, "s", *at, order=k) for k in range(3) for (name, _), at in zip(inputs, own, strict=True)]
     slopes = np.hstack([small.a, small.b - small.a @ d, d - small.a @ d1, d1])
+    a, b, c, c1 = (np.abs(part) for part in (small.a, small.b, d, d1))
+    sizes = np.hstack([a, b + a @ c, c + a @ c1, c1])
+    slopes = np.where(np.abs(slopes) > ROUND_OFF * sizes, slopes, 0.0)
     lines = []
     for row, node, name in zip(slopes, nodes, small.names, strict=True):
         terms = [scale(float(v), n) for v, n in zip(row, (*nodes, *controls), strict=True) if v != 0.0]

@@ -373,6 +373,22 @@ model base {
 }
 scene base_s of base { time 0 s to 1 s
   trace x.f }
+component seat {
+  param k = 100 N/m
+  input u: m
+  port x: translation
+  let z = x.q + u
+  energy T* = 1/2*(2 kg)*z'^2
+  K: potential(e = k*q) x -> ground
+}
+model two {
+  input u[1..2]: m = [0.1 m, 0.2 m]
+  node a, b: translation
+  A: seat(k = 50 N/m) u = u[1], x = a
+  B: seat() u = u[2], x = b
+}
+scene two_s of two { time 0 s to 1 s
+  trace a.q }
 """
 
 
@@ -381,6 +397,7 @@ scene base_s of base { time 0 s to 1 s
     [
         ("frame_s", ["x' = f_x", "f_x' = -9 x - 1/2 f_x - u''"]),
         ("base_s", ["q_x' = f_x", "f_x' = -100 q_x - f_x + 100 integral of v + v", "integral of v' = v"]),
+        ("two_s", ["q_a' = f_a", "q_b' = f_b", "f_a' = -25 q_a - u[1]''", "f_b' = -50 q_b - u[2]''"]),
     ],
 )
 def test_the_linear_form_is_of_the_unknowns_that_it_names(scene, expected, tmp_path, capsys):

@@ -710,3 +710,35 @@ def test_arrays_by_formula_follow_an_input(asked, slopes, tmp_path, capsys):
     expected = [-m * 5 / k / (s * s + 0.3 * s + k) for m, k in zip(slopes, stiffness, strict=True)]
     assert _descriptor(found, s)[:, 0] == pytest.approx(expected, rel=CLOSE)
     assert _reduction(found, s)[:, 0] == pytest.approx(expected, rel=CLOSE)
+
+
+SEATS = """
+component seat {
+  param k = 100 N/m
+  input u: m
+  port x: translation
+  let z = x.q + u
+  energy T* = 1/2*(2 kg)*z'^2
+  K: potential(e = k*q) x -> ground
+}
+model two {
+  input u[1..2]: m = [0.1 m, 0.2 m]
+  input w: m = 0 m
+  node a, b: translation
+  A: seat(k = 50 N/m) u = u[1] + 2*w, x = a
+  B: seat() u = u[2], x = b
+}
+scene s of two { time 0 s to 1 s
+  trace a.q as xa, b.q as xb }
+"""
+
+
+def test_an_input_that_is_an_array_is_one_input_an_element(tmp_path, capsys):
+    """Each seat: 2 (x'' + u'') + k x = 0."""
+    found = linear(capsys, write(tmp_path, SEATS), "--equilibrium")
+    assert found["inputs"] == ["u[1]", "u[2]", "w"]
+    s = 0.3 + 3j
+    one, other = (-s * s / (s * s + k / 2) for k in (50, 100))
+    expected = np.array([[one, 0, 2 * one], [0, other, 0]])
+    for response in (_descriptor(found, s), _reduction(found, s)):
+        assert np.abs(response - expected).max() < CLOSE
