@@ -135,7 +135,7 @@ def _linear(target: Target, prepared: Prepared, request: Request, report: Report
     try:
         places = linearised(found, inputs).reduced.places
         watched = places[places >= 0]
-        small = linearised(found, inputs, watched=watched).reduced
+        small = linearised(found, inputs, watched=watched.tolist()).reduced
     except NoLinearisation as error:
         raise NoSuchEquations(str(error)) from error
     system, count_ = found.system, watched.size
