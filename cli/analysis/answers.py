@@ -138,7 +138,7 @@ def _eigenvalues(
     settings = (*((n, v) for n, v in request.settings if n != name), (name, repr(value)))
     report = Report()
     with ex.fresh():
-        at, why = state_of(replace(request, settings=settings), None, report, rest=rest)
+        at, why = state_of(replace(request, settings=settings), None, (), report, rest=rest)
         if at is None:
             errors = [d.message for d in report.diagnostics if d.severity == "error"]
             return None, why or (errors[0] if errors else "no state")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,14 +20,19 @@ from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.stopping import unwatched
 from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model.calculus import moving, rate_name, time_derivative
+from sysdyn.dsl.model.expression import topological
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.arrival import arrival
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.values import dataclass
 
+Inputs = Sequence[str] | None
+"""Names of inputs, `name[i]` of elements; None: the model's own."""
 STORES = 200
 """Stores up to which the energy of a mode is shared out."""
 
@@ -49,11 +54,12 @@ def compiled(
     report: Report,
     outputs: tuple[str, ...] | None = None,
     also: Callable[[Network], tuple[str, ...]] | None = None,
+    inputs: Inputs = None,
 ) -> tuple[Target, Prepared] | None:
     """The target, compiled whole: what a scene does not need may be unstable all the same.
 
     outputs: names or expressions in the place of the scene's traces.  also: what of a network is observed
-    beside.  None where the report says why not.
+    beside.  inputs: those that move in time.  None where the report says why not.
     """
     document = targets.read(request.file, report)
     target = targets.one(document, request.file, request.model, request.scene, report)
@@ -63,22 +69,57 @@ def compiled(
     network = load.network(
         document, target.model, target.scene, inner, request.settings, levels=request.levels, outputs=outputs
     )
-    if network is not None and also is not None and (asked := also(network)):
-        names = network.traced
-        unasked = frozenset(asked).difference(names)
-        more = (*names, *(name for name in asked if name not in names))
-        second = load.network(
-            document, target.model, target.scene, Report(), request.settings, levels=request.levels, outputs=more
-        )
-        network = second or network
     prepared: Prepared | None = None
     if network is not None:
-        network = replace(unwatched(network), statics=(), expectations=(), goldens=())
-        prepared = prepare(
-            network, inner, formulation=request.formulation, backend=request.backend, gather=False
-        )
+        moves = _moving(network, target, inputs)
+        with moving(moves):
+            asked = also(network) if also is not None else ()
+            if asked or moves:
+                names = network.traced
+                unasked = frozenset(asked).difference(names)
+                more = (*names, *(name for name in asked if name not in names))
+                settings, levels = request.settings, request.levels
+                second = load.network(
+                    document, target.model, target.scene, Report(), settings, levels=levels, outputs=more
+                )
+                network = second or network
+            network = replace(unwatched(network), statics=(), expectations=(), goldens=())
+            network = _with_rates(network, moves)
+            prepared = prepare(
+                network, inner, formulation=request.formulation, backend=request.backend, gather=False
+            )
     report.extend(inner if prepared else targets.unsupported(inner))
     return None if prepared is None else (target, replace(prepared, unasked=unasked))
+
+
+def own_inputs(target: Target, network: Network) -> tuple[str, ...]:
+    """The model's inputs that hold a constant."""
+    known = {p.name for p in network.parameters}
+    return tuple(s.decl.name for s in target.model.body if isinstance(s, syntax.Input) and s.decl.name in known)
+
+
+def _moving(network: Network, target: Target, inputs: Inputs) -> tuple[str, ...]:
+    """The parameters that move with the inputs: these, and those whose values are formulas in them."""
+    asked = own_inputs(target, network) if inputs is None else {text.partition("[")[0].strip() for text in inputs}
+    given = [(p.name, v) for p in network.parameters for v in p.values] + [(s.name, s.value) for s in network.elements]
+    read = [(name, {n.data for n in topological([value]) if n.op == "param"}) for name, value in given]
+    found = {p.name for p in network.parameters if p.name in asked}
+    while more := {name for name, names in read if name not in found and names & found}:
+        found |= more
+    return tuple(p.name for p in network.parameters if p.name in found)
+
+
+def _with_rates(network: Network, moves: Sequence[str]) -> Network:
+    """With first and second rates of the parameters that move: zero, and of formulas those of the formula."""
+    parameters, elements = list(network.parameters), list(network.elements)
+    for p in network.parameters:
+        values, apart = p.values, [s for s in network.elements if s.name == p.name]
+        for order in (1, 2) if p.name in moves else ():
+            values = tuple(map(time_derivative, values))
+            apart = [replace(s, name=rate_name(p.name, order), value=time_derivative(s.value)) for s in apart]
+            parameters.append(replace(p, name=rate_name(p.name, order), values=values))
+            elements += apart
+    return replace(network, parameters=tuple(parameters), elements=tuple(elements))
 
 
 def contents(network: Network) -> tuple[tuple[str, str, str], ...]:

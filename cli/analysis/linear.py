@@ -11,10 +11,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.analysis.asked import Found, contents
+from sysdyn.cli.analysis.asked import Found, contents, own_inputs
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.targets import Target
@@ -26,7 +27,7 @@ from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.linear.modes import Mode, Transfer, modes, stored, transfer, wide_transfer
 from sysdyn.runtime.linear.pencil import Descriptor
 from sysdyn.runtime.linear.states import constant, moving, quadratures
-from sysdyn.runtime.linear.tangent import Given, Outputs, Reduced, Wide, integral, rows_at
+from sysdyn.runtime.linear.tangent import Given, NoLinearisation, Outputs, Reduced, Wide, integral, rows_at
 from sysdyn.runtime.linear.witnessed import witnessed
 from sysdyn.runtime.model.forms import FORMS, Form
 from sysdyn.runtime.model.system import System
@@ -60,11 +61,16 @@ class Linear:
 
 
 def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -> tuple[Input, ...]:
-    """Parameters and inputs by name and index; the model's own inputs where none is asked.  Raises UsageError."""
+    """Parameters and inputs by name and index; where none is asked the model's own inputs, element by element.
+
+    Raises UsageError.
+    """
     known = {p.name: p for p in prepared.network.parameters}
-    own = [s.decl.name for s in target.model.body if isinstance(s, syntax.Input)]
     if asked is None:
-        return tuple((name, ()) for name in own if name in known)
+        boxes = prepared.binding.parameters.boxes
+        ranges_of = {n: [range(a, b + 1) for a, b in boxes.get(n, ())] for n in own_inputs(target, prepared.network)}
+        return tuple((name, at) for name, ranges in ranges_of.items() for at in product(*ranges))
+    own = [s.decl.name for s in target.model.body if isinstance(s, syntax.Input)]
     found: list[Input] = []
     for text in asked:
         match = _INPUT.fullmatch(text.strip())
@@ -91,16 +97,21 @@ def loose_of(found: Found) -> NDArray[np.bool_]:
     return quadratures(found.system, tangible)
 
 
-def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linear:
-    """The linearisation at the state of `found`.  Raises NoLinearisation."""
+def linearised(found: Found, inputs: Sequence[Input], index: str = "3", watched: Sequence[int] = ()) -> Linear:
+    """The linearisation at the state of `found`; watched: places of unknowns that are outputs too, the last ones.
+
+    Raises NoLinearisation.
+    """
     state, system = found.state, found.system
     rows = rows_at(system, state)
     slopes = [
-        Sensitivity(found.prepared.compiled.form, found.binding, found.prepared.network.parameters, name, at)
+        Sensitivity(found.prepared.compiled.form, found.binding, found.prepared.network, name, at)
         for name, at in inputs
     ]
-    names, out = _outputs(found, slopes)
     labels = tuple(name + (f"[{','.join(map(str, at))}]" if at else "") for name, at in inputs)
+    if deeper := [label for label, slope in zip(labels, slopes, strict=True) if slope.deeper]:
+        raise NoLinearisation(f"the equations need a third rate of {', '.join(deeper)}")
+    names, out = _with(_outputs(found, slopes), system, watched)
     by_input = tuple(
         _columns(rows.starter.settled.form, found, [(s, order) for s in slopes]) for order in range(FIRST, LAST + 1)
     )
@@ -122,6 +133,18 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3") -> Linea
     )
 
 
+def _with(
+    seen: tuple[tuple[str, ...], Outputs], system: System, watched: Sequence[int]
+) -> tuple[tuple[str, ...], Outputs]:
+    """The outputs, and unknowns behind them."""
+    names, out = seen
+    own = np.eye(out.by_y.shape[1])[list(watched)]
+    still, none = 0.0 * own, np.zeros((len(watched), out.by_input[0].shape[1]))
+    one, rate, twice = (np.vstack([part, none]) for part in out.by_input)
+    both = np.vstack([out.by_y, own]), np.vstack([out.by_rate, still])
+    return (*names, *(system.name(int(k)) for k in watched)), Outputs(*both, (one, rate, twice))
+
+
 def _asked(found: Found, names: Sequence[str]) -> list[int]:
     """Places of the outputs that were asked for, without what is observed of stores alone."""
     return [k for k, name in enumerate(names) if name not in found.prepared.unasked]
@@ -138,7 +161,8 @@ def _rows(small: Reduced, kept: list[int]) -> Reduced:
 
 
 def _seen(out: Outputs, kept: list[int]) -> Outputs:
-    return Outputs(out.by_y[kept], out.by_rate[kept], out.by_input[kept])
+    one, rate, twice = (part[kept] for part in out.by_input)
+    return Outputs(out.by_y[kept], out.by_rate[kept], (one, rate, twice))
 
 
 def _energies(
@@ -165,19 +189,38 @@ def _transfer(small: Reduced, i: int, j: int) -> Transfer:
 def _descriptor(
     form: System, found: Found, slopes: Sequence[Sensitivity], out: Outputs, labels: tuple[str, ...]
 ) -> Descriptor:
-    """The matrices of an index form; an input that a row holds integrated has its integral for an unknown."""
+    """The matrices of an index form; what rows hold of an input besides its value is an unknown.
+
+    z = (y, integrals s, inputs v, their rates w):  E y' - B1 v' - B2 w' = A y + B-1 s + B0 u,  s' = u,  0 = u - v,
+    v' = w, each for the inputs that need it.
+    """
     y, yd = found.state.for_form(form)
     jy, jyd = form.jacobian(found.state.t, y, yd)
-    e, a = form.dense(jyd), -form.dense(jy)
-    b, by_integral = (-_columns(form.form, found, [(s, order) for s in slopes]) for order in (0, FIRST))
-    summed = np.flatnonzero(by_integral.any(axis=0))
-    more = np.zeros((summed.size, form.unknowns))
-    a = np.block([[a, by_integral[:, summed]], [more, np.zeros((summed.size, summed.size))]])
-    e = np.block([[e, 0.0 * by_integral[:, summed]], [more, np.eye(summed.size)]])
-    b = np.vstack([b, np.eye(len(labels))[summed]])
-    wide = np.zeros((out.by_y.shape[0], e.shape[1] - out.by_y.shape[1]))
+    by = {k: -_columns(form.form, found, [(s, k) for s in slopes]) for k in range(FIRST, LAST + 1)}
+    there = {k: by[k].any(axis=0) for k in by}
+    for k in (1, 2):
+        there[k] = there[k] | out.by_input[k].any(axis=0)
+    summed, valued, rated = (np.flatnonzero(m) for m in (there[FIRST], there[1] | there[2], there[2]))
+    sizes = (form.unknowns, summed.size, valued.size, rated.size)
+    at_y, at_s, at_v, at_w = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
+    rows, unit = form.rows, np.eye(len(labels))
+    e, a = (np.zeros((rows + at_w.size + at_v.size + at_s.size, sum(sizes))) for _ in range(2))
+    of_s, of_v, of_w = np.split(np.arange(rows, e.shape[0]), np.cumsum(sizes[1:])[:-1])
+    e[:rows, at_y], e[:rows, at_v], e[:rows, at_w] = form.dense(jyd), -by[1][:, valued], -by[2][:, rated]
+    a[:rows, at_y], a[:rows, at_s] = -form.dense(jy), by[FIRST][:, summed]
+    e[of_s, at_s], a[of_v, at_v], a[of_w, at_w] = 1.0, -1.0, 1.0
+    e[of_w, at_v[np.isin(valued, rated)]] = 1.0
+    b = np.vstack([by[0], unit[summed], unit[valued], 0.0 * unit[rated]])
+    wide = np.zeros((out.by_y.shape[0], sum(sizes) - out.by_y.shape[1]))
     c, cd = (np.hstack([part, wide]) for part in (out.by_y, out.by_rate))
-    return Descriptor(e, a, b, c, cd, out.by_input, (*form.unknown_names, *(integral(labels[k]) for k in summed)))
+    cd[:, at_v], cd[:, at_w] = out.by_input[1][:, valued], out.by_input[2][:, rated]
+    names = (
+        *form.unknown_names,
+        *(integral(labels[k]) for k in summed),
+        *(labels[k] for k in valued),
+        *(f"rate of {labels[k]}" for k in rated),
+    )
+    return Descriptor(e, a, b, c, cd, out.by_input[0], names)
 
 
 def _columns(form: Form, found: Found, slopes: Sequence[tuple[Sensitivity, int]]) -> Array:
@@ -217,8 +260,12 @@ def _outputs(found: Found, slopes: Sequence[Sensitivity]) -> tuple[tuple[str, ..
         full = np.zeros((int(oracle.to[-1]), room))
         np.add.at(full, (rows.astype(int), columns.astype(int)), values)
         parts.append(full[oracle.to[families]][:, : system.form.written])
-    by_input = [s.rows("observe", 0, state.t, y, yd)[oracle.to[families]] for s in slopes]
-    return names, Outputs(parts[0], parts[1], np.array(by_input).T.reshape(len(names), len(slopes)))
+    at, shape = oracle.to[families], (len(names), len(slopes))
+    one, rate, twice = (
+        np.array([s.rows("observe", order, state.t, y, yd)[at] for s in slopes]).T.reshape(shape)
+        for order in range(LAST + 1)
+    )
+    return names, Outputs(parts[0], parts[1], (one, rate, twice))
 
 
 def _reads_ledger(expression: object) -> bool:

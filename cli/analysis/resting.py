@@ -113,7 +113,7 @@ def equilibria(
             whole, spent = tried / (tries + 1), now - began
             progress(whole, spent * (1.0 - whole) / whole if spent > 1.0 else None)
 
-    made = compiled(request, report, (), of_nodes)
+    made = compiled(request, report, (), of_nodes, ())
     if made is None:
         return None
     found, states, why = resting(*made, tries, advance=advance)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.cli.analysis.asked import Found, arrived, begun, compiled, of_contents
+from sysdyn.cli.analysis.asked import Found, Inputs, arrived, begun, compiled, of_contents
 from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared
@@ -30,10 +30,12 @@ TRIES = 20
 
 
 def state_of(
-    request: Request, outputs: tuple[str, ...] | None, report: Report, *, rest: bool
+    request: Request, outputs: tuple[str, ...] | None, inputs: Inputs, report: Report, *, rest: bool
 ) -> tuple[Found | None, str | None]:
-    """The model at the state asked; else None, the report says why, and what stopped a run or a search."""
-    made = compiled(request, report, outputs, of_contents)
+    """The model at the state asked, its inputs free to move; else None, the report says why, and what stopped a run or
+    a search.
+    """
+    made = compiled(request, report, outputs, of_contents, inputs)
     if made is None:
         return None, None
     if rest:

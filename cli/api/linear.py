@@ -106,7 +106,7 @@ def linearised_at(
     """The linearisation of a request; raises ModelError, UsageError, NoState, NoLinearisation."""
     report = Report()
     with ex.fresh():
-        found, why = state_of(request, outputs, report, rest=rest)
+        found, why = state_of(request, outputs, inputs, report, rest=rest)
         if found is None:
             if why:
                 raise NoState(why)

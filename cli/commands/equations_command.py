@@ -37,7 +37,7 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
 
     with ex.fresh():
         request = Request(index=index, **{**options, "backend": "numpy"})
-        made = compiled(request, console.report)
+        made = compiled(request, console.report, inputs=None if form == "linear" else ())
         if made is None:
             return console.finish(1)
         target, prepared = made

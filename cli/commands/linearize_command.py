@@ -68,15 +68,16 @@ def command(
     assert form in INDICES
     request = Request(until=at, index=index, **options)
     names = None if outputs is None else tuple(text.strip() for text in separate(outputs))
+    moved = None if inputs is None else separate(inputs)
     with ex.fresh():
-        found, failure = state_of(request, names, console.report, rest=equilibrium)
+        found, failure = state_of(request, names, moved, console.report, rest=equilibrium)
         if found is None:
             if failure:
                 console.complain(failure, SOLVER)
             return console.finish(SOLVER if failure else 1)
         from sysdyn.cli.analysis.linear import inputs_of
 
-        chosen_inputs = inputs_of(found.target, found.prepared, None if inputs is None else separate(inputs))
+        chosen_inputs = inputs_of(found.target, found.prepared, moved)
         try:
             linear = linearised(found, chosen_inputs, form)
         except NoLinearisation as error:
@@ -259,6 +260,9 @@ def _result(linear: Any, formulation: str, index: str) -> dict[str, Any]:
     }
     if form.cd.any():
         result["Cd"] = form.cd.tolist()
+    for name, part in (("D1", small.d1), ("D2", small.d2)):
+        if part.any():
+            result["reduced"][name] = part.tolist()
     return result
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 from sysdyn.cli.analysis.asked import begun
 from sysdyn.cli.analysis.linear import inputs_of, linearised
 from sysdyn.cli.run.asked import Request
@@ -27,12 +28,14 @@ from sysdyn.compiler.equations.port_hamiltonian import port_hamiltonian, written
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.forms.legendre import transformed
 from sysdyn.compiler.model.mirror import letter
-from sysdyn.dsl.model.expression import Node, const, param, scale, var
+from sysdyn.dsl.model.expression import Node, const, scale, var
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear.tangent import NoLinearisation
 from sysdyn.runtime.model.system import System
 from sysdyn.values import dataclass
 
+ROUND_OFF = 1e-13
+"""Of its terms: what is left of a slope that cancels."""
 MOST = 400
 """Row families that are printed."""
 
@@ -120,25 +123,39 @@ def _counted(form: DescriptorForm) -> Iterator[str]:
 
 
 def _linear(target: Target, prepared: Prepared, request: Request, report: Report) -> Content | None:
-    """The equations x' = A x + B u about the start, in numbers; x and u are deviations."""
+    """The equations x' = A x + B u about the start, in numbers; x and u are deviations.
+
+    A state of the reduction may be x - D u - D1 u' (runtime/linear/tangent.py): of x itself it is
+    x' = A x + (B - A D) u + (D - A D1) u' + D1 u''.
+    """
     found = begun(target, prepared, request, report)
     if found is None:
         return None
     inputs = inputs_of(target, prepared, None)
     try:
-        linear = linearised(found, inputs)
+        places = linearised(found, inputs).reduced.places
+        watched = places[places >= 0]
+        small = linearised(found, inputs, watched=watched.tolist()).reduced
     except NoLinearisation as error:
         raise NoSuchEquations(str(error)) from error
-    small, system = linear.reduced, found.system
-    nodes = [unknown_node(system, int(k)) for k in small.places]
-    controls = [param(name, *map(const, at)) for name, at in inputs]
+    system, count_ = found.system, watched.size
+    d, d1 = (np.zeros((places.size, len(inputs))) for _ in range(2))
+    d[places >= 0], d1[places >= 0] = (m[m.shape[0] - count_ :] for m in (small.d, small.d1))
+    nodes = [
+        unknown_node(system, int(k)) if k >= 0 else var(name, "s")
+        for k, name in zip(places, small.names, strict=True)
+    ]
+    own = [tuple(map(const, map(float, at))) for _, at in inputs]
+    controls = [var(name, "s", *at, order=k) for k in range(3) for (name, _), at in zip(inputs, own, strict=True)]
+    slopes = np.hstack([small.a, small.b - small.a @ d, d - small.a @ d1, d1])
+    a, b, c, c1 = (np.abs(part) for part in (small.a, small.b, d, d1))
+    sizes = np.hstack([a, b + a @ c, c + a @ c1, c1])
+    slopes = np.where(np.abs(slopes) > ROUND_OFF * sizes, slopes, 0.0)
     lines = []
-    for k, node in enumerate(nodes):
-        values = (*small.a[k], *small.b[k])
-        terms = [scale(float(v), n) for v, n in zip(values, (*nodes, *controls), strict=True) if v != 0.0]
+    for row, node, name in zip(slopes, nodes, small.names, strict=True):
+        terms = [scale(float(v), n) for v, n in zip(row, (*nodes, *controls), strict=True) if v != 0.0]
         rate = var(node.data[0], node.data[1], *node.args, order=1)
         right = tuple(Summed((), term) for term in terms)
-        name = system.name(int(small.places[k]))
         lines.append(Equation("linear", name, None, (Summed((), rate),), right))
     return Content(equations=tuple(lines))
 

@@ -294,7 +294,8 @@ class Latex(Writer):
         if base in GREEK and base != "omicron":
             base = f"\\{base}"
         elif len(base) > 1:
-            base = f"\\mathit{{{_escaped(base)}}}"
+            face = "\\textit" if " " in base else "\\mathit"
+            base = f"{face}{{{_escaped(base)}}}"
         base = ("", "\\dot ", "\\ddot ")[min(letter.dots, 2)] + base
         below = ",".join([*map(_below, letter.below), *index])
         return f"{base}_{{{below}}}" if below else base

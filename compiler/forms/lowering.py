@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
 
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.coverage import Cover, cover, inside, outside
@@ -24,7 +25,7 @@ from sysdyn.compiler.forms.meters.observing import add_initials, add_observation
 from sysdyn.compiler.forms.momenta import given, inertial, jumping, resolved, shared
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
-from sysdyn.dsl.model.calculus import derivative, differential, gradient, time_derivative
+from sysdyn.dsl.model.calculus import derivative, differential, gradient, moved, moving, time_derivative
 from sysdyn.dsl.model.calculus import rate as rate_of
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node, add, is_const, neg, ordered_variables, substitute, var, variables
@@ -152,7 +153,7 @@ def _speeds(model: EnergyModel) -> dict[str, tuple[tuple[Node, ...], Node]]:
 def total_rate(root: Node) -> Node:
     """Total derivative by t, the derivatives of multipliers among its variables."""
     seeds = {n: rate_of(n) or var(*n.data[:2], *n.args, order=1) for n in ordered_variables(root)}
-    return differential(root, seeds)
+    return differential(root, moved(root) | seeds)
 
 
 class _Lowering:
@@ -345,10 +346,12 @@ class _Lowering:
     def _rates(self, row: Row, nest: Nest, expression: Node) -> None:
         if not self._has_rate(row):
             return
-        rate = time_derivative(self._in_states(expression, f"{row.kind} {row.name}", row.place))
-        self.assembly.add(f"{row.kind}_rate", row.name, row.at, nest, rate)
-        if row.kind == "phi":
-            self.assembly.add("phi_acceleration", row.name, row.at, nest, time_derivative(rate))
+        integrated = any(offset.label == row.name for offset in self.model.offsets)
+        with moving(()) if integrated else nullcontext():  # its primitive took parameters for constants
+            rate = time_derivative(self._in_states(expression, f"{row.kind} {row.name}", row.place))
+            self.assembly.add(f"{row.kind}_rate", row.name, row.at, nest, rate)
+            if row.kind == "phi":
+                self.assembly.add("phi_acceleration", row.name, row.at, nest, time_derivative(rate))
 
 
 def _by_name(rows: Iterable[Row]) -> dict[str, list[Row]]:

@@ -1,6 +1,6 @@
 """Momenta and kinetic stores: which coordinates carry a momentum, and what `x.p` means where it is no unknown.
 
-A coordinate carries a momentum as unknown where the author gave T(p) for it, where T* jumps between two instants (a
+A coordinate carries a momentum as unknown where the author gave T(p) for it, where its momentum may jump at given flows (a
 discrete mass, `if t < 1 s`): no impulse acts there, so p stays and the flow jumps; and in the Hamiltonian form where T*
 has a structurally nonzero second derivative by its flow.  Elsewhere its momentum is the expression dT*/df.
 """
@@ -28,8 +28,8 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 
-STEPS = ("sign", "step", "floor", "ceil", "mod")
-"""Functions that jump."""
+JUMPING = ("step", "sign", "setsign", "floor", "ceil", "mod", "frac")
+"""Functions whose values jump."""
 
 
 def given(model: EnergyModel) -> frozenset[str]:
@@ -46,26 +46,6 @@ def moved(model: EnergyModel) -> frozenset[str]:
     return given(model) | frozenset(n.data[0] for t in pieces for n in local_variables(t.expression, rate))
 
 
-def jumping(model: EnergyModel) -> frozenset[str]:
-    """Coordinates whose inertia may jump: it reads what events assign, or steps with time or states."""
-    found = set()
-    for term in model.function(model.mirror.coenergy):
-        if any(_jumps(model, n) for n in topological([term.expression])):
-            found |= {rate.data[0] for rate in local_variables(term.expression, model.mirror.rate)}
-    return frozenset(found) & inertial(model)
-
-
-def _jumps(model: EnergyModel, node: Node) -> bool:
-    """Whether an operation may change its value at one instant where coordinates and rates do not."""
-    if node.op == "param":
-        return node.data in model.discretes
-    if node.op == "var":
-        return node.data[1] == "s" and node.data[0] in model.assigned
-    if node.op in ("cmp", "table") or (node.op == "call" and node.data in STEPS):
-        return any(n.op == "time" or (n.op == "var" and n.data[1] in ("s", "e")) for n in variables(node))
-    return False
-
-
 def inertial(model: EnergyModel) -> frozenset[str]:
     """Coordinates by whose flow T* has a second derivative that is not zero by its structure."""
     found = set()
@@ -76,6 +56,38 @@ def inertial(model: EnergyModel) -> frozenset[str]:
             if any(not is_const(derivative(slope, b), 0.0) for b in rates):
                 found.add(a.data[0])
     return frozenset(found)
+
+
+def jumping(model: EnergyModel) -> frozenset[str]:
+    """Coordinates whose momentum dT*/df may jump at given flows, and those whose inertia is theirs too: momenta keep their
+    values there, flows do not, so these carry their momentum in every form.
+    """
+    pairs: list[tuple[str, str]] = []
+    found = set[str]()
+    for term in model.function(model.mirror.coenergy):
+        rates = local_variables(term.expression, model.mirror.rate)
+        for a in rates:
+            slope = derivative(term.expression, a)
+            joined = [b.data[0] for b in rates if not is_const(derivative(slope, b), 0.0)]
+            pairs += [(a.data[0], b) for b in joined]
+            if joined and any(_jumps(model, n) for n in topological([slope])):
+                found.add(a.data[0])
+    while more := {a for a, b in pairs if b in found} - found:
+        found |= more
+    return frozenset(found)
+
+
+def _jumps(model: EnergyModel, node: Node) -> bool:
+    """Whether an operation may change its value at one instant where coordinates and flows do not: it reads what events
+    assign, or steps with time, dynamic variables or implicit unknowns.
+    """
+    if node.op == "param":
+        return node.data in model.discretes
+    if node.op == "var":
+        return node.data[1] == "s" and node.data[0] in model.assigned
+    if node.op in ("cmp", "table") or (node.op == "call" and node.data in JUMPING):
+        return any(n.op == "time" or (n.op == "var" and n.data[1] in ("s", "e")) for n in variables(node))
+    return False
 
 
 def shared(model: EnergyModel) -> frozenset[str]:

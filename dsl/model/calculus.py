@@ -6,7 +6,9 @@ Forward over the nodes in topological order, d f(a, b, ...) = f_a da + f_b db + 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 from sysdyn.dsl.model.expression import (
     Node,
@@ -214,9 +216,38 @@ def rate(node: Node) -> Node | None:
     return var(family, kind, *node.args, order=1)
 
 
+_MOVING: ContextVar[frozenset[str]] = ContextVar("moving", default=frozenset())
+"""Parameters that a linearisation lets move in time, and their rates."""
+_RATE_OF = "rate of "
+
+
+def rate_name(name: str, order: int = 1) -> str:
+    """What the rate of a parameter is called, or its second rate."""
+    return _RATE_OF * order + name
+
+
+@contextmanager
+def moving(names: Iterable[str]) -> Iterator[None]:
+    """Within, time derivatives of the parameters `names` are parameters `rate of name`, and so on to the second."""
+    token = _MOVING.set(frozenset(rate_name(name, order) for name in names for order in (0, 1)))
+    try:
+        yield
+    finally:
+        _MOVING.reset(token)
+
+
+def moved(root: Node) -> dict[Node, Node]:
+    """The parameters of root that move, with their rates."""
+    names = _MOVING.get()
+    if not names:
+        return {}
+    found = (n for n in topological([root]) if n.op == "param" and n.data in names)
+    return {n: param(rate_name(n.data), *n.args) for n in found}
+
+
 def time_derivative(root: Node) -> Node:
     """Total derivative by t; ValueError names an unknown whose derivative is not among the variables."""
-    seeds: dict[Node, Node] = {}
+    seeds = moved(root)
     for node in ordered_variables(root):
         dot = rate(node)
         if dot is None:

@@ -93,7 +93,7 @@ class Achieved:
     @property
     def below_round_off(self) -> bool:
         """The estimate is less than double precision resolves."""
-        return self.error_estimate is not None and self.error_estimate < ROUND_OFF
+        return self.error_estimate is not None and bool(self.error_estimate < ROUND_OFF)
 
 
 @dataclass(frozen=True, slots=True)

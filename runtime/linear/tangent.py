@@ -55,11 +55,13 @@ class NoLinearisation(Exception):  # noqa: N818
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Slopes of the outputs: by y [outputs, unknowns], by y' [outputs, unknowns], by inputs [outputs, inputs]."""
+    """Slopes of the outputs: by y [outputs, unknowns], by y' [outputs, unknowns], by inputs, their rates and second
+    rates [outputs, inputs].
+    """
 
     by_y: Floats
     by_rate: Floats
-    by_input: Floats
+    by_input: tuple[Floats, Floats, Floats]
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,8 +387,8 @@ def _without_rates_of_inputs(
         chosen = np.concatenate([chosen, np.full(summed.size, -1)])
         names = (*names, *(integral(inputs[k]) for k in summed))
     b = b0 + a @ (b1 + a @ b2)
-    d = d0 + out.by_input + c @ (b1 + a @ b2)
-    return Reduced(a, b, c, d, d1 + c @ b2, d2, chosen, names)
+    d0, d1, d2 = (part + own for part, own in zip((d0, d1, d2), out.by_input, strict=True))
+    return Reduced(a, b, c, d0 + c @ (b1 + a @ b2), d1 + c @ b2, d2, chosen, names)
 
 
 def integral(name: str) -> str:

@@ -352,6 +352,61 @@ def test_the_linear_form_is_that_of_linearize(capsys):
     assert "f_shaft' = -1/2 f_shaft - 25 f_supply" in found
 
 
+DRIVEN = """
+model frame {
+  input u: m = 0.2 m
+  coord x: translation = 0 m
+  let z = x + u
+  energy T* = 1/2*(1 kg)*z'^2
+  energy V = 1/2*(9 N/m)*x^2
+  work -(0.5 N.s/m)*x' on x
+}
+scene frame_s of frame { time 0 s to 1 s
+  trace x }
+model base {
+  input v: m/s = 0 m/s
+  node b, x: translation
+  F: flow(f = v) b -> ground
+  K: potential(e = 100 N/m*q) b -> x
+  D: dissipator(e = 1 N.s/m*f) b -> x
+  M: kinetic(p = 1 kg*f) x
+}
+scene base_s of base { time 0 s to 1 s
+  trace x.f }
+component seat {
+  param k = 100 N/m
+  input u: m
+  port x: translation
+  let z = x.q + u
+  energy T* = 1/2*(2 kg)*z'^2
+  K: potential(e = k*q) x -> ground
+}
+model two {
+  input u[1..2]: m = [0.1 m, 0.2 m]
+  node a, b: translation
+  A: seat(k = 50 N/m) u = u[1], x = a
+  B: seat() u = u[2], x = b
+}
+scene two_s of two { time 0 s to 1 s
+  trace a.q }
+"""
+
+
+@pytest.mark.parametrize(
+    ("scene", "expected"),
+    [
+        ("frame_s", ["x' = f_x", "f_x' = -9 x - 1/2 f_x - u''"]),
+        ("base_s", ["q_x' = f_x", "f_x' = -100 q_x - f_x + 100 integral of v + v", "integral of v' = v"]),
+        ("two_s", ["q_a' = f_a", "q_b' = f_b", "f_a' = -25 q_a - u[1]''", "f_b' = -50 q_b - u[2]''"]),
+    ],
+)
+def test_the_linear_form_is_of_the_unknowns_that_it_names(scene, expected, tmp_path, capsys):
+    """Not of combinations with an input; what follows the integral of an input names that, no multiplier."""
+    assert run(["equations", str(write(tmp_path, DRIVEN)), "--scene", scene, "--form", "linear", "-q"]) == 0
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    assert lines[: len(expected)] == expected
+
+
 # -- the command -------------------------------------------------------------------------------------------------------
 
 

@@ -147,7 +147,7 @@ def test_slopes_of_a_row_by_parameters_and_what_follows_from_them():
     y, yd = (np.append(v[1], np.zeros(20)) for v in (POINTS.y, POINTS.yd))
     row = next(k for k, r in enumerate(model.form.rows) if r.block == "dynamics")
     for name, slope in (("m", a + 4.0 * q - math.sin(t)), ("k", q), ("c", f)):
-        found = Sensitivity(model.form, binding, model.network.parameters, name, ())
+        found = Sensitivity(model.form, binding, model.network, name, ())
         assert found.rows("dynamics", 0, t, y, yd)[row] == pytest.approx(slope, rel=1e-14), name
 
 
@@ -163,7 +163,7 @@ def test_a_parameter_that_moves_moves_the_rates_of_constraints():
         initials=(Initial(q, x.const(1.5), False, (), PLACE),),
     )
     model = compile_network(network, "lagrangian", "numpy")
-    found = Sensitivity(model.form, model.bind(), model.network.parameters, "l", ())
+    found = Sensitivity(model.form, model.bind(), model.network, "l", ())
     y = np.append([1.5, 0.2], np.zeros(20))
     by = {
         (block, order): float(np.abs(found.rows(block, order, 0.0, y, 0.0 * y)).max())

@@ -72,7 +72,7 @@ def given(made):
     jy, jyd = system.jacobian(0.0, state.y, state.yd)
     e, a = system.dense(jyd), -system.dense(jy)
     nothing = np.zeros((rows.starter.settled.rows, 0))
-    out = Outputs(np.zeros((0, n)), np.zeros((0, n)), np.zeros((0, 0)))
+    out = Outputs(np.zeros((0, n)), np.zeros((0, n)), (np.zeros((0, 0)),) * 3)
     found = Given(rows, system, state, (nothing,) * 4, out, (), np.zeros(n, dtype=bool))
     none = np.zeros((len(e), 0)), np.zeros((0, n)), np.zeros((0, n)), np.zeros((0, 0))
     return found, Descriptor(e, a, *none, tuple(system.unknown_names))
