@@ -1,6 +1,6 @@
 """Momenta and kinetic stores: which coordinates carry a momentum, and what `x.p` means where it is no unknown.
 
-A coordinate carries a momentum as unknown where the author gave T(p) for it, where its momentum may jump at given flows (a
+A coordinate carries a momentum as unknown where the author gave T(p) for it, where dT*/df may jump at given flows (a
 discrete mass, `if t < 1 s`): no impulse acts there, so p stays and the flow jumps; and in the Hamiltonian form where T*
 has a structurally nonzero second derivative by its flow.  Elsewhere its momentum is the expression dT*/df.
 """
@@ -59,8 +59,8 @@ def inertial(model: EnergyModel) -> frozenset[str]:
 
 
 def jumping(model: EnergyModel) -> frozenset[str]:
-    """Coordinates whose momentum dT*/df may jump at given flows, and those whose inertia is theirs too: momenta keep their
-    values there, flows do not, so these carry their momentum in every form.
+    """Coordinates whose momentum dT*/df may jump at given flows, and those whose inertia is theirs too: momenta keep
+    their values there, flows do not, so these carry their momentum in every form.
     """
     pairs: list[tuple[str, str]] = []
     found = set[str]()
