@@ -155,23 +155,22 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution |
 
 
 def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> tuple[Floats, bool]:
-    """X after corrections that vanish, or get no less than round-off, and whether the rows hold to theirs then and
-    leave no state or effort open by more than the largest of its like; as it was where they do not determine them.
+    """X after corrections that vanish, and whether the rows hold to their round-off then and leave no state or effort
+    open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little.
     """
     told, begun = starter.moves(*STATE, "e"), x
-    for k in range(SHARPER):
+    for _ in range(SHARPER):
         problem = problem_of(starter, t, x, x, rows=rows, free=free)
         near = corrected(problem, x)
         if near is None:
             return begun, True
         step, size = np.abs(near.x - x), np.maximum(problem.scale, np.abs(x))
-        vanished = step <= EXACT * size
-        if vanished.all() or (k == SHARPER - 1 and (vanished | (step <= near.open_)).all()):
+        if (step <= EXACT * size).all():
             return x, near.agrees and not (near.open_ > starter.largest_alike(size))[told].any()
         if starter.work.done:
-            break
+            return begun, False
         x = near.x
-    return x, False
+    return begun, True
 
 
 def _attempt(

@@ -38,6 +38,8 @@ Mask = NDArray[np.bool_]
 STATE = ("q", "f", "p", "s", *START)
 WEIGHT = {"unwritten": 1e-3, "following": 1e-6}
 NOISE = 1e-13
+WRITTEN = 4.0 * float(np.finfo(float).eps)
+"""Of the largest of its like: a fixed value that is no round-off of the text's own."""
 FLOOR = 1e-5
 """Of the largest alike: below it rows hold to EXACT of that, ten times the round-off that full matrices make of it."""
 EQUATIONS = "equations of the start"
@@ -194,11 +196,13 @@ class Starter:
     @functools.cached_property
     def pinned(self) -> Mask:
         """Fixed values whose rows all hold unknowns beside them, which answer to these values however small they are
-        beside their like [unknowns]; a row of fixed values alone may miss by their round-off.
+        beside their like [unknowns]; a row of fixed values alone may miss by their round-off.  What the text's own
+        arithmetic leaves of a zero (`sin(pi)`) is one.
         """
+        said = np.abs(self.guess) > WRITTEN * self.largest_alike(self.guess)
         answers = np.bincount(self.rows, self.free[self.columns], self.settled.rows) > 0.0
         bound = np.bincount(self.columns, ~answers[self.rows], self.free.size) > 0.0
-        return ~self.free & ~bound
+        return ~self.free & ~bound & said
 
     def residual(self, t: float, x: Floats) -> Floats:
         """All rows [rows]."""
