@@ -158,19 +158,20 @@ def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) ->
     """X after corrections that vanish, and whether the rows hold to their round-off then and leave no state or effort
     open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little.
     """
-    told, begun = starter.moves(*STATE, "e"), x
+    told, begun, agrees = starter.moves(*STATE, "e"), x, True
     for _ in range(SHARPER):
         problem = problem_of(starter, t, x, x, rows=rows, free=free)
         near = corrected(problem, x)
         if near is None:
-            return begun, True
+            break
+        agrees = near.agrees
         step, size = np.abs(near.x - x), np.maximum(problem.scale, np.abs(x))
         if (step <= EXACT * size).all():
-            return x, near.agrees and not (near.open_ > starter.largest_alike(size))[told].any()
+            return x, agrees and not (near.open_ > starter.largest_alike(size))[told].any()
         if starter.work.done:
             return begun, False
         x = near.x
-    return begun, True
+    return begun, agrees
 
 
 def _attempt(

@@ -40,6 +40,35 @@ def graded(a, b):
     return None if failed else x
 
 
+def corrected(a, b, noise):
+    """The answer, x and what round-off leaves open of it, columns without a pivot being left."""
+    a, b, noise = (np.array(item, dtype=float) for item in (a, b, noise))
+    x, doubt = np.zeros((2, a.shape[1]))
+    answer = lib.core.sd_graded(*a.shape, *map(lib.pointer, (a, b, noise, x, doubt)))
+    return answer, x, doubt
+
+
+def test_what_rows_do_not_determine_is_left():
+    """Nodes 1, 2 by 3 S with each other and nothing else: 1 A from the one to the other says 1/3 V between them."""
+    answer, x, _ = corrected([[3, -3], [-3, 3]], [1, -1], [1e-16, 1e-16])
+    assert answer == 0
+    assert x[0] - x[1] == pytest.approx(1 / 3, rel=1e-15)
+    answer, _, _ = corrected([[3, -3], [-3, 3]], [1, -1 + 1e-12], [1e-16, 1e-16])
+    assert answer == 2  # nowhere for the current to go
+
+
+def test_a_leak_in_a_sum_of_conductances_is_known_as_far_as_its_digits_reach():
+    """The same with 1e-12 S from node 2 to ground, summed with the 3 S: one leak's current says 1 V, but for the digits
+    that the sum lost; of 1e-17 S it keeps none, and the current is missed.
+    """
+    leak = 1e-12
+    answer, x, doubt = corrected([[3, -3], [-3, 3 + leak]], [leak, 0], [0, 0])
+    assert answer == 0
+    assert abs(x[1] - 1.0) <= doubt[1] <= 1e-2
+    answer, _, _ = corrected([[3, -3], [-3, 3 + 1e-17]], [leak, 0], [1e-20, 1e-20])
+    assert answer == 2
+
+
 @pytest.mark.parametrize("leak", [1e-3, 1e-12, 1e-25, 1e-170, 1e-300])
 def test_a_node_that_leakage_alone_holds(leak):
     """Nodes 1, 2 by 3 S with each other, by a leak and thrice a leak with ground; currents as rows of their own.  One

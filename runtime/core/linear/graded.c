@@ -283,6 +283,8 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
             b[i] /= line[i];
             x[own[place[i]]] = ldexp(b[i], column[place[i]]);
             if (noise) {
+                for (int32_t j = i; j < pivots; j++)
+                    noise[i] += open[(size_t)i * k + j] * fabs(b[j]);
                 noise[i] /= fabs(line[i]);
                 doubt[own[place[i]]] = ldexp(noise[i], column[place[i]]);
             }
