@@ -1,4 +1,4 @@
-"""Contents that are round-off beside their like, and count: heat of 1e-9 J/K beside 1e6 J/K."""
+"""What is round-off beside its like, and counts: heat of 1e-9 J/K beside 1e6 J/K, nanovolts beside 325 V."""
 
 import numpy as np
 import pytest
@@ -42,3 +42,29 @@ def test_a_fixed_content_is_what_the_text_says(formulation, tmp_path):
     assert found.met
     assert np.abs(found.at("a", t) - heat.y[0]).max() < heat.y[0].max() * 2e-6
     assert np.abs(found.at("b", t) - 300.0).max() < 2e-4
+
+
+BEHIND = """
+model m {
+  node v, a, b: electrical
+  V: effort(e = 325 V) v -> ground
+  Rv: dissipator(e = 2 ohm*f) v -> a
+  Ra: dissipator(e = 1e3 ohm*f) a -> ground
+  R: dissipator(e = 1e6 ohm*f) a -> b
+  C: potential(e = q/(1e6 F)) b -> ground
+  init C.q = 0 C
+}
+scene s of m {
+  time 0 s to 1 s
+  trace b.e as b every 0.1 s
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_a_small_effort_is_no_difference_of_large_ones(formulation, tmp_path):
+    """0.3 nV on a capacitor behind 1 Mohm at 324 V, whose digits end at 60 fV: a t/(R C), a being what divides V."""
+    found, t = ran(tmp_path, BEHIND, formulation=formulation, accuracy=1e-6), np.linspace(0.0, 1.0, 11)
+    assert found.met
+    a = 325.0 / (1.0 + 2.0 * (1e-3 + 1e-6))
+    assert np.abs(found.at("b", t) - a * t / 1e12).max() < a * 1e-12 * 1e-6
