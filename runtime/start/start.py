@@ -149,7 +149,7 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution |
     x = x if held else best.x
     near, held = _corrected(starter, t, x, starter.every, follows)
     x = near if held else x
-    if x is best.x:
+    if x is best.x or not np.isfinite(starter.jacobian(t, x)).all():
         return best
     return solve(problem_of(starter, t, x, x, rows=starter.every, free=follows), x, 1)
 
@@ -163,7 +163,7 @@ def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) ->
         problem = problem_of(starter, t, x, x, rows=rows, free=free)
         near = corrected(problem, x)
         if near is None:
-            break
+            return begun, agrees
         agrees = near.agrees
         step, size = np.abs(near.x - x), np.maximum(problem.scale, np.abs(x))
         if (step <= EXACT * size).all():
@@ -171,7 +171,7 @@ def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) ->
         if starter.work.done:
             return begun, False
         x = near.x
-    return begun, agrees
+    return begun, True
 
 
 def _attempt(
