@@ -21,8 +21,8 @@ from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.stopping import unwatched
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.calculus import moving, rate_name, time_derivative
-from sysdyn.dsl.model.expression import topological
 from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.model.rewriting import following
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.arrival import arrival
@@ -101,11 +101,7 @@ def own_inputs(target: Target, network: Network) -> tuple[str, ...]:
 def _moving(network: Network, target: Target, inputs: Inputs) -> tuple[str, ...]:
     """The parameters that move with the inputs: these, and those whose values are formulas in them."""
     asked = own_inputs(target, network) if inputs is None else {text.partition("[")[0].strip() for text in inputs}
-    given = [(p.name, v) for p in network.parameters for v in p.values] + [(s.name, s.value) for s in network.elements]
-    read = [(name, {n.data for n in topological([value]) if n.op == "param"}) for name, value in given]
-    found = {p.name for p in network.parameters if p.name in asked}
-    while more := {name for name, names in read if name not in found and names & found}:
-        found |= more
+    found = following(network, asked)
     return tuple(p.name for p in network.parameters if p.name in found)
 
 

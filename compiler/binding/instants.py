@@ -88,7 +88,7 @@ def instants(
             search.add(watched)
         for node in crossed:
             if _in_time_alone(node) and _degree((node,)) > 1:
-                search.add(Watched(node, (node,), lambda v: np.sign(v[0]), np.zeros(1), ()))
+                search.add(_zeros(node, (node,)))
         times = search.times()
     except _TooManyError:
         text = f"the text jumps or has kinks at more than {MOST} instants: they are integrated through"
@@ -100,10 +100,15 @@ def turns(binding: Binding, t0: float, t1: float, slope: Node) -> Array:
     """Instants (s) in (t0, t1], ascending, at which an expression of time alone passes zero; none beyond MOST."""
     search = _Search(binding, t0, t1)
     try:
-        search.add(Watched(slope, (slope,), lambda v: np.sign(v[0]), np.zeros(1), ()))
+        search.add(_zeros(slope, (slope,)))
         return search.times()
     except _TooManyError:
         return np.zeros(0)
+
+
+def _zeros(node: Node, arguments: tuple[Node, ...]) -> Watched:
+    """The zeros of its one argument."""
+    return Watched(node, arguments, lambda v: np.sign(v[0]), np.zeros(1), ())
 
 
 def _watched(form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node]) -> Iterator[Watched]:
@@ -130,7 +135,6 @@ def _of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
     """What is watched of a node; nothing where it does not depend on time alone."""
     if not any(_in_time_alone(a) for a in node.args):
         return
-    zero = np.zeros(1)
     if node.op == "table":
         table = tables.get(node.data[0])
         for argument, points in zip(node.args, table.points if table else (), strict=False):
@@ -142,9 +146,9 @@ def _of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
     if not all(_in_time_alone(a) or not variables(a) for a in node.args):
         return
     if node.op == "cmp" or (node.op == "call" and node.data in ("min", "max")):
-        yield Watched(node, node.args, lambda v: np.sign(v[0] - v[1]), zero, ())
+        yield Watched(node, node.args, lambda v: np.sign(v[0] - v[1]), np.zeros(1), ())
     elif node.op == "call" and node.data in ("step", "abs", "sign"):
-        yield Watched(node, node.args, lambda v: np.sign(v[0]), zero, ())
+        yield _zeros(node, node.args)
     elif node.op == "call" and node.data in ("floor", "ceil"):
         rounded = np.floor if node.data == "floor" else np.ceil
         yield Watched(node, node.args, lambda v: np.asarray(rounded(v[0])), None, ())

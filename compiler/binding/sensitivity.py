@@ -30,6 +30,7 @@ from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Kernel
 from sysdyn.dsl.model.calculus import differential, rate_name
 from sysdyn.dsl.model.expression import Node, compare, conditional, const, index, is_const, substitute, topological
 from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.model.rewriting import following
 
 Array = NDArray[np.float64]
 RATES = {
@@ -74,19 +75,10 @@ class _Slope:
         self._name, self._at, self._binding = name, at, binding
         self._known = {p.name: p for p in network.parameters}
         self._apart = [(s.name, s) for s in network.elements]
-        self._follow = self._following(name)
+        self._follow = following(network, (name,)) - {name}
 
     def __call__(self, expression: Node) -> Node:
         return differential(expression, seeds) if (seeds := self._seeds(expression)) else const(0.0)
-
-    def _following(self, name: str) -> frozenset[str]:
-        """The parameters whose value is a formula in one, by others too."""
-        roots = {p.name: [*p.values, *(s.value for n, s in self._apart if n == p.name)] for p in self._known.values()}
-        read = {n: {m.data for m in topological(values) if m.op == "param"} for n, values in roots.items()}
-        found = {name}
-        while more := {n for n, names in read.items() if n not in found and names & found}:
-            found |= more
-        return frozenset(found - {name})
 
     def _seeds(self, expression: Node) -> dict[Node, Node]:
         nodes = [n for n in topological([expression]) if n.op == "param"]

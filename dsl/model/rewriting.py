@@ -37,6 +37,17 @@ def expressions(said: Any, *sorts: str) -> list[Node]:
     return [node for node in found if node is not None]
 
 
+def following(network: Network, names: Iterable[str]) -> frozenset[str]:
+    """These parameters, and those whose values are formulas in them, by others too."""
+    given = [(p.name, value) for p in network.parameters for value in p.values]
+    given += [(s.name, s.value) for s in network.elements]
+    read = [(name, {n.data for n in topological([value]) if n.op == "param"}) for name, value in given]
+    found = {p.name for p in network.parameters}.intersection(names)
+    while more := {name for name, others in read if name not in found and others & found}:
+        found |= more
+    return frozenset(found)
+
+
 def rewritten(network: Network, change: Callable[[Node], Node], sorts: Iterable[str] = EXPRESSIONS) -> Network:
     """The network with every expression of these statements changed."""
 
