@@ -144,14 +144,28 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution |
     follows = free & starter.following(t, best.x)
     written = starter.every & ~starter.groups(*HIDDEN), follows & (np.arange(follows.size) < starter.n)
     x, held = _corrected(starter, t, best.x, *written)
-    if not held and starter.system.form.scales:
+    steep = bool(starter.system.form.scales)
+    if not held and steep:
         return None
     x = x if held else best.x
     near, held = _corrected(starter, t, x, starter.every, follows)
     x = near if held else x
-    if x is best.x or not np.isfinite(starter.jacobian(t, x)).all():
-        return best
-    return solve(problem_of(starter, t, x, x, rows=starter.every, free=follows), x, 1)
+    if x is not best.x and np.isfinite(starter.jacobian(t, x)).all():
+        best = solve(problem_of(starter, t, x, x, rows=starter.every, free=follows), x, 1)
+    return None if steep and not _stays(starter, t, best.x, written[0], follows) else best
+
+
+def _stays(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> bool:
+    """Whether these rows leave states and efforts where they are, with rates that answer: a sum of currents may stand
+    between charges of 1e8 A that cancel in it, and hold to their round-off alone.
+    """
+    problem, told = problem_of(starter, t, x, x, rows=rows, free=free), starter.moves(*STATE, "e")
+    near = corrected(problem, x)
+    if near is None:
+        return True
+    largest = starter.largest_alike(np.maximum(problem.scale, np.abs(x)))
+    off = (near.open_ > largest) | (np.abs(near.x - x) > OWN * largest)
+    return near.agrees and not off[told].any()
 
 
 def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> tuple[Floats, bool]:
