@@ -122,7 +122,7 @@ def test_random_rectifiers_start_where_their_diodes_leave_them(tmp_path, seed):
 @pytest.mark.parametrize("formulation", FORMULATIONS[2:])
 def test_potentials_that_leakage_alone_holds_are_right_or_refused(seed, formulation):
     """Sums of conductances, 1e-13 S of leakage beside 10 S, say where these nodes are as far as their digits reach: two
-    began 0.3 V off, the third (below round-off) 0.17 V, the fourth, whose capacitors drift together at 5e12 V/s, 0.19 V,
+    began 0.3 V off, the third (below round-off) 0.17 V, the fourth (capacitors that drift together at 5e12 V/s) 0.19 V,
     all told as met.
     """
     made, report = rectifiers.rectifier(seed), Report()
