@@ -183,9 +183,7 @@ def _flat_start(prepared: Prepared, started: Started) -> tuple[RowLabel, ...]:
     return by_element(prepared, without_slope(system, state.t, *state.for_form(system)))
 
 
-def _inaccurate(
-    prepared: Prepared, missed: NotMet, place: Place, flat: tuple[RowLabel, ...], report: Report
-) -> None:
+def _inaccurate(prepared: Prepared, missed: NotMet, place: Place, flat: tuple[RowLabel, ...], report: Report) -> None:
     """E920; flat: laws by whose slopes the method steps, and that have none at the start."""
     where = next((o.place for o in prepared.network.observations if o.name == missed.element), place)
     stops = _stops(prepared, missed.element) if missed.undefined else None

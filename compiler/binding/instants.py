@@ -291,9 +291,7 @@ class _Search:
         before = -1
         while True:
             part = (np.arange(each) + random.uniform(0.1, 0.9, (left.size, each))) / each
-            t = np.concatenate(
-                [left[:, None], left[:, None] + (right - left)[:, None] * part, right[:, None]], axis=1
-            )
+            t = np.concatenate([left[:, None], left[:, None] + (right - left)[:, None] * part, right[:, None]], axis=1)
             pairs = np.repeat(np.arange(number), t.size), np.tile(t.ravel(), number)
             value = labels.at(*pairs).reshape(number, *t.shape)
             k, piece, place = np.nonzero(value[..., 1:] != value[..., :-1])
@@ -312,6 +310,7 @@ class _Labels:
 
     def _values(self, index: Whole, t: Array, nodes: tuple[Node, ...] | None = None) -> list[Array]:
         """Of the arguments, or of other nodes."""
+
         def look(node: Node, args: list[Value]) -> Value:
             if node.op == "time":
                 return t

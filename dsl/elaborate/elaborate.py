@@ -45,6 +45,7 @@ class Elaborator(Instances):
         self.space = Space("", Scope(files.scope), files.scope, self.source, component=model.name.name)
         self._body = Body(flatten(model.body))
         self.resolver.taken = self.taken
+        self.resolver.discretes = self.parts.discretes
 
     def names(self) -> None:
         """Bring the model's names into scope; values of inputs may change until `elements`."""

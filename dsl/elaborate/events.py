@@ -473,6 +473,4 @@ def _stick(
     unit = si(NONE)
     frame.said(Constraint("psi", name, at, value, loops, unit, place))
     multiplier = ex.var(name, "mu", *at)
-    frame.parts.drafts.append(
-        Draft(name, at, loops, "friction", place, unit, value, multiplier, element, bound, sense)
-    )
+    frame.parts.drafts.append(Draft(name, at, loops, "friction", place, unit, value, multiplier, element, bound, sense))

@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 _NOWHERE: Mapping[str, str] = {}
 _NOTHING: dict[str, Typed] = {}
 _KINDS = {syntax.Param, syntax.Branch, syntax.Law, syntax.Require}
+
+
 @dataclass(frozen=True, slots=True)
 class Held:
     """A parameter: its unit and its place; value: where the instance does not give it."""

@@ -108,6 +108,7 @@ class Context:
         self.uses: list[Use] = []
         self.whole: set[str] = set()  # parameters used as sizes or indices
         self.inputs: set[str] = set()  # parameters that are inputs: no sizes
+        self.discretes: set[str] = set()  # parameters that events assign
         self.branches: list[Branch] = []  # those found so far
         self.laws: dict[str, Any] = {}  # of branches, by family (laws.LawOf)
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each

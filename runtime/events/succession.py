@@ -45,9 +45,7 @@ class Succession:
         assert self.restart is not None
         return self.restart
 
-    def after(
-        self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool
-    ) -> tuple[Point, bool]:
+    def after(self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool) -> tuple[Point, bool]:
         """The consistent point with the constraints that hold from now on, and whether they were sought: what followed
         before is not; NoActiveSetError.  stalled: no time has passed since the last event.
 
@@ -71,9 +69,7 @@ class Succession:
         again = self._restart.struck(t, *found) if beside else None
         return found if again is None else (again[0], again[1]), sought
 
-    def _after(
-        self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool
-    ) -> tuple[Point, bool]:
+    def _after(self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool) -> tuple[Point, bool]:
         """The same from this very point."""
         restart = self._restart
         self.contacts.through.clear()

@@ -55,9 +55,7 @@ Progress = Callable[[float], None]
 class Integration:
     """The core's structures for one system and request; `run` drives them."""
 
-    def __init__(
-        self, system: System, start: ConsistentState, request: Request, origin: Origin | None = None
-    ) -> None:
+    def __init__(self, system: System, start: ConsistentState, request: Request, origin: Origin | None = None) -> None:
         """origin: of this start, where it is known for several runs."""
         self.system, self.start, self.request = system, start, request
         self.cpu = 0.0
