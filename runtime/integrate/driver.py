@@ -127,7 +127,7 @@ class Driver:
     def impulses(self) -> Impulses | None:
         """What gains over an instant without moving anything; None where nothing does."""
         found = Impulses(self.system) if self.system.are("s").any() else None
-        return found if found is not None and found.states.size else None
+        return found if found is not None and found.any else None
 
     def leave(self, y: Floats, yd: Floats) -> None:
         """Notes the powers at y, yd [unknowns as written], the point behind which the run restarts."""

@@ -31,7 +31,7 @@ AGREED = 1e-9
 
 
 AWAY = 1e-6
-"""Of what has moved: by how much the end of a curved way may be elsewhere."""
+"""Of its magnitude: by how much the end of a curved way may be elsewhere."""
 STEEP = 1e-6
 """Of a power: by what it may differ with pulses in the place of finite flows."""
 
@@ -66,19 +66,37 @@ class Impulses:
         form = settled.another("3").form
         self._moved: Ints = np.full(settled.unknowns, -1, dtype=np.int64)
         self._moved[form.k_f] = form.k_q
-        self._force = np.isin(settled.kinds, FORCES)
+        self._read = self._may_pulse()
         self._balances, self._others = self._by_order()
-        self._carries = settled.kinds == "q"
-        self._carries[self._column[in_rate & self._balances[self._row]]] = True
+        inert = np.isin(np.arange(settled.unknowns), self._column[in_rate & self._balances[self._row]])
+        self._carries = (settled.kinds == "q") | inert
+        self._stays = np.isin(
+            np.arange(settled.unknowns), np.append(self.states, self._moved[inert & (self._moved >= 0)])
+        )
+        # displacements tell the pulses of their flows
+        self._given = np.isin(settled.kinds, FORCES) | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
+
+    @property
+    def any(self) -> bool:
+        """Whether an instant may do something to dynamic variables by impulses."""
+        return bool(self.states.size or self._read.size)
+
+    def _may_pulse(self) -> Ints:
+        """Rows of rates that may have impulses, of dynamic variables that other rows read."""
+        kinds, rates = self.system.kinds, self.system.of_groups("lambda")
+        pulses = np.isin(kinds, ("kappa", "mu")) | ((kinds == "f") & (self._moved >= 0))
+        found = self._row[rates[self._row] & self._in_y & pulses[self._column]]
+        return np.setdiff1d(found, self.rows)
 
     def _by_order(self) -> tuple[Mask, Mask]:
         """Rows that impulses meet, integrated over an instant; rows that hold at each point of the rise."""
         settled, flow = self.system, (self._moved >= 0)[self._column]
         moved, own = np.zeros((2, settled.rows), dtype=bool)
         moved[self._row[self._in_rate | (self._in_y & flow)]], own[self.rows] = True, True
-        laws = settled.of_groups("dynamics", "gamma")
-        integrated = (laws & moved) | (settled.of_groups("lambda") & ~own)
-        return integrated, (laws & ~moved) | settled.of_groups("phi", "phi_rate", "psi", "momentum")
+        own[self._read] = True
+        integrated = settled.of_groups("dynamics", "gamma", "psi") | (settled.of_groups("lambda") & ~own)
+        held = settled.of_groups("phi", "phi_rate", "psi", "momentum")
+        return integrated, held | (settled.of_groups("dynamics", "gamma") & ~moved)
 
     def gains(self, before: Side, behind: Side, magnitude: Floats) -> Floats:
         """s+ - s- [states]; zero of what an event assigns.  magnitude [unknowns].  SolverFailure where a power has no
@@ -98,7 +116,7 @@ class Impulses:
     # -- the rise ------------------------------------------------------------------------------------------------
 
     def _slopes(self, sides: tuple[Side, Side], part: float, y: Floats, pulse: Floats | float = 0.0) -> _Slopes:
-        """dF/dy, dF/dyd [entries] at y: text and parameters have gone a part of their way; pulse [unknowns]: of flows."""
+        """dF/dy, dF/dyd [entries] at y, text and parameters a part of their way along; pulse [unknowns]: of flows."""
         p, own = self.system.description.p, self.system.description.p.copy()
         found = []
         for side in sides:
@@ -136,26 +154,42 @@ class Impulses:
             slopes = self._slopes((before, behind), part, y)
             impulse, met = self._impulse(slopes, way)
             rate = self._rate(slopes, way, impulse)
+            self._still(slopes, way, impulse, behind.t)
             if pulse.any():
                 self._finite(rate, self._rate(self._slopes((before, behind), part, y, pulse), way, impulse), behind.t)
             gained += 0.5 * rate
             faithful &= met and self._holds(before, behind, part, y)
         return gained, faithful
 
+    def _still(self, slopes: _Slopes, way: Floats, impulse: Floats, t: float) -> None:
+        """SolverFailure where a dynamic variable that others read has a rate with an impulse: it would jump."""
+        rows = self._read
+        if not rows.size:
+            return
+        given = np.where(self._in_y, slopes[0] * impulse[self._column], 0.0)
+        terms = self._carried(slopes, way) + given
+        left, size = (np.bincount(self._row, w, self.system.rows)[rows] for w in (terms, np.abs(terms)))
+        if (missed := np.abs(left) > BROKEN * size).any():
+            raise SolverFailure("pulsed", t, 0.0, self._state_of(rows[np.argmax(missed)]))
+
+    def _state_of(self, row: int) -> str:
+        """The name of the dynamic variable whose rate a row tells."""
+        own = self._in_rate & (self._row == row) & (self.system.kinds == "s")[self._column]
+        return self.system.name(int(self._column[own][0]))
+
     def _finite(self, rate: Floats, pulsed: Floats, t: float) -> None:
         """SolverFailure where a rate grows with what is a pulse itself."""
         endless = np.abs(pulsed - rate) > STEEP * np.maximum(np.abs(rate), np.abs(pulsed))
         if endless.any():
-            state = int(self.states[np.argmax(endless)])
-            raise SolverFailure(
-                "endless", t, 0.0, self.system.name(state), self.system.row_label(self.rows[np.argmax(endless)])
-            )
+            raise SolverFailure("endless", t, 0.0, self.system.name(int(self.states[np.argmax(endless)])))
 
     def _impulse(self, slopes: _Slopes, way: Floats) -> tuple[Floats, bool]:
-        """Impulses of forces [unknowns] that balances ask for along the way, and whether these are met."""
-        balances, force = self._balances[self._row], self._force[self._column] & self._in_y
+        """Impulses of forces, and pulses of flows that no displacement tells [unknowns], that rows ask for along the
+        way; whether these are met.
+        """
+        balances, given = self._balances[self._row], self._given[self._column] & self._in_y
         carried = np.where(balances, self._carried(slopes, way), 0.0)
-        at = np.flatnonzero(balances & force & (slopes[0] != 0.0))
+        at = np.flatnonzero(balances & given & (slopes[0] != 0.0))
         aim, impulse = -np.bincount(self._row, carried, self.system.rows), np.zeros(way.size)
         if at.size:
             (rows, i), (columns, j) = (np.unique(k[at], return_inverse=True) for k in (self._row, self._column))
@@ -163,12 +197,12 @@ class Impulses:
             unit = np.zeros(columns.size)
             np.maximum.at(unit, j, np.abs(v))
             impulse[columns] = least_norm((rows.size, columns.size), (i, j, v / unit[j]), aim[rows]) / unit
-        acted = np.where(balances & force, slopes[0] * impulse[self._column], 0.0)
+        acted = np.where(balances & given, slopes[0] * impulse[self._column], 0.0)
         size, left = (np.bincount(self._row, w, aim.size) for w in (np.abs(carried) + np.abs(acted), carried + acted))
         return impulse, bool((np.abs(left) <= BROKEN * size)[self._balances].all())
 
     def _holds(self, before: Side, behind: Side, part: float, y: Floats) -> bool:
-        """Whether rows without impulses hold at y, where the text and all that is asked have gone a part of their way."""
+        """Whether rows without impulses hold at y, where the text and all else asked are a part of their way along."""
         ends = [self.system.residual(behind.t, z, behind.yd)[self._others] for z in (before.y, y, behind.y)]
         off = ends[1] - (1.0 - part) * ends[0] - part * ends[2]
         return bool((np.abs(off) <= BROKEN * (np.abs(ends[0]) + np.abs(ends[2]))).all())
@@ -177,11 +211,11 @@ class Impulses:
 
     def _curved(self, before: Side, behind: Side, way: Floats, magnitude: Floats) -> Floats | None:
         """The gains [states] along the rise itself; None where rows do not tell it: it ends elsewhere."""
-        last, (size, least) = None, (np.maximum(magnitude, np.abs(way)), np.abs(behind.y - before.y))
+        last, size = None, np.maximum(magnitude, np.abs(way))
         for number in PARTS:
             y, gained = self._followed(before, behind, size, number)
             if last is not None and (np.abs(gained - last) <= AGREED * np.abs(gained).max()).all():
-                near = np.abs(y - before.y - way) <= AWAY * np.maximum(least, STILL * size)
+                near = np.abs(y - before.y - way) <= AWAY * size
                 return gained if near[self._carries].all() else None
             last = gained
         return None
@@ -204,23 +238,20 @@ class Impulses:
 
     def _direction(self, slopes: _Slopes, asked: Floats, size: Floats) -> tuple[Floats, Floats]:
         """What y moves by along the rise, and the impulses [unknowns]: what the rows ask for, at least of all."""
-        n, own = size.size, np.isin(np.arange(size.size), self.states)
+        n, rows, moved = size.size, self.system.rows, self._moved[self._column]
         balances, others = self._balances[self._row], self._others[self._row]
-        moved = self._moved[self._column]
-        entries = (
-            (others & ~own[self._column], self._column, slopes[0]),
-            (balances & self._in_rate & ~own[self._column], self._column, slopes[1]),
-            (balances & self._in_y & (moved >= 0), moved, slopes[0]),
-            (balances & self._in_y & self._force[self._column], n + self._column, slopes[0]),
+        parts = (  # two rows each: at the point, and integrated; two columns: moves, and impulses
+            (others & self._in_y, self._row, self._column, slopes[0]),
+            (balances & self._in_rate, rows + self._row, self._column, slopes[1]),
+            (balances & self._in_y & (moved >= 0), rows + self._row, moved, slopes[0]),
+            (balances & self._in_y & self._given[self._column], rows + self._row, n + self._column, slopes[0]),
         )
-        i, j, v = (
-            np.concatenate([items[k][items[0]] for items in ((m, self._row, c, x) for m, c, x in entries)])
-            for k in (1, 2, 3)
-        )
-        take = v != 0.0
-        (rows, i), (columns, j) = (np.unique(k[take], return_inverse=True) for k in (i, j))
-        v, most = v[take], np.zeros(columns.size)
+        takes = [take & (v != 0.0) & ~self._stays[j % n] for take, _, j, v in parts]
+        i, j, v = (np.concatenate([part[k][take] for part, take in zip(parts, takes, strict=True)]) for k in (1, 2, 3))
+        (own, i), (columns, j) = (np.unique(k, return_inverse=True) for k in (i, j))
+        most = np.zeros(columns.size)
         np.maximum.at(most, j, np.abs(v))
         unit, found = np.where(columns < n, size[columns % n], 1.0 / most), np.zeros(2 * n)
-        found[columns] = unit * least_norm((rows.size, columns.size), (i, j, v * unit[j]), asked[rows])
+        aim = np.where(own < rows, asked[own % rows], 0.0)
+        found[columns] = unit * least_norm((own.size, columns.size), (i, j, v * unit[j]), aim)
         return found[:n], found[n:]
