@@ -290,6 +290,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         nodes=tuple(parts.nodes),
         branches=tuple(parts.branches),
         couplings=tuple(parts.couplings),
+        derived=tuple(parts.derived),
         discretes=frozenset(parts.discretes),
         events=tuple(parts.events),
         switches=tuple(parts.switches),

@@ -21,7 +21,7 @@ from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.port_efforts import NotSaidError, conjugate_of
 from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Dynamic, Initial, Loop, Observation, State, loop_indices
+from sysdyn.dsl.model.network import Branch, Derived, Dynamic, Initial, Loop, Observation, State, loop_indices
 from sysdyn.dsl.model.units import Dimension, si
 from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.symbols import Definition, End, Scope, Space, Typed
@@ -32,6 +32,16 @@ _ALONE = (syntax.Input, syntax.Port, syntax.Branch, syntax.Law, syntax.Level)
 """Statements that a model reads otherwise than a component does, or refuses."""
 _STATED = tuple(STATEMENTS)
 """Statements that make equations, in the order in which they are resolved."""
+
+
+_MOVING = (syntax.Energy, syntax.Content, syntax.Work, syntax.Dynamic)
+"""Those that move something: what they differentiate must not jump."""
+
+
+def _reads_flow(branch: Branch) -> bool:
+    """Whether the law of a branch along an expression reads the rate of that."""
+    read = ex.variables(branch.law) if branch.law is not None else ()
+    return branch.kind == "kinetic" or any(n.op == "var" and n.data == (branch.name, "bf", 0) for n in read)
 
 
 class Elaborator(Instances):
@@ -112,11 +122,14 @@ class Elaborator(Instances):
             if not kinds and all(type(s) is not Definition for s in space.scope.symbols.values()):
                 continue
             with self.entering(space):
-                for kind in _STATED:
-                    if kind in kinds:
+                for kind in (k for k in _STATED if k in kinds):
+                    with nullcontext() if kind in _MOVING else self.resolver.aside():
                         self.each(body.of(kind), partial(STATEMENTS[kind], self))
-                self._definitions()
+                with self.resolver.aside():
+                    self._definitions()
         self.resolver.said = True
+        self.parts.derived = [Derived(node, *at) for node, at in self.resolver.derived.items()]
+        self.parts.derived += [Derived(b.on, b.loops, b.place) for b in self.parts.branches if b.on and _reads_flow(b)]
 
     def _said(self, kind: type[syntax.Statement], do: Callable[..., None]) -> None:
         """Carry out all statements of a kind, in the bodies where they stand."""
