@@ -111,7 +111,7 @@ def turns(binding: Binding, t0: float, t1: float, slope: Node) -> Array:
 def changes(
     parameters: Parameters, span: tuple[float, float], root: Node, nest: Nest, tables: Mapping[str, Table]
 ) -> Array:
-    """Instants (s) of a span, ascending, at which an operation of time alone in an expression changes; none beyond MOST."""
+    """Instants (s) of a span, ascending, at which an operation of time alone in it changes; none beyond MOST."""
     search = _Search(parameters, *span)
     try:
         for node in topological_unbound([root]):

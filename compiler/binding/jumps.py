@@ -22,7 +22,7 @@ from sysdyn.dsl.model.calculus import without_signals
 from sysdyn.dsl.model.expression import Node, call, rebuild, time, topological, topological_unbound, variables
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Derived, Loop, Network
-from sysdyn.dsl.text.diagnostics import Diagnostic, Place
+from sysdyn.dsl.text.diagnostics import Diagnostic, Span
 
 Array = NDArray[np.float64]
 STEPPING = ("step", "sign", "setsign", "floor", "ceil", "mod")
@@ -47,17 +47,23 @@ HELP = (
 
 def jumps(network: Network, parameters: Parameters, span: tuple[float, float]) -> tuple[Diagnostic, ...]:
     """E520 for each expression that is differentiated by time and may jump within a span [s] of time."""
-    targets = [a.target for e in network.events for a in e.assignments]
-    assigned = frozenset(n.data if n.op == "param" else n.data[0] for n in targets if n.op == "param" or n.data[1] == "s")
-    found: dict[Place, Diagnostic] = {}
+    targets = [a.target for e in network.events for a in e.actions]
+    assigned = frozenset(
+        n.data if n.op == "param" else n.data[0] for n in targets if n.op == "param" or n.data[1] == "s"
+    )
+    found: dict[tuple[str, Span], Diagnostic] = {}
     for derived in network.derived:
+        place = derived.place
         for one in _parts(derived):
             what = _by_event(one.expression, assigned)
             if what is None and any(_steps(n, network) for n in topological_unbound([one.expression])):
                 what = _Jumping(one, network, parameters, span).what()
             if what:
-                text = f"what is differentiated by time here jumps {what}: its rate is a pulse there, which would be lost"
-                found[derived.place] = Diagnostic("E520", text, derived.place, HELP)
+                owner = f", in {place.element}" if "." in place.element else ""
+                text = (
+                    f"what is differentiated by time here jumps {what}{owner}: its rate is a pulse there, which is lost"
+                )
+                found.setdefault((place.file, place.span), Diagnostic("E520", text, place, HELP))
     return tuple(found.values())
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 
@@ -21,7 +22,8 @@ from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.port_efforts import NotSaidError, conjugate_of
 from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Branch, Derived, Dynamic, Initial, Loop, Observation, State, loop_indices
+from sysdyn.dsl.model.network import Derived, Dynamic, Initial, Loop, Observation, State, loop_indices
+from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.model.units import Dimension, si
 from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.symbols import Definition, End, Scope, Space, Typed
@@ -36,12 +38,6 @@ _STATED = tuple(STATEMENTS)
 
 _MOVING = (syntax.Energy, syntax.Content, syntax.Work, syntax.Dynamic)
 """Those that move something: what they differentiate must not jump."""
-
-
-def _reads_flow(branch: Branch) -> bool:
-    """Whether the law of a branch along an expression reads the rate of that."""
-    read = ex.variables(branch.law) if branch.law is not None else ()
-    return branch.kind == "kinetic" or any(n.op == "var" and n.data == (branch.name, "bf", 0) for n in read)
 
 
 class Elaborator(Instances):
@@ -129,7 +125,6 @@ class Elaborator(Instances):
                     self._definitions()
         self.resolver.said = True
         self.parts.derived = [Derived(node, *at) for node, at in self.resolver.derived.items()]
-        self.parts.derived += [Derived(b.on, b.loops, b.place) for b in self.parts.branches if b.on and _reads_flow(b)]
 
     def _said(self, kind: type[syntax.Statement], do: Callable[..., None]) -> None:
         """Carry out all statements of a kind, in the bodies where they stand."""
@@ -156,6 +151,15 @@ class Elaborator(Instances):
             self.parts.given.add(name)
             target = state if found.first is None else ex.sub(state, found.first)
             self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
+
+    def derived(self) -> None:
+        """What branches along expressions differentiate by time, and integrals of these read."""
+        parts = self.parts
+        along = [(b, b.on) for b in parts.branches if b.on is not None]
+        roots = expressions(parts, "dynamics", "energies", "works", "constraints", "branches.law") if along else ()
+        read = {n.data[0] for root in roots for n in ex.variables(root) if n.op == "var" and n.data[1] == "bf"}
+        moved = [(b, on) for b, on in along if b.kind not in ("potential", "effort") or b.name in read]
+        parts.derived += [Derived(on, b.loops, replace(b.place, element=b.name)) for b, on in moved]
 
     def taken(self, space: Space, end: End, place: Place, *, rates: bool) -> ex.Node:
         """What an instance takes in at an end; place: where that is read."""

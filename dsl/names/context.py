@@ -118,7 +118,9 @@ class Context:
         self.constraints: dict[str, list[Constraint]] = {}
         self._quantities: dict[tuple[int, int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number, unit
         self._values: dict[tuple[Definition, bool], Value | None] = {}
-        self._derived: dict[tuple[Definition, bool], dict[Node, tuple[tuple[Loop, ...], Place]]] = {}  # in each of these
+        self._derived: dict[
+            tuple[Definition, bool], dict[Node, tuple[tuple[Loop, ...], Place]]
+        ] = {}  # in each of these
         self._applied: dict[tuple[syntax.Function, tuple[Node, ...]], Node | None] = {}  # functions to arguments
         self._active: list[Definition] = []
         self._loops: list[Loop] = []
