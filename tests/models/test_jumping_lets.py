@@ -115,5 +115,5 @@ model m {
 scene s of m { time 0 s to 150.5 s; trace x[1] every 1 s }
 """
     (tmp_path / "m.sd").write_text(text.replace("JUMP", "(if i == 150 then 0.1 m else 0 m)"))
-    with pytest.raises(api.ModelError, match="E520.*at t = 150 s"):
+    with pytest.raises(api.ModelError, match=r"E520.*at t = 150 s"):
         api.simulate(tmp_path / "m.sd", output=tmp_path / "m.h5", until=150.5)
