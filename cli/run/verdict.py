@@ -60,7 +60,8 @@ _REMEDIES = {
 
 _REMEDIES_OF_CAUSES = {
     "crawl": "an earlier end (--until), another --method, or a looser --accuracy",
-    "drives": "a bound of zero or more: abs(c), max(c, 0); or an earlier end: --until",
+    "drives": "a bound of zero or more: abs(c), max(c, 0); the other sign of a reaction (floor.on(y) is the effort"
+    " along y); or an earlier end: --until",
     "endless": "a ramp in place of the jump, or something that stores between the two",
     "pulsed": "a ramp in place of the jump, or the store's own displacement or momentum in place of the integral",
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",

@@ -321,7 +321,9 @@ class Handler:
         try:
             found, anew = self.succession.after(t, y, yd, touched, stalled=self._stalled > 0)
         except NoActiveSetError as error:
-            raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
+            drives = self.succession.driving(t, y, yd)
+            cause = "complementarity" if drives is None else "drives"
+            raise SolverFailure(cause, t, 0.0, drives or ", ".join(error.names)) from error
         self._renew(t, *found)
         if anew:
             self._bounce(t, *found)

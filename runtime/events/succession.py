@@ -102,6 +102,14 @@ class Succession:
         contacts, contact = self.contacts, self.contacts.contacts[k]
         if contact.hold < 0 or contacts.active[k]:
             return
+        ends = self._slipping(k, t, y, yd)
+        least = [self.observer.zero(row) for row in (contact.value, contact.rate)]
+        if len(ends) == 2 and (np.abs(ends[0] - ends[1]) <= least).all():
+            contacts.through.add(k)
+
+    def _slipping(self, k: int, t: float, y: Floats, yd: Floats) -> list[Floats]:
+        """Value and rate of a friction that slips in the sense 1, and -1; fewer where there is no such point."""
+        contacts, contact = self.contacts, self.contacts.contacts[k]
         ends, stood = list[Floats](), contacts.state()
         for sense in (1.0, -1.0):
             contacts.slip(k, sense)
@@ -110,9 +118,16 @@ class Succession:
             if found is not None:
                 ends.append(self.observer(t, *found[:2])[[contact.value, contact.rate]])
         contacts.become(stood)
-        least = [self.observer.zero(row) for row in (contact.value, contact.rate)]
-        if len(ends) == 2 and (np.abs(ends[0] - ends[1]) <= least).all():
-            contacts.through.add(k)
+        return ends
+
+    def driving(self, t: float, y: Floats, yd: Floats) -> str | None:
+        """The name of a friction that would push what slips along: its bound is negative, or its sign is wrong."""
+        for k, contact in enumerate(self.contacts.contacts):
+            if contact.kind == "friction":
+                ends = self._slipping(k, t, y, yd)
+                if len(ends) == 2 and ends[0][1] - ends[1][1] > self.observer.zero(contact.rate):
+                    return contact.name
+        return None
 
     def _closed(self, t: float, point: Point) -> Point:
         """The point with gaps that hold brought to nothing: one that is caught in flight is only nearly closed."""
