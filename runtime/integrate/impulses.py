@@ -51,7 +51,7 @@ class Side:
 class Impulses:
     """states: the dynamic variables that no other row reads, rows: those of their rates.  system: of the run."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, unread: Ints) -> None:
         settled = self.system = system.another("settled")
         pattern, (in_y, in_rate) = settled.pattern, settled.structural()
         self._row, self._column = pattern.row.astype(np.int64), pattern.columns_of()
@@ -65,16 +65,17 @@ class Impulses:
         self._in_y, self._in_rate = in_y, in_rate
         form = settled.another("3").form
         self._moved: Ints = np.full(settled.unknowns, -1, dtype=np.int64)
-        self._moved[form.k_f] = form.k_q
+        self._moved[form.k_f] = np.where(np.isin(form.k_q, unread), -1, form.k_q)
         self._read = self._may_pulse()
-        self._balances, self._others = self._by_order()
-        inert = np.isin(np.arange(settled.unknowns), self._column[in_rate & self._balances[self._row]])
-        self._carries = (settled.kinds == "q") | inert
-        self._stays = np.isin(
-            np.arange(settled.unknowns), np.append(self.states, self._moved[inert & (self._moved >= 0)])
-        )
+        inertia = in_rate & settled.of_groups("dynamics", "gamma")[self._row]
+        inertia |= in_y & settled.of_groups("momentum")[self._row] & (settled.kinds == "f")[self._column]
+        inert = np.isin(np.arange(settled.unknowns), self._column[inertia])
         # displacements tell the pulses of their flows
         self._given = np.isin(settled.kinds, FORCES) | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
+        self._balances, self._others = self._by_order()
+        self._carries = ((settled.kinds == "q") & ~np.isin(np.arange(settled.unknowns), unread)) | inert
+        held = form.k_q[inert[form.k_f]]
+        self._stays = np.isin(np.arange(settled.unknowns), np.concatenate([self.states, held, unread]))
 
     @property
     def any(self) -> bool:
@@ -95,6 +96,9 @@ class Impulses:
         moved[self._row[self._in_rate | (self._in_y & flow)]], own[self.rows] = True, True
         own[self._read] = True
         integrated = settled.of_groups("dynamics", "gamma", "psi") | (settled.of_groups("lambda") & ~own)
+        told = np.zeros(settled.rows, dtype=bool)
+        told[self._row[(self._given & (settled.kinds == "f"))[self._column] & self._in_y]] = True
+        integrated |= settled.of_groups("phi_rate") & told
         held = settled.of_groups("phi", "phi_rate", "psi", "momentum")
         return integrated, held | (settled.of_groups("dynamics", "gamma") & ~moved)
 

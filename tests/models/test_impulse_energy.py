@@ -163,3 +163,44 @@ def test_an_integral_that_the_model_reads_and_that_would_jump_is_refused(tmp_pat
     )
     with pytest.raises(api.SolverFailure, match=r"pulsed.*unknown Q"):
         _run(text, tmp_path, formulation="lagrangian")
+
+
+SUMS = {
+    "springs side by side": """\
+  node x0, x1, x2: translation
+  M0: kinetic(p = 2 kg*f) x0
+  K0: potential(e = 37 N/m*q) x0 -> x2
+  M1: kinetic(p = 2 kg*f) x1
+  D1: dissipator(e = 2 N.s/m*f) x1 -> x2
+  M2: kinetic(p = 2 kg*f) x2
+  K2: potential(e = 44 N/m*q) x2 -> x0
+  Q: flow(f = (if t < 0.2 s then 2 m/s else 3 m/s)) x2 -> ground""",
+    "a damper between masses": """\
+  node x0, x1: translation
+  M0: kinetic(p = 2 kg*f) x0
+  D0: dissipator(e = 4 N.s/m*f) x0 -> x1
+  M1: kinetic(p = 1 kg*f) x1
+  D1: dissipator(e = 3 N.s/m*f) x1 -> ground
+  Q: flow(f = (if t < 0.2 s then -1 m/s else 2 m/s)) x0 -> ground""",
+    "two sources": """\
+  node x0, x1: translation
+  M0: kinetic(p = 3 kg*f) x0
+  K0: potential(e = 45 N/m*q) x0 -> x1
+  M1: kinetic(p = 3 kg*f) x1
+  Q: flow(f = (if t < 0.2 s then 3 m/s else -3 m/s)) x0 -> ground
+  F: effort(e = (if t < 0.2 s then 2 N else 3 N)) ground -> x1""",
+}
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.parametrize("case", SUMS)
+def test_what_all_elements_absorb_is_nothing(tmp_path, case, formulation):
+    """Runs of the complementary formulations leave momenta out that nothing reads: pulses are told by their rows."""
+    labels = [line.split(":")[0].strip() for line in SUMS[case].splitlines()[1:]]
+    traced = " + ".join(f"{label}.energy" for label in labels)
+    scene = f"scene s of m {{ time 0 s to 0.5 s; trace {traced} as sum, Q.energy as Q every 10 ms }}"
+    text = f"model m {{\n{SUMS[case]}\n}}\n{scene}\n"
+    found = _run(text, tmp_path, formulation=formulation, accuracy=1e-6)
+    size = np.abs(found["Q"].values).max()
+    assert size > 5.0
+    assert np.abs(found["sum"].values).max() < 1e-5 * size
