@@ -41,6 +41,7 @@ _CAUSES = {
     "complementarity": ("E930", "no set of constraints that hold fits: each one asks for another"),
     "slides": ("E930", "a law jumps there and both its branches drive it back: no motion follows either"),
     "drives": ("E933", "the bound c of dry friction, c*setsign(u) or c*abs(u), falls below zero: it would drive"),
+    "unbalanced": ("E930", "what jumps there is no answer of the balances: an impulse is missing"),
     "endless": ("E933", "a pulse meets a finite resistance there: the power has no integral"),
     "pulsed": ("E933", "a dynamic variable that the model reads would jump there: its rate has a pulse"),
     "conflict": ("E704", "two events assign one variable at one instant"),
@@ -62,6 +63,7 @@ _REMEDIES_OF_CAUSES = {
     "crawl": "an earlier end (--until), another --method, or a looser --accuracy",
     "drives": "a bound of zero or more: abs(c), max(c, 0); the other sign of a reaction (floor.on(y) is the effort"
     " along y); or an earlier end: --until",
+    "unbalanced": "another --formulation, or a ramp in place of the jump",
     "endless": "a ramp in place of the jump, or something that stores between the two",
     "pulsed": "a ramp in place of the jump, or the store's own displacement or momentum in place of the integral",
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",

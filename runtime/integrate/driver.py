@@ -53,6 +53,9 @@ class Driver:
         self.system = system
         self.observed = system.observed_rows("observe")[1]
         self._left: Side | None = None
+        plan = request.events
+        happens = [] if plan is None else [*plan.whens, *plan.sampled]
+        self._assigned = any(a.kind == "flow" for one in happens for a in one.assignments)
         self.unread: Ints = np.zeros(0, dtype=np.int32)
         """Displacements that no row of the run reads: they are not integrated."""
         self.core = lib.core.sd_run_new(
@@ -128,7 +131,7 @@ class Driver:
     @cached_property
     def impulses(self) -> Impulses | None:
         """What gains over an instant without moving anything; None where nothing does."""
-        found = Impulses(self.system, self.unread) if self.system.are("s").any() else None
+        found = Impulses(self.system, self.unread, assigned=self._assigned) if self.system.are("s").any() else None
         return found if found is not None and found.any else None
 
     def leave(self, y: Floats, yd: Floats) -> None:

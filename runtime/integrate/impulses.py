@@ -22,7 +22,7 @@ FORCES = ("e", "kappa", "mu")
 STILL = 1e-10
 """Of its magnitude: what an unknown moves by, and has not jumped (start/restart.py)."""
 BROKEN = 1e-9
-"""Of its terms: what a row is missed by along the straight way, which then is not the rise."""
+"""Of the largest terms: what a row is missed by along the straight way, which then is not the rise."""
 GAUSS = tuple(0.5 + sign * np.sqrt(1.0 / 12.0) for sign in (-1.0, 1.0))
 """Points of Gauss's rule of degree 3: exact for powers of linear elements along a straight way."""
 PARTS = (1, 2, 4, 8, 16, 32, 64)
@@ -51,7 +51,11 @@ class Side:
 class Impulses:
     """states: the dynamic variables that no other row reads, rows: those of their rates.  system: of the run."""
 
-    def __init__(self, system: System, unread: Ints) -> None:
+    def __init__(self, system: System, unread: Ints, *, assigned: bool) -> None:
+        """unread: displacements that the run does not integrate; assigned: events assign flows, by impulses from
+        nowhere.
+        """
+        self._assigned = assigned
         settled = self.system = system.another("settled")
         pattern, (in_y, in_rate) = settled.pattern, settled.structural()
         self._row, self._column = pattern.row.astype(np.int64), pattern.columns_of()
@@ -104,16 +108,18 @@ class Impulses:
 
     def gains(self, before: Side, behind: Side, magnitude: Floats) -> Floats:
         """s+ - s- [states]; zero of what an event assigns.  magnitude [unknowns].  SolverFailure where a power has no
-        integral: pulses of flow through a resistance.
+        integral (pulses of flow through a resistance), and where what jumps is no answer of the balances.
         """
         way, none = behind.y - before.y, np.zeros(self.states.size)
         way[np.abs(way) <= STILL * magnitude] = 0.0
         assigned, way[self.states] = way[self.states] != 0.0, 0.0
         if not way[self._carries].any():
             return none
-        found, faithful = self._straight(before, behind, way)
-        if not faithful:
+        found, balanced, faithful = self._straight(before, behind, way)
+        if not (balanced and faithful):
             curved = self._curved(before, behind, way, magnitude)
+            if curved is None and not balanced and not self._assigned:
+                raise SolverFailure("unbalanced", behind.t, 0.0)
             found = found if curved is None else curved
         return np.where(assigned, 0.0, found)
 
@@ -149,9 +155,9 @@ class Impulses:
 
     # -- straight ------------------------------------------------------------------------------------------------
 
-    def _straight(self, before: Side, behind: Side, way: Floats) -> tuple[Floats, bool]:
-        """The gains [states] where all unknowns go straight, and whether all rows hold on that way."""
-        gained, faithful = np.zeros(self.states.size), True
+    def _straight(self, before: Side, behind: Side, way: Floats) -> tuple[Floats, bool, bool]:
+        """The gains [states] where all unknowns go straight; whether impulses balance there, and others hold."""
+        gained, balanced, faithful = np.zeros(self.states.size), True, True
         pulse = self._pulse(way)
         for part in GAUSS:
             y = before.y + part * way
@@ -162,8 +168,9 @@ class Impulses:
             if pulse.any():
                 self._finite(rate, self._rate(self._slopes((before, behind), part, y, pulse), way, impulse), behind.t)
             gained += 0.5 * rate
-            faithful &= met and self._holds(before, behind, part, y)
-        return gained, faithful
+            balanced &= met
+            faithful &= self._holds(before, behind, part, y)
+        return gained, balanced, faithful
 
     def _still(self, slopes: _Slopes, way: Floats, impulse: Floats, t: float) -> None:
         """SolverFailure where a dynamic variable that others read has a rate with an impulse: it would jump."""
@@ -203,7 +210,7 @@ class Impulses:
             impulse[columns] = least_norm((rows.size, columns.size), (i, j, v / unit[j]), aim[rows]) / unit
         acted = np.where(balances & given, slopes[0] * impulse[self._column], 0.0)
         size, left = (np.bincount(self._row, w, aim.size) for w in (np.abs(carried) + np.abs(acted), carried + acted))
-        return impulse, bool((np.abs(left) <= BROKEN * size)[self._balances].all())
+        return impulse, bool((np.abs(left) <= BROKEN * size.max(initial=0.0))[self._balances].all())
 
     def _holds(self, before: Side, behind: Side, part: float, y: Floats) -> bool:
         """Whether rows without impulses hold at y, where the text and all else asked are a part of their way along."""
