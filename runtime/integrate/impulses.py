@@ -150,8 +150,8 @@ class Impulses:
     def _rate(self, slopes: _Slopes, way: Floats, impulse: Floats) -> Floats:
         """What the states gain [states]: their rows read s' - g."""
         given = np.where(self._in_y, slopes[0] * impulse[self._column], 0.0)
-        total: Floats = np.bincount(self._row, self._carried(slopes, way) + given, self.system.rows)
-        return -total[self.rows]
+        total = np.bincount(self._row, self._carried(slopes, way) + given, self.system.rows)
+        return np.asarray(-total[self.rows], dtype=np.float64)
 
     # -- straight ------------------------------------------------------------------------------------------------
 
