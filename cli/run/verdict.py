@@ -41,7 +41,7 @@ _CAUSES = {
     "complementarity": ("E930", "no set of constraints that hold fits: each one asks for another"),
     "slides": ("E930", "a law jumps there and both its branches drive it back: no motion follows either"),
     "drives": ("E933", "the bound c of dry friction, c*setsign(u) or c*abs(u), falls below zero: it would drive"),
-    "unbalanced": ("E930", "what jumps there is no answer of the balances: an impulse is missing"),
+    "unbalanced": ("E930", "what jumps there is not where a fast rise would lead"),
     "endless": ("E933", "a pulse meets a finite resistance there: the power has no integral"),
     "pulsed": ("E933", "a dynamic variable that the model reads would jump there: its rate has a pulse"),
     "conflict": ("E704", "two events assign one variable at one instant"),

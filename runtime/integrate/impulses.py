@@ -25,9 +25,9 @@ BROKEN = 1e-9
 """Of the largest terms: what a row is missed by along the straight way, which then is not the rise."""
 GAUSS = tuple(0.5 + sign * np.sqrt(1.0 / 12.0) for sign in (-1.0, 1.0))
 """Points of Gauss's rule of degree 3: exact for powers of linear elements along a straight way."""
-PARTS = (1, 2, 4, 8, 16, 32, 64)
+PARTS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 """Steps of the classical method of order 4 along a curved way, until two agree within AGREED of the largest gain."""
-AGREED = 1e-9
+AGREED = 1e-8
 
 
 AWAY = 1e-6

@@ -129,6 +129,23 @@ scene s of m { time 0 s to 0.3 s; init C2.e = 0 V
         assert found["V"].values[-1] == pytest.approx(-0.132349, abs=1e-6)
 
 
+def test_a_mean_that_is_zero_is_no_energy_that_is(tmp_path):
+    """From -3 V to 3 V the mean effort is nothing, what a capacitor of cubic law takes on the way is not."""
+    text = """\
+model m {
+  node a, b: electrical
+  V: effort(e = (if t < 0.2 s then -3 V else 3 V)) ground -> a
+  N: potential(e = 3 V*(q/(1 C) + 0.2*(q/(1 C))^3)) b -> a
+  C: potential(q = 0.2 F*e) ground -> b
+  R: dissipator(e = 1 ohm*f) a -> b
+}
+scene s of m { time 0 s to 0.4 s
+  trace V.energy + N.energy + C.energy + R.energy as off, V.energy as V every 10 ms; accuracy 1e-6 }
+"""
+    found = _run(text, tmp_path, formulation="lagrangian")
+    assert np.abs(found["off"].values).max() < 1e-6 * np.abs(found["V"].values).max()
+
+
 def test_what_events_change_at_fixed_contents_is_no_work_of_the_store(tmp_path):
     """A stiffness that an event doubles: the store absorbs what the mass has lost, and no more."""
     text = """\
