@@ -159,6 +159,7 @@ def _judged(
         return None  # what is missing would be found missing again, in other words
     stopping.watched(elaborator, reader.observations)
     elaborator.quadratures()
+    elaborator.derived()
     checks.run(elaborator, report, required=required)
     checks.set_valued_results(elaborator, reader.observations, report)
     exact_claims(elaborator, report)
@@ -290,6 +291,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         nodes=tuple(parts.nodes),
         branches=tuple(parts.branches),
         couplings=tuple(parts.couplings),
+        derived=tuple(parts.derived),
         discretes=frozenset(parts.discretes),
         events=tuple(parts.events),
         switches=tuple(parts.switches),

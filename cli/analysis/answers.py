@@ -132,9 +132,7 @@ def locus(request: Request, name: str, along: Sequence[float], *, rest: bool, fo
     return Locus(name, units[name.partition("[")[0]], np.array(kept), responses.branches(sets), tuple(failed))
 
 
-def _eigenvalues(
-    request: Request, name: str, value: float, *, rest: bool
-) -> tuple[NDArray[np.complex128] | None, str]:
+def _eigenvalues(request: Request, name: str, value: float, *, rest: bool) -> tuple[NDArray[np.complex128] | None, str]:
     settings = (*((n, v) for n, v in request.settings if n != name), (name, repr(value)))
     report = Report()
     with ex.fresh():

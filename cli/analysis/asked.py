@@ -85,9 +85,7 @@ def compiled(
                 network = second or network
             network = replace(unwatched(network), statics=(), expectations=(), goldens=())
             network = _with_rates(network, moves)
-            prepared = prepare(
-                network, inner, formulation=request.formulation, backend=request.backend, gather=False
-            )
+            prepared = prepare(network, inner, formulation=request.formulation, backend=request.backend, gather=False)
     report.extend(inner if prepared else targets.unsupported(inner))
     return None if prepared is None else (target, replace(prepared, unasked=unasked))
 

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-
 def arrays(linear: Linear) -> dict[str, NDArray[Any]]:
     """Matrices by name: E A B C Cd D of the form, a b c d d1 d2 of the reduction, eigenvalues, participation."""
     form, small = linear.descriptor, linear.reduced

@@ -128,9 +128,7 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3", watched:
     pairs = ((i, j) for i in range(len(names)) for j in range(len(labels)))
     transfers = tuple(_transfer(small, i, j) for i, j in pairs)
     moves, steady = _felt_moves(system, small, found)
-    return Linear(
-        state.t, state.y, descriptor, small, own, transfers, labels, names, moves, steady, stores, energies
-    )
+    return Linear(state.t, state.y, descriptor, small, own, transfers, labels, names, moves, steady, stores, energies)
 
 
 def _with(
@@ -165,9 +163,7 @@ def _seen(out: Outputs, kept: list[int]) -> Outputs:
     return Outputs(out.by_y[kept], out.by_rate[kept], (one, rate, twice))
 
 
-def _energies(
-    found: Found, small: Reduced, own: Sequence[Mode], names: Sequence[str]
-) -> tuple[tuple[str, ...], Array]:
+def _energies(found: Found, small: Reduced, own: Sequence[Mode], names: Sequence[str]) -> tuple[tuple[str, ...], Array]:
     """Names of the stores and their shares of the energy of each mode."""
     at = {name: k for k, name in enumerate(names)}
     known = [s for s in contents(found.prepared.network) if s[1] in at and s[2] in at]
@@ -250,9 +246,7 @@ def _outputs(found: Found, slopes: Sequence[Sensitivity]) -> tuple[tuple[str, ..
     yd = np.concatenate([state.yd, np.zeros(room - state.yd.size)])
     block = form.block("observe")
     ledgers = {s.row for k in (block.kernels if block else ()) for s in k.rows if _reads_ledger(s.expression)}
-    families = [
-        k for k, row in enumerate(form.rows) if row.block == "observe" and row.stored and k not in ledgers
-    ]
+    families = [k for k, row in enumerate(form.rows) if row.block == "observe" and row.stored and k not in ledgers]
     names = tuple(form.rows[k].owner for k in families)
     parts = []
     for order in (0, 1):

@@ -87,11 +87,17 @@ class Equilibrium:
             return f"stability unknown: {self.why}"
         by = {"linearisation": "by the eigenvalues (Lyapunov's indirect method)", "energy": "by the energy test"}
         energy = self.judged.energy if self.judged.stability != "asymptotically stable" else None
-        kind = "" if energy is None else f"; the potential has a {energy.kind}" if energy.kind != "flat" else (
-            "; the potential is flat in a direction"
+        kind = (
+            ""
+            if energy is None
+            else f"; the potential has a {energy.kind}"
+            if energy.kind != "flat"
+            else ("; the potential is flat in a direction")
         )
-        said = "not decided by the eigenvalues" if self.judged.stability == "undecided" else (
-            f"{self.judged.stability} {by[self.judged.by]}"
+        said = (
+            "not decided by the eigenvalues"
+            if self.judged.stability == "undecided"
+            else (f"{self.judged.stability} {by[self.judged.by]}")
         )
         return said + kind
 

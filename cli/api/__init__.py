@@ -136,7 +136,6 @@ class Model:
         found = self._loaded.trace(set or {}, report)
         return found if isinstance(found, Trace) else _handed(found, report, unmet)
 
-
     def sweep(
         self,
         over: Mapping[str, Any],

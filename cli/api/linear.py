@@ -122,4 +122,3 @@ def resting(request: Request, tries: int) -> tuple[Equilibrium, ...]:
     if made is None:
         raise ModelError(report.diagnostics)
     return made[1]
-

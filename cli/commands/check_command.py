@@ -65,9 +65,7 @@ def command(
         seen = watching.changed(given, watching.stamps(given) if fix else seen)
 
 
-def _all(
-    console: Console, files: Sequence[str], refused: bool, jobs: int | None, *, strict: bool, fix: bool
-) -> int:
+def _all(console: Console, files: Sequence[str], refused: bool, jobs: int | None, *, strict: bool, fix: bool) -> int:
     """Check the files and show what was found; the exit code."""
     results, unread = [], False
 

@@ -153,9 +153,7 @@ def _known(files: Iterable[str]) -> None:
             raise UsageError(f"-o {file} holds runs: give another name, or remove it")
 
 
-def _write(
-    file: str, linear: Any, curves: Any, over: Any, kinds: tuple[str, ...], name: str, console: Console
-) -> None:
+def _write(file: str, linear: Any, curves: Any, over: Any, kinds: tuple[str, ...], name: str, console: Console) -> None:
     """One file of matrices or one picture."""
     from sysdyn.cli.analysis.files import written
     from sysdyn.cli.analysis.picture import page, picture

@@ -93,9 +93,7 @@ def command(
     line = ProgressLine("never" if console.quiet else progress)
     number = jobs or said.get("jobs") or cores()
     try:
-        swept = sweep(
-            request, asked, target, number, line, timings=not no_timings, keep=kept, dask=dask, runner=runner
-        )
+        swept = sweep(request, asked, target, number, line, timings=not no_timings, keep=kept, dask=dask, runner=runner)
     finally:
         line.clear()
     return _shown(console, swept, plot)

@@ -142,8 +142,7 @@ def _linear(target: Target, prepared: Prepared, request: Request, report: Report
     d, d1 = (np.zeros((places.size, len(inputs))) for _ in range(2))
     d[places >= 0], d1[places >= 0] = (m[m.shape[0] - count_ :] for m in (small.d, small.d1))
     nodes = [
-        unknown_node(system, int(k)) if k >= 0 else var(name, "s")
-        for k, name in zip(places, small.names, strict=True)
+        unknown_node(system, int(k)) if k >= 0 else var(name, "s") for k, name in zip(places, small.names, strict=True)
     ]
     own = [tuple(map(const, map(float, at))) for _, at in inputs]
     controls = [var(name, "s", *at, order=k) for k in range(3) for (name, _), at in zip(inputs, own, strict=True)]

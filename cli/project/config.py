@@ -69,9 +69,7 @@ def configured(arguments: Sequence[str], commands: Iterable[str]) -> dict[str, A
     return _map(everywhere, own, commands)
 
 
-def _map(
-    everywhere: dict[str, Any], own: dict[str, dict[str, Any]], commands: Iterable[str]
-) -> dict[str, Any]:
+def _map(everywhere: dict[str, Any], own: dict[str, dict[str, Any]], commands: Iterable[str]) -> dict[str, Any]:
     """Defaults of each command: those for all, then its own."""
     general = {name: value for name, value in everywhere.items() if name in ("color", "quiet")}
     runs = {name: value for name, value in everywhere.items() if name in {n for n, _ in _RUN.values()}}

@@ -57,7 +57,12 @@ class Activities:
 
 
 def activities(
-    request: Request, target: Target, report: Report, folder: Path, began: float, progress: Progress | None,
+    request: Request,
+    target: Target,
+    report: Report,
+    folder: Path,
+    began: float,
+    progress: Progress | None,
     limit: float | None = None,
 ) -> Activities | None:
     """The activities of all elements; None where the report says why there are none.
@@ -77,7 +82,12 @@ def activities(
         own = prepared.network.traced
         cells = np.linspace(options.t_start, options.t_end, CELLS + 1)[1:-1]
         options = replace(
-            options, output=folder / "activity.h5", every=None, at=tuple(cells), watch=None, sampled_at=(),
+            options,
+            output=folder / "activity.h5",
+            every=None,
+            at=tuple(cells),
+            watch=None,
+            sampled_at=(),
             max_wall=limit,
         )
         if options.accuracy is not None and own:  # of the scene's quantities alone

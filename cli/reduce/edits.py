@@ -129,9 +129,11 @@ def _ends(text: str, connection: syntax.Connection) -> list[str]:
     """What an element stands between."""
     if isinstance(connection, syntax.Across | syntax.BindAcross):
         return [text[end.span.start : end.span.end] for end in (connection.plus, connection.minus)]
-    return [text[connection.node.span.start : connection.node.span.end], "ground"] if isinstance(
-        connection, syntax.Single
-    ) else []
+    return (
+        [text[connection.node.span.start : connection.node.span.end], "ground"]
+        if isinstance(connection, syntax.Single)
+        else []
+    )
 
 
 def _declared(target: Target, name: str) -> syntax.Node | None:

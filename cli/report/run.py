@@ -18,9 +18,7 @@ _INDEX = {"2": "2 (stabilised)"}
 def passivity(study: Study) -> str:
     """The certificate: who may lose or supply energy, and how that is known."""
     found = certificate(study.prepared.network, study.prepared.binding)
-    rows = [
-        [study.link(f.place, escape(f.name)), f.role, f.how, escape(f.said)] for f in found.findings
-    ]
+    rows = [[study.link(f.place, escape(f.name)), f.role, f.how, escape(f.said)] for f in found.findings]
     said = f"<p>{escape(found.lines()[0])}</p>"
     return said + (table(["element", "role", "known by", ""], rows, left=(0, 1, 2, 3)) if rows else "")
 

@@ -17,6 +17,7 @@ from sysdyn.cli.run.scene_numbers import INSTANTS, beyond, wrong_numbers
 from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.binding.columns import Read, value_of
 from sysdyn.compiler.binding.instants import distinct, instants
+from sysdyn.compiler.binding.jumps import jumps
 from sysdyn.compiler.binding.pulses import pulses, quickest
 from sysdyn.compiler.network.pruning import listed
 from sysdyn.dsl import load
@@ -141,6 +142,9 @@ def options_of(
         raise UsageError(f"the run ends at {t1:g} s, but it begins at {t0:g} s")
     if text := beyond(t0, t1):
         raise UsageError(text)
+    report.extend(jumps(prepared.network, prepared.binding.parameters, (t0, t1)))
+    if report.failed:
+        return None
     every = value(scene.every) if scene.every is not None else None
     if every is not None and (t1 - t0) / every > INSTANTS:
         raise UsageError(f"every {every:g} s from {t0:g} s to {t1:g} s is more than {INSTANTS:.0e} instants")

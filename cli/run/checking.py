@@ -79,6 +79,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     from sysdyn.cli.run.scene_numbers import wrong_numbers
     from sysdyn.cli.run.starting import described, start
     from sysdyn.compiler.binding.certificate import certificate
+    from sysdyn.compiler.binding.jumps import jumps
 
     prepared = prepare(network, report, backend="numpy")
     if prepared is None:
@@ -89,7 +90,12 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
         report.extend(wrong_numbers(target, scene, prepared.binding.evaluate, bare))
         if report.failed:
             return {"ok": False}
-    t0 = prepared.binding.evaluate(scene.start) if scene and scene.start else 0.0
+    value = prepared.binding.evaluate
+    t0 = value(scene.start) if scene and scene.start else 0.0
+    t1 = value(scene.end) if scene and scene.end else t0
+    report.extend(jumps(prepared.network, prepared.binding.parameters, (t0, t1)))
+    if report.failed:
+        return {"ok": False}
     started = start(prepared, t0, report)
     if started is None:
         return {"ok": False}

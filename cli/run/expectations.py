@@ -18,6 +18,12 @@ from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.simulate import Outcome
 from sysdyn.values import dataclass
 
+OPEN = 1e-12
+"""Of the largest terms of the sides of a claim, in the run: what no run resolves (round-off; rows that hold)."""
+LOOSE = ("<=", ">=")
+WORSE = 1.1
+"""Times the worst sample so far: the next one that breaks a claim and is kept, for sizes are known at the end."""
+
 
 @dataclass(frozen=True, slots=True)
 class Claim:
@@ -30,24 +36,27 @@ class Claim:
 
 
 def watch(prepared: Prepared) -> Watch:
-    """What the claims need of a run, whatever its length: the first sample that breaks each, and those at instants."""
+    """What the claims need of a run, whatever its length: the first sample that breaks each, worse ones behind it, and
+    those at instants.
+    """
     claims = list(enumerate(prepared.network.expectations))
 
     def of_run(names: tuple[str, ...]) -> Callable[[Floats, Floats], NDArray[np.bool_]]:
         column = {name: j for j, name in enumerate(names)}
         judged = [(k, e) for k, e in claims if f"expect {k} left" in column]
-        open_ = {k for k, e in judged if e.moment == "always"}
+        worst = {k: -1.0 for k, e in judged if e.moment == "always"}
 
         def wanted(time: Floats, values: Floats) -> NDArray[np.bool_]:
             kept = np.zeros(time.size, dtype=bool)
             for k, e in judged:
                 if e.at is not None:
                     kept |= _near(time, prepared.binding.evaluate(e.at))
-                elif k in open_:
+                elif k in worst:
                     left, right, within = _columns(values, column, k, e)
-                    broken = np.flatnonzero(~where_holds(e.operator, left, right, within))
-                    kept[broken[:1]] = True
-                    open_.difference_update({k} if broken.size else ())
+                    off = np.abs(left - right)
+                    for row in np.flatnonzero(~where_holds(e.operator, left, right, within)):
+                        if not off[row] <= WORSE * worst[k]:
+                            kept[row], worst[k] = True, float(off[row]) if e.operator in LOOSE else np.inf
             return kept
 
         return wanted
@@ -82,8 +91,9 @@ def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report:
             report.error("E909", f"expect failed: the run does not reach {at:g} s", e.place)
             return Claim(text, False, None, at)
         time, left, right, within = time[here[:1]], left[here[:1]], right[here[:1]], within[here[:1]]
+    open_ = _open(outcome, k, e)
     for t, a, b, w in zip(time, left, right, within, strict=True):
-        if not holds(e.operator, a, b, w):
+        if not holds(e.operator, a, b, w + open_):
             _report(outcome, e, (t, a, b, w), report)
             return Claim(text, False, float(a), float(t))
     if not time.size:
@@ -139,6 +149,14 @@ def _sides(outcome: Outcome, k: int, e: Expectation) -> tuple[np.ndarray, np.nda
     samples = outcome.samples
     column = {name: j for j, name in enumerate(samples.names)}
     return samples.time, *_columns(samples.values, column, k, e)
+
+
+def _open(outcome: Outcome, k: int, e: Expectation) -> float:
+    """What a run leaves open of an inequality that may be an equality."""
+    if e.operator not in LOOSE:
+        return 0.0
+    sizes = dict(zip(outcome.samples.names, outcome.samples.largest, strict=True))
+    return OPEN * float(max(sizes[f"expect {k} left"], sizes[f"expect {k} right"]))
 
 
 def _columns(

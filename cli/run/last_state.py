@@ -135,9 +135,7 @@ class LastState:
         def gradients(y: NDArray[np.float64]) -> NDArray[np.float64]:
             by = {"phi": [[ex.var(n, "q")] for n in names]}
             by["psi"] = [[ex.var(n, "q", order=1), ex.var(n, "f")] for n in names]
-            rows = [
-                [sum(self.value(derivative(c.expression, v), y) for v in vs) for vs in by[c.kind]] for c in found
-            ]
+            rows = [[sum(self.value(derivative(c.expression, v), y) for v in vs) for vs in by[c.kind]] for c in found]
             j = np.array(rows)
             return np.asarray(j / np.maximum(np.linalg.norm(j, axis=1, keepdims=True), 1e-300))
 

@@ -123,9 +123,7 @@ def _order(system: System) -> NDArray[np.intp]:
     return np.concatenate([*parts, np.zeros(0, dtype=np.intp)]).astype(np.intp)
 
 
-def _module_rows(
-    system: System, oracle: SampledRows, block: Block, points: Points, rows: NDArray[np.integer]
-) -> Array:
+def _module_rows(system: System, oracle: SampledRows, block: Block, points: Points, rows: NDArray[np.integer]) -> Array:
     """These rows of the block [points, rows] by the carrier; rows: in the order of the form's row families."""
     room, found = np.zeros(max(int(oracle.to[-1]), 1)), np.zeros((points.t.size, rows.size))
     for k, point in enumerate(zip(points.t, points.y, points.yd, strict=True)):

@@ -41,12 +41,15 @@ _CAUSES = {
     "complementarity": ("E930", "no set of constraints that hold fits: each one asks for another"),
     "slides": ("E930", "a law jumps there and both its branches drive it back: no motion follows either"),
     "drives": ("E933", "the bound c of dry friction, c*setsign(u) or c*abs(u), falls below zero: it would drive"),
+    "unbalanced": ("E930", "what jumps there is not where a fast rise would lead"),
+    "endless": ("E933", "a pulse meets a finite resistance there: the power has no integral"),
+    "pulsed": ("E933", "a dynamic variable that the model reads would jump there: its rate has a pulse"),
     "conflict": ("E704", "two events assign one variable at one instant"),
     "memory": ("E934", "there is no memory left"),
 }
 AT_REST = 1e-8
 """Of what there was of its kind at the start: an unknown that has come to rest."""
-_OF_EVENTS = ("max_events", "chatter", "complementarity", "conflict", "slides", "drives")
+_OF_EVENTS = ("max_events", "chatter", "complementarity", "conflict", "slides", "drives", "endless", "pulsed")
 _REMEDIES = {
     "E704": "one event for both, or conditions that do not become true together",
     "E930": "another --method or --index, a looser --accuracy, or a smoother law there",
@@ -58,7 +61,11 @@ _REMEDIES = {
 
 _REMEDIES_OF_CAUSES = {
     "crawl": "an earlier end (--until), another --method, or a looser --accuracy",
-    "drives": "a bound of zero or more: abs(c), max(c, 0); or an earlier end: --until",
+    "drives": "a bound of zero or more: abs(c), max(c, 0); the other sign of a reaction (floor.on(y) is the effort"
+    " along y); or an earlier end: --until",
+    "unbalanced": "another --formulation, or a ramp in place of the jump",
+    "endless": "a ramp in place of the jump, or something that stores between the two",
+    "pulsed": "a ramp in place of the jump, or the store's own displacement or momentum in place of the integral",
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",
     "chatter": "a condition and an action that do not undo each other: hysteresis, or an 'every' in place of a 'when'",
     "complementarity": "constraints that do not ask for opposites: a resistance or a clearance between these elements",
@@ -183,9 +190,7 @@ def _flat_start(prepared: Prepared, started: Started) -> tuple[RowLabel, ...]:
     return by_element(prepared, without_slope(system, state.t, *state.for_form(system)))
 
 
-def _inaccurate(
-    prepared: Prepared, missed: NotMet, place: Place, flat: tuple[RowLabel, ...], report: Report
-) -> None:
+def _inaccurate(prepared: Prepared, missed: NotMet, place: Place, flat: tuple[RowLabel, ...], report: Report) -> None:
     """E920; flat: laws by whose slopes the method steps, and that have none at the start."""
     where = next((o.place for o in prepared.network.observations if o.name == missed.element), place)
     stops = _stops(prepared, missed.element) if missed.undefined else None

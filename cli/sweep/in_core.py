@@ -133,4 +133,3 @@ class Cases:
                 p[k], anchor[k] = alone
                 good[k] = True
         return p, anchor, good
-

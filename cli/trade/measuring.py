@@ -278,9 +278,7 @@ class Bench:
         return carried.sizes[form]
 
 
-def _levels(
-    network: Network, given: tuple[tuple[str, str], ...], own: str
-) -> dict[str, tuple[tuple[str, str], ...]]:
+def _levels(network: Network, given: tuple[tuple[str, str], ...], own: str) -> dict[str, tuple[tuple[str, str], ...]]:
     """Levels by their text, those of the scene first: what is left open in every combination,
     those with few changes first, MOST at most.
     """

@@ -113,9 +113,7 @@ def _beside(asked: tuple[Request, Path, Combination, float | None]) -> _Tried:
     return _finest(bench_of(request, folder), combination, budget, 1)
 
 
-def _finest(
-    bench: Bench, combination: Combination, budget: float | None, number: int
-) -> _Tried:
+def _finest(bench: Bench, combination: Combination, budget: float | None, number: int) -> _Tried:
     """A run at the finest tolerance that ends in time; None where none does, and why."""
     law, tolerance = LAWS[combination.method], FINEST[combination.method]
     coarsest = max(law.tolerance(ENOUGH * bench.accuracy), tolerance)

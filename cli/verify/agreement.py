@@ -73,9 +73,7 @@ def _common(one: Trace, other: Trace) -> tuple[Floats, Places, Places]:
     return times[use], here[use].astype(np.intp), there[use].astype(np.intp)
 
 
-def _compared(
-    one: Trace, other: Trace, bounds: Bounds
-) -> tuple[tuple[Floats, Places, Places], dict[str, Floats]]:
+def _compared(one: Trace, other: Trace, bounds: Bounds) -> tuple[tuple[Floats, Places, Places], dict[str, Floats]]:
     """Common instants and their places, and there the ratio of difference to bound of each quantity; not a number
     counts as infinite.
     """

@@ -59,9 +59,7 @@ class Start:
 
     def at(self, values: NDArray[np.float64]) -> Start:
         """The same statement with other values."""
-        return Start(
-            self.family, self.positions, values, self.fixed, self.label, self.file, self.line, self.place
-        )
+        return Start(self.family, self.positions, values, self.fixed, self.label, self.file, self.line, self.place)
 
 
 @dataclass(frozen=True, slots=True)

@@ -171,8 +171,10 @@ class _Judge:
             if energy.function not in ("D", "G"):
                 continue
             kinds = ("f", "nf", "bf") if energy.function == "D" else ("e", "ne", "be", "f")
-            own = sorted((n for n in ex.variables(energy.expression) if n.op == "var" and _is_rate(n, kinds)),
-                         key=lambda n: n.number)
+            own = sorted(
+                (n for n in ex.variables(energy.expression) if n.op == "var" and _is_rate(n, kinds)),
+                key=lambda n: n.number,
+            )
             name = f"content of line {_line(energy.place)}"
             rates = {n: ex.var("#own", "bf", ex.const(float(k))) for k, n in enumerate(own)}
             inner = ex.substitute(energy.expression, dict(rates))
@@ -260,8 +262,11 @@ class _Judge:
 
     def _together(self, controlled: Sequence[tuple[str, Node, Place]]) -> Finding:
         """Controlled sources and works by what they absorb together; the first that supplies most is named."""
-        found = self._sampled(", ".join(dict.fromkeys(name for name, _, _ in controlled)),
-                              [power for _, power, _ in controlled], controlled[0][2])
+        found = self._sampled(
+            ", ".join(dict.fromkeys(name for name, _, _ in controlled)),
+            [power for _, power, _ in controlled],
+            controlled[0][2],
+        )
         if found.role != "active":
             return found
         worst = min(controlled, key=lambda item: self._least(item[1]))

@@ -86,9 +86,7 @@ def _ordered(network: Network, names: list[str]) -> list[str]:
     formulas = {p.name: p.values for p in network.parameters}
     left, order = list(names), list[str]()
     while left:
-        free = [
-            n for n in left if not {m.data for m in topological(list(formulas[n])) if m.op == "param"} & set(left)
-        ]
+        free = [n for n in left if not {m.data for m in topological(list(formulas[n])) if m.op == "param"} & set(left)]
         if not free:
             break  # binding says that they depend on themselves
         order += free

@@ -184,9 +184,9 @@ def enclose(root: Node, low: Array, high: Array, fixed: Values, outlines: Mappin
     return found[root]
 
 
-def enclose_over(root: Node, known: Mapping[Node, tuple[float, float]], fixed: Callable[[Node], float]) -> tuple[
-    float, float
-]:
+def enclose_over(
+    root: Node, known: Mapping[Node, tuple[float, float]], fixed: Callable[[Node], float]
+) -> tuple[float, float]:
     """Bounds of an expression over ranges of its unknowns and of time; those that are not known go from -inf to inf.
 
     fixed: values of expressions without unknowns.

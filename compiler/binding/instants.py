@@ -13,13 +13,15 @@ Received: a descriptor form and a binding; returned: `Instants`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, DescriptorForm
 from sysdyn.compiler.model.interpret import Value, evaluate, grid
+from sysdyn.compiler.model.parameters import Parameters
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.expression import Node, topological, topological_unbound, variables
 from sysdyn.dsl.model.network import Loop, Table
@@ -82,7 +84,7 @@ def instants(
     crossed: whose zeros are events, which no step may pass over twice.  None of them, with a note, where they are more
     than MOST.
     """
-    search = _Search(binding, t0, t1)
+    search = _Search(binding.parameters, t0, t1)
     try:
         for watched in _watched(form, {t.name: t for t in tables}, read):
             search.add(watched)
@@ -98,9 +100,23 @@ def instants(
 
 def turns(binding: Binding, t0: float, t1: float, slope: Node) -> Array:
     """Instants (s) in (t0, t1], ascending, at which an expression of time alone passes zero; none beyond MOST."""
-    search = _Search(binding, t0, t1)
+    search = _Search(binding.parameters, t0, t1)
     try:
         search.add(_zeros(slope, (slope,)))
+        return search.times()
+    except _TooManyError:
+        return np.zeros(0)
+
+
+def changes(
+    parameters: Parameters, span: tuple[float, float], root: Node, nest: Nest, tables: Mapping[str, Table]
+) -> Array:
+    """Instants (s) of a span, ascending, at which an operation of time alone in it changes; none beyond MOST."""
+    search = _Search(parameters, *span)
+    try:
+        for node in topological_unbound([root]):
+            for watched in _of(node, dict(tables)):
+                search.add(replace(watched, nest=_trimmed(watched.arguments, nest)))
         return search.times()
     except _TooManyError:
         return np.zeros(0)
@@ -205,8 +221,8 @@ def distinct(*found: Array) -> Array:
 class _Search:
     """Collects instants of one binding in (t0, t1)."""
 
-    def __init__(self, binding: Binding, t0: float, t1: float) -> None:
-        self._parameters = binding.parameters
+    def __init__(self, parameters: Parameters, t0: float, t1: float) -> None:
+        self._parameters = parameters
         self.t0, self.t1 = t0, t1
         self.note: str | None = None
         self._found: dict[Node, Array] = {}
@@ -291,9 +307,7 @@ class _Search:
         before = -1
         while True:
             part = (np.arange(each) + random.uniform(0.1, 0.9, (left.size, each))) / each
-            t = np.concatenate(
-                [left[:, None], left[:, None] + (right - left)[:, None] * part, right[:, None]], axis=1
-            )
+            t = np.concatenate([left[:, None], left[:, None] + (right - left)[:, None] * part, right[:, None]], axis=1)
             pairs = np.repeat(np.arange(number), t.size), np.tile(t.ravel(), number)
             value = labels.at(*pairs).reshape(number, *t.shape)
             k, piece, place = np.nonzero(value[..., 1:] != value[..., :-1])
@@ -312,6 +326,7 @@ class _Labels:
 
     def _values(self, index: Whole, t: Array, nodes: tuple[Node, ...] | None = None) -> list[Array]:
         """Of the arguments, or of other nodes."""
+
         def look(node: Node, args: list[Value]) -> Value:
             if node.op == "time":
                 return t

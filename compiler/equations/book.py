@@ -218,4 +218,3 @@ def functions(algebra: Algebra, model: EnergyModel) -> Iterator[Function]:
     efforts = {key: joined(algebra, add(*found)) for key, found in works.items()}
     if any(efforts.values()):
         yield Function("W", (), tuple(Effort(loops, terms, on) for (loops, on), terms in efforts.items() if terms))
-

@@ -18,6 +18,8 @@ TURNING = 40
 """The same of trigonometric ones."""
 GRANTED = 1500
 """Operations of all coefficients of one model for which shorter forms are looked for: some seconds."""
+
+
 def moving(node: Node) -> bool:
     """Whether an unknown is one of those in which terms are polynomials."""
     return node.op == "var" and (node.data[2] > 0 or node.data[1] not in ("q", "s"))

@@ -73,9 +73,8 @@ def rows_of(form: DescriptorForm, *blocks: str) -> list[Row]:
                         raise NoSuchEquations("families over ranges are not written out: --form descriptor keeps them")
                     found.setdefault((name, s.row), []).append(s.expression)
     return [
-        Row(name, form.rows[k].owner, form.rows[k].place, add(*parts)) for (name, k), parts in sorted(
-            found.items(), key=lambda item: (blocks.index(item[0][0]), item[0][1])
-        )
+        Row(name, form.rows[k].owner, form.rows[k].place, add(*parts))
+        for (name, k), parts in sorted(found.items(), key=lambda item: (blocks.index(item[0][0]), item[0][1]))
     ]
 
 
@@ -167,7 +166,8 @@ def _solved(algebra: Algebra, rows: Sequence[Row], wanted: Sequence[Node]) -> li
     if not 0 < len(wanted) <= LARGEST or len(rows) != len(wanted):
         raise NoSuchEquations(
             f"{len(wanted)} rates and multipliers in {len(rows)} rows: up to {LARGEST} are solved for in symbols"
-            if len(rows) == len(wanted) else "the rows do not determine the rates and multipliers one by one"
+            if len(rows) == len(wanted)
+            else "the rows do not determine the rates and multipliers one by one"
         )
     sympy = algebra.sympy
     still = dict.fromkeys(wanted, const(0.0))
@@ -241,9 +241,7 @@ def _divided(sympy: Any, value: Any, pivot: Any) -> Any:
     if value == 0:
         return value
     parts = [term / pivot for term in sympy.Add.make_args(value)]
-    return sympy.Add(
-        *(part if part.is_Symbol or part.count_ops() > FACTORED else sympy.factor(part) for part in parts)
-    )
+    return sympy.Add(*(part if part.is_Symbol or part.count_ops() > FACTORED else sympy.factor(part) for part in parts))
 
 
 def _simple(sympy: Any, value: Any) -> Any:
@@ -297,8 +295,13 @@ def canonical(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> tup
     if not carriers:
         raise NoSuchEquations("no coordinate carries a momentum: there is no kinetic store")
     flows = [var(owner, "f") for owner in carriers]
-    if len(model.solved) > MOVING and any(n.op == "var" for r in rows for f in flows for n in
-                                          variables(derivative(r.expression, f)) if r.owner in model.solved):
+    if len(model.solved) > MOVING and any(
+        n.op == "var"
+        for r in rows
+        for f in flows
+        for n in variables(derivative(r.expression, f))
+        if r.owner in model.solved
+    ):
         raise NoSuchEquations(
             f"the inertia of {', '.join(model.solved)} moves: up to {MOVING} such coordinates are solved in symbols;"
             " --form descriptor has p = dT*/df"

@@ -282,9 +282,7 @@ class _View:
     def _exchange(self, linear: Mapping[str, Sequence[Node]]) -> None:
         """The skew part of dQ/df goes to J, the symmetric one to R."""
         names = list(dict.fromkeys([*linear, *(n for n in self.names if n not in linear)]))
-        matrix = {
-            (a, b): derivative(add(*linear.get(a, ())), var(b, self.m.rate)) for a in names for b in names
-        }
+        matrix = {(a, b): derivative(add(*linear.get(a, ())), var(b, self.m.rate)) for a in names for b in names}
         for k, a in enumerate(names):
             for b in names[k:]:
                 one, other = matrix[a, b], matrix[b, a]

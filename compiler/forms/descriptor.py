@@ -43,10 +43,16 @@ HOME = {
 }  # fmt: skip
 HOME |= {f"{name}_scale": HOME.get(name, name) for name in SCALED}
 # rows without Jacobian entries: Newton never sees them, or only to judge others
-WITHOUT_ENTRIES = frozenset((
-    "observe", "observe_rate", "observe_scale", "audit", "ledger",
-    *(f"{n}_scale" for n in SCALED),
-))
+WITHOUT_ENTRIES = frozenset(
+    (
+        "observe",
+        "observe_rate",
+        "observe_scale",
+        "audit",
+        "ledger",
+        *(f"{n}_scale" for n in SCALED),
+    )
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,9 +69,7 @@ def _at(what: tuple[Constraint, Node], at: tuple[Node, ...]) -> tuple[Node, Node
     return expression, effort
 
 
-def _watched(
-    s: Switch, what: tuple[Constraint, Node], guards: Mapping[str, Node]
-) -> Iterator[tuple[str, Node]]:
+def _watched(s: Switch, what: tuple[Constraint, Node], guards: Mapping[str, Node]) -> Iterator[tuple[str, Node]]:
     """What events read of the effort: of an inequality what is not negative while it is free."""
     at = tuple(ex.const(float(k)) for k in s.at)
     row, _ = _at(what, at)

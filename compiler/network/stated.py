@@ -171,8 +171,6 @@ def _kept(energy: Energy) -> Energy:
     function = STATE_FUNCTIONS[energy.function]
     held = energy.expression
     if function.name in ("T*", "V*"):
-        products = [
-            ex.mul(n, ex.var(n.data[0], f"b{function.conjugate}", *n.args)) for n in _read(energy.expression)
-        ]
+        products = [ex.mul(n, ex.var(n.data[0], f"b{function.conjugate}", *n.args)) for n in _read(energy.expression)]
         held = ex.sub(ex.add(*products), held)
     return replace(energy, function=f"kept {function.edge}", expression=held)

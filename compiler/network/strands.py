@@ -180,9 +180,7 @@ def _classes(ways: Sequence[tuple[Strand, Links]], of: Mapping[str | None, str])
     for way, links in ways:
         if way.nodes[0] not in of and way.nodes[-1] not in of:
             continue
-        one, two = (
-            numbers.setdefault(("end", of.get(n, n)), len(numbers)) for n in (way.nodes[0], way.nodes[-1])
-        )
+        one, two = (numbers.setdefault(("end", of.get(n, n)), len(numbers)) for n in (way.nodes[0], way.nodes[-1]))
         key: object = (links, (one, two))
         back = tuple((not sense, law) for sense, law in reversed(links)), (two, one)
         if back < (links, (one, two)):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 
@@ -21,7 +22,8 @@ from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.port_efforts import NotSaidError, conjugate_of
 from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Dynamic, Initial, Loop, Observation, State, loop_indices
+from sysdyn.dsl.model.network import Derived, Dynamic, Initial, Loop, Observation, State, loop_indices
+from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.model.units import Dimension, si
 from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
 from sysdyn.dsl.names.symbols import Definition, End, Scope, Space, Typed
@@ -32,6 +34,10 @@ _ALONE = (syntax.Input, syntax.Port, syntax.Branch, syntax.Law, syntax.Level)
 """Statements that a model reads otherwise than a component does, or refuses."""
 _STATED = tuple(STATEMENTS)
 """Statements that make equations, in the order in which they are resolved."""
+
+
+_MOVING = (syntax.Energy, syntax.Content, syntax.Work, syntax.Dynamic)
+"""Those that move something: what they differentiate must not jump."""
 
 
 class Elaborator(Instances):
@@ -45,6 +51,7 @@ class Elaborator(Instances):
         self.space = Space("", Scope(files.scope), files.scope, self.source, component=model.name.name)
         self._body = Body(flatten(model.body))
         self.resolver.taken = self.taken
+        self.resolver.discretes = self.parts.discretes
 
     def names(self) -> None:
         """Bring the model's names into scope; values of inputs may change until `elements`."""
@@ -111,11 +118,13 @@ class Elaborator(Instances):
             if not kinds and all(type(s) is not Definition for s in space.scope.symbols.values()):
                 continue
             with self.entering(space):
-                for kind in _STATED:
-                    if kind in kinds:
+                for kind in (k for k in _STATED if k in kinds):
+                    with nullcontext() if kind in _MOVING else self.resolver.aside():
                         self.each(body.of(kind), partial(STATEMENTS[kind], self))
-                self._definitions()
+                with self.resolver.aside():
+                    self._definitions()
         self.resolver.said = True
+        self.parts.derived = [Derived(node, *at) for node, at in self.resolver.derived.items()]
 
     def _said(self, kind: type[syntax.Statement], do: Callable[..., None]) -> None:
         """Carry out all statements of a kind, in the bodies where they stand."""
@@ -142,6 +151,15 @@ class Elaborator(Instances):
             self.parts.given.add(name)
             target = state if found.first is None else ex.sub(state, found.first)
             self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
+
+    def derived(self) -> None:
+        """What branches along expressions differentiate by time, and integrals of these read."""
+        parts = self.parts
+        along = [(b, b.on) for b in parts.branches if b.on is not None]
+        roots = expressions(parts, "dynamics", "energies", "works", "constraints", "branches.law") if along else ()
+        read = {n.data[0] for root in roots for n in ex.variables(root) if n.op == "var" and n.data[1] == "bf"}
+        moved = [(b, on) for b, on in along if b.kind not in ("potential", "effort") or b.name in read]
+        parts.derived += [Derived(on, b.loops, replace(b.place, element=b.name)) for b, on in moved]
 
     def taken(self, space: Space, end: End, place: Place, *, rates: bool) -> ex.Node:
         """What an instance takes in at an end; place: where that is read."""

@@ -242,7 +242,21 @@ def _target(frame: ElaborationContext, action: syntax.Action) -> tuple[Typed, bo
     help_ = f"discrete {text} = ... in place of its declaration" if node.op == "param" else None
     if node.op == "var" and node.data[1:] == ("q", 0):
         help_ = f"{text}' := ..., its rate"
+    elif node.op == "var" and node.data[1] in ("be", "bf", "bq", "bp"):
+        help_ = _instead(frame, node)
     raise frame.resolver.fail("E702", message, action.target.span, help=help_)
+
+
+def _instead(frame: ElaborationContext, node: Node) -> str:
+    """What an event may assign in place of a quantity of a branch."""
+    branch = next((b for b in frame.parts.branches if b.name == node.data[0]), None)
+    ends = [e.node for e in (branch.plus, branch.minus) if e is not None and e.node] if branch is not None else []
+    if node.data[1] in ("bf", "bp") and branch is not None and branch.domain.common == "flow" and ends:
+        return (
+            " or ".join(f"{name}.f := ..." for name in ends)
+            + f", the flow of {'its node' if len(ends) == 1 else 'a node'}"
+        )
+    return "a source that acts for a short time; or a state with 'dynamic' in place of the element"
 
 
 # -- constraints that hold at times --------------------------------------------------------------------------
@@ -257,6 +271,10 @@ def guarded(frame: ElaborationContext, s: syntax.Constraint, constraint: Constra
         else:
             message = f"{s.kind} {s.decl.name}: restitution is in {{}}, wants a ratio"
             restitution = frame.resolver.wanted(item.expr, NONE, "E208", message)
+            if ex.variables(restitution) or _discretes(frame, restitution):
+                message = f"{s.kind} {s.decl.name}: restitution is one number for the whole run; it reads what moves"
+                help_ = "a parameter; of several, a phi each, 'while' a discrete condition holds"
+                raise frame.resolver.fail("E807", message, item.expr.span, help=help_)
             if s.relation == "=" or s.kind != "phi":
                 what = "an equality" if s.relation == "=" else f"a {s.kind}"
                 message = f"{s.kind} {s.decl.name}: restitution on {what}"
@@ -473,6 +491,4 @@ def _stick(
     unit = si(NONE)
     frame.said(Constraint("psi", name, at, value, loops, unit, place))
     multiplier = ex.var(name, "mu", *at)
-    frame.parts.drafts.append(
-        Draft(name, at, loops, "friction", place, unit, value, multiplier, element, bound, sense)
-    )
+    frame.parts.drafts.append(Draft(name, at, loops, "friction", place, unit, value, multiplier, element, bound, sense))

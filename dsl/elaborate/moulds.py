@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 _NOWHERE: Mapping[str, str] = {}
 _NOTHING: dict[str, Typed] = {}
 _KINDS = {syntax.Param, syntax.Branch, syntax.Law, syntax.Require}
+
+
 @dataclass(frozen=True, slots=True)
 class Held:
     """A parameter: its unit and its place; value: where the instance does not give it."""
@@ -253,7 +255,7 @@ def required_of(it: Elaborator, space: Likeness, body: Body) -> None:
 def _learnt(it: Elaborator) -> tuple[int, ...]:
     """How much has been found beside what a statement becomes."""
     beside = it.resolver.uses, it.resolver.whole, it.resolver.quadratures, it.parts.drafts, it.parts.watched
-    return len(it.report), it.waiting, *map(len, beside)
+    return len(it.report), it.waiting, len(it.resolver.derived), *map(len, beside)
 
 
 def _plain(body: Body) -> bool:

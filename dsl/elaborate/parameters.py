@@ -113,9 +113,7 @@ class Parameters(ElaborationContext):
             values, unit, truth = self._values(statement, given.written, given.value, unit, shape, given)
         if unit is None:
             help_ = f"param {decl.name} = 3 N/m, or param {decl.name}: N/m where somebody else sets it"
-            raise self.resolver.fail(
-                "E207", f"'{decl.name}' has neither a unit nor a default", decl.span, help=help_
-            )
+            raise self.resolver.fail("E207", f"'{decl.name}' has neither a unit nor a default", decl.span, help=help_)
         around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
         indices = (*around, *(loop.index for loop in own))
         self.enter(ParameterSymbol(decl.name, family, unit.dimension, truth, place))

@@ -17,6 +17,7 @@ from sysdyn.dsl.model.network import (
     Constraint,
     Coordinate,
     Coupling,
+    Derived,
     Dynamic,
     Energy,
     Event,
@@ -109,6 +110,7 @@ class NetworkBuilder:
     couplings: list[Coupling] = field(default_factory=list)
     inputs: dict[str, tuple[Unit, Place]] = field(default_factory=dict)  # of the model, which a scene may set
     given: set[str] = field(default_factory=set)  # states that have a dynamic, sound or not
+    derived: list[Derived] = field(default_factory=list)  # what is differentiated by time
     owned: dict[str, list[Energy | Work | Constraint]] = field(default_factory=dict)  # by the path of their instance
 
 

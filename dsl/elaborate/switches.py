@@ -43,6 +43,7 @@ def _iterations(loops: tuple[Loop, ...], known: Values) -> Iterator[dict[Node, N
 
 def _switch(frame: ElaborationContext, draft: Draft, change: dict[Node, Node], known: Values) -> Switch:
     """One element of a set-valued law with its watched values."""
+
     def of(node: Node) -> Node:
         return ex.substitute(node, change)
 

@@ -26,9 +26,7 @@ def last_of(nodes: Iterable[Node], lookup: Callable[[Node], float]) -> Any:
     return found
 
 
-def evaluate_along(
-    root: Node, leaf: Node, points: Iterable[float], lookup: Callable[[Node], float]
-) -> Iterator[float]:
+def evaluate_along(root: Node, leaf: Node, points: Iterable[float], lookup: Callable[[Node], float]) -> Iterator[float]:
     """Values of a scalar node where one leaf takes the values of points; what does not read it is evaluated once."""
     values: dict[Node, Any] = {}
     moving: list[Node] = []

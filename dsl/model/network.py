@@ -420,6 +420,15 @@ class LevelChoice:
 
 
 @dataclass(frozen=True, slots=True)
+class Derived:
+    """What a statement differentiates by time: it must not jump (E520)."""
+
+    expression: Node
+    loops: tuple[Loop, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
 class Network:
     """A model under a scene, checked: names bound, dimensions agree, SI units everywhere."""
 
@@ -444,6 +453,7 @@ class Network:
     nodes: tuple[NodeFamily, ...] = ()
     branches: tuple[Branch, ...] = ()
     couplings: tuple[Coupling, ...] = ()
+    derived: tuple[Derived, ...] = ()
     slopes: tuple[Slope, ...] = ()  # of laws that the compiler has inverted
     quasis: tuple[str, ...] = ()  # families of quasi-velocities
     speeds: tuple[Observation, ...] = ()  # the scalar ones of the model itself

@@ -108,6 +108,8 @@ class Context:
         self.uses: list[Use] = []
         self.whole: set[str] = set()  # parameters used as sizes or indices
         self.inputs: set[str] = set()  # parameters that are inputs: no sizes
+        self.derived: dict[Node, tuple[tuple[Loop, ...], Place]] = {}  # differentiated by what is being read
+        self.discretes: set[str] = set()  # parameters that events assign
         self.branches: list[Branch] = []  # those found so far
         self.laws: dict[str, Any] = {}  # of branches, by family (laws.LawOf)
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
@@ -116,6 +118,9 @@ class Context:
         self.constraints: dict[str, list[Constraint]] = {}
         self._quantities: dict[tuple[int, int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number, unit
         self._values: dict[tuple[Definition, bool], Value | None] = {}
+        self._derived: dict[
+            tuple[Definition, bool], dict[Node, tuple[tuple[Loop, ...], Place]]
+        ] = {}  # in each of these
         self._applied: dict[tuple[syntax.Function, tuple[Node, ...]], Node | None] = {}  # functions to arguments
         self._active: list[Definition] = []
         self._loops: list[Loop] = []
@@ -230,6 +235,15 @@ class Context:
         """Report that nobody can cut the loop."""
         message = f"'{several.label}' is declared in several places, over which {several.loop.rpartition('.')[2]} runs"
         return self.fail("E806", message, span, help="one statement for each of these places")
+
+    @contextmanager
+    def aside(self) -> Iterator[dict[Node, tuple[tuple[Loop, ...], Place]]]:
+        """What is differentiated within, of which nobody around knows."""
+        before, self.derived = self.derived, {}
+        try:
+            yield self.derived
+        finally:
+            self.derived = before
 
     @property
     def loops(self) -> tuple[Loop, ...]:

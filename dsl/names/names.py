@@ -244,11 +244,14 @@ class Names(Context):
     def definition(self, symbol: Definition, at: tuple[Node, ...] | None = None) -> Value:
         """The value of a let, output, input or const, inlined; at: indices of a family's element."""
         value = self._template(symbol)
+        given = zip(symbol.at, at or (), strict=False)
+        change = {ex.index(f"{symbol.name}.{name}"): node for name, node in given}
+        for node, (_, place) in self._derived[symbol, self.virtual].items():
+            self.derived[ex.substitute(node, change)] = self.loops, place
         if at is None:
             return value
         if isinstance(value, Vector):
             return pick(value, at)
-        change = {ex.index(f"{symbol.name}.{name}"): node for name, node in zip(symbol.at, at, strict=True)}
         return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
 
     def _template(self, symbol: Definition) -> Value:
@@ -269,7 +272,8 @@ class Names(Context):
         self._active.append(symbol)
         placeholders = {n: Typed(ex.index(f"{symbol.name}.{n}"), NONE) for n in symbol.at}
         try:
-            with self.space(symbol.space), self.bound({**dict(symbol.bound), **placeholders}):
+            around = self.space(symbol.space), self.bound({**dict(symbol.bound), **placeholders}), self.aside()
+            with around[0], around[1], around[2] as self._derived[key]:
                 value = self.resolve(symbol.expression)
                 value = self._declared(symbol, value)
                 if self.virtual and symbol.kind in ("output", "input"):
@@ -392,6 +396,8 @@ class Names(Context):
 
     def rate(self, node: Node, span: syntax.Span) -> Node:
         """The time derivative of a node."""
+        if node.op != "var":
+            self.derived[node] = self.loops, self.place(span)
         try:
             return time_derivative(node)
         except ValueError as error:

@@ -23,6 +23,8 @@ BRANCH = ("e", "f", "q", "p", "power", "energy", *MEMBERS)
 _WHOLE = {"kinetic": "audit.kinetic", "potential": "audit.potential", "dissipator": "audit.dissipated"}
 """What of the whole model an edge's state functions are, or add up to."""
 
+STORED = {"kinetic": "T", "potential": "V"}
+"""What stores of an edge hold."""
 OF_ELEMENTS = "stores have T, Tstar or V, Vstar, dissipators D, G"
 """Who has state functions."""
 
@@ -128,11 +130,32 @@ class Quantities(Paths):
         return self.quadrature(f"{family.name}.p", node, family.whole, unit, at, e)
 
     def _absorbed(self, symbol: BranchSymbol, at: tuple[Node, ...], power: Dimension, e: syntax.Member) -> Node:
-        """The energy that a branch has absorbed since the start: a quadrature."""
+        """The energy that a branch has absorbed since the start: what it stores more than then, where its law tells
+        that alone; else a quadrature.
+        """
         family = symbol.family
         counters = tuple(ex.index(f"#e{k}") for k in range(len(family.whole)))
+        if (stored := self._stored(family.name)) is not None:
+            first = ex.var(family.name, stored, *counters)
+            begun = self.quadrature(f"{family.name}.begun", ex.const(0.0), family.whole, power, at, e, first)
+            return ex.sub(ex.var(family.name, stored, *at), begun)
         node = ex.mul(ex.var(family.name, "be", *counters), ex.var(family.name, "bf", *counters))
         return self.quadrature(f"{family.name}.energy", node, family.whole, power, at, e)
+
+    def _stored(self, family: str) -> str | None:
+        """The kind of what a store holds, T or V, where its law reads nothing but its own variables: what it absorbs is
+        then the difference; else None.
+        """
+        law = self.laws.get(family)
+        if law is None or law.kind not in STORED:
+            return None
+        own = {
+            ex.var(family, f"b{letter}", *n.args) for n in ex.variables(law.law) for letter in "efqp" if n.op == "var"
+        }
+        read = ex.variables(law.law)
+        changed = any(n.op == "param" and n.data in self.discretes for n in ex.topological([law.law]))
+        alone = read <= own and len({n.args for n in read}) <= 1 and not changed
+        return f"b{STORED[law.kind]}" if alone else None
 
     def quadrature(
         self,
@@ -142,9 +165,12 @@ class Quantities(Paths):
         dimension: Dimension,
         at: tuple[Node, ...],
         e: syntax.Expr,
+        first: Node | None = None,
     ) -> Node:
-        """The integral of a power (over the counters #e0, #e1, ... of its shape) at one element."""
-        found = Quadrature(power, shape, multiply(dimension, dim.TIME), self.place(e.span))
+        """The integral of a power (over the counters #e0, #e1, ... of its shape) at one element, from zero or from the
+        initial value of `first`.
+        """
+        found = Quadrature(power, shape, multiply(dimension, dim.TIME), self.place(e.span), first)
         self.quadratures.setdefault(name, found)
         return ex.var(name, "s", *at)
 

@@ -29,9 +29,7 @@ def read_unit(
     return found
 
 
-def _read(
-    unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, bound: Container[str]
-) -> Unit | None:
+def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, bound: Container[str]) -> Unit | None:
     dimension: Dimension = NONE
     scale = Fraction(1)
     for factor in unit.factors:

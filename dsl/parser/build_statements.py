@@ -364,6 +364,11 @@ def bind(v: Values, span: Span, notes: Notes) -> s.Bind:
     return s.Bind(v[0], v[1], span)
 
 
+def bind_on(v: Values, span: Span, notes: Notes) -> s.Bind:
+    """`on = expr`: an input of that name."""
+    return s.Bind(s.Word("on", Span(span.start, span.start + len("on"))), v[0], span)
+
+
 def bind_across(v: Values, span: Span, notes: Notes) -> s.BindAcross:
     """`NAME = ref -> ref`."""
     return s.BindAcross(v[0], v[1], v[2], span)

@@ -559,30 +559,30 @@ ROWS = """\
 -203:124 225:85 227:53 289:19 501:94
 137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 503:61 504:13
 -81:125 505:15
-137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
+137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57 507:15
 -204:65
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
--205:92 508:64
+-205:92 509:64
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 -206:66
 -207:22 97:13 99:23 100:24 101:25 102:26 103:27 104:28 105:29 106:30 107:31 108:32 109:33 110:34 111:35 112:36 113:37 114:38 115:39 116:40 117:41 118:42 119:43 120:44 121:45 122:46 123:47 124:48
 97:13
 -208:126
 -209:65
--210:65 303:15 304:100 512:127
+-210:65 303:15 304:100 513:127
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 -211:65
-514:15
+515:15
 -212:65
 -162:128
 -213:65
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 -214:65
-516:22
--215:22 518:1
-225:85 227:53 289:19 519:129
--216:22 188:13 521:1
--217:65 522:121
+517:22
+-215:22 519:1
+225:85 227:53 289:19 520:129
+-216:22 188:13 522:1
+-217:65 523:121
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 -218:104
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
@@ -591,62 +591,62 @@ ROWS = """\
 -219:65 303:15 304:100
 -220:65
 -221:65
--222:65 527:15
+-222:65 528:15
 -223:65
 -224:65
 -225:65
-47:14 529:101
+47:14 530:101
 -226:65 303:15 304:100
 -227:65
--228:65 531:15
+-228:65 532:15
 -229:65
-533:76 534:15 535:79
+534:76 535:15 536:79
 -230:65
-536:15
--231:65 537:15
+537:15
+-231:65 538:15
 -232:65
 -233:65
 -234:83
 -235:73
-137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 504:13 539:61
+137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 504:13 540:61
 -236:105
 -237:88
 -238:88
 -239:80
 -240:80
 -241:82
--242:61 540:64
+-242:61 541:64
 137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 504:13
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 -243:82
 -244:119
-545:130
+546:130
 -245:65
 -246:22 151:58 152:59 153:39 154:60
 -247:65
 -248:122
-546:15
+547:15
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
-548:62
+549:62
 -249:12
--250:22 549:1
+-250:22 550:1
 -251:22 106:30 109:33 123:47 377:107 378:108 379:37 380:109 381:110 382:111 383:112 384:113 385:114
--252:22 552:1
+-252:22 553:1
 -253:22
--254:65 553:103
+-254:65 554:103
 -255:65
-225:85 227:53 289:19 554:15
+225:85 227:53 289:19 555:15
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 -256:65
-225:85 227:53 289:19 556:15
--257:65 558:16
-559:131
--258:132 560:133 561:99
--259:134 563:64
--260:65 564:29
-565:135
+225:85 227:53 289:19 557:15
+-257:65 559:16
+560:131
+-258:132 561:133 562:99
+-259:134 564:64
+-260:65 565:29
+566:135
 264:96 265:13 266:50
 264:96 265:13 266:50
 -261:117
@@ -654,17 +654,18 @@ ROWS = """\
 496:49 497:50
 -263:117
 -264:117
-569:50
+570:50
 -265:117
 -266:65
--267:65 570:64
+-267:65 571:64
 400:13 401:103
 188:13
-573:61
+574:61
 -268:136
 -81:123 236:16 459:15
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 -269:124
+137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 -270:137
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 -271:119
@@ -675,13 +676,13 @@ ROWS = """\
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 -276:65
 -277:65
--278:22 579:1
+-278:22 581:1
 -279:22 188:13
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
--280:22 583:1
+-280:22 585:1
 -281:22
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
--282:65 585:121
+-282:65 587:121
 -283:65
 -284:65
 -285:65
@@ -696,12 +697,12 @@ ROWS = """\
 -290:104
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
-592:61
+594:61
 -291:82
 137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 504:13
 -292:122
 -293:122
-594:62
+596:62
 -294:119
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
@@ -709,21 +710,21 @@ ROWS = """\
 264:96 265:13 266:50
 -296:22 106:30 109:33 123:47 377:107 378:108 379:37 380:109 381:110 382:111 383:112 384:113 385:114
 -297:65
--298:22 599:1
+-298:22 601:1
 -299:22 106:30 109:33 123:47 377:107 378:108 379:37 380:109 381:110 382:111 383:112 384:113 385:114
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
-602:13
+604:13
 -300:65
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
 -301:65
-137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 607:61 608:13
+137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 609:61 610:13
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
-610:13
+612:13
 264:96 265:13 266:50
--302:134 612:64
+-302:134 614:64
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
-616:53 617:138 618:139
+618:53 619:138 620:139
 -303:117
 -304:117
 -305:117
@@ -733,107 +734,108 @@ ROWS = """\
 -308:124 225:85 227:53 289:19
 -309:136
 -310:124
--78:140 225:85 226:19 227:53 620:94
--311:119
--312:65
+-78:140 225:85 226:19 227:53 622:94
+-311:124
+-312:119
 -313:65
--314:22 188:13
--315:65
+-314:65
+-315:22 188:13
 -316:65
--317:22 622:1
--318:22 188:13
--319:65
-137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
+-317:65
+-318:22 624:1
+-319:22 188:13
 -320:65
+137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 -321:65
 -322:65
--323:65 627:141 628:142
--324:65
+-323:65
+-324:65 629:141 630:142
 -325:65
--326:82
--327:122
+-326:65
+-327:82
+-328:122
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
--328:71
--329:12
--330:122
--331:65
--332:22 106:30 109:33 123:47 377:107 378:108 379:37 380:109 381:110 382:111 383:112 384:113 385:114
--333:65 631:64
--334:65
+-329:71
+-330:12
+-331:122
+-332:65
+-333:22 106:30 109:33 123:47 377:107 378:108 379:37 380:109 381:110 382:111 383:112 384:113 385:114
+-334:65 633:64
 -335:65
 -336:65
-632:61
--337:122
--338:61 634:64
--339:65
--81:123 236:16 635:15
+-337:65
+634:61
+-338:122
+-339:61 636:64
 -340:65
--341:132
--342:132 636:133
+-81:123 236:16 637:15
+-341:65
+-342:132
+-343:132 638:133
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
--343:132
--344:65
--345:12
-639:16
-616:53 641:139
-642:52
--346:124
+-344:132
+-345:65
+-346:12
+641:16
+618:53 643:139
+644:52
+-347:124
 188:13
--347:65
--348:22 188:13
--349:65
--350:65 627:141 628:142
--351:143
--352:65
+-348:65
+-349:22 188:13
+-350:65
+-351:65 629:141 630:142
+-352:143
+-353:65
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57
-647:61
--353:65 648:64
+649:61
+-354:65 650:64
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
--354:65
--355:61 650:64
-137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 608:13
-137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 653:144
-654:13
--356:132
-656:64 657:92
-496:49 660:50
--357:12
-661:52
+-355:65
+-356:61 652:64
+137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 610:13
+137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 655:144
+656:13
+-357:132
+658:64 659:92
+496:49 662:50
 -358:12
--359:124 225:85 227:53 289:19
--360:143
+663:52
+-359:12
+-360:124 225:85 227:53 289:19
 -361:143
 -362:143
--363:82
+-363:143
+-364:82
 137:16 138:49 139:13 140:50 141:51 142:52 143:53 144:54 147:57
--364:124
-137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 608:13
--365:122
+-365:124
+137:16 138:49 140:50 141:51 142:52 143:53 144:54 145:55 146:56 147:57 610:13
 -366:122
 -367:122
--368:132
-664:64 665:92
-639:16 667:92
--369:12
-669:64
--370:122
+-368:122
+-369:132
+666:64 667:92
+641:16 669:92
+-370:12
+671:64
 -371:122
--372:12
--373:124
--374:122
-639:16 671:92
--375:12
--376:119
--377:12
-672:61 673:64
-496:49 660:50
--378:119
--379:12
--380:119
-496:49 660:50
--381:122
+-372:122
+-373:12
+-374:124
+-375:122
+641:16 673:92
+-376:12
+-377:119
+-378:12
+674:61 675:64
+496:49 662:50
+-379:119
+-380:12
+-381:119
+496:49 662:50
 -382:122
+-383:122
 """
 """For each state action:set, where the action is a state to shift to, or -1 - rule to reduce."""
 
@@ -1241,54 +1243,46 @@ _args:502 and_:125 arg:340 arith:126 atom:127 call:128 compare:129 expr:341 not_
 
 arith:506 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
-arith:507 atom:127 call:128 power:133 ref:134 term:135 unary:136
+arith:508 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
-arith:274 atom:127 call:128 index:509 power:133 range:277 ref:134 term:135 unary:136
+arith:274 atom:127 call:128 index:510 power:133 range:277 ref:134 term:135 unary:136
 
 branch:67 constraint:68 content:69 coord:70 decl:71 discrete:72 dynamic:73 energy:74 every:75 expect:76 for_:77 golden:78 implicit:79 init:80 input:81 instance:82 law:83 let:84 level:85 lossless:86 node:87 output:88 param:89 port:90 quasi:91 require:92 state:93 statement:402 when:95 work:96
-decl:510
+decl:511
 
 
-initial:511
-and_:125 arith:126 atom:127 call:128 compare:129 expr:513 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+initial:512
+and_:125 arith:126 atom:127 call:128 compare:129 expr:514 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
 
 
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:515 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:516 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
-___body{action}_star_24:517
+___body{action}_star_24:518
 
-action:520 ref:422
-
-arith:523 atom:127 call:128 power:133 ref:134 term:135 unary:136
+action:521 ref:422
 
 arith:524 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
-block:525
-initial:526
+arith:525 atom:127 call:128 power:133 ref:134 term:135 unary:136
+
+block:526
+initial:527
 
 
 
 
 
 
-block:528
-initial:530
+block:529
+initial:531
 
 
 
-relation:532
-
-
-
-
-
-
-
-_args:538 and_:125 arg:340 arith:126 atom:127 call:128 compare:129 expr:341 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+relation:533
 
 
 
@@ -1296,10 +1290,18 @@ _args:538 and_:125 arg:340 arith:126 atom:127 call:128 compare:129 expr:341 not_
 
 
 
-and_:125 arg:541 arith:126 atom:127 call:128 compare:129 expr:341 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-and_:125 arith:126 atom:127 call:128 compare:129 expr:542 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-arith:428 atom:127 call:128 power:133 range:543 ref:134 term:135 unary:136
-and_:125 arith:126 atom:127 call:128 compare:129 expr:544 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+_args:539 and_:125 arg:340 arith:126 atom:127 call:128 compare:129 expr:341 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+
+
+
+
+
+
+
+and_:125 arg:542 arith:126 atom:127 call:128 compare:129 expr:341 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:543 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+arith:428 atom:127 call:128 power:133 range:544 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:545 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
 
@@ -1308,210 +1310,212 @@ role:465
 
 
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:547 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:548 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
 
-accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:550 set_:371 solver:372 time:373 trace:374 when:375
-___body{scene_statement}_star_22:551
+accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:551 set_:371 solver:372 time:373 trace:374 when:375
+___body{scene_statement}_star_22:552
 
 
 
 
-arith:555 atom:127 call:128 power:133 ref:134 term:135 unary:136
+arith:556 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
 
-options:557
+options:558
 
 
-__trace_items_star_10:562
+__trace_items_star_10:563
 
 
-unit_factor:566
 unit_factor:567
+unit_factor:568
 
 
-_exponent:568 negative_number:495
-
-
-
-
-
-
-connection:571 ref:398
-ref:572
-
-
-
-and_:125 arith:126 atom:127 call:128 compare:129 expr:574 not_:131 or_:132 power:133 ref:575 term:135 unary:136
-
-
-arith:274 atom:127 call:128 index:576 power:133 range:277 ref:134 term:135 unary:136
-
-
-
-initial:577
-
-and_:125 arith:126 atom:127 call:128 compare:129 expr:578 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-
-
-
-action:580 ref:422
-and_:125 arith:126 atom:127 call:128 compare:129 expr:581 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-___body{action}_star_24:582
-
-arith:584 atom:127 call:128 power:133 ref:134 term:135 unary:136
+_exponent:569 negative_number:495
 
 
 
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:586 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
-block:587
+
+connection:572 ref:398
+ref:573
+
+
+
+and_:125 arith:126 atom:127 call:128 compare:129 expr:575 not_:131 or_:132 power:133 ref:576 term:135 unary:136
+
+and_:125 arith:126 atom:127 call:128 compare:129 expr:577 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+
+arith:274 atom:127 call:128 index:578 power:133 range:277 ref:134 term:135 unary:136
+
+
+
+initial:579
+
+and_:125 arith:126 atom:127 call:128 compare:129 expr:580 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+
+
+
+action:582 ref:422
+and_:125 arith:126 atom:127 call:128 compare:129 expr:583 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+___body{action}_star_24:584
+
+arith:586 atom:127 call:128 power:133 ref:134 term:135 unary:136
+
+
+
 
 and_:125 arith:126 atom:127 call:128 compare:129 expr:588 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-arith:589 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
-
+block:589
 
 and_:125 arith:126 atom:127 call:128 compare:129 expr:590 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-and_:125 arith:126 atom:127 call:128 compare:129 expr:591 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+arith:591 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
 
-and_:125 arg:593 arith:126 atom:127 call:128 compare:129 expr:341 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
+and_:125 arith:126 atom:127 call:128 compare:129 expr:592 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:593 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
+and_:125 arg:595 arith:126 atom:127 call:128 compare:129 expr:341 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:595 not_:131 or_:132 power:133 ref:134 term:135 unary:136
-and_:125 arith:126 atom:127 call:128 compare:129 expr:596 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
-unit:597 unit_factor:263
-accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:598 set_:371 solver:372 time:373 trace:374 when:375
 
 
-accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:550 set_:371 solver:372 time:373 trace:374 when:375
-arith:600 ariths:601 atom:127 call:128 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:597 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:598 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
+unit:599 unit_factor:263
+accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:600 set_:371 solver:372 time:373 trace:374 when:375
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:603 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
-_options:604 and_:125 arith:126 atom:127 call:128 compare:129 expr:605 not_:131 option:606 or_:132 power:133 ref:134 term:135 unary:136
-arith:609 atom:127 call:128 power:133 ref:134 term:135 unary:136
+accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:551 set_:371 solver:372 time:373 trace:374 when:375
+arith:602 ariths:603 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
-unit:611 unit_factor:263
 
-arith:485 atom:127 call:128 power:133 ref:134 term:135 trace_item:613 unary:136
-arith:614 atom:127 call:128 power:133 ref:134 term:135 unary:136
-rows:615
+and_:125 arith:126 atom:127 call:128 compare:129 expr:605 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
+_options:606 and_:125 arith:126 atom:127 call:128 compare:129 expr:607 not_:131 option:608 or_:132 power:133 ref:134 term:135 unary:136
+arith:611 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
+unit:613 unit_factor:263
 
+arith:485 atom:127 call:128 power:133 ref:134 term:135 trace_item:615 unary:136
+arith:616 atom:127 call:128 power:133 ref:134 term:135 unary:136
+rows:617
 
-connection:619 ref:398
 
 
 
+connection:621 ref:398
 
 
 
 
 
-action:621 ref:422
 
 
 
-action:580 ref:422
 
-arith:623 atom:127 call:128 power:133 ref:134 term:135 unary:136
+action:623 ref:422
 
 
 
-__guards_star_5:624 guard:625 guards:626
+action:582 ref:422
 
+arith:625 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
 
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:629 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+__guards_star_5:626 guard:627 guards:628
 
 
 
 
-accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:598 set_:371 solver:372 time:373 trace:374 when:375
-__ariths_star_11:630
+and_:125 arith:126 atom:127 call:128 compare:129 expr:631 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
 
 
+accuracy:362 expect:363 formulation:364 golden:365 init:366 limit:367 redundancy:368 scene_level:369 scene_statement:600 set_:371 solver:372 time:373 trace:374 when:375
+__ariths_star_11:632
 
-___options_star_12:633
 
 
 
 
+___options_star_12:635
 
-arith:485 atom:127 call:128 power:133 ref:134 term:135 trace_item:637 unary:136
 
 
 
-row:638
-rows:640
 
+arith:485 atom:127 call:128 power:133 ref:134 term:135 trace_item:639 unary:136
 
-ref:643
 
-action:621 ref:422
 
-guard:644
+row:640
+rows:642
 
 
-arith:645 atom:127 call:128 power:133 ref:134 term:135 unary:136
-and_:125 arith:126 atom:127 call:128 compare:129 expr:646 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+ref:645
 
+action:623 ref:422
 
-arith:649 atom:127 call:128 power:133 ref:134 term:135 unary:136
+guard:646
 
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:605 not_:131 option:651 or_:132 power:133 ref:134 term:135 unary:136
-and_:125 arith:126 atom:127 call:128 compare:129 expr:652 not_:131 or_:132 power:133 ref:134 term:135 unary:136
+arith:647 atom:127 call:128 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:648 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
-__rows_star_3:655
-_signed:658 negative_number:659
+arith:651 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
 
+and_:125 arith:126 atom:127 call:128 compare:129 expr:607 not_:131 option:653 or_:132 power:133 ref:134 term:135 unary:136
+and_:125 arith:126 atom:127 call:128 compare:129 expr:654 not_:131 or_:132 power:133 ref:134 term:135 unary:136
 
 
+__rows_star_3:657
+_signed:660 negative_number:661
 
 
 
 
-arith:662 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
-and_:125 arith:126 atom:127 call:128 compare:129 expr:605 not_:131 option:663 or_:132 power:133 ref:134 term:135 unary:136
 
 
 
+arith:664 atom:127 call:128 power:133 ref:134 term:135 unary:136
 
+and_:125 arith:126 atom:127 call:128 compare:129 expr:607 not_:131 option:665 or_:132 power:133 ref:134 term:135 unary:136
 
-row:666
 
-__row_plus_4:668
 
 
 
+row:668
 
+__row_plus_4:670
 
-row:670
 
 
 
 
-_signed:674 negative_number:659
+row:672
 
 
 
-_signed:675 negative_number:659
+
+_signed:676 negative_number:661
+
+
+
+_signed:677 negative_number:661
 
 
 """
@@ -1828,6 +1832,7 @@ __connections_star_6 2 [] 1
 connection 3 across 0 2
 args 3 args 1*
 connection 3 bind 0 2
+connection 3 bind_on 2
 __indices_star_9 3 [] 0* 2
 coord 6 coord 0 1 3 4 5
 discrete 6 discrete 1 3 5

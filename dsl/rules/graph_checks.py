@@ -186,9 +186,7 @@ def _rises(law: Node, own: Node, known: Values) -> bool:
     if law.op != "mul":
         return False
     factors = zip(law.data, law.args, strict=True)
-    return all(
-        e == 1.0 if a is own else a.op == "param" and not a.args and known.number(a) > 0.0 for e, a in factors
-    )
+    return all(e == 1.0 if a is own else a.op == "param" and not a.args and known.number(a) > 0.0 for e, a in factors)
 
 
 def _own(branch: Branch) -> Node | None:

@@ -85,6 +85,7 @@ REMEDIES = {
     "E517": "delete one of them, or add the freedom that is missing",
     "E518": "a state whose rate is given by 'dynamic'",
     "E519": "other initial values or guesses: init ... ~ ...",
+    "E520": "a ramp in place of the jump (clip, smoothstep, a linear table), or the rate itself",
     "E601": "leave the formulation to 'auto'",
     "E602": "leave the formulation to 'auto'",
     "E603": "leave the formulation to 'auto'",

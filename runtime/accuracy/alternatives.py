@@ -72,9 +72,7 @@ def _without_newton(way: Way, options: Options) -> tuple[Way, ...]:
     return (replace(way, method="rosenbrock"),) if serves else ()
 
 
-def _of_steep_laws(
-    way: Way, other: Way, written: System, start: ConsistentState, options: Options
-) -> tuple[Way, ...]:
+def _of_steep_laws(way: Way, other: Way, written: System, start: ConsistentState, options: Options) -> tuple[Way, ...]:
     iterating = (other, way) if way.system.unknowns <= SMALL else (way, other)
     ways = _without_newton(way, options) + iterating + _differentiated(way, written, options)
     return _reduced(way, written, start, options) + ways

@@ -78,6 +78,8 @@ CPU of 36 rows of drafts with 11 to 13 steps over that with 7: with 6 0.98, with
 coil at 1e-2, whose run of the bdf comes to nothing, is dearer by a third."""
 LIGHTLY = 1e-5
 """Of accuracies below a method of low order is not tried: at 1e-6 every second model takes it too many steps."""
+
+
 @dataclass(frozen=True, slots=True)
 class Achieved:
     """error_estimate: largest relative error estimated of the last run (None: nothing estimates it, and it is not
@@ -326,9 +328,7 @@ def control(
     return _achieved(estimate.apart, False, number, last.tolerance)
 
 
-def _finer(
-    run: Run, last: Sampled, tolerance: float, longest: float, law: Law, *, compared: bool
-) -> Sampled | None:
+def _finer(run: Run, last: Sampled, tolerance: float, longest: float, law: Law, *, compared: bool) -> Sampled | None:
     """A run with a smaller tolerance; where it fails half the way to it, while that is worth a run.
 
     compared: there is an estimate without it; else its failure is raised.

@@ -43,7 +43,7 @@ class Samples:
     """Quantities of block observe at the rows that the watcher kept, and at the last one.
 
     names [observed]; time [k]; kind [k] (TRACE, STEP, a sum); values [k, observed]; energy [k] (J) and constraints [k]
-    are the meters.
+    are the meters; largest [observed]: values and terms met in the run; zero of one that has not ended.
     """
 
     names: tuple[str, ...]
@@ -52,6 +52,7 @@ class Samples:
     values: Floats
     energy: Floats
     constraints: Floats
+    largest: Floats
 
 
 class Runs:
@@ -265,9 +266,9 @@ class Runs:
         """Samples of the run that stands in the trace."""
         parts = self.samples if self.done is None else self.done[1]
         rows = np.concatenate(parts) if parts else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
-        return Samples(
-            self.names, rows[:, 0], rows[:, 1].astype(np.int32), self._observed(rows), rows[:, 6], rows[:, 7]
-        )
+        largest = np.zeros(len(self.names)) if self.done is None else self.done[0].largest
+        kind, values = rows[:, 1].astype(np.int32), self._observed(rows)
+        return Samples(self.names, rows[:, 0], kind, values, rows[:, 6], rows[:, 7], largest)
 
 
 def _observed_names(description: Description) -> tuple[str, ...]:

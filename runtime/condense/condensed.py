@@ -84,9 +84,7 @@ class Condensed:
     unknown k; own_rows [unknowns]: where not every unknown has a row, those that are sure (-1: none).
     """
 
-    def __init__(
-        self, system: System, found: Sums, terms: Composition, straights: Straights, kept_rows: Ints
-    ) -> None:
+    def __init__(self, system: System, found: Sums, terms: Composition, straights: Straights, kept_rows: Ints) -> None:
         """found: the structure; terms: as sums of kept unknowns; straights: of found."""
         self._straights = straights
         self.whole, self.sums = system, found

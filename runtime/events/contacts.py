@@ -34,9 +34,7 @@ BEYOND = 1e-6
 class Contacts:
     """The active set and the senses of a model; p: its parameters, where senses stand; starting: a start is sought."""
 
-    def __init__(
-        self, plan: Plan, system: System, observer: Observer, p: Floats, *, starting: bool = False
-    ) -> None:
+    def __init__(self, plan: Plan, system: System, observer: Observer, p: Floats, *, starting: bool = False) -> None:
         self.contacts = contacts = plan.contacts
         self.starting = starting
         self.system, self.observer, self.p = system, observer, p
@@ -211,9 +209,7 @@ class Contacts:
         if c.kind == "psi":
             return bool(values[c.value] < -zero(c.value) or values[c.rate] < -zero(c.rate))
         closing = values[c.rate] < -zero(c.rate)
-        return bool(
-            closing or (values[c.rate] <= zero(c.rate) and values[c.acceleration] < -zero(c.acceleration))
-        )
+        return bool(closing or (values[c.rate] <= zero(c.rate) and values[c.acceleration] < -zero(c.acceleration)))
 
     def _beyond(self, c: Contact) -> float:
         """How much less than nothing a gap cannot be, whatever it does next; one caught in flight is so by little."""

@@ -286,9 +286,7 @@ class Handler:
             point = self.settled(t, y, point[1], said)
         raise SolverFailure("chatter", t, 0.0, self._names())
 
-    def settled(
-        self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()
-    ) -> Point:
+    def settled(self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()) -> Point:
         """The consistent point with the constraints and the branches that hold from now on."""
         self.kinks.leave(self.observer(t, y, yd))
         point = self._constrained(t, y, yd, said, touched)
@@ -311,9 +309,7 @@ class Handler:
         """How the contacts stand."""
         return [self.contacts.word(k) for k in range(len(self.plan.contacts))]
 
-    def _constrained(
-        self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()
-    ) -> Point:
+    def _constrained(self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()) -> Point:
         """The consistent point with the constraints that hold from now on; SolverFailure where there is none."""
         assert self.restart is not None
         if not self.plan.contacts:
@@ -325,7 +321,9 @@ class Handler:
         try:
             found, anew = self.succession.after(t, y, yd, touched, stalled=self._stalled > 0)
         except NoActiveSetError as error:
-            raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
+            drives = self.succession.driving(t, y, yd)
+            cause = "complementarity" if drives is None else "drives"
+            raise SolverFailure(cause, t, 0.0, drives or ", ".join(error.names)) from error
         self._renew(t, *found)
         if anew:
             self._bounce(t, *found)
@@ -363,9 +361,7 @@ class Handler:
         self.truth = self._true()
         return fired
 
-    def _assign(
-        self, t: float, y: Floats, yd: Floats, events: list[tuple[str, tuple[Assignment, ...]]]
-    ) -> Floats:
+    def _assign(self, t: float, y: Floats, yd: Floats, events: list[tuple[str, tuple[Assignment, ...]]]) -> Floats:
         """All values are read, then all assigned; a law driven back to where it came from is no longer so for that."""
         values = self.observer(t, y, yd)
         y, set_by = y.copy(), dict[tuple[str, int], str]()

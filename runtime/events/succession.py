@@ -45,9 +45,7 @@ class Succession:
         assert self.restart is not None
         return self.restart
 
-    def after(
-        self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool
-    ) -> tuple[Point, bool]:
+    def after(self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool) -> tuple[Point, bool]:
         """The consistent point with the constraints that hold from now on, and whether they were sought: what followed
         before is not; NoActiveSetError.  stalled: no time has passed since the last event.
 
@@ -71,9 +69,7 @@ class Succession:
         again = self._restart.struck(t, *found) if beside else None
         return found if again is None else (again[0], again[1]), sought
 
-    def _after(
-        self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool
-    ) -> tuple[Point, bool]:
+    def _after(self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool) -> tuple[Point, bool]:
         """The same from this very point."""
         restart = self._restart
         self.contacts.through.clear()
@@ -106,6 +102,14 @@ class Succession:
         contacts, contact = self.contacts, self.contacts.contacts[k]
         if contact.hold < 0 or contacts.active[k]:
             return
+        ends = self._slipping(k, t, y, yd)
+        least = [self.observer.zero(row) for row in (contact.value, contact.rate)]
+        if len(ends) == 2 and (np.abs(ends[0] - ends[1]) <= least).all():
+            contacts.through.add(k)
+
+    def _slipping(self, k: int, t: float, y: Floats, yd: Floats) -> list[Floats]:
+        """Value and rate of a friction that slips in the sense 1, and -1; fewer where there is no such point."""
+        contacts, contact = self.contacts, self.contacts.contacts[k]
         ends, stood = list[Floats](), contacts.state()
         for sense in (1.0, -1.0):
             contacts.slip(k, sense)
@@ -114,9 +118,16 @@ class Succession:
             if found is not None:
                 ends.append(self.observer(t, *found[:2])[[contact.value, contact.rate]])
         contacts.become(stood)
-        least = [self.observer.zero(row) for row in (contact.value, contact.rate)]
-        if len(ends) == 2 and (np.abs(ends[0] - ends[1]) <= least).all():
-            contacts.through.add(k)
+        return ends
+
+    def driving(self, t: float, y: Floats, yd: Floats) -> str | None:
+        """The name of a friction that would push what slips along: its bound is negative, or its sign is wrong."""
+        for k, contact in enumerate(self.contacts.contacts):
+            if contact.kind == "friction":
+                ends = self._slipping(k, t, y, yd)
+                if len(ends) == 2 and ends[0][1] - ends[1][1] > self.observer.zero(contact.rate):
+                    return contact.name
+        return None
 
     def _closed(self, t: float, point: Point) -> Point:
         """The point with gaps that hold brought to nothing: one that is caught in flight is only nearly closed."""

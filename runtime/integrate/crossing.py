@@ -74,7 +74,7 @@ def go_on(run: Integration, t: float, label: float, point: list[Floats]) -> None
         run.driver.run.start_rate = lib.pointer(run.start_rate)
     y, run.start_rate[:] = np.zeros(run.system.unknowns), 0.0
     run.start_rate[:n] = point.pop()
-    y[:n] = point.pop()
+    y[:n] = run.driver.arrive(t, point.pop(), run.start_rate[:n], run.sizes.magnitude)
     run.method.rest()
     yd = np.where(run.roles.differential, run.start_rate, 0.0)
     run.sizes.begin_to_move(t, y, run.start_rate)

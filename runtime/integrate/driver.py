@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.integrate.impulses import Impulses, Side
 from sysdyn.runtime.integrate.least_norm import LeastNorm
 from sysdyn.runtime.integrate.ledgers import Ledgers
 from sysdyn.runtime.integrate.methods import Method
@@ -50,6 +52,12 @@ class Driver:
     ) -> None:
         self.system = system
         self.observed = system.observed_rows("observe")[1]
+        self._left: Side | None = None
+        plan = request.events
+        said = () if plan is None else (*(w.assignments for w in plan.whens), *(s.assignments for s in plan.sampled))
+        self._assigned = any(a.kind == "flow" for assignments in said for a in assignments)
+        self.unread: Ints = np.zeros(0, dtype=np.int32)
+        """Displacements that no row of the run reads: they are not integrated."""
         self.core = lib.core.sd_run_new(
             method.stepper,
             settler.core,
@@ -120,9 +128,26 @@ class Driver:
             return False
         return bool(self._kinds[run.next] & TRACE)
 
+    @cached_property
+    def impulses(self) -> Impulses | None:
+        """What gains over an instant without moving anything; None where nothing does."""
+        found = Impulses(self.system, self.unread, assigned=self._assigned) if self.system.are("s").any() else None
+        return found if found is not None and found.any else None
+
     def leave(self, y: Floats, yd: Floats) -> None:
         """Notes the powers at y, yd [unknowns as written], the point behind which the run restarts."""
         lib.core.sd_run_leave(self.core, lib.pointer(y), lib.pointer(yd))
+        if self.impulses is not None:
+            self._left = Side(self.run.t_to, y.copy(), yd.copy(), self.system.description.p.copy())
+
+    def arrive(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
+        """Y behind the instant at which the point before it was left, with what integrals gain by its impulses."""
+        if self.impulses is None or self._left is None:
+            return y
+        behind, before, self._left = Side(t, y, yd, self.system.description.p.copy()), self._left, None
+        y = y.copy()
+        y[self.impulses.states] += self.impulses.gains(before, behind, magnitude[: y.size])
+        return y
 
     def drain(self, sink: Sink) -> None:
         """Rows so far go to the sink."""

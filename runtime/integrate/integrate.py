@@ -55,9 +55,7 @@ Progress = Callable[[float], None]
 class Integration:
     """The core's structures for one system and request; `run` drives them."""
 
-    def __init__(
-        self, system: System, start: ConsistentState, request: Request, origin: Origin | None = None
-    ) -> None:
+    def __init__(self, system: System, start: ConsistentState, request: Request, origin: Origin | None = None) -> None:
         """origin: of this start, where it is known for several runs."""
         self.system, self.start, self.request = system, start, request
         self.cpu = 0.0
@@ -93,6 +91,8 @@ class Integration:
         self._stepper()
         keeps = self.settlers.keeps
         self.driver = Driver(system, request, self.method, self.settler, keeps, self.start_rate, self._drift())
+        if self.forms is not None:
+            self.driver.unread = np.asarray(self.forms.settled.unread, dtype=np.int32)
         if self.underlying is None and system.form.scales:
             self.driver.run.magnitude = lib.pointer(self.sizes.magnitude)
         self.pieces = Pieces(self, request.events) if request.events else None

@@ -50,9 +50,7 @@ class Method:
             assert underlying is not None
             assert isinstance(system, System)
             audited = system.observed_rows("audit")[1]
-            self._core = lib.core.sd_energy_new(
-                c.byref(system.core), underlying.core, system.form.extended, audited
-            )
+            self._core = lib.core.sd_energy_new(c.byref(system.core), underlying.core, system.form.extended, audited)
         elif underlying is not None:
             self._core = lib.core.sd_dopri_new(c.byref(system.core), underlying.core)
         elif name == "rosenbrock":

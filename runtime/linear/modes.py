@@ -211,9 +211,7 @@ def _first_markov(a: Floats, b: Floats, c: Floats) -> tuple[int, float] | None:
     return None
 
 
-def _zeros(
-    a: Floats, b: Floats, c: Floats, d: float, first: tuple[int, float] | None
-) -> tuple[Complexes, float]:
+def _zeros(a: Floats, b: Floats, c: Floats, d: float, first: tuple[int, float] | None) -> tuple[Complexes, float]:
     """Zeros and leading coefficient; none and 0 where nothing passes; first: of `_first_markov`."""
     if not b.size:
         return np.zeros(0, complex), d

@@ -81,8 +81,12 @@ def span(transfers: Iterable[Transfer]) -> tuple[float, float]:
 def frequencies(transfer: Transfer, low: float, high: float, points: int = POINTS) -> Frequencies:
     """G along the imaginary axis; resonances between the points are not missed: their corners are points too."""
     corners = [abs(c) for c in (*transfer.poles, *transfer.zeros) if low < abs(c) < high]
-    near = [abs(p.imag) * (1.0 + k * max(abs(p.real / p.imag), 1e-9)) for p in transfer.poles if p.imag > 0.0
-            for k in (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)]
+    near = [
+        abs(p.imag) * (1.0 + k * max(abs(p.real / p.imag), 1e-9))
+        for p in transfer.poles
+        if p.imag > 0.0
+        for k in (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
+    ]
     found = np.unique([*np.geomspace(low, high, points), *corners, *(w for w in near if low < w < high)])
     on = [abs(p.imag) for p in transfer.poles if p.real == 0.0]
     w = np.array([x for x in found if x not in on])

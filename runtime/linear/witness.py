@@ -125,9 +125,7 @@ def _term(e: Floats, a: Floats, power: int) -> tuple[int, Any] | None:
 def _log_determinant(e: Floats, a: Floats, s: Any) -> Any:
     """Logarithm of |det(s E - A)| by Gauss's elimination of the shortest row by its largest entry; None if zero."""
     places = (e != 0.0) | (a != 0.0)
-    rows = {
-        i: {int(j): s * float(e[i, j]) - float(a[i, j]) for j in np.flatnonzero(places[i])} for i in range(len(e))
-    }
+    rows = {i: {int(j): s * float(e[i, j]) - float(a[i, j]) for j in np.flatnonzero(places[i])} for i in range(len(e))}
     total = mpmath.mpf(0)
     while rows:
         row = rows.pop(min(rows, key=lambda i: len(rows[i])))
@@ -140,4 +138,3 @@ def _log_determinant(e: Floats, a: Floats, s: Any) -> Any:
             if column in other:
                 subtract(other, row, other.pop(column) / pivot, CANCELLED)
     return total
-

@@ -142,14 +142,10 @@ class ModuleCarrier:
         address = [c.cast(callback, c.c_void_p).value for callback in made]
         assert address[0] is not None
         rest = iter(address[1:])
-        return Pointers(
-            address[0], next(rest) if extent.dy else None, next(rest) if extent.dyd else None, tuple(made)
-        )
+        return Pointers(address[0], next(rest) if extent.dy else None, next(rest) if extent.dyd else None, tuple(made))
 
 
-def _callback(
-    function: Callable[..., None], tables: Tables, inputs: int, outputs: int, failure: Failure
-) -> Any:
+def _callback(function: Callable[..., None], tables: Tables, inputs: int, outputs: int, failure: Failure) -> Any:
     """A C function pointer to function(p, ix, at, to, t, y, yd, out)."""
     views: dict[tuple[int, int], Floats] = {}
 

@@ -179,9 +179,7 @@ class Initial:
     label: RowLabel
 
 
-def stated(
-    at: Ints, size: int, initial: tuple[Initial, ...]
-) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+def stated(at: Ints, size: int, initial: tuple[Initial, ...]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
     """What a text says of unknowns at the start [size]: the values, 0 where it says nothing; which are fixed, and which
     are written.  Of an unknown that is said twice a fixed value counts; at: places of families.
     """
@@ -264,9 +262,7 @@ def _bound(value: Any, depth: int) -> Index:
 
 
 def _kernel(value: Mapping[str, Any]) -> Kernel:
-    loops = tuple(
-        (_bound(low, depth), _bound(high, depth)) for depth, (low, high) in enumerate(value.get("loops", ()))
-    )
+    loops = tuple((_bound(low, depth), _bound(high, depth)) for depth, (low, high) in enumerate(value.get("loops", ())))
     reads, rates, curved = (frozenset(value[name]) if name in value else None for name in ("reads", "rates", "curved"))
     rows = tuple(_reference(row) for row in value.get("rows", ())) if loops else ()
     return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())), reads, rates, curved, rows)

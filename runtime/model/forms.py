@@ -252,9 +252,7 @@ def plan(description: Description, name: str) -> Form:
     base, _, kept = name.partition("/")
     level = {int(k) for k in kept.split(",")} if kept else set[int]()
     for block, group in FORMS[base]:
-        if block not in description.blocks or (
-            group in ("kinematics", "phi_rate") and name == "2" and not stabilised
-        ):
+        if block not in description.blocks or (group in ("kinematics", "phi_rate") and name == "2" and not stabilised):
             continue
         if group == "kinematics" and block != normal:
             continue

@@ -16,6 +16,7 @@ Entries = tuple[Places, Places, Floats]
 CANCELS = 1e-12
 """Sum of a column of M over that of its magnitudes that is round-off."""
 
+
 def _own(system: System, values: Floats, group: str, kind: str) -> Floats:
     """The entry of each unknown of a kind in its coordinate's row of a group [unknowns]; 0 where there is none."""
     mine = _own_places(system, group, kind)

@@ -50,7 +50,5 @@ def entries_of(description: Description, call: Planned) -> tuple[Places, Places]
         [row.shape for row in description.rows],
         [item.shape for item in description.families],
     )
-    dy, dyd = (
-        places(kernels, which, description.ix, shapes, (call.to, call.at)) for which in ("dy", "dyd")
-    )
+    dy, dyd = (places(kernels, which, description.ix, shapes, (call.to, call.at)) for which in ("dy", "dyd"))
     return dy, dyd

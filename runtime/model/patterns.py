@@ -96,9 +96,7 @@ def _positions(reference: Reference, shape: Shape, loops: list[Longs], number: i
     """Row-major position in its family in each iteration [number]."""
     position: Longs | None = None
     if len(reference.indices) != len(shape):
-        raise ContractError(
-            f"a reference with {len(reference.indices)} indices into a family with {len(shape)}"
-        )
+        raise ContractError(f"a reference with {len(reference.indices)} indices into a family with {len(shape)}")
     for index, (first, last) in zip(reference.indices, shape, strict=True):
         value = _value(index, loops, number, ix)
         if number and (value.min() < first or value.max() > last):
@@ -112,9 +110,7 @@ def _place(reference: Reference, shape: Shape, ix: Ints) -> int:
     """Row-major position in its family where no loop goes round."""
     position = 0
     if len(reference.indices) != len(shape):
-        raise ContractError(
-            f"a reference with {len(reference.indices)} indices into a family with {len(shape)}"
-        )
+        raise ContractError(f"a reference with {len(reference.indices)} indices into a family with {len(shape)}")
     for index, (first, last) in zip(reference.indices, shape, strict=True):
         _, slot, constant, *table = index
         value = constant + (int(ix[slot]) if slot >= 0 else 0)
@@ -164,9 +160,7 @@ def places(
     )
 
 
-def spared(
-    kernels: Sequence[Kernel], read: NDArray[np.bool_], ix: Ints, shapes: Sequence[Shape], to: Ints
-) -> Ints:
+def spared(kernels: Sequence[Kernel], read: NDArray[np.bool_], ix: Ints, shapes: Sequence[Shape], to: Ints) -> Ints:
     """1 for each loop of a block [kernels] that adds to none of the rows that are read [rows].  shapes, to: of row
     families.
     """

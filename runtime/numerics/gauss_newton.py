@@ -147,9 +147,7 @@ def _numbered(places: Any, used: Mask) -> Any:
     return number[places]
 
 
-def _graded(
-    a: Floats, aim: Floats, step: Floats, noise: Floats | None = None, doubt: Floats | None = None
-) -> int:
+def _graded(a: Floats, aim: Floats, step: Floats, noise: Floats | None = None, doubt: Floats | None = None) -> int:
     """What core/linear/graded.h answers."""
     failed: int = lib.core.sd_graded(*a.shape, *map(lib.pointer, (a, aim, noise, step, doubt)))
     if failed < 0:
@@ -283,9 +281,7 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
         return _solve(problem, x, most)
 
 
-def _in_core(
-    problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, most: int, *, measure: bool
-) -> Solution:
+def _in_core(problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, most: int, *, measure: bool) -> Solution:
     """The same of a small problem (core/start/search.h); measure: x as it is, of any."""
     found, scaled = x.copy(), np.zeros(problem.number)
     use, free, work = problem.use.astype(np.int32), problem.free.astype(np.int32), problem.work

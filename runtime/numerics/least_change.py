@@ -90,9 +90,7 @@ def _to_size_one(i: Any, v: Floats, rows: int) -> Floats:
     return size
 
 
-def in_order(
-    shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats, levels: Sequence[Mask]
-) -> Floats:
+def in_order(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats, levels: Sequence[Mask]) -> Floats:
     """The u with A u = aim of least norm within the first level, then within the next, each with what stands before it
     held, at last of the others; A [rows, unknowns] by its entries, a full matrix.
     """

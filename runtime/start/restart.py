@@ -54,9 +54,7 @@ class Restart:
         found = self._struck(t, y, yd, self.magnitude(y.size))
         return None if found is None else found[:2]
 
-    def struck(
-        self, t: float, y: Floats, yd: Floats, *, quickly: bool = False
-    ) -> tuple[Floats, Floats, Floats] | None:
+    def struck(self, t: float, y: Floats, yd: Floats, *, quickly: bool = False) -> tuple[Floats, Floats, Floats] | None:
         """The same with the impulses [unknowns as written] that took the flows there, of a set of constraints that is
         tried; quickly: without a search.  Sizes stay as they were: where it has no rank its multipliers are without
         bound.

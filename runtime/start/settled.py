@@ -90,9 +90,7 @@ def flows_open(
     return settled.once(("flows open", turning), lambda: _flows_open(settled, t, y, yd, state, turning))
 
 
-def _flows_open(
-    settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_], turning: bool
-) -> bool:
+def _flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_], turning: bool) -> bool:
     (jy, jyd), pattern, rates = settled.jacobian(t, y, yd), settled.pattern, rates_of(settled)
     n, columns = settled.unknowns, pattern.columns_of()
     if turning:

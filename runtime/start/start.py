@@ -113,9 +113,7 @@ def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
 
 
-def _anew(
-    starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask
-) -> tuple[Solution, bool]:
+def _anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """The solution with its state to round-off, in its own magnitudes, and what follows found from x as where no state
     moves: neither depends on the way here; whether that holds.  What is too large for full matrices is left alone.
     """
@@ -188,9 +186,7 @@ def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) ->
     return begun, True
 
 
-def _attempt(
-    starter: Starter, t: float, guess: Floats, free: Mask, most: int | None = None
-) -> tuple[Solution, str]:
+def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | None = None) -> tuple[Solution, str]:
     """The first strategy that holds, of all or as many, from the guess, and its name; the least residual and "" where
     none does.
     """
@@ -206,9 +202,7 @@ def _attempt(
     return best, ""
 
 
-def _explain(
-    starter: Starter, t: float, guess: Floats, free: Mask, best: Solution, flat: Ints
-) -> InconsistentStart:
+def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Solution, flat: Ints) -> InconsistentStart:
     """Why there is no consistent state: rows in the way, and the fixed values that would have to move; flat: of laws
     without a slope.
     """

@@ -424,4 +424,3 @@ def problem_of(
         check=starter.settled.failure.check,
         spare=lambda: starter.system.trim(LARGE),
     )
-

@@ -22,6 +22,7 @@ from sysdyn.values import dataclass
 
 __all__ = ["Column", "Layout", "Parameter", "Quantity", "Trace", "columns_of"]
 
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Quantity(NDArrayOperatorsMixin):
     """A traced quantity: an array with its unit, nominal magnitude and derivative (None: not known)."""

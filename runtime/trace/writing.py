@@ -205,9 +205,7 @@ class TraceWriter:
         """Nominal values, last attributes, `final`, events; closes the file.  One that was given up stays as it is."""
         if self.closed:
             return
-        sizes = {
-            column.name: {"nominal": float(nominal.get(column.name, 0.0))} for column in self._layout.columns
-        }
+        sizes = {column.name: {"nominal": float(nominal.get(column.name, 0.0))} for column in self._layout.columns}
         sizes["/audit/energy"] = {"nominal": self._met.turned_over}
         self._turn({**sizes, "/": {**attributes, "final": np.int64(final)}}, events)
         self.discard()

@@ -72,6 +72,7 @@ def exact(periods: int) -> tuple[np.ndarray, np.ndarray]:
     x, rest = np.array(BEGIN), np.array([E / R, E])
     duties = np.empty(periods)
     for k in range(periods):
+
         def lacks(t: float, x: np.ndarray = x) -> float:
             v = (rest + flow(t) @ (x - rest))[1]
             return t / PERIOD - 0.5 - GAIN * (WANTED - v)

@@ -172,9 +172,7 @@ def _deck(text: str) -> tuple[float, str]:
         file = Path(folder) / "m.cir"
         file.write_text(text)
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        done = subprocess.run(
-            ["ngspice", "-b", str(file)], capture_output=True, text=True, timeout=600, check=False
-        )
+        done = subprocess.run(["ngspice", "-b", str(file)], capture_output=True, text=True, timeout=600, check=False)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout
 

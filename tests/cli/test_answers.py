@@ -233,9 +233,7 @@ SYSTEMS = {
         "x",
         # M x'' = F - k x + m g (a - x)/l, m a'' = -m g (a - x)/l
         [0.5, 0, 0.5 * 10 / 0.8],
-        np.polysub(
-            np.polymul([3, 0, 7 + 0.5 * 10 / 0.8], [0.5, 0, 0.5 * 10 / 0.8]), [(0.5 * 10 / 0.8) ** 2]
-        ),
+        np.polysub(np.polymul([3, 0, 7 + 0.5 * 10 / 0.8], [0.5, 0, 0.5 * 10 / 0.8]), [(0.5 * 10 / 0.8) ** 2]),
     ),
     "notch": (  # a series resonance to ground behind a resistor
         """
@@ -292,9 +290,7 @@ SYSTEMS = {
         """,
         "y",
         np.polymul([1200, 1.6e4], [1.5e5]),
-        np.polysub(
-            np.polymul([300, 1200, 1.6e4], [30, 1200, 1.66e5]), np.polymul([1200, 1.6e4], [1200, 1.6e4])
-        ),
+        np.polysub(np.polymul([300, 1200, 1.6e4], [30, 1200, 1.66e5]), np.polymul([1200, 1.6e4], [1200, 1.6e4])),
     ),
     "pi_controller": (  # (kp + ki/s) on a lag of 2 s with gain 3
         """

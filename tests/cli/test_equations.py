@@ -207,7 +207,9 @@ def test_the_canonical_suspension_has_the_row_of_the_book(capsys):
 
 
 def test_matrices_by_name(capsys):
-    assert printed(capsys, "pendulum", "--form", "matrices") == """\
+    assert (
+        printed(capsys, "pendulum", "--form", "matrices")
+        == """\
   M = [ m   0 ]
       [ 0   m ]
 Φ_q = [ 2 q1   2 q2 ]
@@ -224,6 +226,7 @@ index by structure: 3
   displacement constraint rod: differentiated twice
   all once more for the rates of what has none yet: κ of rod
 """
+    )
 
 
 def test_latex(capsys):

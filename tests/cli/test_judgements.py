@@ -63,7 +63,7 @@ def expecting(said, samples, *, finished=True, estimate=None):
         values = np.array(
             [[evaluate([n], lambda v, x=x: x)[0] for one in sides for n in one] for _, x in samples]
         ).reshape(time.size, len(names))
-        known = SimpleNamespace(names=tuple(names), time=time, values=values)
+        known = SimpleNamespace(names=tuple(names), time=time, values=values, largest=np.abs(values).max(axis=0))
         binding = SimpleNamespace(evaluate=lambda node: evaluate([node], lambda _: NAN)[0])
         prepared = SimpleNamespace(network=network, binding=binding)
         outcome = SimpleNamespace(samples=known, error_estimate=estimate)
@@ -81,6 +81,15 @@ def test_always_is_judged_by_the_first_sample_that_breaks_it():
     assert told.message == "expect failed: 2 at 2 s, expected < 1.5"
     assert kept == [False, False, True, False]
     assert expecting("expect always: x < 5", RAMP)[:2] == ([(True, 4.0, 4.0)], [])
+
+
+def test_an_inequality_holds_up_to_what_no_run_resolves():
+    near = [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0 + 1e-12), (3.0, 2.0 + 3e-12)]
+    claims, (_,), kept = expecting("expect always: x <= 2", near)
+    assert (claims[0][0], claims[0][2]) == (False, 3.0)
+    assert kept == [False, False, True, True]
+    assert expecting("expect always: x <= 2", near[:3])[0][0][0] is True
+    assert expecting("expect always: x < 2", near[:3])[0] == [(False, 2.0 + 1e-12, 2.0)]
 
 
 def test_finally_is_the_last_sample_of_a_run_that_ended():

@@ -512,7 +512,6 @@ def test_an_output_that_does_not_exist(tmp_path, capsys):
     assert found["diagnostics"][0]["severity"] == "error"
 
 
-
 @pytest.mark.parametrize(("model", "outputs"), [("motor", ("om", "i")), ("circuit", ("c.e", "v_r"))])
 def test_python_control_says_the_same(model, outputs, tmp_path):
     """Poles, zeros, static gain and frequency response by python-control of the reduction, where it is installed."""

@@ -115,9 +115,7 @@ def true_error(file, m, entry, folder):
     trace, t = ran.outcome.traced, np.array(entry["t"])
     rows = np.searchsorted(trace.time, t + 1e-9 * t[-1], side="right") - 1
     wanted = entry["values"]
-    return max(
-        np.abs(trace[v].values[rows] - np.array(wanted[v])).max() / trace[v].nominal for v in entry["variables"]
-    )
+    return max(np.abs(trace[v].values[rows] - np.array(wanted[v])).max() / trace[v].nominal for v in entry["variables"])
 
 
 BOOK = ["dc_motor", "fluid_tank", *(["nonlinear_spring", "thermal_two_node", "lc_ladder"] if LONG else [])]

@@ -234,9 +234,7 @@ MUTANTS: dict[str, Callable[[Base], Base | None]] = {
     "missed spike": lambda b: _at(b, b.time.size // 2, b.values[b.first][b.time.size // 2] + 0.05 * _spread(b)),
     "narrow spike": _spike,
     "offset": lambda b: b.with_value(b.values[b.first] + 0.01 * _spread(b), rates=b.rates[b.first]),
-    "small offset": lambda b: b.with_value(
-        b.values[b.first] + 1.2e-3 * b.nominal[b.first], rates=b.rates[b.first]
-    ),
+    "small offset": lambda b: b.with_value(b.values[b.first] + 1.2e-3 * b.nominal[b.first], rates=b.rates[b.first]),
     "frequency 2 %": lambda b: _resampled(b, b.time, 1.02 * b.time),
     "frequency 0.2 %": lambda b: _resampled(b, b.time, 0.998 * b.time) if _turns(b) else None,
     "chirp": _chirp,

@@ -67,9 +67,7 @@ def test_other_units_of_the_same_dimension_are_converted(base):
 
 def test_time_in_another_unit_is_converted():
     right = BASES["oscillator"]()
-    other = replace(
-        right, time=right.time / 60.0, rates={n: r * 60.0 for n, r in right.rates.items()}, time_unit="min"
-    )
+    other = replace(right, time=right.time / 60.0, rates={n: r * 60.0 for n, r in right.rates.items()}, time_unit="min")
     assert verdict(right, other).equal
     assert verdict(other, right).equal
 

@@ -25,9 +25,7 @@ def compiled(n, formulation="lagrangian", backend="c"):
 def test_text_and_structure_do_not_depend_on_the_length(formulation, backend):
     short, long = compiled(10, formulation, backend), compiled(100_000, formulation, backend)
     assert short.text == long.text
-    assert structure(short.form, short.program, short.network) == structure(
-        long.form, long.program, long.network
-    )
+    assert structure(short.form, short.program, short.network) == structure(long.form, long.program, long.network)
 
 
 def point(oracle, seed=1):

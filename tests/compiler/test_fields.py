@@ -12,6 +12,7 @@ from sysdyn.dsl.model.network import Constraint, Energy, Loop, Work
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
+
 def quantities(net, **written):
     network = net.network(**written)
     efforts, momenta = field_quantities(network, Incidence(network, Sizes(network)).elements)
@@ -53,8 +54,11 @@ def test_every_iteration_that_reads_an_element_counts():
 
     def own(i):
         root = x.substitute(effort, {x.index("i"): x.const(i)})
-        sums = {n: x.add(*(x.substitute(n.args[2], {x.index(n.data[1]): x.const(k)}) for k in (1, 2, 3)))
-                for n in x.topological([root]) if n.op == "reduce"}
+        sums = {
+            n: x.add(*(x.substitute(n.args[2], {x.index(n.data[1]): x.const(k)}) for k in (1, 2, 3)))
+            for n in x.topological([root])
+            if n.op == "reduce"
+        }
         return evaluate([x.substitute(root, sums)], lambda n: held.get(n.args[0].data, 0.0))[0]
 
     assert [own(i) for i in range(1, 5)] == [-1.0, 1.0 - 4.0, 4.0 - 2.0, 2.0]

@@ -14,10 +14,7 @@ from sysdyn.dsl.text.diagnostics import Report
 
 CATALOGUE = load("catalogue.json")
 TRANSFORMED = [
-    (key, k)
-    for key, entry in CATALOGUE.items()
-    for k, m in enumerate(entry["models"])
-    if m["form"] == "hamiltonian"
+    (key, k) for key, entry in CATALOGUE.items() for k, m in enumerate(entry["models"]) if m["form"] == "hamiltonian"
 ]
 
 

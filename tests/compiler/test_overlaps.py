@@ -11,6 +11,7 @@ from sysdyn.dsl.model.network import Initial, Loop
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
+
 def over(name, first, last):
     return Loop(name, x.const(first), x.const(last))
 

@@ -1,6 +1,5 @@
 """Arrays of branches and nodes: one structure for every size, and the poles and readings of unrolled references."""
 
-
 import numpy as np
 import pytest
 from catalogue import ONE, PLACE

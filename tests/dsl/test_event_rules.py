@@ -44,3 +44,64 @@ def test_a_rate_is_the_remedy_where_there_is_one(target, remedy):
     text = MODEL.format("").replace("  init x'", element.format(target, "N" if target == "K.e" else "m"))
     (found,) = [d for d in check(text) if d.code == "E702"]
     assert (found.help == remedy) if remedy else ("'" + " := ..." not in found.help)
+
+
+NODES = """
+model m {{
+  node x, y: translation
+  node a: electrical
+  M: kinetic(p = 2 kg*f) x
+  K: kinetic(p = 2 kg*f) x -> y
+  L: kinetic(p = 2 H*f) a -> ground
+  C: potential(q = 2 F*e) a -> ground
+  when t > 0.2 s {{ {} }}
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("assigned", "remedy"),
+    [
+        ("M.f := 3 m/s", "x.f := ..., the flow of its node"),
+        ("M.p := 3 kg.m/s", "x.f := ..., the flow of its node"),
+        ("K.f := 3 m/s", "x.f := ... or y.f := ..., the flow of a node"),
+        ("L.f := 3 A", "a source that acts for a short time"),
+        ("C.e := 3 V", "a source that acts for a short time"),
+    ],
+)
+def test_what_an_event_may_assign_in_place_of_a_quantity_of_an_element(assigned, remedy):
+    (found,) = [d for d in check(NODES.format(assigned)) if d.severity == "error"]
+    assert found.code == "E702"
+    assert found.help.startswith(remedy)
+
+
+def test_the_flow_of_a_node_may_be_assigned():
+    assert not [d for d in check(NODES.format("x.f := 3 m/s")) if d.severity == "error"]
+
+
+@pytest.mark.parametrize("number", ["e_", "(if abs(x') > 3 m/s then 0.8 else 0.3)"])
+def test_a_restitution_is_one_number_for_the_run(number):
+    """One that an event changes kept the value of the start."""
+    said = (
+        f"  discrete e_ = 0.8\n  phi floor: x >= 0 m restitution {number}\n  when t > 0.7 s {{ e_ := 0.2 }}\n  init x'"
+    )
+    text = MODEL.format("").replace("  init x'", said)
+    (found,) = [d for d in check(text) if d.severity == "error"]
+    assert (found.code, found.place.start) == ("E807", (7, 35))
+    assert "restitution is one number" in found.message
+
+
+def test_an_input_named_on_is_bound_where_a_component_stands(tmp_path):
+    (tmp_path / "m.sd").write_text("""
+component switched { port p: electrical
+  input on: 1
+  R: dissipator(e = 1 ohm*(2 - on)*f) p -> ground }
+model m {
+  node a: electrical
+  V: effort(e = 3 V) a -> ground
+  S: switched() p = a, on = step(t - 0.5 s)
+}
+scene s of m { time 0 s to 1 s; trace S.R.f as i every 0.1 s }
+""")
+    found = simulate(tmp_path / "m.sd", output=tmp_path / "m.h5")["i"].values
+    assert (found[0], found[-1]) == pytest.approx((1.5, 3.0), abs=1e-12)

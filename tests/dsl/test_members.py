@@ -112,7 +112,7 @@ def read(fresh):
         ("R.D", "R.D", "W"),
         ("C[2].q", "C[2].q", "C"),
         ("C[n].V", "C[n].V", "J"),
-        ("C[2].energy", "C.energy[2]", "J"),
+        ("C[2].energy", "C[2].V - C.begun[2]", "J"),
         ("T.e1", "T#1.e", "V"),
         ("T.f2", "T#2.f", "A"),
         ("X.inner.f", "X.inner.f", "A"),

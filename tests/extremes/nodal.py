@@ -60,8 +60,10 @@ class Circuit:
         lines = [f"node {', '.join(self.nodes)}: electrical"]
         for kind, listed in self.branches.items():
             lines += [f"{label}: {made[kind](value)} {a} -> {b}" for label, value, a, b in listed]
-        lines += [f"init {label}.{'e' if label[0] == 'C' else 'f'} = {v!r} {'V' if label[0] == 'C' else 'A'}"
-                  for label, v in self.said.items()]
+        lines += [
+            f"init {label}.{'e' if label[0] == 'C' else 'f'} = {v!r} {'V' if label[0] == 'C' else 'A'}"
+            for label, v in self.said.items()
+        ]
         traced = [f"{label}.e as {label}" for k in "RC" for label, *_ in self.branches[k]]
         traced += [f"{label}.f as {label}" for label, *_ in self.branches["L"]]
         body = "\n  ".join(lines)

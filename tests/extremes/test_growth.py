@@ -27,9 +27,7 @@ def exponential(t):
 
 
 def epidemic(t):
-    return np.exp(
-        solved(lambda t, x: [-0.5 * x[0] * np.exp(x[1]), 0.5 * x[0] - 0.1], [1 - 1e-12, np.log(1e-12)], t)[1]
-    )
+    return np.exp(solved(lambda t, x: [-0.5 * x[0] * np.exp(x[1]), 0.5 * x[0] - 0.1], [1 - 1e-12, np.log(1e-12)], t)[1])
 
 
 def oscillator(t):

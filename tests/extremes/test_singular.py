@@ -23,9 +23,7 @@ def energy(start, push, angle):
 @pytest.mark.one_in(5)
 def test_a_flat_parallelogram_stays_one_or_is_refused(tmp_path, start, push, b, method, formulation):
     settings = (("start", repr(start)), ("push", repr(push)), ("b", repr(b)))
-    run = ran(
-        tmp_path, MODEL, scene="turned", method=method, formulation=formulation, accuracy=1e-3, settings=settings
-    )
+    run = ran(tmp_path, MODEL, scene="turned", method=method, formulation=formulation, accuracy=1e-3, settings=settings)
     if method == "bdf":
         assert not run.refused
         assert run.met

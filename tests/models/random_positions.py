@@ -56,7 +56,7 @@ def springs(seed):
         return sorted(int(k) for k in random.integers(low, high + 1, 2))
 
     def say(name, low, high):
-        word, value = "~=" [int(random.integers(2))], float(f"{random.uniform(-1.0, 1.0):.3f}")
+        word, value = "~="[int(random.integers(2))], float(f"{random.uniform(-1.0, 1.0):.3f}")
         lines.append(f"  for i in {low}..{high} {{ init {name}[i].q {word} {value!r} m*(1 + i/4) }}")
         found.said += [(f"{name}[{i}]", word, value * (1 + i / 4)) for i in range(low, high + 1)]
 

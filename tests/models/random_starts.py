@@ -87,8 +87,10 @@ def closed_form(of):
     for word, below in (("~", words == ""), ("", np.zeros(len(words), dtype=bool))):
         left, sigma, _ = np.linalg.svd(around[:, below])
         rest = left[:, int((sigma > small).sum()) :].T
-        held[words == word] += np.linalg.pinv(rest @ around[:, words == word], rcond=1e-9) @ (rest @ aim) * (
-            np.abs(rest @ around[:, words == word]).max(initial=0.0) > small
+        held[words == word] += (
+            np.linalg.pinv(rest @ around[:, words == word], rcond=1e-9)
+            @ (rest @ aim)
+            * (np.abs(rest @ around[:, words == word]).max(initial=0.0) > small)
         )
         aim = -around @ held
     if np.abs(aim).max(initial=0.0) > 1e-9 * max(np.abs(held / size).max(initial=0.0), 1.0):

@@ -89,17 +89,13 @@ def test_the_flow_of_a_vessel_that_runs_empty_has_half_the_digits(tmp_path, accu
     was farther off than the other.
     """
     (tmp_path / "model.sd").write_text(TURBULENT)
-    trace = api.simulate(
-        tmp_path / "model.sd", accuracy=accuracy, formulation=formulation, output=tmp_path / "out.h5"
-    )
+    trace = api.simulate(tmp_path / "model.sd", accuracy=accuracy, formulation=formulation, output=tmp_path / "out.h5")
     share = np.maximum(1.0 - trace.time / 4.0, 0.0)
     assert np.abs(trace["f"].values / 5e-3 - share).max() <= accuracy
     assert np.abs(trace["q"].values / 1e-2 - share**2).max() <= accuracy
 
 
-@pytest.mark.parametrize(
-    ("accuracy", "start"), [(1e-4, 0.01), (1.2e-4, 0.005935), (1e-3, 0.0113), (3.6e-4, 0.018816)]
-)
+@pytest.mark.parametrize(("accuracy", "start"), [(1e-4, 0.01), (1.2e-4, 0.005935), (1e-3, 0.0113), (3.6e-4, 0.018816)])
 def test_a_run_that_meets_an_accuracy_meets_it_where_the_vessel_ends(tmp_path, accuracy, start):
     """Radau's runs were compared at instants of the draft alone, and by chance two are equally far from zero in the one
     row where the flow ends: told as met, up to 34 times that off.

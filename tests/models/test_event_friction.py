@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from sysdyn import api
 from sysdyn.api import simulate
 
 CHAIN = """
@@ -70,3 +71,29 @@ def test_a_box_drops_on_four_feet_and_stays_level(tmp_path):
     y = np.where(trace.time < landed, 0.1 - 0.5 * 9.80665 * trace.time**2, 0.0)
     assert np.abs(np.asarray(trace["y"]) - y).max() < 1e-12
     assert np.abs(np.asarray(trace["th"])).max() < 1e-30
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_friction_on_a_reaction_of_the_wrong_sign_is_told(tmp_path, formulation):
+    """The multiplier of y = 0 is minus the reaction: what would rub drives, from 25 N*sin(1.3 t) = 0.3 m g on."""
+    text = """\
+model m {
+  coord x, y: translation = 0 m
+  energy T* = 1/2*(3 kg)*(x'^2 + y'^2)
+  energy V = (3 kg)*g0*y
+  phi floor: y = 0 m
+  implicit R: N ~ 0 N
+  work R on x
+  gamma fr: R + 0.3*REACTION*setsign(x') = 0 N
+  work 25 N*sin(1.3 rad/s*t) on x
+  init x' = 0 m/s
+}
+scene s of m { time 0 s to 1 s; trace x }
+"""
+    (tmp_path / "m.sd").write_text(text.replace("REACTION", "floor.multiplier"))
+    with pytest.raises(api.SolverFailure, match="drives") as failed:
+        api.simulate(tmp_path / "m.sd", output=tmp_path / "m.h5", formulation=formulation)
+    assert failed.value.time == pytest.approx(np.arcsin(0.9 * 9.80665 / 25.0) / 1.3, abs=1e-6)
+    for reaction in ("floor.on(y)", "abs(floor.multiplier)"):
+        (tmp_path / "m.sd").write_text(text.replace("REACTION", reaction))
+        assert api.simulate(tmp_path / "m.sd", output=tmp_path / "m.h5", formulation=formulation).final == 1

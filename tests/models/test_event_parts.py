@@ -68,8 +68,11 @@ def row_of(masses, restitution=0.5):
 def test_a_run_begins_as_the_text_says_whatever_the_run_before_left():
     """Magnitudes and rates at the start are those of the numbers that hold there."""
     spring = "model m { param k = 3 N/m; param m = 2 kg; coord x: translation = 1 m; energy T* = 1/2*m*x'^2"
-    made = Model(spring + """; energy V = 1/2*k*x^2; phi stop: x >= 0.5 m restitution 1; init x' = 0 m/s }
-        scene s of m { time 0 s to 3 s; trace x }""")
+    made = Model(
+        spring
+        + """; energy V = 1/2*k*x^2; phi stop: x >= 0.5 m restitution 1; init x' = 0 m/s }
+        scene s of m { time 0 s to 3 s; trace x }"""
+    )
     begin = made.run.request.begin
     assert begin is not None
     first = made.run.sizes.magnitude.copy(), made.run.start_rate.copy()

@@ -56,7 +56,7 @@ def test_a_soliton_with_tails(n, k, law, formulation):
     volts = (np.sinh(k) / np.cosh(place)) ** 2
     if formulation == "lagrangian":
         charges = state.y[named(state, system, "C")]
-        slopes = state.yd[named(state, system, "L'")][: n]
+        slopes = state.yd[named(state, system, "L'")][:n]
         assert slopes == pytest.approx((volts[:-1] - volts[1:])[: slopes.size], rel=1e-6, abs=1e-11)
     else:
         charges = state.y[named(state, system, "C.p")]

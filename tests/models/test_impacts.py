@@ -29,7 +29,9 @@ def off(trace, name, expected, instant=0.1):
     return np.abs(trace[name].values - expected)[np.abs(trace.time - instant) > 1e-9].max()
 
 
-STRUCK = LINE + """\
+STRUCK = (
+    LINE
+    + """\
 from std.mechanical import mass, coulomb
 model struck {
   node a, b: translation
@@ -48,6 +50,7 @@ scene hit of struck {
   accuracy 1e-8
 }
 """
+)
 
 
 @FORMULATIONS
@@ -63,7 +66,9 @@ def test_dry_friction_gives_way_to_an_impact(tmp_path, formulation):
     assert off(trace, "a.f", np.where(behind, a, 5.0)) < 3e-7
 
 
-FOLLOWED = LINE + """\
+FOLLOWED = (
+    LINE
+    + """\
 from std.mechanical import mass
 model followed {
   node a, b: translation
@@ -82,6 +87,7 @@ scene hit of followed {
   accuracy 1e-8
 }
 """
+)
 
 
 @FORMULATIONS
@@ -93,7 +99,9 @@ def test_a_ratchet_hands_an_impact_on(tmp_path, formulation):
     assert off(trace, "b.f", np.where(behind, 4.0, -4.0)) < 1e-7
 
 
-JAMMED = LINE + """\
+JAMMED = (
+    LINE
+    + """\
 from std.mechanical import mass
 model jammed {
   node a, b, c: translation
@@ -116,6 +124,7 @@ scene hit of jammed {
   accuracy 1e-8
 }
 """
+)
 
 
 @FORMULATIONS

@@ -26,8 +26,6 @@ PLACES = ("coord", "cocoord", "node", "branch")
 LONG = os.environ.get("SYSDYN_LONG") == "1"
 
 
-
-
 def has(domain, function):
     """Whether a domain has that edge: thermal ones have no kinetic stores, and heat has nowhere to go."""
     return domain != "heat" and (domain != "thermal" or STATE_FUNCTIONS[function].edge == "potential")

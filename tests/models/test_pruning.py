@@ -321,7 +321,7 @@ def test_every_part_of_a_network_is_known_to_pruning():
     known = (
         "model place parameters tables coordinates unknowns states energies works constraints dynamics initials"
         " observations expectations statics goldens scene elements nodes branches couplings slopes quasis read"
-        " discretes events switches levels speeds authors positions literal"
+        " discretes events switches levels speeds authors positions literal derived"
     )
     assert set(Network.__dataclass_fields__) == set(known.split())
 

@@ -546,10 +546,13 @@ scene s of hoop { time 0 s to 6 s; trace x, y every 0.05 s }
     trace = run(tmp_path, text, formulation, method="radau")
     angle, begin, pieces, sense = 0.0, 0.0, [], -1.0
     while sense:
+
         def rate(_, z, sense=sense):
             return [z[1], -G0 * np.cos(z[0]) - 0.2 * sense * abs(z[1] ** 2 - G0 * np.sin(z[0]))]
+
         def halts(_, z):
             return z[1]
+
         halts.terminal, halts.direction = True, -sense
         found = solve_ivp(rate, (begin, 9.0), [angle, sense * 1e-14], rtol=1e-11, atol=1e-13, events=halts,
                           dense_output=True, max_step=0.02)  # fmt: skip

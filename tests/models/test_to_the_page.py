@@ -74,7 +74,9 @@ component tether {
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 def test_bundles_hold_bundles_and_their_ports_take_ground(tmp_path, formulation):
-    text = BUNDLES + """
+    text = (
+        BUNDLES
+        + """
 model m {
   param n = 2
   node P[1..n]: pair
@@ -87,6 +89,7 @@ model m {
 }
 scene s of m { time 0 s to 1 s; trace P[2].a.x.q as x, P[1].b.y.q as y, T[2].X.e as F every 0.1 s }
 """
+    )
     trace = run(tmp_path, text, formulation=formulation)
     assert off(trace, "x", lambda t: cos(12**0.5 * t)) < 1e-6
     assert off(trace, "y", lambda t: 3 * t - G * t**2 / 2) < 1e-6

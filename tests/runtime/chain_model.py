@@ -65,8 +65,7 @@ def structure():
         ("kappa", "kappa", "link"),
     ]
     kinds += [
-        ("audit." + n, "audit", n)
-        for n in ["energy", "kinetic", "potential", "dissipated", "supplied", "constraints"]
+        ("audit." + n, "audit", n) for n in ["energy", "kinetic", "potential", "dissipated", "supplied", "constraints"]
     ]
     row = lambda block, label, **more: {  # noqa: E731
         "block": block,

@@ -137,18 +137,14 @@ def small(
         b.add_block("momentum_rate", "momentum", [rate(x) for x in momentum])
     if phi:
         b.add_rows("phi", list(phi), list(phi))
-        reaction = [
-            sum(b.y[f"kappa_{k}"] * sp.diff(x, q[n]) for k, x in zip(phi, phis, strict=True)) for n in names
-        ]
+        reaction = [sum(b.y[f"kappa_{k}"] * sp.diff(x, q[n]) for k, x in zip(phi, phis, strict=True)) for n in names]
         b.add_block("phi_reaction", "dynamics", [sp.sympify(x) for x in reaction])
         b.add_block("phi", "phi", phis)
         b.add_block("phi_rate", "phi", [rate(x) for x in phis])
         b.add_block("phi_acceleration", "phi", [rate(rate(x)) for x in phis])
     if psi:
         b.add_rows("psi", list(psi), list(psi))
-        reaction = [
-            sum(b.y[f"mu_{k}"] * sp.diff(x, f[n]) for k, x in zip(psi, psis, strict=True)) for n in names
-        ]
+        reaction = [sum(b.y[f"mu_{k}"] * sp.diff(x, f[n]) for k, x in zip(psi, psis, strict=True)) for n in names]
         b.add_block("psi_reaction", "dynamics", [sp.sympify(x) for x in reaction])
         b.add_block("psi", "psi", psis)
         b.add_block("psi_rate", "psi", [rate(x) for x in psis])
@@ -165,8 +161,7 @@ def small(
     supplied = read(source_power) if source_power is not None else sum(works[n] * f[n] for n in names)
     b.add_block("audit", "audit", [stored, pot, dissipated, supplied])
     audits = [
-        ("audit." + n, "audit", n)
-        for n in ["energy", "kinetic", "potential", "dissipated", "supplied", "constraints"]
+        ("audit." + n, "audit", n) for n in ["energy", "kinetic", "potential", "dissipated", "supplied", "constraints"]
     ]
     observe = observe if observe is not None else {n: n for n in b.y}
     expressions = [read(x) for x in observe.values()]
@@ -174,9 +169,7 @@ def small(
         all(s.name[0] in "qfspe" for s in x.free_symbols - {T}) and not (x.free_symbols & set(b.yd.values()))
         for x in expressions
     ]
-    b.add_rows(
-        "observe", list(observe), list(observe), name=list(observe), stored=[True] * len(observe), rate=known
-    )
+    b.add_rows("observe", list(observe), list(observe), name=list(observe), stored=[True] * len(observe), rate=known)
     b.add_block("observe", "observe", expressions)
     b.add_block(
         "observe_rate",

@@ -99,9 +99,7 @@ def test_long_chain(library):
 
 def test_two_carriers_give_the_same_run(library):
     binding = chain.binding(4)
-    runs = [
-        end(System(MANIFEST, binding, carrier, "2"), rtol=1e-7) for carrier in (library, load(chain.Chain))
-    ]
+    runs = [end(System(MANIFEST, binding, carrier, "2"), rtol=1e-7) for carrier in (library, load(chain.Chain))]
     assert np.abs(runs[0][0] - runs[1][0]).max() < 1e-9
     assert runs[0][1].statistics.steps == runs[1][1].statistics.steps
 

@@ -15,9 +15,7 @@ def run(made, t_end, form="3", index=0, instants=(), **request):
     state = consistent_start(system, 0.0)
     blocks = []
     wanted = np.unique(np.append(np.asarray(instants, float), t_end))
-    finished = integrate(
-        system, state, Request(t_end, wanted, every_step=False, index=index, **request), blocks.append
-    )
+    finished = integrate(system, state, Request(t_end, wanted, every_step=False, index=index, **request), blocks.append)
     names = [row.name for row in system.description.rows if row.block == "observe"]
     rows = np.concatenate(blocks)
     columns = {name: rows[:, ROW_HEAD + k] for k, name in enumerate(names)}
@@ -89,10 +87,7 @@ def test_hamiltonian_agrees_with_lagrangian():
     for make in (models.pendulum, models.dc_motor, models.mass_spring):
         form, index = ("2", 2) if make is models.pendulum else ("3", 1)
         name = "q1" if make is models.pendulum else ("f_a" if make is models.dc_motor else "q_x")
-        values = [
-            run(make(kind), 0.6, form, index, rtol=1e-9)[1][name][-1]
-            for kind in ("lagrangian", "hamiltonian")
-        ]
+        values = [run(make(kind), 0.6, form, index, rtol=1e-9)[1][name][-1] for kind in ("lagrangian", "hamiltonian")]
         assert values[0] == pytest.approx(values[1], rel=1e-6)
 
 

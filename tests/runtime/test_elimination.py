@@ -96,8 +96,15 @@ def test_a_vanishing_coefficient_defines_nothing(part):
     assert (("three", "e_3") in may) == (part > 0.0)
 
 
-@pytest.mark.parametrize(("law", "leaves"), [("e_1 - 1e12*q_x", True), ("e_1 - 1e12*q_x + 1e12", False),
-                                             ("e_1 - 1e12*q_x + e_2", False), ("e_1 - 1e12*e_2", False)])
+@pytest.mark.parametrize(
+    ("law", "leaves"),
+    [
+        ("e_1 - 1e12*q_x", True),
+        ("e_1 - 1e12*q_x + 1e12", False),
+        ("e_1 - 1e12*q_x + e_2", False),
+        ("e_1 - 1e12*e_2", False),
+    ],
+)
 def test_a_multiple_of_what_carries_the_state_keeps_its_digits(law, leaves):
     """The voltage of a capacitor of 1 pF by its charge, beside resistors of 1 ohm: no difference is taken of it, unless
     a constant or another unknown stands beside.

@@ -84,9 +84,9 @@ def test_a_layout_is_that_of_its_blocks(index):
         for part in entries_of(of.description, call):
             own |= set(zip(part.row.tolist(), part.column.tolist(), strict=True))
     assert there == {(r, c) for r, c in own if 0 <= r < of.rows and 0 <= c < of.unknowns}
-    assert sum(map(len, layout.slots[2:-1])) == sum(p.row.size for call in of.form.calls for p in entries_of(
-        of.description, call
-    ))
+    assert sum(map(len, layout.slots[2:-1])) == sum(
+        p.row.size for call in of.form.calls for p in entries_of(of.description, call)
+    )
 
 
 @pytest.mark.parametrize("family", ["lagrangian", "hamiltonian"])

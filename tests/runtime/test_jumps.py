@@ -117,9 +117,7 @@ def test_a_mass_takes_no_displacement_at_once():
 
 def test_impulses_of_a_constraint_share_a_displacement():
     """Capacitors of 1 F and 3 F at 4 V and 0 V, joined: the common voltage is 1 V (charge stays)."""
-    system = settled_of(
-        "a b", 0, "q_a**2/2 + q_b**2/6", psi={"joint": "f_a + f_b"}, phi={"charge": "q_a + q_b - 4"}
-    )
+    system = settled_of("a b", 0, "q_a**2/2 + q_b**2/6", psi={"joint": "f_a + f_b"}, phi={"charge": "q_a + q_b - 4"})
     y = values(system, q_a=4.0)
     found, _ = Instant(system).displacements(0.0, y, np.zeros(y.size), np.ones(y.size))
     assert read(system, found, "q_a", "q_b") == pytest.approx([1.0, 3.0], rel=1e-12)

@@ -32,8 +32,12 @@ def problem(residual, jacobian, guess, **more):
     rows, n = residual(guess).size, guess.size
     i, j = np.indices((rows, n)).reshape(2, -1)
     given = {
-        "use": np.ones(rows, bool), "free": np.ones(n, bool), "guess": guess,
-        "scale": np.ones(n), "weight": np.ones(n), **more,
+        "use": np.ones(rows, bool),
+        "free": np.ones(n, bool),
+        "guess": guess,
+        "scale": np.ones(n),
+        "weight": np.ones(n),
+        **more,
     }
     return Problem(residual, lambda x: np.asarray(jacobian(x)).ravel(), i, j, rows, **given)
 
@@ -84,8 +88,11 @@ def test_the_nearest_point_of_a_circle():
 def test_weights_and_scales_say_who_moves():
     """x + y = 1 from zero: parts in the ratio (scale/weight)^2."""
     made = problem(
-        lambda x: np.array([x.sum() - 1.0]), lambda x: [[1.0, 1.0]], [0.0, 0.0],
-        scale=np.array([2.0, 1.0]), weight=np.array([1.0, 3.0]),
+        lambda x: np.array([x.sum() - 1.0]),
+        lambda x: [[1.0, 1.0]],
+        [0.0, 0.0],
+        scale=np.array([2.0, 1.0]),
+        weight=np.array([1.0, 3.0]),
     )
     assert solve(made, made.guess).x == pytest.approx(np.array([4.0, 1.0 / 9.0]) / (4.0 + 1.0 / 9.0), rel=1e-12)
 
@@ -109,6 +116,7 @@ def test_levels_move_in_their_order():
 
 def test_curved_rows_move_the_last_level_first():
     """x^2 + y^2 = 25 from (3, 1): y goes to 4 while x stays; of one level both move along the radius."""
+
     def made(*levels):
         rows = problem(lambda x: np.array([x @ x - 25.0]), lambda x: [2.0 * x], [3.0, 1.0])
         return replace(rows, levels=tuple(np.array(level) for level in levels))

@@ -49,9 +49,7 @@ class Solver:
 def random_matrix(n, seed, density=0.05):
     rng = np.random.default_rng(seed)
     matrix = csc_array(random_array((n, n), density=density, rng=rng))
-    matrix = csc_array(
-        matrix + csc_array((rng.normal(size=n), (rng.permutation(n), np.arange(n))), shape=(n, n))
-    )
+    matrix = csc_array(matrix + csc_array((rng.normal(size=n), (rng.permutation(n), np.arange(n))), shape=(n, n)))
     matrix.sort_indices()
     return matrix
 

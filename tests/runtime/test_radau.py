@@ -41,9 +41,7 @@ def test_order_five_on_a_smooth_ode():
 def test_order_on_the_pendulum_in_every_index_form(form, index, order):
     errors = []
     for h in (0.05, 0.025):
-        found = run(
-            models.pendulum(), 4.0, form, index, INSTANTS, method="radau", fixed_step=h, rtol=1e-12
-        )[1]
+        found = run(models.pendulum(), 4.0, form, index, INSTANTS, method="radau", fixed_step=h, rtol=1e-12)[1]
         errors.append(max(np.abs(found["q1"] - Q1).max(), np.abs(found["kappa1"] - KAPPA).max()))
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.2)
 
@@ -81,8 +79,7 @@ def test_index_two_circuit_valves_and_a_stiff_diode():
     columns = run(models.nonlinear_fluid(), 60.0, "3", 2, method="radau", rtol=1e-8)[1]
     assert columns["q_2"][-1] == pytest.approx(4.971874535507478, rel=1e-6)
     values = [
-        run(models.diode_circuit(), 0.05, "3", 2, rtol=1e-9, method=method)[1]["q_c"][-1]
-        for method in ("bdf", "radau")
+        run(models.diode_circuit(), 0.05, "3", 2, rtol=1e-9, method=method)[1]["q_c"][-1] for method in ("bdf", "radau")
     ]
     assert values[0] == pytest.approx(values[1], rel=1e-5)
 
@@ -93,9 +90,7 @@ def test_sparse_and_dense_factors_give_the_same(monkeypatch):
     found = []
     for limit in (50, 0):
         monkeypatch.setattr(ordering, "DENSE", limit)
-        request = Request(
-            0.5, np.linspace(0, 0.5, 6), every_step=False, index=2, method="radau", rtol=1e-9
-        )
+        request = Request(0.5, np.linspace(0, 0.5, 6), every_step=False, index=2, method="radau", rtol=1e-9)
         rows = []
         Integration(system, state, request).run(rows.append)
         found.append(np.concatenate(rows))

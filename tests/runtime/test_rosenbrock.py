@@ -57,8 +57,11 @@ def test_order_five_of_constraints_whose_matrix_moves(family):
 def test_inertia_that_depends_on_the_position():
     # a bead on a wheel's spoke: E = dF/dyd moves; closed form r = r0 cosh(w t), w = 3 held by a constraint on the flow
     made = models.small(
-        "r a", "f_r**2/2 + q_r**2*f_a**2/2", psi={"motor": "f_a - 3"},
-        initial={"q_r": (0.1, True), "q_a": (0, True), "f_r": (0, True)}, source_power="-3*mu_motor",
+        "r a",
+        "f_r**2/2 + q_r**2*f_a**2/2",
+        psi={"motor": "f_a - 3"},
+        initial={"q_r": (0.1, True), "q_a": (0, True), "f_r": (0, True)},
+        source_power="-3*mu_motor",
     )
     errors = []
     for h in (0.05, 0.025, 0.0125):
@@ -170,8 +173,9 @@ def test_the_same_run_twice():
 
 def van_der_pol():
     """x'' = 500 (1 - x^2) x' - x: the phase of loose runs is off."""
-    return models.small("x", "f_x**2/2", "q_x**2/2", work={"x": "500*(1 - q_x**2)*f_x"},
-                        initial={"q_x": (2, True), "f_x": (0, True)})
+    return models.small(
+        "x", "f_x**2/2", "q_x**2/2", work={"x": "500*(1 - q_x**2)*f_x"}, initial={"q_x": (2, True), "f_x": (0, True)}
+    )
 
 
 @pytest.mark.long

@@ -68,8 +68,7 @@ def test_what_is_open_moves_together():
     shape, chain = _chain(n)
     parts = [(ring, 0, 0), (ring, n, n), (chain, 2 * n, 2 * n)]
     entries = tuple(
-        np.concatenate(item)
-        for item in zip(*(((e[0] + i), (e[1] + j), e[2]) for e, i, j in parts), strict=True)
+        np.concatenate(item) for item in zip(*(((e[0] + i), (e[1] + j), e[2]) for e, i, j in parts), strict=True)
     )
     found = left_open((2 * n + shape[0], 3 * n), entries)
     first, second, third = found[:n], found[n : 2 * n], found[2 * n :]
@@ -213,6 +212,8 @@ def test_an_unknown_does_not_follow_by_an_entry_that_is_next_to_none():
     faint = np.where((j == 9) & (np.isin(i, i[(j == 9) & (v > 0.5)])), 1e-12, v)
     columns = tall.by_columns(shape, (i, j, faint), fewer=False)
     assert tall._substituted(columns, np.ones(shape[0]), np.zeros(N)) == 1
+
+
 @pytest.mark.parametrize("n", [150, 500])
 def test_what_stands_in_every_row_is_eliminated_last(n):
     """Each of the others fills nothing; taken first it would fill everything."""

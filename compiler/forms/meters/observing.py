@@ -64,8 +64,12 @@ def add_observations(assembly: Assembly, model: EnergyModel, carriers: frozenset
 
 
 def _scale(expression: Node) -> Node:
-    """The magnitude of a term; that of the audit's balance is what went round, of norms of scaled rows one."""
-    read = {n: add(*(call("abs", var(k, "audit")) for k in TURNED)) for n in _meters(expression, ("energy",))}
+    """The magnitude of a term; that of the audit's balance, and of what is supplied, which it balances and which may
+    cancel, is what went round; of norms of scaled rows one.
+    """
+    read = {
+        n: add(*(call("abs", var(k, "audit")) for k in TURNED)) for n in _meters(expression, ("energy", "supplied"))
+    }
     read |= {n: const(1.0) for n in _meters(expression, ("constraints", "drift"))}
     return call("abs", substitute(expression, read) if read else expression)
 

@@ -54,7 +54,5 @@ def _rows(nodes: Balances) -> Iterator[Step]:
 
 def _shown(name: str, box: Box) -> str:
     """`v[1..n]`, `v[0]`."""
-    ranges = [
-        f"{i.first.node}" if i.first.value == i.last.value else f"{i.first.node}..{i.last.node}" for i in box
-    ]
+    ranges = [f"{i.first.node}" if i.first.value == i.last.value else f"{i.first.node}..{i.last.node}" for i in box]
     return f"{name}[{', '.join(ranges)}]" if ranges else name

@@ -318,4 +318,3 @@ def _led_by(m: Member) -> Box:
     """The elements of the leader that a member follows."""
     pairs = ((None if k is None else m.box[k], c) for k, c in m.leader_index)
     return tuple(Interval(c, c) if i is None else i.plus(c) for i, c in pairs)
-

@@ -83,9 +83,7 @@ def _slopes(network: Network, name: str) -> tuple[list[_Slope], list[_Slope]]:
     return efforts, momenta
 
 
-def _by(
-    root: Node, loops: tuple[Loop, ...], place: Place, wanted: tuple[str, str], factor: Node
-) -> Iterator[_Slope]:
+def _by(root: Node, loops: tuple[Loop, ...], place: Place, wanted: tuple[str, str], factor: Node) -> Iterator[_Slope]:
     """Factor times the derivative of a statement by each reference to the branch that it holds."""
     if not any(n.op == "var" and n.data == (*wanted, 0) for n in variables(root)):
         return

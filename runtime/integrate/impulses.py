@@ -1,0 +1,268 @@
+"""What dynamic variables that no other row reads gain over an instant at which a state jumps: energies, momenta.
+
+    s' = g(t, y, y')      s+ - s- = int_0^1 dg/dz(y(r)) . dz/dr dr,     z = (y', flows that are pulses, forces)
+
+An instant is the limit of a fast rise r = 0..1 along which what the text tells goes straight from its value before to
+that behind.  Impulses are what such a rise integrates: of rates the jumps of flows and momenta, of flows those of
+displacements, of forces what the balances ask for (start/instant.py); finite terms do not count.  What is a flow times
+a force so is its impulse times the mean of the other, of linear stores; of others y(r) is followed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.facts import Mask
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.least_change import least_norm
+from sysdyn.values import dataclass
+
+FORCES = ("e", "kappa", "mu")
+STILL = 1e-10
+"""Of its magnitude: what an unknown moves by, and has not jumped (start/restart.py)."""
+BROKEN = 1e-9
+"""Of the largest terms: what a row is missed by along the straight way, which then is not the rise."""
+GAUSS = tuple(0.5 + sign * np.sqrt(1.0 / 12.0) for sign in (-1.0, 1.0))
+"""Points of Gauss's rule of degree 3: exact for powers of linear elements along a straight way."""
+PARTS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
+"""Steps of the classical method of order 4 along a curved way, until two agree within AGREED of the largest gain."""
+AGREED = 1e-8
+
+
+AWAY = 1e-6
+"""Of its magnitude: by how much the end of a curved way may be elsewhere."""
+STEEP = 1e-6
+"""Of a power: by what it may differ with pulses in the place of finite flows."""
+
+_Slopes = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """A side of an instant: t (s), y, yd [unknowns as written], parameters."""
+
+    t: float
+    y: Floats
+    yd: Floats
+    p: Floats
+
+
+class Impulses:
+    """states: the dynamic variables that no other row reads, rows: those of their rates.  system: of the run."""
+
+    def __init__(self, system: System, unread: Ints, *, assigned: bool) -> None:
+        """unread: displacements that the run does not integrate; assigned: events assign flows, by impulses from
+        nowhere.
+        """
+        self._assigned = assigned
+        settled = self.system = system.another("settled")
+        pattern, (in_y, in_rate) = settled.pattern, settled.structural()
+        self._row, self._column = pattern.row.astype(np.int64), pattern.columns_of()
+        states, rates = settled.kinds == "s", settled.of_groups("lambda")
+        read = np.zeros(settled.unknowns, dtype=bool)
+        read[self._column[in_y | (in_rate & ~rates[self._row])]] = True
+        own = in_rate & (states & ~read)[self._column]
+        many = np.bincount(self._column[own], minlength=settled.unknowns) > 1
+        own &= ~many[self._column]
+        self.states, self.rows = self._column[own], self._row[own]
+        self._in_y, self._in_rate = in_y, in_rate
+        form = settled.another("3").form
+        self._moved: Ints = np.full(settled.unknowns, -1, dtype=np.int64)
+        self._moved[form.k_f] = np.where(np.isin(form.k_q, unread), -1, form.k_q)
+        self._read = self._may_pulse()
+        inertia = in_rate & settled.of_groups("dynamics", "gamma")[self._row]
+        inertia |= in_y & settled.of_groups("momentum")[self._row] & (settled.kinds == "f")[self._column]
+        inert = np.isin(np.arange(settled.unknowns), self._column[inertia])
+        # displacements tell the pulses of their flows
+        self._given = np.isin(settled.kinds, FORCES) | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
+        self._balances, self._others = self._by_order()
+        self._carries = ((settled.kinds == "q") & ~np.isin(np.arange(settled.unknowns), unread)) | inert
+        held = form.k_q[inert[form.k_f]]
+        self._stays = np.isin(np.arange(settled.unknowns), np.concatenate([self.states, held, unread]))
+
+    @property
+    def any(self) -> bool:
+        """Whether an instant may do something to dynamic variables by impulses."""
+        return bool(self.states.size or self._read.size)
+
+    def _may_pulse(self) -> Ints:
+        """Rows of rates that may have impulses, of dynamic variables that other rows read."""
+        kinds, rates = self.system.kinds, self.system.of_groups("lambda")
+        pulses = np.isin(kinds, ("kappa", "mu")) | ((kinds == "f") & (self._moved >= 0))
+        found = self._row[rates[self._row] & self._in_y & pulses[self._column]]
+        return np.setdiff1d(found, self.rows)
+
+    def _by_order(self) -> tuple[Mask, Mask]:
+        """Rows that impulses meet, integrated over an instant; rows that hold at each point of the rise."""
+        settled, flow = self.system, (self._moved >= 0)[self._column]
+        moved, own = np.zeros((2, settled.rows), dtype=bool)
+        moved[self._row[self._in_rate | (self._in_y & flow)]], own[self.rows] = True, True
+        own[self._read] = True
+        integrated = settled.of_groups("dynamics", "gamma", "psi") | (settled.of_groups("lambda") & ~own)
+        told = np.zeros(settled.rows, dtype=bool)
+        told[self._row[(self._given & (settled.kinds == "f"))[self._column] & self._in_y]] = True
+        integrated |= settled.of_groups("phi_rate") & told
+        held = settled.of_groups("phi", "phi_rate", "psi", "momentum")
+        return integrated, held | (settled.of_groups("dynamics", "gamma") & ~moved)
+
+    def gains(self, before: Side, behind: Side, magnitude: Floats) -> Floats:
+        """s+ - s- [states]; zero of what an event assigns.  magnitude [unknowns].  SolverFailure where a power has no
+        integral (pulses of flow through a resistance), and where what jumps is no answer of the balances.
+        """
+        way, none = behind.y - before.y, np.zeros(self.states.size)
+        way[np.abs(way) <= STILL * magnitude] = 0.0
+        assigned, way[self.states] = way[self.states] != 0.0, 0.0
+        if not way[self._carries].any():
+            return none
+        found, balanced, faithful = self._straight(before, behind, way)
+        if not (balanced and faithful):
+            curved = self._curved(before, behind, way, magnitude)
+            if curved is None and not balanced and not self._assigned:
+                raise SolverFailure("unbalanced", behind.t, 0.0)
+            found = found if curved is None else curved
+        return np.where(assigned, 0.0, found)
+
+    # -- the rise ------------------------------------------------------------------------------------------------
+
+    def _slopes(self, sides: tuple[Side, Side], part: float, y: Floats, pulse: Floats | float = 0.0) -> _Slopes:
+        """dF/dy, dF/dyd [entries] at y, text and parameters a part of their way along; pulse [unknowns]: of flows."""
+        p, own = self.system.description.p, self.system.description.p.copy()
+        found = []
+        for side in sides:
+            if (side.p != p).any():
+                p[:] = side.p
+            found.append(self.system.jacobian(side.t, y + pulse, side.yd))
+        if (own != p).any():
+            p[:] = own
+        (jy, jyd), (ky, kyd) = found
+        return (1.0 - part) * jy + part * ky, (1.0 - part) * jyd + part * kyd
+
+    def _carried(self, slopes: _Slopes, way: Floats) -> Floats:
+        """What rows gain [entries] by moves of y along the way [unknowns]: by rates, and by pulses of flows."""
+        rated = np.where(self._in_rate, slopes[1] * way[self._column], 0.0)
+        return rated + np.where(self._in_y, slopes[0] * self._pulse(way)[self._column], 0.0)
+
+    def _pulse(self, way: Floats) -> Floats:
+        """Flows [unknowns] that are pulses, integrated."""
+        return np.where(self._moved >= 0, way[self._moved], 0.0)
+
+    def _rate(self, slopes: _Slopes, way: Floats, impulse: Floats) -> Floats:
+        """What the states gain [states]: their rows read s' - g."""
+        given = np.where(self._in_y, slopes[0] * impulse[self._column], 0.0)
+        total = np.bincount(self._row, self._carried(slopes, way) + given, self.system.rows)
+        return np.asarray(-total[self.rows], dtype=np.float64)
+
+    # -- straight ------------------------------------------------------------------------------------------------
+
+    def _straight(self, before: Side, behind: Side, way: Floats) -> tuple[Floats, bool, bool]:
+        """The gains [states] where all unknowns go straight; whether impulses balance there, and others hold."""
+        gained, balanced, faithful = np.zeros(self.states.size), True, True
+        pulse = self._pulse(way)
+        for part in GAUSS:
+            y = before.y + part * way
+            slopes = self._slopes((before, behind), part, y)
+            impulse, met = self._impulse(slopes, way)
+            rate = self._rate(slopes, way, impulse)
+            self._still(slopes, way, impulse, behind.t)
+            if pulse.any():
+                self._finite(rate, self._rate(self._slopes((before, behind), part, y, pulse), way, impulse), behind.t)
+            gained += 0.5 * rate
+            balanced &= met
+            faithful &= self._holds(before, behind, part, y)
+        return gained, balanced, faithful
+
+    def _still(self, slopes: _Slopes, way: Floats, impulse: Floats, t: float) -> None:
+        """SolverFailure where a dynamic variable that others read has a rate with an impulse: it would jump."""
+        rows = self._read
+        if not rows.size:
+            return
+        given = np.where(self._in_y, slopes[0] * impulse[self._column], 0.0)
+        terms = self._carried(slopes, way) + given
+        left, size = (np.bincount(self._row, w, self.system.rows)[rows] for w in (terms, np.abs(terms)))
+        if (missed := np.abs(left) > BROKEN * size).any():
+            raise SolverFailure("pulsed", t, 0.0, self._state_of(rows[np.argmax(missed)]))
+
+    def _state_of(self, row: int) -> str:
+        """The name of the dynamic variable whose rate a row tells."""
+        own = self._in_rate & (self._row == row) & (self.system.kinds == "s")[self._column]
+        return self.system.name(int(self._column[own][0]))
+
+    def _finite(self, rate: Floats, pulsed: Floats, t: float) -> None:
+        """SolverFailure where a rate grows with what is a pulse itself."""
+        endless = np.abs(pulsed - rate) > STEEP * np.maximum(np.abs(rate), np.abs(pulsed))
+        if endless.any():
+            raise SolverFailure("endless", t, 0.0, self.system.name(int(self.states[np.argmax(endless)])))
+
+    def _impulse(self, slopes: _Slopes, way: Floats) -> tuple[Floats, bool]:
+        """Impulses of forces, and pulses of flows that no displacement tells [unknowns], that rows ask for along the
+        way; whether these are met.
+        """
+        balances, given = self._balances[self._row], self._given[self._column] & self._in_y
+        carried = np.where(balances, self._carried(slopes, way), 0.0)
+        at = np.flatnonzero(balances & given & (slopes[0] != 0.0))
+        aim, impulse = -np.bincount(self._row, carried, self.system.rows), np.zeros(way.size)
+        if at.size:
+            (rows, i), (columns, j) = (np.unique(k[at], return_inverse=True) for k in (self._row, self._column))
+            v = slopes[0][at]
+            unit = np.zeros(columns.size)
+            np.maximum.at(unit, j, np.abs(v))
+            impulse[columns] = least_norm((rows.size, columns.size), (i, j, v / unit[j]), aim[rows]) / unit
+        acted = np.where(balances & given, slopes[0] * impulse[self._column], 0.0)
+        size, left = (np.bincount(self._row, w, aim.size) for w in (np.abs(carried) + np.abs(acted), carried + acted))
+        return impulse, bool((np.abs(left) <= BROKEN * size.max(initial=0.0))[self._balances].all())
+
+    def _holds(self, before: Side, behind: Side, part: float, y: Floats) -> bool:
+        """Whether rows without impulses hold at y, where the text and all else asked are a part of their way along."""
+        ends = [self.system.residual(behind.t, z, behind.yd)[self._others] for z in (before.y, y, behind.y)]
+        off = ends[1] - (1.0 - part) * ends[0] - part * ends[2]
+        return bool((np.abs(off) <= BROKEN * (np.abs(ends[0]) + np.abs(ends[2]))).all())
+
+    # -- curved --------------------------------------------------------------------------------------------------
+
+    def _curved(self, before: Side, behind: Side, way: Floats, magnitude: Floats) -> Floats | None:
+        """The gains [states] along the rise itself; None where rows do not tell it: it ends elsewhere."""
+        last, size = None, np.maximum(magnitude, np.abs(way))
+        for number in PARTS:
+            y, gained = self._followed(before, behind, size, number)
+            if last is not None and (np.abs(gained - last) <= AGREED * np.abs(gained).max()).all():
+                near = np.abs(y - before.y - way) <= AWAY * size
+                return gained if near[self._carries].all() else None
+            last = gained
+        return None
+
+    def _followed(self, before: Side, behind: Side, size: Floats, number: int) -> tuple[Floats, Floats]:
+        """Y [unknowns] and gains [states] at the end, in a number of steps of the classical Runge-Kutta method."""
+        y, gained, step = before.y.copy(), np.zeros(self.states.size), 1.0 / number
+        ends = [self.system.residual(behind.t, z, behind.yd) for z in (before.y, behind.y)]
+        asked = np.where(self._others, ends[1] - ends[0], 0.0)
+        for k in range(number):
+            way, total, gain = np.zeros(y.size), np.zeros(y.size), np.zeros(self.states.size)
+            for part, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
+                at = y + part * step * way
+                slopes = self._slopes((before, behind), (k + part) * step, at)
+                way, impulse = self._direction(slopes, asked, size)
+                total += weight / 6.0 * way
+                gain += weight / 6.0 * self._rate(slopes, way, impulse)
+            y, gained = y + step * total, gained + step * gain
+        return y, gained
+
+    def _direction(self, slopes: _Slopes, asked: Floats, size: Floats) -> tuple[Floats, Floats]:
+        """What y moves by along the rise, and the impulses [unknowns]: what the rows ask for, at least of all."""
+        n, rows, moved = size.size, self.system.rows, self._moved[self._column]
+        balances, others = self._balances[self._row], self._others[self._row]
+        parts = (  # two rows each: at the point, and integrated; two columns: moves, and impulses
+            (others & self._in_y, self._row, self._column, slopes[0]),
+            (balances & self._in_rate, rows + self._row, self._column, slopes[1]),
+            (balances & self._in_y & (moved >= 0), rows + self._row, moved, slopes[0]),
+            (balances & self._in_y & self._given[self._column], rows + self._row, n + self._column, slopes[0]),
+        )
+        takes = [take & (v != 0.0) & ~self._stays[j % n] for take, _, j, v in parts]
+        i, j, v = (np.concatenate([part[k][take] for part, take in zip(parts, takes, strict=True)]) for k in (1, 2, 3))
+        (own, i), (columns, j) = (np.unique(k, return_inverse=True) for k in (i, j))
+        most = np.zeros(columns.size)
+        np.maximum.at(most, j, np.abs(v))
+        unit, found = np.where(columns < n, size[columns % n], 1.0 / most), np.zeros(2 * n)
+        aim = np.where(own < rows, asked[own % rows], 0.0)
+        found[columns] = unit * least_norm((own.size, columns.size), (i, j, v * unit[j]), aim)
+        return found[:n], found[n:]
