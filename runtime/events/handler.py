@@ -30,7 +30,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.values import dataclass
 
-__all__ = ["Handler", "Point", "Watched"]
+__all__ = ["STALLED", "Handler", "Point", "Watched"]
 
 CASCADE = 100
 """Rounds of events at one instant: more will never end."""
@@ -76,7 +76,7 @@ class Handler:
         self.bounces: dict[int, Bounce] = {}
         self.happened: list[Happened] = []
         self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
-        self._stalled, self.last = 0, -np.inf
+        self.stalled, self.last = 0, -np.inf
         self.simple, self.rounds = False, list[Round]()
         self._exact: list[int] = []
         self._sinking: set[int] = set()
@@ -105,10 +105,9 @@ class Handler:
         if self.restart is not None:
             self.restart.settler.core.contents.ready = 0
 
-    def caught_up(self, t: float) -> None:
-        """The core has been in charge, until an event at t (s)."""
-        if t > self.last:
-            self._stalled, self.last = 0, t
+    def caught_up(self, t: float, stalled: int) -> None:
+        """The core has been in charge, until an event at t (s), which is as many in a row within no time."""
+        self.stalled, self.last = stalled, t
 
     def stands(self, which: Sequence[Watched]) -> bool:
         """Whether kinks alone were crossed since `before`, and every branch is what it was."""
@@ -323,7 +322,7 @@ class Handler:
             self._renew(t, *found)
             return found
         try:
-            found, anew = self.succession.after(t, y, yd, touched, stalled=self._stalled > 0)
+            found, anew = self.succession.after(t, y, yd, touched, stalled=self.stalled > 0)
         except NoActiveSetError as error:
             raise SolverFailure("complementarity", t, 0.0, ", ".join(error.names)) from error
         self._renew(t, *found)
@@ -413,8 +412,8 @@ class Handler:
 
     def _count(self, t: float) -> None:
         near = t - self.last <= self.nothing
-        self._stalled, self.last = (self._stalled + 1 if near else 0), t
-        if self._stalled > STALLED:
+        self.stalled, self.last = (self.stalled + 1 if near else 0), t
+        if self.stalled > STALLED:
             raise SolverFailure("chatter", t, 0.0, self._names())
         if self.plan.limit is not None and len(self.happened) > self.plan.limit:
             raise SolverFailure("max_events", t, 0.0, self._names())

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sysdyn.runtime.events.handler import Handler, Watched
+from sysdyn.runtime.events.handler import STALLED, Handler, Watched
 from sysdyn.runtime.events.kinks import WORDS
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.integrate.crossing import JUMP
@@ -87,6 +87,7 @@ class Modes:
         self._fixed = [k.sense for k in plan.contacts if k.sense >= 0] + [k.branch for k in plan.kinks]
         self._fixed += [k.hold for k in plan.contacts if k.hold >= 0]
         self.core = lib.Modes(now=-1, last=-np.inf, begin=run.start.t, longest=longest, left=UNLIMITED)
+        self.core.chatters = STALLED
         self._sizes(plan)
         self._plan(plan)
         self._run()
@@ -180,7 +181,7 @@ class Modes:
             side, truth, contacts = self._states[number]
             handler.side[:], handler.truth = side, list(truth)
             handler.contacts.become(contacts)
-            handler.caught_up(core.last)
+            handler.caught_up(core.last, core.stalled)
         if core.now == lib.OWN:
             self.stands()
         return some
@@ -194,7 +195,7 @@ class Modes:
         """The number of the handler's present mode, which the core is in from now on; -1: one too many."""
         core, handler = self.core, self.handler
         key = handler.side.tobytes(), tuple(handler.truth), handler.contacts.state(), tuple(handler.kinks.state())
-        core.last = handler.last
+        core.last, core.stalled = handler.last, handler.stalled
         limit = handler.plan.limit
         core.left = UNLIMITED if limit is None else limit - len(handler.happened)
         usual = not handler.bounces and not handler.contacts.barred.any()

@@ -9,6 +9,8 @@
 #define ITERATIONS 60    /* of Ridders' method */
 #define SAME 8.0         /* spacings of t within which two instants are one */
 #define FOLLOWED 6       /* points settled from an instant of the dense output as it is */
+#define CLOSER 3         /* of these, after which what is ENOUGH will do */
+#define ROUND_OFF 1e-15  /* of the largest value and terms of a row: it is no closer to zero */
 #define ENOUGH 1e-3      /* of what counts as zero: what is watched may be past it by */
 #define WIDER 3.0        /* times the stretch before: the next one that is searched behind where it has been seen */
 
@@ -149,13 +151,14 @@ static int follow(sd_run *run, int32_t one, double low, double high, double *t)
         double last = value;
         sd_run_observe(run, at, m->values);
         value = side * m->values[row];
-        if (value <= 0.0 && value >= -enough) {
+        slope = k > 0 && at != before ? (value - last) / (at - before) : slope;
+        double exact = fmax(SAME * spacing(at) * fabs(slope), ROUND_OFF * m->largest[row]);
+        if (value <= 0.0 && value >= -(k < CLOSER ? fmin(exact, enough) : enough)) {
             *t = at;
             return alone(m, one, m->values);
         }
-        slope = k > 0 ? (value - last) / (at - before) : slope;
         before = at;
-        at -= (value + 0.5 * enough) / slope;
+        at -= (value + 0.5 * fmin(exact, enough)) / slope;
         at = at != before ? at : before + copysign(spacing(before), value);
     }
     return 0;

@@ -10,6 +10,19 @@
 
 #define ROWS_OF_EVENT 8  /* at most, beside those asked for */
 
+/* No time has passed since the event before. */
+static int near_the_last(const sd_modes *m, double t)
+{
+    return t - m->last <= m->nothing;
+}
+
+/* An event at t is taken. */
+static void count(sd_modes *m, double t)
+{
+    m->stalled = near_the_last(m, t) ? m->stalled + 1 : 0;
+    m->last = t;
+}
+
 /* -- laws whose branch turns ------------------------------------------------------------------------------------- */
 
 /* The present mode becomes the core's own, if it is not. */
@@ -68,7 +81,7 @@ static int turns(sd_run *run, double t, int32_t crossed)
 {
     sd_modes *m = run->modes;
     int32_t from = m->now;
-    if (m->contacts || m->logged + crossed > m->room || t - m->last <= m->nothing || m->left < crossed || !kinks_of(m, crossed))
+    if (m->contacts || m->logged + crossed > m->room || near_the_last(m, t) || m->left < crossed || !kinks_of(m, crossed))
         return 0;
     sd_landing_leave(run);
     own(m);
@@ -167,7 +180,7 @@ static int same(int32_t n, const int32_t *a, int32_t number, const int32_t *b)
 static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_t due)
 {
     sd_modes *m = run->modes;
-    if (m->logged >= m->room || t - m->last <= m->nothing)
+    if (m->logged >= m->room || (near_the_last(m, t) && (m->contacts || m->stalled >= m->chatters)))
         return NULL;
     for (int32_t k = sd_mode_now(m)->first; k >= 0; k = m->transition[k].next) {
         const sd_transition *one = &m->transition[k];
@@ -230,7 +243,7 @@ static int event(sd_run *run, double enough)
         const sd_transition *one = taken(run, t, crossed, 0);
         if (!one && !turns(run, t, crossed))
             return SD_EVENT;
-        m->last = t;
+        count(m, t);
         if (one && !one->moves) {
             m->begin = t;
             continue;
@@ -316,7 +329,7 @@ static int sample(sd_run *run, int32_t due)
     run->settle->enough = enough;
     if (!one)
         return SD_FINISHED;
-    m->last = t;
+    count(m, t);
     for (int32_t i = 0; i < due; i++)
         while (m->first + (double)m->next[one->sample[i]] * m->period[one->sample[i]] <= t + m->nothing)
             m->next[one->sample[i]]++;
@@ -354,7 +367,8 @@ static int jump(sd_run *run)
         sd_run_row(run, SD_TRACE);
         forth(run, to);
     }
-    m->last = crossed ? t : m->last;
+    if (crossed)
+        count(m, t);
     m->log[(size_t)m->logged * (size_t)m->width] = next->label;
     m->at++;
     m->segment = next->end;

@@ -104,7 +104,8 @@ typedef struct sd_modes {
     sd_watch *watch;                  /* [watches] */
     double *log;                      /* [room][width] t, transition, before and after of what was assigned; t, -1 - kink
                                        * and its branches */
-    int64_t left;                     /* events that may still be */
+    int64_t left, stalled, chatters;  /* events that may still be; so many in a row within no time, of which the handler says
+                                       * that they never end */
     double differs;                   /* of its size: what a value differs by that has jumped */
     int32_t pieces, at;               /* number of the present piece */
     int32_t width, room, logged, waits; /* waits: an event has no room for its rows yet */

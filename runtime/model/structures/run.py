@@ -104,7 +104,7 @@ class Modes(c.Structure):
         *[(name, P) for name in ["rate", "y", "yd", "before", "before_d", "restart", "restart_d"]],
         *[(name, P) for name in ["values", "low", "high", "p_before", "p_after"]],
         *[(name, P) for name in ["exact", "found", "which", "turning", "watch", "log"]],
-        ("left", L),
+        *[(name, L) for name in ["left", "stalled", "chatters"]],
         ("differs", D),
         *[(name, I) for name in ["pieces", "at"]],
         *[(name, I) for name in ["width", "room", "logged", "waits"]],
