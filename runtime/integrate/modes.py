@@ -40,21 +40,31 @@ JUMPS = -1
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What a transition is called: its assignments, event by event, and its entries as they were."""
+    """What a transition is called: name, element, what is said (before and after alike, but for numbers), which numbers
+    of each entry that assigns; the other entries as they were.
+    """
 
-    groups: tuple[tuple[Assignment, ...], ...]
+    assigns: tuple[tuple[str, str, str, slice, slice], ...]
     entries: tuple[Happened, ...]
 
     def at(self, t: float, values: Sequence[float]) -> list[Happened]:
         """The entries at t (s); values: before and after of each assignment."""
-        found, k = [], 0
-        for entry, group in zip(self.entries, self.groups, strict=False):
-            pairs = [(a.name, values[2 * (k + i)], values[2 * (k + i) + 1]) for i, a in enumerate(group)]
-            before, after = (", ".join(f"{p[0]} = {p[side]:.9g}" for p in pairs) for side in (1, 2))
-            found.append(Happened(t, entry.name, entry.element, before, after))
-            k += len(group)
-        rest = self.entries[len(self.groups) :]
-        return found + [Happened(t, e.name, e.element, e.before, e.after) for e in rest]
+        found = [
+            Happened(t, name, element, said % tuple(values[before]), said % tuple(values[after]))
+            for name, element, said, before, after in self.assigns
+        ]
+        return found + [Happened(t, e.name, e.element, e.before, e.after) for e in self.entries]
+
+
+def _told(groups: Sequence[tuple[Assignment, ...]], entries: Sequence[Happened]) -> Told:
+    """groups: assignments of the first entries."""
+    assigns, k = [], 0
+    for entry, group in zip(entries, groups, strict=False):
+        said = ", ".join(f"{a.name.replace('%', '%%')} = %.9g" for a in group)
+        end = k + 2 * len(group)
+        assigns.append((entry.name, entry.element, said, slice(k, end, 2), slice(k + 1, end, 2)))
+        k = end
+    return Told(tuple(assigns), tuple(entries[len(assigns) :]))
 
 
 def serves(plan: Plan, run: Integration) -> bool:
@@ -277,7 +287,7 @@ class Modes:
         )
         self.core.transition = c.addressof(self._transitions)
         self._modes[begin].first = number
-        self._told.append(Told(groups, entries))
+        self._told.append(_told(groups, entries))
 
     def _determined(self, t: float, point: Any) -> bool:
         """Whether the mode leaves nothing open at t (s)."""
