@@ -77,7 +77,7 @@ class Handler:
         self.happened: list[Happened] = []
         self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
         self.stalled, self.last = 0, -np.inf
-        self.simple, self.rounds = False, list[Round]()
+        self.simple, self.struck, self.rounds = False, -1, list[Round]()
         self._exact: list[int] = []
         self._sinking: set[int] = set()
         self.back(begin)
@@ -232,10 +232,12 @@ class Handler:
     ) -> Point | None:
         """The point after everything that happens at t; None where nothing changes.  which: of the watched.
 
-        rounds, simple: what is assigned, and whether that is all, and without an impact.
+        rounds, simple: what is assigned, and whether that is all, and without an impact; struck: the gap that closed in
+        flight and opened again, where that is all, else -1.
         """
         self._count(t)
-        self.simple, self.rounds = not self.bounces, []
+        free = not self.contacts.active.any()
+        self.simple, self.struck, self.rounds = True, -1, []
         said, stood = self._words(), self.kinks.state()
         self.kinks.anew()
         crossed = [w.relation for w in which if w.relation >= 0]
@@ -269,9 +271,19 @@ class Handler:
         self.simple &= all(self.plan.contacts[k].kind != "phi" for k in touched)
         if not (changed or touched):
             return None
+        self.struck = touched[0] if free and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
+        self.struck = self.struck if self._bounced(self.struck) else -1
+        self.simple &= not self.bounces
         self.happened += self.kinks.happened(t, stood)
         return point
+
+    def _bounced(self, k: int) -> bool:
+        """Whether gap k has closed and opened again, and nothing holds."""
+        plan, impacts = self.plan.contacts, self.succession.impacts
+        plain = all(c.kind in ("phi", "friction") and c.guard < 0 for c in plan)
+        bounced = k >= 0 and impacts.closed == [k] and list(self.bounces) == [plan[k].value]
+        return plain and bounced and not self.contacts.active.any()
 
     def _followed(self, t: float, point: Point) -> Point:
         """The point after the conditions that became true where the constraints were found anew."""
@@ -279,7 +291,7 @@ class Handler:
             fired = self._risen(())
             if not fired:
                 return point
-            self.simple, said = False, self._words()
+            self.simple, self.struck, said = False, -1, self._words()
             y = self._assign(t, *point, [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired])
             self._renew(t, y, point[1])
             point = self.settled(t, y, point[1], said)
@@ -300,9 +312,10 @@ class Handler:
 
     def anew(self, t: float, y: Floats, yd: Floats) -> Point:
         """The point behind an instant at which the text jumps, and behind the conditions that become true by it."""
-        self.simple, self.rounds, stood = not self.bounces, [], self.kinks.state()
+        self.simple, self.struck, self.rounds, stood = True, -1, [], self.kinks.state()
         self.kinks.anew()
         point = self._followed(t, self.settled(t, y, yd, self._words()))
+        self.simple &= not self.bounces
         self.happened += self.kinks.happened(t, stood)
         return point
 

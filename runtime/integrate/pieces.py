@@ -18,7 +18,7 @@ from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.crossing import go_on
 from sysdyn.runtime.integrate.driver import Sink
-from sysdyn.runtime.integrate.modes import Modes, serves
+from sysdyn.runtime.integrate.modes import UNSEEN, Modes, serves
 from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.integrate.round_off import left_open
 from sysdyn.runtime.integrate.segments import Segment
@@ -29,8 +29,6 @@ from sysdyn.runtime.model.scales import group_maxima
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
 
-UNSEEN = 100.0
-"""Times a run's tolerance: of a bounce that rises less, the error test of the bdf hardly sees that it falls."""
 PARTS = 8
 """Steps at least that such a bounce takes (radau and dopri follow a parabola in one), or after one that misled."""
 

@@ -27,6 +27,8 @@ static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const
         return 0;
     if (slip > sd_mode_zero(m, c->value))
         return 1;
+    if (m->struck >= 0 && c == &m->contact[m->struck])
+        return v[c->rate] > sd_mode_zero(m, c->rate);
     return c->kind != SD_PHI && slip >= -sd_mode_zero(m, c->value) && sense * v[c->rate] >= -sd_mode_zero(m, c->rate);
 }
 

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "run/fits.h"
+#include "run/strike.h"
 
 #define HELD 1e8 /* weight of the state across an event */
 
@@ -139,10 +140,13 @@ int sd_landing_takes(sd_run *run, const sd_transition *one, double t)
     int32_t from = m->now;
     const sd_mode *before = sd_mode_now(m);
     sd_landing_leave(run);
-    int done = assign(run, one, t);
+    int done = assign(run, one, t) && (!one->strike || sd_strike_gap(run, one->strike, t));
+    m->struck = one->strike ? one->strike->contact : -1;
     sd_landing_enter(run, one->to);
     done = done && sd_landing_arrives(run, one->sides + one->rounds * m->relations, t) && sd_mode_ordinary(m) &&
            sd_mode_decided(m, before, one, m->values);
+    m->struck = -1;
+    done = done && sd_strike_throws(run, one->strike);
     if (!done) {
         memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
         sd_landing_enter(run, from);

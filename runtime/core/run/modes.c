@@ -110,7 +110,7 @@ static void watch(sd_run *run)
     for (int32_t i = 0; i < m->observed; i++)
         m->largest[i] = fmax(m->largest[i], run->largest[i]);
     for (int32_t k = 0; k < mode->watches; k++)
-        m->watch[k] = (sd_watch){mode->row[k], mode->side[k], sd_mode_zero(m, mode->row[k])};
+        m->watch[k] = (sd_watch){mode->row[k], mode->side[k], sd_mode_least(m, mode->row[k]) - sd_mode_level(m, mode->row[k])};
     run->watch = m->watch;
     run->watches = mode->watches;
 }
