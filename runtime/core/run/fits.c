@@ -7,6 +7,7 @@
 #define SLIP 1e-9        /* of a bound of friction */
 #define SLIDES 2.0       /* branches, as events/kinks.py names them */
 #define RESTS 3.0
+#define NO_SIZE 1e-9     /* of its magnitude, an unknown of which round-off leaves nothing open */
 
 /* Whether an inequality, or a friction law, is as the mode says. */
 static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const double *v)
@@ -113,7 +114,7 @@ int sd_mode_sized(const sd_modes *m)
 int sd_mode_ordinary(const sd_modes *m)
 {
     for (int32_t i = 0; i < m->unknowns; i++)
-        if (fabs(m->restart[i]) > 2.0 * m->resolved[i])
+        if (fabs(m->restart[i]) > 2.0 * fmax(m->resolved[i], NO_SIZE * m->magnitude[i]))
             return 0;
     return sd_mode_sized(m);
 }
