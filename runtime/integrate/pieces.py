@@ -182,7 +182,7 @@ class Pieces:
         self.handler.before = self.handler.now()
         if stepper.refine:
             _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
-        end, begun = method.t, core.t_from == self._begun
+        end, begun = method.t, core.t_from == (self._begun if self.modes is None else self.modes.core.begun)
         begin = max(self._from, min(core.t_clear, end))
         reach = core.t_seen
         while True:
@@ -264,6 +264,8 @@ class Pieces:
         core.start_kind = TRACE
         self._bounce(t)
         self._begun = t
+        if self.modes is not None:
+            self.modes.core.begun = t
         if misled:
             self._short(t, misled)
         self.leave(*before)

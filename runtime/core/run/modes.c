@@ -9,6 +9,8 @@
 #include "run/landing.h"
 
 #define ROWS_OF_EVENT 8  /* at most, beside those asked for */
+#define AT_ONCE 1e-2     /* of the first step behind an event: before that its dense output knows nothing */
+#define SHORTER 8.0      /* steps in the place of one that misled */
 
 /* No time has passed since the event before. */
 static int near_the_last(const sd_modes *m, double t)
@@ -156,6 +158,7 @@ static void go_on(sd_run *run, double t, double label, int32_t kind, int32_t log
     double sample = INFINITY;
     for (int32_t k = 0; k < m->samples; k++)
         sample = fmin(sample, m->first + (double)m->next[k] * m->period[k]);
+    m->begun = t;
     *m->h_max = m->longest;
     *m->t_end = sample < m->segment - m->nothing ? sample : m->segment; /* where the text jumps too, that is first */
     run->end_kind = sample <= m->segment + m->nothing ? SD_TRACE : 0;
@@ -168,6 +171,17 @@ static void go_on(sd_run *run, double t, double label, int32_t kind, int32_t log
     m->logged += logged;
     m->left -= entries;
     watch(run);
+}
+
+/* The next steps, from t on, are parts of one that misled, until its end is passed. */
+static void shorten(sd_run *run, double t, double step)
+{
+    sd_modes *m = run->modes;
+    *m->h_max = fmax(fmin(step / SHORTER, *m->h_max), 16.0 * (nextafter(fabs(t), INFINITY) - fabs(t)));
+    if (t + step < *m->t_end) {
+        *m->t_end = t + step;
+        run->end_kind = 0;
+    }
 }
 
 static int same(int32_t n, const int32_t *a, int32_t number, const int32_t *b)
@@ -249,10 +263,14 @@ static int event(sd_run *run, double enough)
             continue;
         }
         int32_t to = back(run, from);
+        double step = end - run->t_from;
+        int misled = one && one->strike && run->t_from == m->begun && t - run->t_from < AT_ONCE * step;
         run->settle->enough = enough;
         sd_run_accept(run, t, SD_TRACE);
         forth(run, to);
         go_on(run, t, t, SD_TRACE, one ? 1 : crossed, one ? one->entries : crossed);
+        if (misled)
+            shorten(run, t, step);
         return SD_RUNNING;
     }
 }

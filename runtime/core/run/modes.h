@@ -101,7 +101,7 @@ typedef struct sd_modes {
     double first, segment;            /* s: of the samples, end of the piece of the text */
     double last, nothing;             /* s: the event before, what is no time behind it */
     double begin;                     /* s: from here on the last step has not been looked at */
-    double longest;                   /* s: step */
+    double longest, begun;            /* s: step; of the event that the run goes on from */
     double *t_end, *h_max;            /* of the method */
     double *largest;                  /* [observed] of values and terms, at points asked for */
     double small, still;              /* of `largest`: zero; of a magnitude: what a state moves by and has not jumped */

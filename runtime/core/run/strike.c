@@ -17,7 +17,6 @@
 #define UNSEEN_FLIGHT (16.0 * DBL_EPSILON) /* of the terms of a gap: a flight lower than that */
 #define REGULAR 1e-11 /* of its column: a pivot */
 #define STAYS 1e-14  /* of its magnitude, what an unknown is moved by that stays where it is */
-#define AT_ONCE 1e-2 /* of a step: what happens before that is of a dense output which knows nothing so near */
 
 /* The flow with which the gap opens again, 0 where it closes no more, or something else is at its zero too. */
 static double thrown_back(const sd_run *run, const sd_strike *strike)
@@ -95,8 +94,8 @@ int sd_strike_gap(sd_run *run, const sd_strike *strike, double t)
     sd_modes *m = run->modes;
     sd_system *system = strike->system, before = *system;
     const sd_contact *c = &m->contact[strike->contact];
-    double end = *run->stepper->t, back = thrown_back(run, strike);
-    if (back == 0.0 || t - run->t_from < AT_ONCE * (end - run->t_from))
+    double back = thrown_back(run, strike);
+    if (back == 0.0)
         return 0;
     system->held = strike->held.held;
     system->clear = strike->held.clear;
