@@ -78,6 +78,7 @@ class Handler:
         self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
         self.stalled, self.last = 0, -np.inf
         self.simple, self.struck, self.rounds = False, -1, list[Round]()
+        self._plain = all(c.kind in ("phi", "friction") and c.guard < 0 for c in plan.contacts)
         self._exact: list[int] = []
         self._sinking: set[int] = set()
         self.back(begin)
@@ -267,7 +268,8 @@ class Handler:
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
         self._sink(t, which)
         self.succession.blow = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
-        self.simple &= not self.succession.blow and not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
+        self.simple &= not (self.succession.blow and not (free and self._plain))
+        self.simple &= not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
         self.simple &= all(self.plan.contacts[k].kind != "phi" for k in touched)
         if not (changed or touched):
             return None
@@ -280,10 +282,9 @@ class Handler:
 
     def _bounced(self, k: int) -> bool:
         """Whether gap k has closed and opened again, and nothing holds."""
-        plan, impacts = self.plan.contacts, self.succession.impacts
-        plain = all(c.kind in ("phi", "friction") and c.guard < 0 for c in plan)
-        bounced = k >= 0 and impacts.closed == [k] and list(self.bounces) == [plan[k].value]
-        return plain and bounced and not self.contacts.active.any()
+        closed, contacts = self.succession.impacts.closed, self.plan.contacts
+        bounced = k >= 0 and closed == [k] and list(self.bounces) == [contacts[k].value]
+        return bounced and self._plain and not self.contacts.active.any()
 
     def _followed(self, t: float, point: Point) -> Point:
         """The point after the conditions that became true where the constraints were found anew."""

@@ -17,7 +17,7 @@ from sysdyn.runtime.events.handler import STALLED, Handler, Watched
 from sysdyn.runtime.events.kinks import WORDS
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.integrate.crossing import JUMP
-from sysdyn.runtime.integrate.strikes import Strike
+from sysdyn.runtime.integrate.strikes import Balance, of_momenta, struck
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN
 from sysdyn.runtime.start.restart import STILL
@@ -95,7 +95,7 @@ class Modes:
         self._states: list[Any] = []
         self._told: list[Told] = []
         self._tried: dict[str, int] = {}
-        self._strikes: dict[int, Strike] = {}
+        self._strikes: dict[int, Balance | None] = {}
         self._modes, self._transitions = (lib.Mode * 8)(), (lib.Transition * 16)()
         settled = [run.system, run.settler.system, *([run.projection.system] if run.projection else [])]
         self._systems = list({id(s): s for s in settled}.values())
@@ -295,7 +295,9 @@ class Modes:
         if begin < 0 or number >= MANY or not self._determined(t, point):
             return
         strike = None if handler.simple else self._strike(t, point)
-        if not (handler.simple or strike):
+        flows = any(a.kind == "flow" for r in handler.rounds for group in r.groups for a in group)
+        momenta = self._momenta(t, point) if flows else None
+        if not (handler.simple or strike) or momenta == 0:
             return
         end = self.stands()
         groups = tuple(group for r in handler.rounds for group in r.groups)
@@ -323,6 +325,7 @@ class Modes:
             sides=self._array(np.concatenate([flipped, *(r.sides for r in handler.rounds)])),
             entries=len(entries),
             strike=strike,
+            momenta=momenta,
         )
         self.core.transition = c.addressof(self._transitions)
         self._modes[begin].first = number
@@ -334,9 +337,20 @@ class Modes:
         if k < 0 or point is None:
             return None
         if k not in self._strikes:
-            self._strikes[k] = Strike(self.handler, k, t, *point)
+            self._strikes[k] = struck(self.handler, k, t, *point)
         one = self._strikes[k]
-        return c.addressof(one.core) if one.ready else None
+        return None if one is None else one.address
+
+    def _momenta(self, t: float, point: Any) -> int | None:
+        """The address of the rows that momenta follow from; None: the model has none, 0: they do not tell them."""
+        restart = self.handler.restart
+        assert restart is not None
+        if not (restart.settler.system.kinds == "p").any():
+            return None
+        if -1 not in self._strikes:
+            self._strikes[-1] = of_momenta(restart.settler.system, t, *point)
+        one = self._strikes[-1]
+        return 0 if one is None else one.address
 
     def _determined(self, t: float, point: Any) -> bool:
         """Whether the mode leaves nothing open at t (s)."""

@@ -70,6 +70,8 @@ static int assign(sd_run *run, const sd_transition *one, double t)
         }
         for (; a < one->end[r]; a++)
             (one->kind[a] ? m->y : m->p)[one->place[a]] = row[3 + 2 * a];
+        if (one->momenta && !sd_strike_momenta(run, one->momenta, t))
+            return 0;
         sd_landing_look(run, t, m->y, m->yd, m->values);
         if (!sd_mode_sides_fit(m, one->sides + (r + 1) * m->relations, one->sides + r * m->relations, m->values))
             return 0;

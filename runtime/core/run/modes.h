@@ -47,11 +47,11 @@ typedef struct sd_mode {
 typedef struct sd_strike {
     sd_system *system;
     struct sd_linear *linear;
-    int32_t contact, row, own;        /* the gap, its row of flows in the system, the column of its impulse */
+    int32_t contact, row, own;        /* the gap, its row of flows in the system, the column of its impulse; -1: none */
     int32_t n, moves;                 /* columns; the first ones are unknowns that move, the others impulses */
     const int32_t *unknown, *of_row, *integral; /* [n] unknown of a column, row of a row; 1: integrated over the instant */
     const int32_t *column, *row_of, *slot, *rated; /* [n + 1], [entries] */
-    sd_held held;                     /* of the system: this gap alone holds */
+    sd_held held;                     /* of the system: this gap alone holds; or as it was */
     double restitution;
     double *jy, *jyd, *r;             /* [entries], [rows] of the system */
     double *value, *scale, *x, *impulse; /* [entries], [n] */
@@ -65,7 +65,7 @@ typedef struct sd_transition {
     const int32_t *kind, *place, *read; /* [end of the last] 0: a parameter, 1: an unknown; place; row that it becomes */
     const double *sides;              /* [1 + rounds][relations] once what crossed has changed, and behind each round */
     int64_t entries;                  /* events that it counts as */
-    const sd_strike *strike;          /* an impact; NULL: none */
+    const sd_strike *strike, *momenta; /* an impact; momenta that follow from flows which are assigned; NULL: none */
 } sd_transition;
 
 /* rows as in events/plan.py; sense: place in p */

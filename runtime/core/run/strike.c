@@ -86,7 +86,12 @@ static int moved(sd_run *run, const sd_strike *strike, double t, double aim)
         if (fabs(m->y[k] - m->restart[k]) <= STAYS * run->settle->scale[k])
             m->y[k] = m->restart[k];
     }
-    return strike->impulse[strike->own] > 0.0;
+    return strike->own < 0 || strike->impulse[strike->own] > 0.0;
+}
+
+int sd_strike_momenta(sd_run *run, const sd_strike *momenta, double t)
+{
+    return moved(run, momenta, t, 0.0);
 }
 
 int sd_strike_gap(sd_run *run, const sd_strike *strike, double t)

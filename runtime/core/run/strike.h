@@ -9,6 +9,9 @@
  * terms are m->values and m->high; 0: it is not as simple, and m->y is no point. */
 int sd_strike_gap(sd_run *run, const sd_strike *strike, double t);
 
+/* m->y := the same with the momenta that its flows have; 0: that fails */
+int sd_strike_momenta(sd_run *run, const sd_strike *momenta, double t);
+
 /* What is in flight behind an event, from m->values there; strike NULL: no gap that is near zero.  1; 0: so low that the
  * method has to be told, and nothing has changed. */
 int sd_strike_throws(sd_run *run, const sd_strike *strike);

@@ -77,7 +77,7 @@ class Transition(c.Structure):
         *[(name, I) for name in ["to", "next", "crossed", "due", "rounds", "moves"]],
         *[(name, P) for name in ["which", "sample", "end", "kind", "place", "read", "sides"]],
         ("entries", L),
-        ("strike", P),
+        *[(name, P) for name in ["strike", "momenta"]],
     ]
 
 
