@@ -60,8 +60,8 @@ class Told:
         return found + [Happened(t, e.name, e.element, e.before, e.after) for e in self.entries]
 
 
-def _told(groups: Sequence[tuple[Assignment, ...]], entries: Sequence[Happened]) -> Told:
-    """groups: assignments of the first entries."""
+def told_of(groups: Sequence[tuple[Assignment, ...]], entries: Sequence[Happened]) -> Told:
+    """What a transition is called of which these are the entries; groups: assignments of the first of them."""
     assigns, k = [], 0
     for entry, group in zip(entries, groups, strict=False):
         said = ", ".join(f"{a.name.replace('%', '%%')} = %.9g" for a in group)
@@ -329,7 +329,7 @@ class Modes:
         )
         self.core.transition = c.addressof(self._transitions)
         self._modes[begin].first = number
-        self._told.append(_told(groups, entries))
+        self._told.append(told_of(groups, entries))
 
     def _strike(self, t: float, point: Any) -> int | None:
         """The address of the impact that has just been, where the core can do the like; None: it cannot."""

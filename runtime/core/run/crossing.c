@@ -10,7 +10,7 @@
 #define SAME 8.0         /* spacings of t within which two instants are one */
 #define FOLLOWED 6       /* points settled from an instant of the dense output as it is */
 #define CLOSER 3         /* of these, after which what is ENOUGH will do */
-#define ROUND_OFF 1e-15  /* of the largest value and terms of a row: it is no closer to zero */
+#define ROUND_OFF 1e-15  /* of the largest value and terms of a row, or of its flight: it is no closer to zero */
 #define ENOUGH 1e-3      /* of what counts as zero: what is watched may be past it by */
 #define WIDER 3.0        /* times the stretch before: the next one that is searched behind where it has been seen */
 
@@ -161,7 +161,9 @@ static int follow(sd_run *run, int32_t one, double low, double high, double *t)
     int32_t row = sd_mode_now(m)->row[one];
     double side = sd_mode_now(m)->side[one], level = sd_mode_level(m, row), value = side * m->low[row] - level;
     double before = low, at = *t, slope = -value / (at - low);
-    double enough = ENOUGH * sd_mode_zero(m, row);
+    int32_t flies = sd_mode_thrown(m, row);
+    double height = flies < 0 ? m->largest[row] : fmin(m->height[flies], m->largest[row]);
+    double enough = ENOUGH * fmin(sd_mode_zero(m, row), ENOUGH * height);
     if (!(value > 0.0 && at > low))
         return 0;
     for (int k = 0; k < FOLLOWED && low < at && at <= high; k++) {
@@ -169,7 +171,7 @@ static int follow(sd_run *run, int32_t one, double low, double high, double *t)
         sd_run_observe(run, at, m->values);
         value = side * m->values[row] - level;
         slope = k > 0 && at != before ? (value - last) / (at - before) : slope;
-        double exact = fmax(SAME * spacing(at) * fabs(slope), ROUND_OFF * m->largest[row]);
+        double exact = fmax(SAME * spacing(at) * fabs(slope), ROUND_OFF * height);
         if (value <= 0.0 && value >= -(k < CLOSER ? fmin(exact, enough) : enough)) {
             *t = at;
             return alone(m, one, m->values);

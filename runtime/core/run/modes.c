@@ -194,7 +194,8 @@ static int same(int32_t n, const int32_t *a, int32_t number, const int32_t *b)
 static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_t due)
 {
     sd_modes *m = run->modes;
-    if (m->logged >= m->room || (near_the_last(m, t) && (m->contacts || m->stalled >= m->chatters)))
+    const int near = near_the_last(m, t);
+    if (m->logged >= m->room || (near && m->stalled >= m->chatters))
         return NULL;
     for (int32_t k = sd_mode_now(m)->first; k >= 0; k = m->transition[k].next) {
         const sd_transition *one = &m->transition[k];
@@ -202,7 +203,7 @@ static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_
             continue;
         if (due == SD_JUMP ? one->due != SD_JUMP : !same(one->due, one->sample, due, m->which))
             continue;
-        if (one->entries > m->left)
+        if (one->entries > m->left || (near && m->contacts && one->moves))
             return NULL;
         if (!one->moves)
             sd_landing_enter(run, one->to);
