@@ -237,7 +237,7 @@ class Handler:
         flight and opened again, where that is all, else -1.
         """
         self._count(t)
-        free = not self.contacts.active.any()
+        free = self._free()
         self.simple, self.struck, self.rounds = True, -1, []
         said, stood = self._words(), self.kinks.state()
         self.kinks.anew()
@@ -281,10 +281,15 @@ class Handler:
         return point
 
     def _bounced(self, k: int) -> bool:
-        """Whether gap k has closed and opened again, and nothing holds."""
+        """Whether gap k has closed and opened again, and nothing holds that has impulses."""
         closed, contacts = self.succession.impacts.closed, self.plan.contacts
         bounced = k >= 0 and closed == [k] and list(self.bounces) == [contacts[k].value]
-        return bounced and self._plain and not self.contacts.active.any()
+        return bounced and self._plain and self._free()
+
+    def _free(self) -> bool:
+        """Whether nothing holds but dry friction, which has no impulses."""
+        pairs = zip(self.plan.contacts, self.contacts.active.tolist(), strict=True)
+        return not any(holds and (c.kind != "friction" or c.hold >= 0) for c, holds in pairs)
 
     def _followed(self, t: float, point: Point) -> Point:
         """The point after the conditions that became true where the constraints were found anew."""

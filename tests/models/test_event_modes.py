@@ -106,7 +106,7 @@ RELAY = """model m {
   when x >= 0.01 { u := -1; n := n + 1 }
   when x <= -0.01 { u := 1; n := n + 1 }
 }
-scene s of m { time 0 s to 2 s; trace x, n every 0.37 s }
+scene s of m { time 0 s to 2 s; trace x, n every 0.3713 s }
 """
 CASCADE = """model m {
   state x = 0
@@ -120,7 +120,7 @@ CASCADE = """model m {
   when n >= 3*(k + 1) { k := k + 1 }
   when k >= 2*(z + 1) { z := z + 1; x := x/2 }
 }
-scene s of m { time 0 s to 60 s; trace x, n, k, z every 0.37 s }
+scene s of m { time 0 s to 60 s; trace x, n, k, z every 0.3713 s }
 """
 FIRES = """model m {
   param tau = 10 ms
@@ -173,7 +173,7 @@ BALL = """model m {
 scene s of m { time 0 s to 20 s; trace x, n every 37 ms }
 """
 FLOOR = "phi floor: x >= 0 m restitution R"
-COUNTED = "when x >= 0.5 m { n := n + 1 } every 0.3 s { n := n + 10 }"
+COUNTED = "when x >= 0.5 m { n := n + 1 }\n  every 0.3 s { n := n + 10 }"
 TURNED = "when x <= 0 m { x' := -0.99*x'; n := n + 1 }"
 WALLS = """model m {
   coord x: translation = 0 m
@@ -232,14 +232,14 @@ MANY = {
     "samples": SAMPLES,
     "elastic": BALL.replace("WHAT", FLOOR.replace("R", "1")),
     "comes to rest": BALL.replace("WHAT", FLOOR.replace("R", "0.7")).replace("20 s", "5 s"),
-    "counted": BALL.replace("WHAT", f"{FLOOR.replace('R', '1')} {COUNTED}"),
+    "counted": BALL.replace("WHAT", f"{FLOOR.replace('R', '1')}\n  {COUNTED}"),
     "turned": BALL.replace("WHAT", TURNED),
     "walls": WALLS,
     "play": PLAY,
     "rod": ROD,
     "kicked": KICKED,
 }
-MOST_ASKED = 16
+MOST_ASKED = 20
 """Events of a run and its comparison that go to the handler: each kind is new once in each run, some sizes grow."""
 
 
@@ -247,7 +247,7 @@ MOST_ASKED = 16
 @pytest.mark.parametrize("name", list(MANY))
 def test_the_core_makes_what_the_handler_does(name, way, tmp_path, asked, monkeypatch):
     """Assignments, cascades at one instant, flows that are assigned, samples, impacts: instants, entries, values, steps."""
-    if way == "dopri" and "phi " in MANY[name] or way == "dopri" and "psi " in MANY[name]:
+    if way == "dopri" and any(word in MANY[name] for word in ("phi ", "psi ")):
         pytest.skip("constraints that hold at times")
     options = {"formulation": way} if way in ("hamiltonian", "kane") else {"method": way}
     one, two = both(MANY[name], tmp_path, monkeypatch, accuracy=1e-6, **options)
@@ -258,8 +258,7 @@ def test_the_core_makes_what_the_handler_does(name, way, tmp_path, asked, monkey
     assert [e.after.count("=") for e in one.events] == [e.after.count("=") for e in two.events]
     for quantity in one.names:
         assert np.abs(one[quantity].values - two[quantity].values).max() <= 1e-8 * two[quantity].nominal
-    for number in ("steps", "factorisations"):
-        assert one.statistics[number] == pytest.approx(two.statistics[number], rel=0.02, abs=20)
+    assert one.statistics["steps"] == pytest.approx(two.statistics["steps"], rel=0.02, abs=10)
     assert one.attributes["met"] == two.attributes["met"] == 1
 
 
@@ -268,8 +267,7 @@ def test_the_handler_is_asked_for_what_is_new(name, tmp_path, asked):
     file = tmp_path / "m.sd"
     file.write_text(MANY[name])
     trace = simulate(file, scene="s", output=tmp_path / "m.h5", accuracy=1e-6, method="radau")
-    assert asked[0] <= MOST_ASKED
-    assert len(trace.events) >= 1.2 * MOST_ASKED or name in ("kicked", "turned", "rod", "elastic", "play")
+    assert asked[0] <= min(MOST_ASKED, len(trace.events))  # of two runs or more
 
 
 def test_elastic_impacts_by_the_core_keep_their_energy(tmp_path, asked):
