@@ -1,7 +1,8 @@
 """What the core needs to know of a gap that closes in flight: the equations of its impulse (core/run/strike.c).
 
 They are those of start/instant.py, of unknowns that move and of impulses that act, where they are as many as these: no
-dry friction tells an impulse, and inertia leaves no flow open.  Momenta follow from flows that are assigned by rows alone.
+dry friction tells an impulse, and inertia leaves no flow open.  Momenta follow from flows that are assigned by their
+rows alone.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ Mask = NDArray[np.bool_]
 def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Balance | None:
     """The impulse of contact k, which alone holds, as at a point; None where the core cannot tell it."""
     assert handler.restart is not None
-    system, contact, multiplier = handler.restart.settler.system, handler.plan.contacts[k], handler.contacts.multiplier[k]
+    system, contact = handler.restart.settler.system, handler.plan.contacts[k]
     active = handler.contacts.active.copy()
     handler.contacts.active[:] = np.arange(active.size) == k
     handler.contacts.apply()
@@ -43,7 +44,8 @@ def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Balance
         family, position = handler.contacts.switches.places[contact.number]
         row = int(first["phi_rate", multiplier_row(system.description, family)]) + position
         found = Balance(system, (t, y, yd), (behind, system.of_groups("dynamics")), (system.are("f", "p", "e"), acts))
-        return found.of_gap(k, row, multiplier, contact.restitution) if found.ready else None
+        place = handler.contacts.multiplier[k]
+        return found.of_gap(k, row, place, contact.restitution) if found.ready else None
     finally:
         handler.contacts.active[:] = active
         handler.contacts.apply()
@@ -87,10 +89,10 @@ class Balance:
 
     def of_gap(self, k: int, row: int, multiplier: int, restitution: float) -> Balance | None:
         """The same of contact k: its row of flows, the place of its multiplier; None where that has no impulse."""
-        places = np.flatnonzero(self._columns == multiplier)
+        core, places = self.core, np.flatnonzero(self._columns == multiplier)
         if not places.size:
             return None
-        self.core.contact, self.core.row, self.core.own, self.core.restitution = k, row, int(places[0]), restitution
+        core.contact, core.row, core.own, core.restitution = k, row, int(places[0]), restitution
         return self
 
     @property

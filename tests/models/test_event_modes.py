@@ -246,7 +246,7 @@ MOST_ASKED = 20
 @pytest.mark.parametrize("way", ["radau", "bdf", "rosenbrock", "dopri", "hamiltonian", "kane"])
 @pytest.mark.parametrize("name", list(MANY))
 def test_the_core_makes_what_the_handler_does(name, way, tmp_path, asked, monkeypatch):
-    """Assignments, cascades at one instant, flows that are assigned, samples, impacts: instants, entries, values, steps."""
+    """Assignments, cascades, flows that are assigned, samples, impacts: instants, entries, values, steps."""
     if way == "dopri" and any(word in MANY[name] for word in ("phi ", "psi ")):
         pytest.skip("constraints that hold at times")
     options = {"formulation": way} if way in ("hamiltonian", "kane") else {"method": way}

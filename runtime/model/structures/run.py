@@ -84,7 +84,9 @@ class Transition(c.Structure):
 class Contact(c.Structure):
     """sd_contact."""
 
-    _fields_ = [(name, I) for name in ["kind", "value", "rate", "multiplier", "bound", "guard", "sense", "acceleration"]]
+    _fields_ = [
+        *[(name, I) for name in ["kind", "value", "rate", "multiplier", "bound", "guard", "sense", "acceleration"]],
+    ]
 
 
 class Kink(c.Structure):
@@ -117,7 +119,8 @@ class Modes(c.Structure):
         *[(name, D) for name in ["unknown_size", "round_off"]],
         *[(name, P) for name in ["rate", "y", "yd", "before", "before_d", "restart", "restart_d"]],
         *[(name, P) for name in ["values", "low", "high", "p_before", "p_after"]],
-        *[(name, P) for name in ["exact", "found", "which", "turning", "thrown", "level", "height", "flight", "fastest"]],
+        *[(name, P) for name in ["exact", "found", "which", "turning"]],
+        *[(name, P) for name in ["thrown", "level", "height", "flight", "fastest"]],
         *[(name, D) for name in ["rest", "faint"]],
         *[(name, P) for name in ["watch", "log"]],
         *[(name, L) for name in ["left", "stalled", "chatters"]],
