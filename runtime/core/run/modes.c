@@ -288,23 +288,34 @@ int sd_modes_event(sd_run *run)
     return state;
 }
 
-/* The relations that the text takes to their other side as it jumps to t, into m->which; -1: one is near zero.  Theirs are
- * the first watches of a mode.  m->low := the values before it */
-static int32_t turned(sd_run *run, double t)
+/* Whether a relation that has a side falls through zero where the last step ends, but for round-off; m->low: values there,
+ * m->high := those shortly before, where `looked` says that they are not there yet */
+static int met(sd_run *run, int32_t row, double side, int *looked)
+{
+    sd_modes *m = run->modes;
+    double t = *run->stepper->t, step = (t - run->t_from) / SHORTER;
+    if (!(fabs(m->low[row]) <= sd_mode_zero(m, row)) || step <= m->nothing)
+        return 0;
+    if (!*looked)
+        sd_run_observe(run, t - step, m->high);
+    *looked = 1;
+    double rate = side * (m->high[row] - m->low[row]) / step;
+    return rate > 0.0 && side * m->low[row] <= rate * m->nothing;
+}
+
+/* The relations that cross where the last step ends, into m->which; values: behind a jump of the text, which takes some to
+ * their other side, NULL: there is none.  Theirs are the first watches of a mode.  m->low: the values before it */
+static int32_t turned(sd_run *run, const double *values)
 {
     sd_modes *m = run->modes;
     const sd_mode *mode = sd_mode_now(m);
     int32_t found = 0;
-    sd_landing_look(run, *run->stepper->t, m->before, m->before_d, m->low);
-    sd_landing_look(run, t, m->before, m->before_d, m->values);
+    int looked = 0;
     for (int32_t k = 0, watch = 0; k < m->relations; k++) {
-        double value = m->values[m->relation_row[k]], small = sd_mode_zero(m, m->relation_row[k]);
-        if (!m->relation_moves[k])
-            continue;
-        if (mode->relation[k] != 0.0 && !(fabs(value) > small))
-            return -1;
-        for (int32_t sides = mode->relation[k] != 0.0 ? 1 : 2; sides; sides--, watch++)
-            if (mode->side[watch] * value < -small)
+        int32_t row = m->relation_row[k], sides = mode->relation[k] != 0.0 ? 1 : 2;
+        double small = sd_mode_zero(m, row);
+        for (int32_t i = 0; m->relation_moves[k] && i < sides; i++, watch++)
+            if ((values && mode->side[watch] * values[row] < -small) || (sides == 1 && met(run, row, mode->side[watch], &looked)))
                 m->which[found++] = watch;
     }
     return found;
@@ -329,6 +340,13 @@ static int32_t due_at(const sd_modes *m, double t)
     return due;
 }
 
+/* The transition of the samples due at t, as `taken` says it. */
+static const sd_transition *sampled(sd_run *run, double t)
+{
+    int32_t due = due_at(run->modes, t);
+    return taken(run, t, 0, due);
+}
+
 /* m->before := the end of the last step, to round-off */
 static void settle_end(sd_run *run)
 {
@@ -344,7 +362,8 @@ static int sample(sd_run *run, int32_t due)
     double t = *run->stepper->t, enough = run->settle->enough;
     run->settle->enough = 0.0;
     settle_end(run);
-    const sd_transition *one = taken(run, t, 0, due);
+    sd_landing_look(run, t, m->before, m->before_d, m->low);
+    const sd_transition *one = turned(run, NULL) ? NULL : sampled(run, t);
     run->settle->enough = enough;
     if (!one)
         return SD_FINISHED;
@@ -376,8 +395,10 @@ static int jump(sd_run *run)
         return SD_FINISHED;
     run->settle->enough = 0.0;
     settle_end(run);
-    int32_t crossed = turned(run, t);
-    const sd_transition *one = crossed < 0 ? NULL : taken(run, t, crossed, SD_JUMP);
+    sd_landing_look(run, *run->stepper->t, m->before, m->before_d, m->low);
+    sd_landing_look(run, t, m->before, m->before_d, m->values);
+    int32_t crossed = turned(run, m->values);
+    const sd_transition *one = taken(run, t, crossed, SD_JUMP);
     run->settle->enough = enough;
     if (!one)
         return SD_FINISHED;
