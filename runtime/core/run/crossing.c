@@ -8,8 +8,8 @@
 
 #define ITERATIONS 60    /* of Ridders' method */
 #define SAME 8.0         /* spacings of t within which two instants are one */
-#define FOLLOWED 6       /* points settled from an instant of the dense output as it is */
-#define CLOSER 3         /* of these, after which what is ENOUGH will do */
+#define FOLLOWED 8       /* points settled from an instant of the dense output as it is */
+#define CLOSER 6         /* of these, after which what is ENOUGH will do */
 #define ROUND_OFF 1e-15  /* of the largest value and terms of a row, or of its flight: it is no closer to zero */
 #define ENOUGH 1e-3      /* of what counts as zero: what is watched may be past it by */
 #define WIDER 3.0        /* times the stretch before: the next one that is searched behind where it has been seen */
