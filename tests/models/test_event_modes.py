@@ -224,7 +224,17 @@ model m {
 }
 scene s of m { time 0 s to 20 s; trace x.q as x, n every 37 ms }
 """
+TWISTS = """model m {
+  coord x: translation = 1 m
+  energy T* = 1/2*(1 kg)*x'^2
+  work -2 N*sign(x) on x
+  content D = 1 N*abs(x')
+  init x' = 0 m/s
+}
+scene s of m { time 0 s to 6 s; trace x, x' as v every 20 ms }
+"""
 MANY = {
+    "twists": TWISTS,
     "relay": RELAY,
     "cascade": CASCADE,
     "fires": FIRES,
@@ -249,17 +259,20 @@ MOST_ASKED = 20
 @pytest.mark.parametrize("name", list(MANY))
 def test_the_core_makes_what_the_handler_does(name, way, tmp_path, asked, monkeypatch):
     """Assignments, cascades, flows that are assigned, samples, impacts: instants, entries, values, steps."""
-    if way == "dopri" and any(word in MANY[name] for word in ("phi ", "psi ")):
+    if way == "dopri" and any(word in MANY[name] for word in ("phi ", "psi ", "abs(")):
         pytest.skip("constraints that hold at times")
+    if (name, way) == ("twists", "bdf"):
+        pytest.skip("chatters behind its Zeno point: runtime/events/README.md")
     options = {"formulation": way} if way in ("hamiltonian", "kane") else {"method": way}
     one, two = both(MANY[name], tmp_path, monkeypatch, accuracy=1e-6, **options)
     assert [(e.name, e.element) for e in one.events] == [(e.name, e.element) for e in two.events]
     assert len(one.events) >= 5
+    same = SAME.get(name, 1e-10)
     span = one.time[-1] - one.time[0]
-    assert max(abs(a.time - b.time) for a, b in zip(one.events, two.events, strict=True)) <= SAME.get(name, 1e-10) * span
+    assert max(abs(a.time - b.time) for a, b in zip(one.events, two.events, strict=True)) <= same * span
     assert [e.after.count("=") for e in one.events] == [e.after.count("=") for e in two.events]
     for quantity in one.names:
-        assert np.abs(one[quantity].values - two[quantity].values).max() <= 1e-8 * two[quantity].nominal
+        assert np.abs(one[quantity].values - two[quantity].values).max() <= 100.0 * same * two[quantity].nominal
     assert one.statistics["steps"] == pytest.approx(two.statistics["steps"], rel=0.02, abs=10)
     assert one.attributes["met"] == two.attributes["met"] == 1
 
@@ -290,3 +303,20 @@ scene s of m { time 0 s to 1000 s; trace x, x' as v every 37 ms }
     assert np.abs(np.array([e.time for e in trace.events]) - (2 * k + 1) * 0.05).max() < 1e-9
     assert np.abs(np.abs(trace["v"].values) - 1.0).max() < 1e-12
     assert asked[0] < 100
+
+
+@pytest.mark.parametrize("method", ["radau", "rosenbrock"])
+def test_what_twists_into_its_zero_rests_there(method, tmp_path):
+    """Each half turn takes a third of the way, and the root of a third of the time, of the one before: a finite sum."""
+    file = tmp_path / "m.sd"
+    file.write_text(TWISTS)
+    trace = simulate(file, scene="s", output=tmp_path / "m.h5", method=method)
+    first = np.sqrt(2.0) * (1.0 + 1.0 / 3.0)
+    end = first / (1.0 - np.sqrt(1.0 / 3.0))
+    turns = [e.time for e in trace.events if e.name.startswith("content")]
+    exact = [first * (1.0 - 3.0 ** (-k / 2.0)) / (1.0 - 3.0**-0.5) for k in range(1, 11)]
+    assert np.abs(np.array(turns[:10]) - exact).max() < 1e-6
+    late = trace.time > end + 1e-3
+    assert np.abs(trace["x"].values[late]).max() < 1e-6
+    assert np.abs(trace["v"].values[late]).max() < 1e-6
+    assert len(trace.events) < 60

@@ -71,6 +71,8 @@ static int kink_fits(const sd_modes *m, const sd_kink *k, const double *v)
         return fabs(v[k->value]) <= small && (k->rate < 0 || fabs(v[k->rate]) <= sd_mode_zero(m, k->rate));
     if (branch * v[k->value] > small)
         return 1;
+    if (k->jumps && branch == m->p_before[k->branch]) /* it has not crossed zero, and is there */
+        return 0;
     return branch * v[k->value] >= -small && (k->rate < 0 || branch * v[k->rate] >= -sd_mode_zero(m, k->rate));
 }
 

@@ -74,7 +74,8 @@ typedef struct sd_contact {
 } sd_contact;
 
 typedef struct sd_kink {
-    int32_t branch, value, rate, above, below, inner; /* inner: coordinates move it, and nothing is supplied at its zero */
+    int32_t branch, value, rate, above, below;
+    int32_t inner, jumps;             /* coordinates move it, and nothing is supplied at its zero; it may rest there */
 } sd_kink;
 
 /* A smooth piece of the text (s); label: of the row in which it begins. */

@@ -92,7 +92,7 @@ class Contact(c.Structure):
 class Kink(c.Structure):
     """sd_kink."""
 
-    _fields_ = [(name, I) for name in ["branch", "value", "rate", "above", "below", "inner"]]
+    _fields_ = [(name, I) for name in ["branch", "value", "rate", "above", "below", "inner", "jumps"]]
 
 
 class Piece(c.Structure):
