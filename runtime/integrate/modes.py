@@ -134,8 +134,8 @@ class Modes:
             rows = one.value, one.rate, one.multiplier, one.bound, one.guard, one.sense, one.acceleration
             contacts[k] = lib.Contact(KINDS["follows" if k in handler.contacts.frozen else one.kind], *rows)
         for k, kink in enumerate(plan.kinks):
-            rows = kink.branch, kink.value, kink.rate, kink.above, kink.below
-            kinks[k] = lib.Kink(*rows, kink.inner, kink.jumps)
+            functions = kink.branch, kink.value, kink.rate, kink.above, kink.below
+            kinks[k] = lib.Kink(*functions, kink.inner, kink.jumps)
         pieces = (lib.Piece * len(self.run.segments))(*(lib.Piece(s.begin, s.end, s.label) for s in self.run.segments))
         systems = (c.c_void_p * len(self._systems))(*(c.addressof(s.core) for s in self._systems))
         self._keep += [contacts, kinks, systems, pieces]

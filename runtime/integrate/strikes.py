@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.handler import Handler
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.model.system import System
@@ -111,8 +111,10 @@ class Balance:
         pattern, (slots,) = compress(n, n, [Places(i[take], j[take])])
         slot, which = np.zeros((2, pattern.entries), dtype=np.int32)
         slot[slots], which[slots] = entries[take], rated[take]
-        integers: list[Ints] = [columns, own, integral, pattern.column, pattern.row, slot, which]
-        integers = [np.ascontiguousarray(item, dtype=np.int32) for item in integers]
+        integers = [
+            np.ascontiguousarray(item, dtype=np.int32)
+            for item in (columns, own, integral, pattern.column, pattern.row, slot, which)
+        ]
         sizes = [system.pattern.entries, system.pattern.entries, system.rows, pattern.entries, n, n, n]
         room = [np.zeros(size + 8) for size in sizes]
         names = ["unknown", "of_row", "integral", "column", "row_of", "slot", "rated"]
