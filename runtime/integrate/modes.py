@@ -225,7 +225,7 @@ class Modes:
     def _throw(self) -> None:
         """The core has the gaps in flight as the handler does."""
         thrown, level, height, flight = self._flights()
-        thrown[:] = 0
+        thrown[:], self.core.flying = 0, len(self.handler.bounces)
         for k, contact in enumerate(self.handler.plan.contacts):
             bounce = self.handler.bounces.get(contact.value)
             if bounce is not None:

@@ -17,7 +17,7 @@ static inline double sd_mode_zero(const sd_modes *m, int32_t row)
 /* the gap in flight whose value a row is, -1: none */
 static inline int32_t sd_mode_thrown(const sd_modes *m, int32_t row)
 {
-    for (int32_t k = 0; k < m->contacts; k++)
+    for (int32_t k = 0; k < m->contacts && m->flying; k++)
         if (m->thrown[k] && m->contact[k].value == row)
             return k;
     return -1;

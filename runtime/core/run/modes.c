@@ -314,9 +314,11 @@ static int32_t turned(sd_run *run, const double *values)
     for (int32_t k = 0, watch = 0; k < m->relations; k++) {
         int32_t row = m->relation_row[k], sides = mode->relation[k] != 0.0 ? 1 : 2;
         double small = sd_mode_zero(m, row);
-        for (int32_t i = 0; m->relation_moves[k] && i < sides; i++, watch++)
-            if ((values && mode->side[watch] * values[row] < -small) || (sides == 1 && met(run, row, mode->side[watch], &looked)))
+        for (int32_t i = 0; m->relation_moves[k] && i < sides; i++, watch++) {
+            int32_t side = mode->side[watch];
+            if ((values && side * values[row] < -small) || (sides == 1 && met(run, row, side, &looked)))
                 m->which[found++] = watch;
+        }
     }
     return found;
 }
@@ -340,13 +342,6 @@ static int32_t due_at(const sd_modes *m, double t)
     return due;
 }
 
-/* The transition of the samples due at t, as `taken` says it. */
-static const sd_transition *sampled(sd_run *run, double t)
-{
-    int32_t due = due_at(run->modes, t);
-    return taken(run, t, 0, due);
-}
-
 /* m->before := the end of the last step, to round-off */
 static void settle_end(sd_run *run)
 {
@@ -363,7 +358,7 @@ static int sample(sd_run *run, int32_t due)
     run->settle->enough = 0.0;
     settle_end(run);
     sd_landing_look(run, t, m->before, m->before_d, m->low);
-    const sd_transition *one = turned(run, NULL) ? NULL : sampled(run, t);
+    const sd_transition *one = turned(run, NULL) ? NULL : taken(run, t, 0, due_at(m, t));
     run->settle->enough = enough;
     if (!one)
         return SD_FINISHED;

@@ -122,7 +122,7 @@ typedef struct sd_modes {
     int32_t *thrown;                  /* [contacts] 1: an impact has opened the gap, which is in flight (events/bounces.py) */
     double *level, *height, *flight;  /* [contacts] of these: value at which it begins, what it rises to, s: its time */
     double *fastest;                  /* [contacts] speed at which each gap closed at most */
-    double rest, faint;               /* of it: a slower impact is the last; of `largest`: of a lower flight the method is told */
+    double rest, faint;               /* of it: a slower impact is the last; of `largest`: lower flights are the handler's */
     sd_watch *watch;                  /* [watches] */
     double *log;                      /* [room][width] t, transition, before and after of what was assigned; t, -1 - kink
                                        * and its branches */
@@ -130,7 +130,7 @@ typedef struct sd_modes {
                                        * that they never end */
     double differs;                   /* of its size: what a value differs by that has jumped */
     int32_t pieces, at;               /* number of the present piece */
-    int32_t struck;                   /* the contact that is thrown by the event at hand, -1: none */
+    int32_t struck, flying;           /* the contact that is thrown by the event at hand, -1: none; how many are thrown */
     int32_t width, room, logged, waits; /* waits: an event has no room for its rows yet */
 } sd_modes;
 

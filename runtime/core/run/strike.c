@@ -25,9 +25,11 @@ static double thrown_back(const sd_run *run, const sd_strike *strike)
     const sd_contact *c = &m->contact[strike->contact];
     const double *v = m->values;
     double speed = v[c->rate], back = -strike->restitution * speed, *fastest = &m->fastest[strike->contact];
-    for (int32_t k = 0; k < m->contacts; k++)
-        if (k != strike->contact && m->contact[k].kind == SD_PHI && v[m->contact[k].value] <= sd_mode_zero(m, m->contact[k].value))
+    for (int32_t k = 0; k < m->contacts; k++) {
+        int32_t row = m->contact[k].value;
+        if (k != strike->contact && m->contact[k].kind == SD_PHI && v[row] <= sd_mode_zero(m, row))
             return 0.0;
+    }
     for (int32_t k = 0; k < m->relations; k++)
         if (m->relation_moves[k] && fabs(v[m->relation_row[k]]) <= sd_mode_zero(m, m->relation_row[k]))
             return 0.0;
@@ -128,6 +130,7 @@ int sd_strike_throws(sd_run *run, const sd_strike *strike)
     sd_modes *m = run->modes;
     if (!strike) {
         memset(m->thrown, 0, (size_t)m->contacts * sizeof *m->thrown);
+        m->flying = 0;
         return 1;
     }
     int32_t k = strike->contact;
@@ -138,7 +141,7 @@ int sd_strike_throws(sd_run *run, const sd_strike *strike)
     if (height < m->faint * m->largest[c->value])
         return 0;
     memset(m->thrown, 0, (size_t)m->contacts * sizeof *m->thrown);
-    m->thrown[k] = 1;
+    m->thrown[k] = m->flying = 1;
     m->level[k] = fmin(m->values[c->value], 0.0);
     m->height[k] = height;
     m->flight[k] = back ? 2.0 * speed / pull : INFINITY;

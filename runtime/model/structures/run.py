@@ -125,7 +125,7 @@ class Modes(c.Structure):
         *[(name, P) for name in ["watch", "log"]],
         *[(name, L) for name in ["left", "stalled", "chatters"]],
         ("differs", D),
-        *[(name, I) for name in ["pieces", "at", "struck"]],
+        *[(name, I) for name in ["pieces", "at", "struck", "flying"]],
         *[(name, I) for name in ["width", "room", "logged", "waits"]],
     ]
 
