@@ -30,7 +30,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.values import dataclass
 
-__all__ = ["Handler", "Point", "Watched"]
+__all__ = ["STALLED", "Handler", "Point", "Watched"]
 
 CASCADE = 100
 """Rounds of events at one instant: more will never end."""
@@ -76,8 +76,9 @@ class Handler:
         self.bounces: dict[int, Bounce] = {}
         self.happened: list[Happened] = []
         self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
-        self._stalled, self.last = 0, -np.inf
-        self.simple, self.rounds = False, list[Round]()
+        self.stalled, self.last = 0, -np.inf
+        self.simple, self.struck, self.rounds = False, -1, list[Round]()
+        self._plain = all(c.kind in ("phi", "friction") and c.guard < 0 for c in plan.contacts)
         self._exact: list[int] = []
         self._sinking: set[int] = set()
         self.back(begin)
@@ -105,10 +106,9 @@ class Handler:
         if self.restart is not None:
             self.restart.settler.core.contents.ready = 0
 
-    def caught_up(self, t: float) -> None:
-        """The core has been in charge, until an event at t (s)."""
-        if t > self.last:
-            self._stalled, self.last = 0, t
+    def caught_up(self, t: float, stalled: int) -> None:
+        """The core has been in charge, until an event at t (s), which is as many in a row within no time."""
+        self.stalled, self.last = stalled, t
 
     def stands(self, which: Sequence[Watched]) -> bool:
         """Whether kinks alone were crossed since `before`, and every branch is what it was."""
@@ -233,10 +233,12 @@ class Handler:
     ) -> Point | None:
         """The point after everything that happens at t; None where nothing changes.  which: of the watched.
 
-        rounds, simple: what is assigned, and whether that is all, and without an impact.
+        rounds, simple: what is assigned, and whether that is all, and without an impact; struck: the gap that closed in
+        flight and opened again, where that is all, else -1.
         """
         self._count(t)
-        self.simple, self.rounds = not self.bounces, []
+        free = self._free()
+        self.simple, self.struck, self.rounds = True, -1, []
         said, stood = self._words(), self.kinks.state()
         self.kinks.anew()
         crossed = [w.relation for w in which if w.relation >= 0]
@@ -266,13 +268,28 @@ class Handler:
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
         self._sink(t, which)
         self.succession.blow = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
-        self.simple &= not self.succession.blow and not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
+        self.simple &= not (self.succession.blow and not (free and self._plain))
+        self.simple &= not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
         self.simple &= all(self.plan.contacts[k].kind != "phi" for k in touched)
         if not (changed or touched):
             return None
+        self.struck = touched[0] if free and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
+        self.struck = self.struck if self._bounced(self.struck) else -1
+        self.simple &= not self.bounces
         self.happened += self.kinks.happened(t, stood)
         return point
+
+    def _bounced(self, k: int) -> bool:
+        """Whether gap k has closed and opened again, and nothing holds that has impulses."""
+        closed, contacts = self.succession.impacts.closed, self.plan.contacts
+        bounced = k >= 0 and closed == [k] and list(self.bounces) == [contacts[k].value]
+        return bounced and self._plain and self._free()
+
+    def _free(self) -> bool:
+        """Whether nothing holds but dry friction, which has no impulses."""
+        pairs = zip(self.plan.contacts, self.contacts.active.tolist(), strict=True)
+        return not any(holds and (c.kind != "friction" or c.hold >= 0) for c, holds in pairs)
 
     def _followed(self, t: float, point: Point) -> Point:
         """The point after the conditions that became true where the constraints were found anew."""
@@ -280,7 +297,7 @@ class Handler:
             fired = self._risen(())
             if not fired:
                 return point
-            self.simple, said = False, self._words()
+            self.simple, self.struck, said = False, -1, self._words()
             y = self._assign(t, *point, [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired])
             self._renew(t, y, point[1])
             point = self.settled(t, y, point[1], said)
@@ -299,9 +316,10 @@ class Handler:
 
     def anew(self, t: float, y: Floats, yd: Floats) -> Point:
         """The point behind an instant at which the text jumps, and behind the conditions that become true by it."""
-        self.simple, self.rounds, stood = not self.bounces, [], self.kinks.state()
+        self.simple, self.struck, self.rounds, stood = True, -1, [], self.kinks.state()
         self.kinks.anew()
         point = self._followed(t, self.settled(t, y, yd, self._words()))
+        self.simple &= not self.bounces
         self.happened += self.kinks.happened(t, stood)
         return point
 
@@ -319,7 +337,7 @@ class Handler:
             self._renew(t, *found)
             return found
         try:
-            found, anew = self.succession.after(t, y, yd, touched, stalled=self._stalled > 0)
+            found, anew = self.succession.after(t, y, yd, touched, stalled=self.stalled > 0)
         except NoActiveSetError as error:
             drives = self.succession.driving(t, y, yd)
             cause = "complementarity" if drives is None else "drives"
@@ -409,8 +427,8 @@ class Handler:
 
     def _count(self, t: float) -> None:
         near = t - self.last <= self.nothing
-        self._stalled, self.last = (self._stalled + 1 if near else 0), t
-        if self._stalled > STALLED:
+        self.stalled, self.last = (self.stalled + 1 if near else 0), t
+        if self.stalled > STALLED:
             raise SolverFailure("chatter", t, 0.0, self._names())
         if self.plan.limit is not None and len(self.happened) > self.plan.limit:
             raise SolverFailure("max_events", t, 0.0, self._names())

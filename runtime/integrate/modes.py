@@ -12,10 +12,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sysdyn.runtime.events.handler import Handler, Watched
+from sysdyn.runtime.events.bounces import Bounce
+from sysdyn.runtime.events.handler import STALLED, Handler, Watched
 from sysdyn.runtime.events.kinks import WORDS
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.integrate.crossing import JUMP
+from sysdyn.runtime.integrate.strikes import Balance, of_momenta, struck
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN
 from sysdyn.runtime.start.restart import STILL
@@ -34,27 +36,39 @@ AGAIN = 3
 LOG = 1024
 """Events between two looks at them."""
 UNLIMITED = 1 << 62
+UNSEEN = 100.0
+"""Times a run's tolerance: of a bounce that rises less, the error test of the bdf hardly sees that it falls."""
 JUMPS = -1
 """Samples due where the text jumps (core/run/modes.h)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What a transition is called: its assignments, event by event, and its entries as they were."""
+    """What a transition is called: name, element, what is said (before and after alike, but for numbers), which numbers
+    of each entry that assigns; the other entries as they were.
+    """
 
-    groups: tuple[tuple[Assignment, ...], ...]
+    assigns: tuple[tuple[str, str, str, slice, slice], ...]
     entries: tuple[Happened, ...]
 
     def at(self, t: float, values: Sequence[float]) -> list[Happened]:
         """The entries at t (s); values: before and after of each assignment."""
-        found, k = [], 0
-        for entry, group in zip(self.entries, self.groups, strict=False):
-            pairs = [(a.name, values[2 * (k + i)], values[2 * (k + i) + 1]) for i, a in enumerate(group)]
-            before, after = (", ".join(f"{p[0]} = {p[side]:.9g}" for p in pairs) for side in (1, 2))
-            found.append(Happened(t, entry.name, entry.element, before, after))
-            k += len(group)
-        rest = self.entries[len(self.groups) :]
-        return found + [Happened(t, e.name, e.element, e.before, e.after) for e in rest]
+        found = [
+            Happened(t, name, element, said % tuple(values[before]), said % tuple(values[after]))
+            for name, element, said, before, after in self.assigns
+        ]
+        return found + [Happened(t, e.name, e.element, e.before, e.after) for e in self.entries]
+
+
+def told_of(groups: Sequence[tuple[Assignment, ...]], entries: Sequence[Happened]) -> Told:
+    """What a transition is called of which these are the entries; groups: assignments of the first of them."""
+    assigns, k = [], 0
+    for entry, group in zip(entries, groups, strict=False):
+        said = ", ".join(f"{a.name.replace('%', '%%')} = %.9g" for a in group)
+        end = k + 2 * len(group)
+        assigns.append((entry.name, entry.element, said, slice(k, end, 2), slice(k + 1, end, 2)))
+        k = end
+    return Told(tuple(assigns), tuple(entries[len(assigns) :]))
 
 
 def serves(plan: Plan, run: Integration) -> bool:
@@ -81,12 +95,14 @@ class Modes:
         self._states: list[Any] = []
         self._told: list[Told] = []
         self._tried: dict[str, int] = {}
+        self._strikes: dict[int, Balance | None] = {}
         self._modes, self._transitions = (lib.Mode * 8)(), (lib.Transition * 16)()
         settled = [run.system, run.settler.system, *([run.projection.system] if run.projection else [])]
         self._systems = list({id(s): s for s in settled}.values())
         self._fixed = [k.sense for k in plan.contacts if k.sense >= 0] + [k.branch for k in plan.kinks]
         self._fixed += [k.hold for k in plan.contacts if k.hold >= 0]
         self.core = lib.Modes(now=-1, last=-np.inf, begin=run.start.t, longest=longest, left=UNLIMITED)
+        self.core.chatters = STALLED
         self._sizes(plan)
         self._plan(plan)
         self._run()
@@ -115,10 +131,11 @@ class Modes:
         core.relation_moves = self._array([r.moves for r in plan.relations], np.int32)
         contacts, kinks = (lib.Contact * max(len(plan.contacts), 1))(), (lib.Kink * max(len(plan.kinks), 1))()
         for k, one in enumerate(plan.contacts):
-            rows = one.value, one.rate, one.multiplier, one.bound, one.guard, one.sense
+            rows = one.value, one.rate, one.multiplier, one.bound, one.guard, one.sense, one.acceleration
             contacts[k] = lib.Contact(KINDS["follows" if k in handler.contacts.frozen else one.kind], *rows)
         for k, kink in enumerate(plan.kinks):
-            kinks[k] = lib.Kink(kink.branch, kink.value, kink.rate, kink.above, kink.below, kink.inner)
+            functions = kink.branch, kink.value, kink.rate, kink.above, kink.below
+            kinks[k] = lib.Kink(*functions, kink.inner, kink.jumps)
         pieces = (lib.Piece * len(self.run.segments))(*(lib.Piece(s.begin, s.end, s.label) for s in self.run.segments))
         systems = (c.c_void_p * len(self._systems))(*(c.addressof(s.core) for s in self._systems))
         self._keep += [contacts, kinks, systems, pieces]
@@ -137,7 +154,7 @@ class Modes:
         core.log = lib.pointer(self._log)
 
     def _run(self) -> None:
-        core, run, method = self.core, self.run, self.run.method.contents
+        core, run, method, plan = self.core, self.run, self.run.method.contents, self.handler.plan
         extended = max(run.system.unknowns, run.system.form.extended) + 8
         core.still, core.unknown_size, core.round_off = STILL, UNKNOWN, ROUND_OFF
         core.state = self._array(run.roles.state[: run.system.form.written], np.int32)
@@ -152,6 +169,12 @@ class Modes:
             setattr(core, name, self._array(np.zeros(run.driver.observed + 1)))
         for name in ("p_before", "p_after"):
             setattr(core, name, self._array(np.zeros(core.parameters + 1)))
+        contacts = core.contacts
+        core.thrown = self._array(np.zeros(contacts), np.int32)
+        for name in ("level", "height", "flight"):
+            setattr(core, name, self._array(np.zeros(contacts)))
+        core.fastest, core.rest, core.struck = lib.pointer(self.handler.succession.impacts.fastest), plan.rest, -1
+        core.faint = UNSEEN * run.request.rtol if run.request.method == "bdf" else 0.0
         core.exact = self._array(np.zeros(core.relations + 1), np.int32)
         core.turning = self._array(np.zeros(core.kinks + 1), np.int32)
         core.own.value = self._array(np.zeros(core.places + 1))
@@ -180,10 +203,33 @@ class Modes:
             side, truth, contacts = self._states[number]
             handler.side[:], handler.truth = side, list(truth)
             handler.contacts.become(contacts)
-            handler.caught_up(core.last)
+            handler.caught_up(core.last, core.stalled)
+            handler.bounces = self._bounces()
         if core.now == lib.OWN:
             self.stands()
         return some
+
+    def _flights(self) -> list[Any]:
+        """Views of thrown, level, height, flight [contacts]."""
+        core = self.core
+        number = max(core.contacts, 1)
+        thrown = np.frombuffer((c.c_int32 * number).from_address(core.thrown), dtype=np.int32)
+        return [thrown, *(lib.reader(at, number) for at in (core.level, core.height, core.flight))]
+
+    def _bounces(self) -> dict[int, Bounce]:
+        """The gaps in flight, as the handler has them."""
+        thrown, *about = self._flights()
+        contacts = self.handler.plan.contacts
+        return {contacts[k].value: Bounce(*(float(a[k]) for a in about)) for k in np.flatnonzero(thrown).tolist()}
+
+    def _throw(self) -> None:
+        """The core has the gaps in flight as the handler does."""
+        thrown, level, height, flight = self._flights()
+        thrown[:], self.core.flying = 0, len(self.handler.bounces)
+        for k, contact in enumerate(self.handler.plan.contacts):
+            bounce = self.handler.bounces.get(contact.value)
+            if bounce is not None:
+                thrown[k], level[k], height[k], flight[k] = 1, bounce.level, bounce.height, bounce.flight
 
     def _turned(self, row: Sequence[float]) -> list[Happened]:
         """The entry of a law whose branch the core turned: time (s), -1 - its number, its branches."""
@@ -194,10 +240,11 @@ class Modes:
         """The number of the handler's present mode, which the core is in from now on; -1: one too many."""
         core, handler = self.core, self.handler
         key = handler.side.tobytes(), tuple(handler.truth), handler.contacts.state(), tuple(handler.kinks.state())
-        core.last = handler.last
+        core.last, core.stalled = handler.last, handler.stalled
         limit = handler.plan.limit
         core.left = UNLIMITED if limit is None else limit - len(handler.happened)
-        usual = not handler.bounces and not handler.contacts.barred.any()
+        self._throw()
+        usual = not handler.contacts.barred.any()
         core.now = self._mode(key) if usual else -1
         return int(core.now)
 
@@ -246,7 +293,12 @@ class Modes:
         """
         (crossed, due), (flipped, point, before) = what, moved
         handler, number = self.handler, len(self._told)
-        if begin < 0 or number >= MANY or not handler.simple or not self._determined(t, point):
+        if begin < 0 or number >= MANY or not self._determined(t, point):
+            return
+        strike = None if handler.simple else self._strike(t, point)
+        flows = any(a.kind == "flow" for r in handler.rounds for group in r.groups for a in group)
+        momenta = self._momenta(t, point) if flows else None
+        if not (handler.simple or strike) or momenta == 0:
             return
         end = self.stands()
         groups = tuple(group for r in handler.rounds for group in r.groups)
@@ -273,10 +325,33 @@ class Modes:
             end=self._array(ends, np.int32),
             sides=self._array(np.concatenate([flipped, *(r.sides for r in handler.rounds)])),
             entries=len(entries),
+            strike=strike,
+            momenta=momenta,
         )
         self.core.transition = c.addressof(self._transitions)
         self._modes[begin].first = number
-        self._told.append(Told(groups, entries))
+        self._told.append(told_of(groups, entries))
+
+    def _strike(self, t: float, point: Any) -> int | None:
+        """The address of the impact that has just been, where the core can do the like; None: it cannot."""
+        k = self.handler.struck
+        if k < 0 or point is None:
+            return None
+        if k not in self._strikes:
+            self._strikes[k] = struck(self.handler, k, t, *point)
+        one = self._strikes[k]
+        return None if one is None else one.address
+
+    def _momenta(self, t: float, point: Any) -> int | None:
+        """The address of the rows that momenta follow from; None: the model has none, 0: they do not tell them."""
+        restart = self.handler.restart
+        assert restart is not None
+        if not (restart.settler.system.kinds == "p").any():
+            return None
+        if -1 not in self._strikes:
+            self._strikes[-1] = of_momenta(restart.settler.system, t, *point)
+        one = self._strikes[-1]
+        return 0 if one is None else one.address
 
     def _determined(self, t: float, point: Any) -> bool:
         """Whether the mode leaves nothing open at t (s)."""

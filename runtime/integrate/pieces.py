@@ -18,7 +18,7 @@ from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.crossing import go_on
 from sysdyn.runtime.integrate.driver import Sink
-from sysdyn.runtime.integrate.modes import Modes, serves
+from sysdyn.runtime.integrate.modes import UNSEEN, Modes, serves
 from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.integrate.round_off import left_open
 from sysdyn.runtime.integrate.segments import Segment
@@ -29,8 +29,6 @@ from sysdyn.runtime.model.scales import group_maxima
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
 
-UNSEEN = 100.0
-"""Times a run's tolerance: of a bounce that rises less, the error test of the bdf hardly sees that it falls."""
 PARTS = 8
 """Steps at least that such a bounce takes (radau and dopri follow a parabola in one), or after one that misled."""
 
@@ -184,7 +182,7 @@ class Pieces:
         self.handler.before = self.handler.now()
         if stepper.refine:
             _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
-        end, begun = method.t, core.t_from == self._begun
+        end, begun = method.t, core.t_from == (self._begun if self.modes is None else self.modes.core.begun)
         begin = max(self._from, min(core.t_clear, end))
         reach = core.t_seen
         while True:
@@ -266,6 +264,8 @@ class Pieces:
         core.start_kind = TRACE
         self._bounce(t)
         self._begun = t
+        if self.modes is not None:
+            self.modes.core.begun = t
         if misled:
             self._short(t, misled)
         self.leave(*before)

@@ -27,6 +27,7 @@ from sysdyn.runtime.model.structures.run import (
     Run,
     RunClaim,
     RunSamples,
+    Strike,
     Transition,
     Watch,
 )
@@ -112,6 +113,7 @@ __all__ = [
     "Span",
     "Stepper",
     "Straight",
+    "Strike",
     "System",
     "Transition",
     "Underlying",

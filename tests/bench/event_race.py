@@ -6,6 +6,9 @@ diode into a capacitor and a resistor; it follows the sine until the current tur
 these closed forms, the largest at 200 instants over the largest value.  CPU: ours `cpu_integrate_s` of `--accuracy`
 (all runs of the control); Siconos the time stepping alone; ngspice its process less that of an empty deck.  Printed:
 every run, then the least CPU at which each meets an error.  A peer that is not installed is said to be missing.
+
+Then what an event costs: events of one kind, and little between them, with the core's transitions and impacts and with
+the handler asked for every one; CPU of all runs of the control over the events of the trace.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 from sysdyn.api import simulate
+from sysdyn.runtime.integrate import pieces
 
 SAMPLES = 200
 WANTED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
@@ -75,6 +79,48 @@ R1 a 0 50
 """,
 }
 SPAN = {"bridge": 5e-3, "rectifier": 0.1}
+PLAIN = {
+    "assignments": """model m {
+  state x = 0
+  discrete u = 1
+  discrete n = 0
+  dynamic x' = u/(1 s)
+  when x >= 0.01 { u := -1; n := n + 1 }
+  when x <= -0.01 { u := 1; n := n + 1 }
+}
+scene s of m { time 0 s to SPAN s; trace x every 0.37 s }
+""",
+    "samples": """model m {
+  state x = 0
+  discrete u = 0
+  discrete i = 0
+  dynamic x' = (u - x)/(0.1 s)
+  every 20 ms { i := i + 0.02*(1 - x); u := 2*(1 - x) + i }
+}
+scene s of m { time 0 s to SPAN s; trace x every 0.37 s }
+""",
+    "flows": """model m {
+  coord x: translation = 0 m
+  energy T* = 1/2*(1 g)*x'^2
+  when x >= 1 cm { x' := -x' }
+  when x <= -1 cm { x' := -x' }
+  init x' = 1 m/s
+}
+scene s of m { time 0 s to SPAN s; trace x every 0.37 s }
+""",
+    "impacts": """model m {
+  coord x: translation = 0 m
+  energy T* = 1/2*(1 g)*x'^2
+  phi right: x <= 1 cm restitution 1
+  phi left: x >= -1 cm restitution 1
+  init x' = 1 m/s
+}
+scene s of m { time 0 s to SPAN s; trace x every 0.37 s }
+""",
+}
+"""An event every 20 ms."""
+EVENTS = {True: 10_000, False: 1000}
+"""By the core, by the handler."""
 AGAIN = 3
 """Runs of which the fastest counts."""
 
@@ -191,8 +237,26 @@ def runs(name: str) -> list[tuple[str, str, float, float]]:
     return found
 
 
+def an_event(name: str, *, core: bool) -> float:
+    """CPU seconds an event."""
+    serves, known = pieces.serves, EVENTS[core]
+    pieces.serves = serves if core else lambda *_: False
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "m.sd"
+            file.write_text(PLAIN[name].replace("SPAN", f"{0.02 * known:g}"))
+            trace = simulate(file, scene="s", output=Path(folder) / "t.h5")
+        return float(trace.timings["cpu_integrate_s"]) / len(trace.events)
+    finally:
+        pieces.serves = serves
+
+
 def main() -> int:
     """Runs and prints."""
+    for name in PLAIN:
+        core, handler = an_event(name, core=True), an_event(name, core=False)
+        said = f"{1e6 * core:7.1f} us an event, by the handler {1e6 * handler:7.0f}"
+        print(f"{name:12} {said}: {handler / core:.0f} times")
     for name in TEXT:
         found = runs(name)
         print(f"{name}")

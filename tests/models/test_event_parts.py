@@ -14,7 +14,7 @@ from sysdyn.runtime.events.impacts import Impacts
 from sysdyn.runtime.events.plan import Assignment, Happened
 from sysdyn.runtime.events.succession import Succession
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.modes import Told, serves
+from sysdyn.runtime.integrate.modes import serves, told_of
 from sysdyn.runtime.integrate.request import Request
 
 G = 9.81
@@ -272,7 +272,7 @@ def test_the_core_takes_transitions_but_those_of_friction_in_the_plane():
 def test_what_the_core_tells_of_a_transition_is_what_the_handler_tells():
     assigned = Assignment("g", "discrete", 0, 0), Assignment("h", "discrete", 1, 1)
     entry, other = Happened(0.0, "when x < 0", "", "", ""), Happened(0.0, "D1", "D1.one_way", "free", "holds")
-    told = Told((assigned,), (entry, other))
+    told = told_of((assigned,), (entry, other))
     assert told.at(2.5, [1.0, 2.0, 3.0, 4.0]) == [
         Happened(2.5, "when x < 0", "", "g = 1, h = 3", "g = 2, h = 4"),
         Happened(2.5, "D1", "D1.one_way", "free", "holds"),

@@ -8,11 +8,19 @@
 
 #define ITERATIONS 60    /* of Ridders' method */
 #define SAME 8.0         /* spacings of t within which two instants are one */
-#define FOLLOWED 6       /* points settled from an instant of the dense output as it is */
+#define FOLLOWED 8       /* points settled from an instant of the dense output as it is */
+#define CLOSER 6         /* of these, after which what is ENOUGH will do */
+#define ROUND_OFF 1e-15  /* of the largest value and terms of a row, or of its flight: it is no closer to zero */
 #define ENOUGH 1e-3      /* of what counts as zero: what is watched may be past it by */
 #define WIDER 3.0        /* times the stretch before: the next one that is searched behind where it has been seen */
 
 typedef void look(sd_run *run, double t, double *values);
+
+/* side * value of a row less a level, which falls through zero; enough: past it by so much at most */
+typedef struct sd_fall {
+    int32_t row;
+    double side, level, enough;
+} sd_fall;
 
 static double spacing(double t)
 {
@@ -24,15 +32,21 @@ static int falls(const sd_modes *m, int32_t k, const double *low, const double *
 {
     const sd_mode *mode = sd_mode_now(m);
     int32_t row = mode->row[k], rate = mode->rate[k];
-    double side = mode->side[k];
+    double side = mode->side[k], level = sd_mode_level(m, row), least = sd_mode_least(m, row);
     int rises = rate >= 0 && side * low[row] <= 0.0 && side * low[rate] > 0.0 && side * high[rate] >= 0.0;
-    return side * high[row] < -sd_mode_zero(m, row) && !rises;
+    if (rate >= 0 && sd_mode_thrown(m, row) >= 0) {
+        double still = -sd_mode_zero(m, rate);
+        rises = side * low[row] <= level + least && side * low[rate] >= still && side * high[rate] >= still;
+    }
+    return side * high[row] - level < -least && !rises;
 }
 
-/* Where side*value falls through zero between a (fa) and b (fb), by no more than `enough`; a where it is not above zero
- * there already. */
-static double root(sd_run *run, look *at, int32_t row, double side, double enough, double a, double fa, double b, double fb)
+/* Where side*value - level falls through zero between a (fa) and b (fb), by no more than `enough`; a where it is not above
+ * zero there already. */
+static double root(sd_run *run, look *at, sd_fall fall, double a, double fa, double b, double fb)
 {
+    const int32_t row = fall.row;
+    const double side = fall.side, level = fall.level, enough = fall.enough;
     double *values = run->modes->values;
     if (fa <= 0.0)
         return a;
@@ -41,7 +55,7 @@ static double root(sd_run *run, look *at, int32_t row, double side, double enoug
         if (!(a < middle && middle < b))
             break;
         at(run, middle, values);
-        double fm = side * values[row], size = sqrt(fm * fm - fa * fb);
+        double fm = side * values[row] - level, size = sqrt(fm * fm - fa * fb);
         double t = size > 0.0 ? middle + (middle - a) * fm / size : middle;
         if (fm > 0.0)
             a = middle, fa = fm;
@@ -49,7 +63,7 @@ static double root(sd_run *run, look *at, int32_t row, double side, double enoug
             b = middle, fb = fm;
         if (a < t && t < b) {
             at(run, t, values);
-            double ft = side * values[row];
+            double ft = side * values[row] - level;
             if (ft > 0.0)
                 a = t, fa = ft;
             else
@@ -66,16 +80,20 @@ static double instant(sd_run *run, look *at, int32_t k, double a, double b)
 {
     sd_modes *m = run->modes;
     int32_t row = sd_mode_now(m)->row[k], rate = sd_mode_now(m)->rate[k];
-    double side = sd_mode_now(m)->side[k], begin = a, value = side * m->low[row];
+    double side = sd_mode_now(m)->side[k], begin = a, level = sd_mode_level(m, row), value = side * m->low[row] - level;
     double enough = at == sd_run_observe ? 0.0 : ENOUGH * sd_mode_zero(m, row);
     if (value <= 0.0 && rate >= 0 && side * m->low[rate] > 0.0 && side * m->high[rate] < 0.0) {
-        begin = root(run, at, rate, side, 0.0, a, side * m->low[rate], b, side * m->high[rate]);
+        begin = root(run, at, (sd_fall){rate, side, 0.0, 0.0}, a, side * m->low[rate], b, side * m->high[rate]);
         at(run, begin, m->values);
-        value = side * m->values[row];
-        if (value <= 0.0)
+        value = side * m->values[row] - level;
+        if (value <= 0.0 && sd_mode_thrown(m, row) < 0)
             return b;
+        if (value <= 0.0) { /* that is round-off too: through what it may fall by unseen */
+            value += sd_mode_least(m, row);
+            level -= sd_mode_least(m, row);
+        }
     }
-    return root(run, at, row, side, enough, begin, value, b, side * m->high[row]);
+    return root(run, at, (sd_fall){row, side, level, enough}, begin, value, b, side * m->high[row] - level);
 }
 
 /* The first part of begin..end in whose end something watched has changed, low..high, and how many of m->which; 0: none.
@@ -130,7 +148,7 @@ static int alone(const sd_modes *m, int32_t one, const double *values)
 {
     const sd_mode *mode = sd_mode_now(m);
     for (int32_t k = 0; k < mode->watches; k++)
-        if (k != one && mode->side[k] * values[mode->row[k]] < -sd_mode_zero(m, mode->row[k]))
+        if (k != one && mode->side[k] * values[mode->row[k]] - sd_mode_level(m, mode->row[k]) < -sd_mode_least(m, mode->row[k]))
             return 0;
     return 1;
 }
@@ -141,21 +159,25 @@ static int follow(sd_run *run, int32_t one, double low, double high, double *t)
 {
     sd_modes *m = run->modes;
     int32_t row = sd_mode_now(m)->row[one];
-    double side = sd_mode_now(m)->side[one], before = low, value = side * m->low[row], at = *t, slope = -value / (at - low);
-    double enough = ENOUGH * sd_mode_zero(m, row);
+    double side = sd_mode_now(m)->side[one], level = sd_mode_level(m, row), value = side * m->low[row] - level;
+    double before = low, at = *t, slope = -value / (at - low);
+    int32_t flies = sd_mode_thrown(m, row);
+    double height = flies < 0 ? m->largest[row] : fmin(m->height[flies], m->largest[row]);
+    double enough = ENOUGH * fmin(sd_mode_zero(m, row), ENOUGH * height);
     if (!(value > 0.0 && at > low))
         return 0;
     for (int k = 0; k < FOLLOWED && low < at && at <= high; k++) {
         double last = value;
         sd_run_observe(run, at, m->values);
-        value = side * m->values[row];
-        if (value <= 0.0 && value >= -enough) {
+        value = side * m->values[row] - level;
+        slope = k > 0 && at != before ? (value - last) / (at - before) : slope;
+        double exact = fmax(SAME * spacing(at) * fabs(slope), ROUND_OFF * height);
+        if (value <= 0.0 && value >= -(k < CLOSER ? fmin(exact, enough) : enough)) {
             *t = at;
             return alone(m, one, m->values);
         }
-        slope = k > 0 ? (value - last) / (at - before) : slope;
         before = at;
-        at -= (value + 0.5 * enough) / slope;
+        at -= (value + 0.5 * fmin(exact, enough)) / slope;
         at = at != before ? at : before + copysign(spacing(before), value);
     }
     return 0;

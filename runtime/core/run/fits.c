@@ -7,6 +7,7 @@
 #define SLIP 1e-9        /* of a bound of friction */
 #define SLIDES 2.0       /* branches, as events/kinks.py names them */
 #define RESTS 3.0
+#define NO_SIZE 1e-9     /* of its magnitude, an unknown of which round-off leaves nothing open */
 
 /* Whether an inequality, or a friction law, is as the mode says. */
 static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const double *v)
@@ -27,6 +28,8 @@ static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const
         return 0;
     if (slip > sd_mode_zero(m, c->value))
         return 1;
+    if (m->struck >= 0 && c == &m->contact[m->struck])
+        return v[c->rate] > sd_mode_zero(m, c->rate);
     return c->kind != SD_PHI && slip >= -sd_mode_zero(m, c->value) && sense * v[c->rate] >= -sd_mode_zero(m, c->rate);
 }
 
@@ -68,6 +71,8 @@ static int kink_fits(const sd_modes *m, const sd_kink *k, const double *v)
         return fabs(v[k->value]) <= small && (k->rate < 0 || fabs(v[k->rate]) <= sd_mode_zero(m, k->rate));
     if (branch * v[k->value] > small)
         return 1;
+    if (k->jumps && branch == m->p_before[k->branch]) /* it has not crossed zero, and is there */
+        return 0;
     return branch * v[k->value] >= -small && (k->rate < 0 || branch * v[k->rate] >= -sd_mode_zero(m, k->rate));
 }
 
@@ -111,7 +116,7 @@ int sd_mode_sized(const sd_modes *m)
 int sd_mode_ordinary(const sd_modes *m)
 {
     for (int32_t i = 0; i < m->unknowns; i++)
-        if (fabs(m->restart[i]) > 2.0 * m->resolved[i])
+        if (fabs(m->restart[i]) > 2.0 * fmax(m->resolved[i], NO_SIZE * m->magnitude[i]))
             return 0;
     return sd_mode_sized(m);
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "run/fits.h"
+#include "run/strike.h"
 
 #define HELD 1e8 /* weight of the state across an event */
 
@@ -69,6 +70,8 @@ static int assign(sd_run *run, const sd_transition *one, double t)
         }
         for (; a < one->end[r]; a++)
             (one->kind[a] ? m->y : m->p)[one->place[a]] = row[3 + 2 * a];
+        if (one->momenta && !sd_strike_momenta(run, one->momenta, t))
+            return 0;
         sd_landing_look(run, t, m->y, m->yd, m->values);
         if (!sd_mode_sides_fit(m, one->sides + (r + 1) * m->relations, one->sides + r * m->relations, m->values))
             return 0;
@@ -139,10 +142,13 @@ int sd_landing_takes(sd_run *run, const sd_transition *one, double t)
     int32_t from = m->now;
     const sd_mode *before = sd_mode_now(m);
     sd_landing_leave(run);
-    int done = assign(run, one, t);
+    int done = assign(run, one, t) && (!one->strike || sd_strike_gap(run, one->strike, t));
+    m->struck = one->strike ? one->strike->contact : -1;
     sd_landing_enter(run, one->to);
     done = done && sd_landing_arrives(run, one->sides + one->rounds * m->relations, t) && sd_mode_ordinary(m) &&
            sd_mode_decided(m, before, one, m->values);
+    m->struck = -1;
+    done = done && sd_strike_throws(run, one->strike);
     if (!done) {
         memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
         sd_landing_enter(run, from);

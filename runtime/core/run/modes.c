@@ -9,6 +9,21 @@
 #include "run/landing.h"
 
 #define ROWS_OF_EVENT 8  /* at most, beside those asked for */
+#define AT_ONCE 1e-2     /* of the first step behind an event: before that its dense output knows nothing */
+#define SHORTER 8.0      /* steps in the place of one that misled */
+
+/* No time has passed since the event before. */
+static int near_the_last(const sd_modes *m, double t)
+{
+    return t - m->last <= m->nothing;
+}
+
+/* An event at t is taken. */
+static void count(sd_modes *m, double t)
+{
+    m->stalled = near_the_last(m, t) ? m->stalled + 1 : 0;
+    m->last = t;
+}
 
 /* -- laws whose branch turns ------------------------------------------------------------------------------------- */
 
@@ -68,7 +83,7 @@ static int turns(sd_run *run, double t, int32_t crossed)
 {
     sd_modes *m = run->modes;
     int32_t from = m->now;
-    if (m->contacts || m->logged + crossed > m->room || t - m->last <= m->nothing || m->left < crossed || !kinks_of(m, crossed))
+    if (m->contacts || m->logged + crossed > m->room || near_the_last(m, t) || m->left < crossed || !kinks_of(m, crossed))
         return 0;
     sd_landing_leave(run);
     own(m);
@@ -97,7 +112,7 @@ static void watch(sd_run *run)
     for (int32_t i = 0; i < m->observed; i++)
         m->largest[i] = fmax(m->largest[i], run->largest[i]);
     for (int32_t k = 0; k < mode->watches; k++)
-        m->watch[k] = (sd_watch){mode->row[k], mode->side[k], sd_mode_zero(m, mode->row[k])};
+        m->watch[k] = (sd_watch){mode->row[k], mode->side[k], sd_mode_least(m, mode->row[k]) - sd_mode_level(m, mode->row[k])};
     run->watch = m->watch;
     run->watches = mode->watches;
 }
@@ -143,6 +158,7 @@ static void go_on(sd_run *run, double t, double label, int32_t kind, int32_t log
     double sample = INFINITY;
     for (int32_t k = 0; k < m->samples; k++)
         sample = fmin(sample, m->first + (double)m->next[k] * m->period[k]);
+    m->begun = t;
     *m->h_max = m->longest;
     *m->t_end = sample < m->segment - m->nothing ? sample : m->segment; /* where the text jumps too, that is first */
     run->end_kind = sample <= m->segment + m->nothing ? SD_TRACE : 0;
@@ -157,6 +173,17 @@ static void go_on(sd_run *run, double t, double label, int32_t kind, int32_t log
     watch(run);
 }
 
+/* The next steps, from t on, are parts of one that misled, until its end is passed. */
+static void shorten(sd_run *run, double t, double step)
+{
+    sd_modes *m = run->modes;
+    *m->h_max = fmax(fmin(step / SHORTER, *m->h_max), 16.0 * (nextafter(fabs(t), INFINITY) - fabs(t)));
+    if (t + step < *m->t_end) {
+        *m->t_end = t + step;
+        run->end_kind = 0;
+    }
+}
+
 static int same(int32_t n, const int32_t *a, int32_t number, const int32_t *b)
 {
     return n == number && !memcmp(a, b, (size_t)n * sizeof *a);
@@ -167,7 +194,8 @@ static int same(int32_t n, const int32_t *a, int32_t number, const int32_t *b)
 static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_t due)
 {
     sd_modes *m = run->modes;
-    if (m->logged >= m->room || t - m->last <= m->nothing)
+    const int near = near_the_last(m, t);
+    if (m->logged >= m->room || (near && m->stalled >= m->chatters))
         return NULL;
     for (int32_t k = sd_mode_now(m)->first; k >= 0; k = m->transition[k].next) {
         const sd_transition *one = &m->transition[k];
@@ -175,7 +203,7 @@ static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_
             continue;
         if (due == SD_JUMP ? one->due != SD_JUMP : !same(one->due, one->sample, due, m->which))
             continue;
-        if (one->entries > m->left)
+        if (one->entries > m->left || (near && m->contacts && one->moves))
             return NULL;
         if (!one->moves)
             sd_landing_enter(run, one->to);
@@ -230,16 +258,20 @@ static int event(sd_run *run, double enough)
         const sd_transition *one = taken(run, t, crossed, 0);
         if (!one && !turns(run, t, crossed))
             return SD_EVENT;
-        m->last = t;
+        count(m, t);
         if (one && !one->moves) {
             m->begin = t;
             continue;
         }
         int32_t to = back(run, from);
+        double step = end - run->t_from;
+        int misled = one && one->strike && run->t_from == m->begun && t - run->t_from < AT_ONCE * step;
         run->settle->enough = enough;
         sd_run_accept(run, t, SD_TRACE);
         forth(run, to);
         go_on(run, t, t, SD_TRACE, one ? 1 : crossed, one ? one->entries : crossed);
+        if (misled)
+            shorten(run, t, step);
         return SD_RUNNING;
     }
 }
@@ -256,24 +288,37 @@ int sd_modes_event(sd_run *run)
     return state;
 }
 
-/* The relations that the text takes to their other side as it jumps to t, into m->which; -1: one is near zero.  Theirs are
- * the first watches of a mode.  m->low := the values before it */
-static int32_t turned(sd_run *run, double t)
+/* Whether a relation that has a side falls through zero where the last step ends, but for round-off; m->low: values there,
+ * m->high := those shortly before, where `looked` says that they are not there yet */
+static int met(sd_run *run, int32_t row, double side, int *looked)
+{
+    sd_modes *m = run->modes;
+    double t = *run->stepper->t, step = (t - run->t_from) / SHORTER;
+    if (!(fabs(m->low[row]) <= sd_mode_zero(m, row)) || step <= m->nothing)
+        return 0;
+    if (!*looked)
+        sd_run_observe(run, t - step, m->high);
+    *looked = 1;
+    double rate = side * (m->high[row] - m->low[row]) / step;
+    return rate > 0.0 && side * m->low[row] <= rate * m->nothing;
+}
+
+/* The relations that cross where the last step ends, into m->which; values: behind a jump of the text, which takes some to
+ * their other side, NULL: there is none.  Theirs are the first watches of a mode.  m->low: the values before it */
+static int32_t turned(sd_run *run, const double *values)
 {
     sd_modes *m = run->modes;
     const sd_mode *mode = sd_mode_now(m);
     int32_t found = 0;
-    sd_landing_look(run, *run->stepper->t, m->before, m->before_d, m->low);
-    sd_landing_look(run, t, m->before, m->before_d, m->values);
+    int looked = 0;
     for (int32_t k = 0, watch = 0; k < m->relations; k++) {
-        double value = m->values[m->relation_row[k]], small = sd_mode_zero(m, m->relation_row[k]);
-        if (!m->relation_moves[k])
-            continue;
-        if (mode->relation[k] != 0.0 && !(fabs(value) > small))
-            return -1;
-        for (int32_t sides = mode->relation[k] != 0.0 ? 1 : 2; sides; sides--, watch++)
-            if (mode->side[watch] * value < -small)
+        int32_t row = m->relation_row[k], sides = mode->relation[k] != 0.0 ? 1 : 2;
+        double small = sd_mode_zero(m, row);
+        for (int32_t i = 0; m->relation_moves[k] && i < sides; i++, watch++) {
+            int32_t side = mode->side[watch];
+            if ((values && side * values[row] < -small) || (sides == 1 && met(run, row, side, &looked)))
                 m->which[found++] = watch;
+        }
     }
     return found;
 }
@@ -312,11 +357,12 @@ static int sample(sd_run *run, int32_t due)
     double t = *run->stepper->t, enough = run->settle->enough;
     run->settle->enough = 0.0;
     settle_end(run);
-    const sd_transition *one = taken(run, t, 0, due);
+    sd_landing_look(run, t, m->before, m->before_d, m->low);
+    const sd_transition *one = turned(run, NULL) ? NULL : taken(run, t, 0, due_at(m, t));
     run->settle->enough = enough;
     if (!one)
         return SD_FINISHED;
-    m->last = t;
+    count(m, t);
     for (int32_t i = 0; i < due; i++)
         while (m->first + (double)m->next[one->sample[i]] * m->period[one->sample[i]] <= t + m->nothing)
             m->next[one->sample[i]]++;
@@ -344,8 +390,10 @@ static int jump(sd_run *run)
         return SD_FINISHED;
     run->settle->enough = 0.0;
     settle_end(run);
-    int32_t crossed = turned(run, t);
-    const sd_transition *one = crossed < 0 ? NULL : taken(run, t, crossed, SD_JUMP);
+    sd_landing_look(run, *run->stepper->t, m->before, m->before_d, m->low);
+    sd_landing_look(run, t, m->before, m->before_d, m->values);
+    int32_t crossed = turned(run, m->values);
+    const sd_transition *one = taken(run, t, crossed, SD_JUMP);
     run->settle->enough = enough;
     if (!one)
         return SD_FINISHED;
@@ -354,7 +402,8 @@ static int jump(sd_run *run)
         sd_run_row(run, SD_TRACE);
         forth(run, to);
     }
-    m->last = crossed ? t : m->last;
+    if (crossed)
+        count(m, t);
     m->log[(size_t)m->logged * (size_t)m->width] = next->label;
     m->at++;
     m->segment = next->end;

@@ -14,6 +14,7 @@
 #include "system/assembly.h"
 
 struct sd_run;
+struct sd_linear;
 
 #define SD_OWN INT32_MAX /* the mode that the core has found by itself */
 #define SD_JUMP (-1)     /* in place of samples that are due: the text jumps */
@@ -41,6 +42,21 @@ typedef struct sd_mode {
     const sd_held *held;              /* [systems] */
 } sd_mode;
 
+/* The impulse that opens a gap again: equations of the flows and momenta behind it and of impulses, in whose matrix, by
+ * columns, entry k is that of place slot[k] of dF/dy of the settled system, or where rated of dF/dyd. */
+typedef struct sd_strike {
+    sd_system *system;
+    struct sd_linear *linear;
+    int32_t contact, row, own;        /* the gap, its row of flows in the system, the column of its impulse; -1: none */
+    int32_t n, moves;                 /* columns; the first ones are unknowns that move, the others impulses */
+    const int32_t *unknown, *of_row, *integral; /* [n] unknown of a column, row of a row; 1: integrated over the instant */
+    const int32_t *column, *row_of, *slot, *rated; /* [n + 1], [entries] */
+    sd_held held;                     /* of the system: this gap alone holds; or as it was */
+    double restitution;
+    double *jy, *jyd, *r;             /* [entries], [rows] of the system */
+    double *value, *scale, *x, *impulse; /* [entries], [n] */
+} sd_strike;
+
 typedef struct sd_transition {
     int32_t to, next;                 /* next: transition from the same mode, -1: none */
     int32_t crossed, due, rounds, moves; /* due SD_JUMP: where the text jumps; moves 0: nothing but sides change, the step goes on */
@@ -49,15 +65,17 @@ typedef struct sd_transition {
     const int32_t *kind, *place, *read; /* [end of the last] 0: a parameter, 1: an unknown; place; row that it becomes */
     const double *sides;              /* [1 + rounds][relations] once what crossed has changed, and behind each round */
     int64_t entries;                  /* events that it counts as */
+    const sd_strike *strike, *momenta; /* an impact; momenta that follow from flows which are assigned; NULL: none */
 } sd_transition;
 
 /* rows as in events/plan.py; sense: place in p */
 typedef struct sd_contact {
-    int32_t kind, value, rate, multiplier, bound, guard, sense;
+    int32_t kind, value, rate, multiplier, bound, guard, sense, acceleration;
 } sd_contact;
 
 typedef struct sd_kink {
-    int32_t branch, value, rate, above, below, inner; /* inner: coordinates move it, and nothing is supplied at its zero */
+    int32_t branch, value, rate, above, below;
+    int32_t inner, jumps;             /* coordinates move it, and nothing is supplied at its zero; it may rest there */
 } sd_kink;
 
 /* A smooth piece of the text (s); label: of the row in which it begins. */
@@ -84,7 +102,7 @@ typedef struct sd_modes {
     double first, segment;            /* s: of the samples, end of the piece of the text */
     double last, nothing;             /* s: the event before, what is no time behind it */
     double begin;                     /* s: from here on the last step has not been looked at */
-    double longest;                   /* s: step */
+    double longest, begun;            /* s: step; of the event that the run goes on from */
     double *t_end, *h_max;            /* of the method */
     double *largest;                  /* [observed] of values and terms, at points asked for */
     double small, still;              /* of `largest`: zero; of a magnitude: what a state moves by and has not jumped */
@@ -101,12 +119,18 @@ typedef struct sd_modes {
     double *found;                    /* [watches] */
     int32_t *which;                   /* [watches] */
     int32_t *turning;                 /* [kinks] that turn now */
+    int32_t *thrown;                  /* [contacts] 1: an impact has opened the gap, which is in flight (events/bounces.py) */
+    double *level, *height, *flight;  /* [contacts] of these: value at which it begins, what it rises to, s: its time */
+    double *fastest;                  /* [contacts] speed at which each gap closed at most */
+    double rest, faint;               /* of it: a slower impact is the last; of `largest`: lower flights are the handler's */
     sd_watch *watch;                  /* [watches] */
     double *log;                      /* [room][width] t, transition, before and after of what was assigned; t, -1 - kink
                                        * and its branches */
-    int64_t left;                     /* events that may still be */
+    int64_t left, stalled, chatters;  /* events that may still be; so many in a row within no time, of which the handler says
+                                       * that they never end */
     double differs;                   /* of its size: what a value differs by that has jumped */
     int32_t pieces, at;               /* number of the present piece */
+    int32_t struck, flying;           /* the contact that is thrown by the event at hand, -1: none; how many are thrown */
     int32_t width, room, logged, waits; /* waits: an event has no room for its rows yet */
 } sd_modes;
 

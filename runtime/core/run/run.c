@@ -450,12 +450,10 @@ static int advance(sd_run *run)
     if (run->stepper->step(run->stepper->self))
         return SD_FAILED;
     run->t_from = from;
-    if (sd_run_changes(run, from)) {
-        if (!run->modes)
-            return SD_EVENT;
+    if (run->modes)
         run->modes->begin = from;
-        return sd_modes_event(run);
-    }
+    if (sd_run_changes(run, from))
+        return run->modes ? sd_modes_event(run) : SD_EVENT;
     measure(run, from, *run->stepper->t);
     if (run->ledgers && run->ledgers->lost >= 0)
         return SD_FAILED;

@@ -57,6 +57,19 @@ class Mode(c.Structure):
     ]
 
 
+class Strike(c.Structure):
+    """sd_strike."""
+
+    _fields_ = [
+        *[(name, P) for name in ["system", "linear"]],
+        *[(name, I) for name in ["contact", "row", "own", "n", "moves"]],
+        *[(name, P) for name in ["unknown", "of_row", "integral", "column", "row_of", "slot", "rated"]],
+        ("held", Held),
+        ("restitution", D),
+        *[(name, P) for name in ["jy", "jyd", "r", "value", "scale", "x", "impulse"]],
+    ]
+
+
 class Transition(c.Structure):
     """sd_transition."""
 
@@ -64,19 +77,22 @@ class Transition(c.Structure):
         *[(name, I) for name in ["to", "next", "crossed", "due", "rounds", "moves"]],
         *[(name, P) for name in ["which", "sample", "end", "kind", "place", "read", "sides"]],
         ("entries", L),
+        *[(name, P) for name in ["strike", "momenta"]],
     ]
 
 
 class Contact(c.Structure):
     """sd_contact."""
 
-    _fields_ = [(name, I) for name in ["kind", "value", "rate", "multiplier", "bound", "guard", "sense"]]
+    _fields_ = [
+        *[(name, I) for name in ["kind", "value", "rate", "multiplier", "bound", "guard", "sense", "acceleration"]],
+    ]
 
 
 class Kink(c.Structure):
     """sd_kink."""
 
-    _fields_ = [(name, I) for name in ["branch", "value", "rate", "above", "below", "inner"]]
+    _fields_ = [(name, I) for name in ["branch", "value", "rate", "above", "below", "inner", "jumps"]]
 
 
 class Piece(c.Structure):
@@ -95,7 +111,7 @@ class Modes(c.Structure):
         *[(name, I) for name in ["systems", "samples", "observed", "alikes", "unknowns"]],
         *[(name, P) for name in ["p", "place", "relation_row", "relation_moves", "contact", "kink", "system"]],
         *[(name, P) for name in ["period", "next", "piece"]],
-        *[(name, D) for name in ["first", "segment", "last", "nothing", "begin", "longest"]],
+        *[(name, D) for name in ["first", "segment", "last", "nothing", "begin", "longest", "begun"]],
         *[(name, P) for name in ["t_end", "h_max", "largest"]],
         *[(name, D) for name in ["small", "still"]],
         *[(name, P) for name in ["alike", "alike_end", "state", "differential", "unnamed"]],
@@ -103,10 +119,13 @@ class Modes(c.Structure):
         *[(name, D) for name in ["unknown_size", "round_off"]],
         *[(name, P) for name in ["rate", "y", "yd", "before", "before_d", "restart", "restart_d"]],
         *[(name, P) for name in ["values", "low", "high", "p_before", "p_after"]],
-        *[(name, P) for name in ["exact", "found", "which", "turning", "watch", "log"]],
-        ("left", L),
+        *[(name, P) for name in ["exact", "found", "which", "turning"]],
+        *[(name, P) for name in ["thrown", "level", "height", "flight", "fastest"]],
+        *[(name, D) for name in ["rest", "faint"]],
+        *[(name, P) for name in ["watch", "log"]],
+        *[(name, L) for name in ["left", "stalled", "chatters"]],
         ("differs", D),
-        *[(name, I) for name in ["pieces", "at"]],
+        *[(name, I) for name in ["pieces", "at", "struck", "flying"]],
         *[(name, I) for name in ["width", "room", "logged", "waits"]],
     ]
 
