@@ -137,8 +137,12 @@ class Driver:
     def leave(self, y: Floats, yd: Floats) -> None:
         """Notes the powers at y, yd [unknowns as written], the point behind which the run restarts."""
         lib.core.sd_run_leave(self.core, lib.pointer(y), lib.pointer(yd))
+        self.note(self.run.t_to, y, yd)
+
+    def note(self, t: float, y: Floats, yd: Floats) -> None:
+        """The point at t (s) from which integrals gain by impulses."""
         if self.impulses is not None:
-            self._left = Side(self.run.t_to, y.copy(), yd.copy(), self.system.description.p.copy())
+            self._left = Side(t, y.copy(), yd.copy(), self.system.description.p.copy())
 
     def arrive(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
         """Y behind the instant at which the point before it was left, with what integrals gain by its impulses."""

@@ -297,6 +297,8 @@ class Modes:
             return
         strike = None if handler.simple else self._strike(t, point)
         flows = any(a.kind == "flow" for r in handler.rounds for group in r.groups for a in group)
+        if (strike or flows) and self.run.driver.impulses is not None:
+            return  # integrals gain by the impulses
         momenta = self._momenta(t, point) if flows else None
         if not (handler.simple or strike) or momenta == 0:
             return

@@ -64,7 +64,10 @@ class Pieces:
         self.at = 0
         """The number of the segment."""
         n = run.system.form.written
-        self._first(self.handler.begin(start.t, run.y[:n].copy(), run.start_rate[:n].copy()))
+        before = run.y[:n].copy(), run.start_rate[:n].copy()
+        if plan.sampled:
+            run.driver.note(start.t, *before)
+        self._first(self.handler.begin(start.t, *before))
         self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
         self._mode, self._open, self._begun = -1, np.full(run.driver.observed, np.inf), start.t
         self._watch()
@@ -74,7 +77,8 @@ class Pieces:
         if point is None:
             return
         run, n = self.run, self.run.system.form.written
-        run.y[:n], run.start_rate[:n] = point
+        y, run.start_rate[:n] = point
+        run.y[:n] = run.driver.arrive(run.start.t, y, run.start_rate[:n], run.sizes.magnitude)
         run.yd = np.where(run.roles.differential, run.start_rate, 0.0)
         run.sizes.begin_to_move(run.start.t, run.y, run.start_rate)
         run.method.start(run.start.t, run.y, run.yd)

@@ -221,3 +221,41 @@ def test_what_all_elements_absorb_is_nothing(tmp_path, case, formulation):
     size = np.abs(found["Q"].values).max()
     assert size > 5.0
     assert np.abs(found["sum"].values).max() < 1e-5 * size
+
+
+TABLE = """\
+model m {
+  node b, x: translation
+  Q: flow(f = 1 m/s*cos(10*t/(1 s))) b -> ground
+  M: kinetic(p = 2 kg*f) x
+  F: effort(e = 20 N) x -> ground
+  init x.q = 0.5 m
+  init x.f = 0 m/s
+  phi c: x.q - b.q >= 0 m restitution 0.7
+}
+scene s of m { time 0 s to 3 s
+  trace Q.energy as EQ, M.energy as EM, F.energy as EF, b.f as vb, x.f as vx every 10 ms; accuracy 1e-6 }
+"""
+
+
+@pytest.mark.parametrize("method", ["radau", "bdf"])
+@pytest.mark.parametrize("formulation", FOUR[:2])
+def test_a_table_that_is_struck_many_times_does_the_work_of_each_impact(tmp_path, formulation, method):
+    """The core takes such impacts by itself only where no integral gains by them: 3.6 J were missing of 7.9 J lost."""
+    trace = _run(TABLE, tmp_path, formulation=formulation, method=method)
+    t, table, ball = trace.time, trace["vb"].values, trace["vx"].values
+    struck = np.flatnonzero(np.diff(t) == 0.0)
+    assert struck.size > 30
+    lost = np.sum((ball[struck] - table[struck]) ** 2 - (ball[struck + 1] - table[struck + 1]) ** 2)
+    assert abs(sum(_last(trace, "EQ", "EM", "EF")) + lost) <= 1e-5 * lost
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_what_is_sampled_at_the_start_counts(tmp_path, formulation):
+    """Two capacitors that a sample charges at once: what sources gave is what stores and resistors have."""
+    source = "discrete u = 1 V; every 10 ms { u := 4 V - u }; V: effort(e = u) a -> ground"
+    text = VOLTAGE.replace("V: effort(e = (if t < 0.2 s then 1 V else 3 V)) a -> ground", source).replace("QTRACE", "")
+    trace = _run(text.replace("state Q: C = 0 C\n", "").replace("dynamic Q' = V.f\n", ""), tmp_path, formulation=formulation)
+    total = sum(trace[name].values for name in ("EV", "E1", "E2", "ER"))
+    assert np.abs(trace["EV"].values).max() > 2.0
+    assert np.abs(total).max() <= 1e-6
