@@ -30,13 +30,25 @@ from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
-from sysdyn.runtime.start.strategies import CLOSED, EXACT, HIDDEN, OWN, applicable, around, first, rescaled
+from sysdyn.runtime.start.strategies import (
+    CLOSED,
+    EXACT,
+    HIDDEN,
+    OWN,
+    applicable,
+    around,
+    first,
+    own_residual,
+    rescaled,
+)
 from sysdyn.values import dataclass
 
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
 NOTHING = 1e-100
 """Of any unit: what an iteration down a steep law leaves of zero."""
+NEARLY = 1e-4
+"""Scaled residual of a point from which corrections may lead to one where steep laws hold."""
 SHARPER = 60
 """Corrections in which what follows from the state is found, or left as it was."""
 EXPLAINED = 0.1
@@ -139,31 +151,30 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution |
     """
     if best.x.size > SINGULAR_VALUES:
         return best
-    follows = free & starter.following(t, best.x)
-    written = starter.every & ~starter.groups(*HIDDEN), follows & (np.arange(follows.size) < starter.n)
-    x, held = _corrected(starter, t, best.x, *written)
-    steep = bool(starter.system.form.scales)
+    follows, steep = free & starter.following(t, best.x), bool(starter.system.form.scales)
+    written = starter.every & ~starter.groups(*HIDDEN)
+    x, held = _corrected(starter, t, best.x, written, follows & (np.arange(follows.size) < starter.n))
     if not held and steep:
         return None
     x = x if held else best.x
     near, held = _corrected(starter, t, x, starter.every, follows)
-    x = near if held else x
-    if x is not best.x and np.isfinite(starter.jacobian(t, x)).all():
+    if held and near is not x:
+        best = Solution(near, own_residual(starter, t, near, near))
+    elif x is not best.x and np.isfinite(starter.jacobian(t, x)).all():
         best = solve(problem_of(starter, t, x, x, rows=starter.every, free=follows), x, 1)
-    return None if steep and not _stays(starter, t, best.x, written[0], follows) else best
+    return None if steep and not _tells(starter, t, best.x, written, follows) else best
 
 
-def _stays(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> bool:
-    """Whether these rows leave states and efforts where they are, with rates that answer: a sum of currents may stand
-    between charges of 1e8 A that cancel in it, and hold to their round-off alone.
+def _tells(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> bool:
+    """Whether these rows, rates answering, hold and leave no state or effort of the point open by more than the largest
+    of its like: a sum of currents may stand between charges of 1e8 A that cancel in it, and hold to their round-off.
     """
     problem, told = problem_of(starter, t, x, x, rows=rows, free=free), starter.moves(*STATE, "e")
     near = corrected(problem, x)
     if near is None:
         return True
     largest = starter.largest_alike(np.maximum(problem.scale, np.abs(x)))
-    off = (near.open_ > largest) | (np.abs(near.x - x) > OWN * largest)
-    return near.agrees and not off[told].any()
+    return near.agrees and not (near.open_ > largest)[told].any()
 
 
 def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> tuple[Floats, bool]:
@@ -195,7 +206,8 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | 
     for name, strategy in itertools.islice(applicable(starter, t, x), most):
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = _anew(starter, t, found, x, guess, free)
-        sharp = _sharp(starter, t, again, free) if holds or sure else None
+        nearly = bool(starter.system.form.scales) and again.residual < NEARLY
+        sharp = _sharp(starter, t, again, free) if holds or sure or nearly else None
         if sharp is not None:
             return sharp, name
         best = found if found.residual < best.residual else best

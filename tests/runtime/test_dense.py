@@ -118,6 +118,23 @@ def test_what_graded_rows_leave_open():
     assert graded([[1.0, 0.0], [0.0, 2.0], [1.0, 1.0]], [1.0, 4.0, 3.1]) is None  # rows in excess that do not agree
 
 
+def test_errors_that_cancel_leave_nothing_open():
+    """A node on 1e-10 S of leakage behind 9.55 S: its current is the sum of two rows, known to 2e-16 A, not what 9.55 S
+    make of potentials that are open by 2e-6 V each, and the node behind a junction of 1e-7 S is as sure as they are.
+    """
+    wide, leak, junction = 9.55, 1e-10, 1.8e-7
+    rows = [
+        [wide, -wide, 0, 0],
+        [-wide, wide, 1, 0],
+        [leak, 0, -1, 0],
+        [0, junction, 0, -junction],
+    ]
+    answer, x, doubt = corrected(rows, [0, 0, 0, 0], [1e-16, 1e-16, 1e-26, 1e-22])
+    assert answer == 0
+    assert not x.any()
+    assert doubt == pytest.approx([2e-6, 2e-6, 2e-16, 2e-6], rel=1e-6)
+
+
 def test_what_is_no_number_is_said():
     with pytest.raises(rank.NotFiniteError):
         rank.rank(np.array([[1.0, np.nan], [0.0, 1.0]]))

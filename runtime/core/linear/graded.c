@@ -154,8 +154,10 @@ static void subtract(int32_t k, int32_t n, double factor, double open, const dou
 }
 
 /* a := its factors, lines moved so that pivots stand on the diagonal, b := L^-1 b; place [n]: the column that was there;
- * open [m, n], noise [m]: bounds of round-off.  Returns the number of pivots that are more than that. */
-static int32_t eliminate(int32_t m, int32_t n, double *a, double *open, double *b, double *noise, int32_t *place)
+ * open [m, n], noise [m]: bounds of round-off; missing [m]: that of b as it was, moved along.  Returns the number of pivots
+ * that are more than that. */
+static int32_t eliminate(int32_t m, int32_t n, double *a, double *open, double *b, double *noise, double *missing,
+                         int32_t *place)
 {
     double certain = noise ? LIKELY : CERTAIN;
     for (int32_t j = 0; j < n; j++)
@@ -179,8 +181,10 @@ static int32_t eliminate(int32_t m, int32_t n, double *a, double *open, double *
         swap_lines(m, n, a, row, column, k);
         swap_lines(m, n, open, row, column, k);
         swap(b + row, b + k);
-        if (noise)
+        if (noise) {
             swap(noise + row, noise + k);
+            swap(missing + row, missing + k);
+        }
         int32_t kept = place[k];
         place[k] = place[column];
         place[column] = kept;
@@ -189,9 +193,10 @@ static int32_t eliminate(int32_t m, int32_t n, double *a, double *open, double *
             return k;
         for (int32_t i = k + 1; i < m; i++) {
             double *line = a + (size_t)i * n, *line_open = open + (size_t)i * n, factor = line[k] / pivot[k];
+            double unsure = (line_open[k] + fabs(factor) * pivot_open[k]) / fabs(pivot[k]);
+            line[k] = factor;
             if (factor == 0.0)
                 continue;
-            double unsure = (line_open[k] + fabs(factor) * pivot_open[k]) / fabs(pivot[k]);
             if (!power_of_two(pivot[k]) && !power_of_two(factor))
                 unsure += DBL_EPSILON * fabs(factor);
             subtract(k + 1, n, factor, unsure, pivot, pivot_open, line, line_open);
@@ -247,16 +252,54 @@ static int doubtful(int32_t m, int32_t n, const double *a, int32_t k)
     return 0;
 }
 
+/* w := U^-1 w of the first k pivots; n: columns of a */
+static void substitute(int32_t k, int32_t n, const double *a, double *w)
+{
+    for (int32_t i = k - 1; i >= 0; i--) {
+        const double *line = a + (size_t)i * n;
+        for (int32_t j = i + 1; j < k; j++)
+            w[i] -= line[j] * w[j];
+        w[i] /= line[i];
+    }
+}
+
+/* doubt [k] of the solution x [k] by the inverse of the first k rows and columns, L U, so that errors which cancel do:
+ * missing [k] of the rows, open [m, n] of U; w [k] is room */
+static void doubts(int32_t k, int32_t n, const double *a, const double *open, const double *missing, const double *x,
+                   double *w, double *doubt)
+{
+    memset(doubt, 0, (size_t)k * sizeof *doubt);
+    for (int32_t i = 0; i < k; i++) {
+        double unsure = 0.0;
+        for (int32_t j = i; j < k; j++)
+            unsure += open[(size_t)i * n + j] * fabs(x[j]);
+        for (int32_t of_rows = 0; of_rows < 2; of_rows++) {
+            double bound = of_rows ? missing[i] : unsure;
+            if (bound == 0.0)
+                continue;
+            memset(w, 0, (size_t)k * sizeof *w);
+            w[i] = 1.0;
+            for (int32_t r = i + 1; r < k && of_rows; r++)
+                for (int32_t j = i; j < r; j++)
+                    w[r] -= a[(size_t)r * n + j] * w[j];
+            substitute(k, n, a, w);
+            for (int32_t j = 0; j < k; j++)
+                doubt[j] += fabs(w[j]) * bound;
+        }
+    }
+}
+
 int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double *x, double *doubt)
 {
     int32_t *own = malloc((3 * (size_t)n + 1) * sizeof *own);
-    double *open = malloc(((size_t)m * (size_t)n + 1) * sizeof *open);
+    double *open = malloc(((size_t)m * (size_t)n + (size_t)m + 2 * (size_t)n + 1) * sizeof *open);
     if (!own || !open) {
         free(own);
         free(open);
         return -2;
     }
     int32_t *column = own + n, *place = own + 2 * (size_t)n, k = used(m, n, a, own);
+    double *missing = open + (size_t)m * (size_t)n, *room = missing + m, *unsure = room + n;
     memset(x, 0, (size_t)n * sizeof *x);
     if (noise)
         memset(doubt, 0, (size_t)n * sizeof *doubt);
@@ -268,27 +311,23 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
     int32_t pivots = k, left = 0;
     if (!failed) {
         double most = largest(m, b);
-        pivots = eliminate(m, k, a, open, b, noise, place);
+        if (noise)
+            memcpy(missing, noise, (size_t)m * sizeof *missing);
+        pivots = eliminate(m, k, a, open, b, noise, missing, place);
         failed = !noise && (pivots < k || !(largest(m - k, b + k) <= AGREES * most));
         left = noise && (missed(m - pivots, b + pivots, noise + pivots) || doubtful(m, k, a, pivots));
     }
-    if (!failed)
-        for (int32_t i = pivots - 1; i >= 0; i--) {
-            const double *line = a + (size_t)i * k;
-            for (int32_t j = i + 1; j < pivots; j++) {
-                b[i] -= line[j] * b[j];
-                if (noise)
-                    noise[i] += fabs(line[j]) * noise[j];
-            }
-            b[i] /= line[i];
-            x[own[place[i]]] = ldexp(b[i], column[place[i]]);
-            if (noise) {
-                for (int32_t j = i; j < pivots; j++)
-                    noise[i] += open[(size_t)i * k + j] * fabs(b[j]);
-                noise[i] /= fabs(line[i]);
-                doubt[own[place[i]]] = ldexp(noise[i], column[place[i]]);
-            }
+    if (!failed) {
+        substitute(pivots, k, a, b);
+        if (noise)
+            doubts(pivots, k, a, open, missing, b, room, unsure);
+        for (int32_t i = 0; i < pivots; i++) {
+            int32_t j = own[place[i]], exponent = column[place[i]];
+            x[j] = ldexp(b[i], exponent);
+            if (noise)
+                doubt[j] = ldexp(unsure[i], exponent);
         }
+    }
     free(open);
     free(own);
     return failed ? failed : 2 * left;
