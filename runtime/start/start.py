@@ -47,8 +47,6 @@ BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
 NOTHING = 1e-100
 """Of any unit: what an iteration down a steep law leaves of zero."""
-NEARLY = 1e-4
-"""Scaled residual of a point from which corrections may lead to one where steep laws hold."""
 SHARPER = 60
 """Corrections in which what follows from the state is found, or left as it was."""
 EXPLAINED = 0.1
@@ -206,8 +204,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | 
     for name, strategy in itertools.islice(applicable(starter, t, x), most):
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = _anew(starter, t, found, x, guess, free)
-        nearly = bool(starter.system.form.scales) and again.residual < NEARLY
-        sharp = _sharp(starter, t, again, free) if holds or sure or nearly else None
+        sharp = _sharp(starter, t, again, free) if holds or sure else None
         if sharp is not None:
             return sharp, name
         best = found if found.residual < best.residual else best

@@ -4,6 +4,7 @@ A slice of the numbers runs always; SYSDYN_LONG=1 runs all 200.
 """
 
 import functools
+import itertools
 import os
 import re
 from collections import Counter
@@ -118,8 +119,12 @@ def test_random_rectifiers_start_where_their_diodes_leave_them(tmp_path, seed):
         assert error <= 1e-6 * np.abs(potentials).max()
 
 
-@pytest.mark.parametrize("seed", [24, 25, 26, 33])
-@pytest.mark.parametrize("formulation", FORMULATIONS[2:])
+@pytest.mark.parametrize(
+    ("seed", "formulation"),
+    itertools.product(range(20, 40), FORMULATIONS[2:])
+    if LONG
+    else [(24, "co_lagrangian"), (25, "co_lagrangian"), (26, "co_hamiltonian"), (33, "co_lagrangian")],
+)
 def test_potentials_that_leakage_alone_holds_are_right_or_refused(seed, formulation):
     """Sums of conductances, 1e-13 S of leakage beside 10 S, say where these nodes are as far as their digits reach: two
     began 0.3 V off, the third (below round-off) 0.17 V, the fourth (capacitors that drift together at 5e12 V/s) 0.19 V,
@@ -127,6 +132,8 @@ def test_potentials_that_leakage_alone_holds_are_right_or_refused(seed, formulat
     """
     made, report = rectifiers.rectifier(seed), Report()
     potentials = rectifiers.at_the_start(made)
+    if potentials is None:
+        pytest.skip("no reference: its iteration does not end")
     _, begun = prepared_start(made.text(1e-4, 1.0 / made.frequency), formulation, report=report)
     if begun is None:
         assert [d.code for d in report.diagnostics if d.severity == "error"] == ["E903"]
