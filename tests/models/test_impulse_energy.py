@@ -49,6 +49,7 @@ def _last(trace, *names):
 
 @pytest.mark.parametrize("way", STEPS)
 @pytest.mark.parametrize("formulation", [*FOUR, "kane"])
+@pytest.mark.one_in(3)
 def test_a_source_of_velocity_that_steps_does_the_work_of_its_impulse(tmp_path, formulation, way):
     jump, step = STEPS[way]
     text = VELOCITY.replace("JUMP", jump).replace("STEP", step)
@@ -211,6 +212,7 @@ SUMS = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("case", SUMS)
+@pytest.mark.one_in(3)
 def test_what_all_elements_absorb_is_nothing(tmp_path, case, formulation):
     """Runs of the complementary formulations leave momenta out that nothing reads: pulses are told by their rows."""
     labels = [line.split(":")[0].strip() for line in SUMS[case].splitlines()[1:]]
@@ -240,6 +242,7 @@ scene s of m { time 0 s to 3 s
 
 @pytest.mark.parametrize("method", ["radau", "bdf"])
 @pytest.mark.parametrize("formulation", FOUR[:2])
+@pytest.mark.one_in(2)
 def test_a_table_that_is_struck_many_times_does_the_work_of_each_impact(tmp_path, formulation, method):
     """The core takes such impacts by itself only where no integral gains by them: 3.6 J were missing of 7.9 J lost."""
     trace = _run(TABLE, tmp_path, formulation=formulation, method=method)
@@ -251,6 +254,7 @@ def test_a_table_that_is_struck_many_times_does_the_work_of_each_impact(tmp_path
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_what_is_sampled_at_the_start_counts(tmp_path, formulation):
     """Two capacitors that a sample charges at once: what sources gave is what stores and resistors have."""
     source = "discrete u = 1 V; every 10 ms { u := 4 V - u }; V: effort(e = u) a -> ground"
