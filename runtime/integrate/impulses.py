@@ -15,12 +15,11 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.facts import Mask
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.least_change import least_norm
+from sysdyn.runtime.numerics.least_change import least_measured
+from sysdyn.runtime.start.instant import FORCES
+from sysdyn.runtime.start.restart import STILL
 from sysdyn.values import dataclass
 
-FORCES = ("e", "kappa", "mu")
-STILL = 1e-10
-"""Of its magnitude: what an unknown moves by, and has not jumped (start/restart.py)."""
 BROKEN = 1e-9
 """Of the largest terms: what a row is missed by along the straight way, which then is not the rise."""
 GAUSS = tuple(0.5 + sign * np.sqrt(1.0 / 12.0) for sign in (-1.0, 1.0))
@@ -28,8 +27,6 @@ GAUSS = tuple(0.5 + sign * np.sqrt(1.0 / 12.0) for sign in (-1.0, 1.0))
 PARTS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 """Steps of the classical method of order 4 along a curved way, until two agree within AGREED of the largest gain."""
 AGREED = 1e-8
-
-
 AWAY = 1e-6
 """Of its magnitude: by how much the end of a curved way may be elsewhere."""
 STEEP = 1e-6
@@ -201,13 +198,9 @@ class Impulses:
         balances, given = self._balances[self._row], self._given[self._column] & self._in_y
         carried = np.where(balances, self._carried(slopes, way), 0.0)
         at = np.flatnonzero(balances & given & (slopes[0] != 0.0))
-        aim, impulse = -np.bincount(self._row, carried, self.system.rows), np.zeros(way.size)
-        if at.size:
-            (rows, i), (columns, j) = (np.unique(k[at], return_inverse=True) for k in (self._row, self._column))
-            v = slopes[0][at]
-            unit = np.zeros(columns.size)
-            np.maximum.at(unit, j, np.abs(v))
-            impulse[columns] = least_norm((rows.size, columns.size), (i, j, v / unit[j]), aim[rows]) / unit
+        aim = np.asarray(-np.bincount(self._row, carried, self.system.rows), dtype=np.float64)
+        entries = self._row[at], self._column[at], slopes[0][at]
+        impulse = least_measured(entries, aim, np.full(way.size, np.nan))
         acted = np.where(balances & given, slopes[0] * impulse[self._column], 0.0)
         size, left = (np.bincount(self._row, w, aim.size) for w in (np.abs(carried) + np.abs(acted), carried + acted))
         return impulse, bool((np.abs(left) <= BROKEN * size.max(initial=0.0))[self._balances].all())
@@ -259,10 +252,6 @@ class Impulses:
         )
         takes = [take & (v != 0.0) & ~self._stays[j % n] for take, _, j, v in parts]
         i, j, v = (np.concatenate([part[k][take] for part, take in zip(parts, takes, strict=True)]) for k in (1, 2, 3))
-        (own, i), (columns, j) = (np.unique(k, return_inverse=True) for k in (i, j))
-        most = np.zeros(columns.size)
-        np.maximum.at(most, j, np.abs(v))
-        unit, found = np.where(columns < n, size[columns % n], 1.0 / most), np.zeros(2 * n)
-        aim = np.where(own < rows, asked[own % rows], 0.0)
-        found[columns] = unit * least_norm((own.size, columns.size), (i, j, v * unit[j]), aim)
+        aim = np.append(asked, np.zeros(rows))
+        found = least_measured((i, j, v), aim, np.append(size, np.full(n, np.nan)))
         return found[:n], found[n:]

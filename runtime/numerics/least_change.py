@@ -82,6 +82,21 @@ def least_norm(
     return least[1] if least[0] < FAR * tried[0][0] else tried[0][1]
 
 
+def least_measured(entries: tuple[Any, Any, Floats], aim: Floats, scale: Floats) -> Floats:
+    """The least x [columns], each in its scale, that meets `aim` [rows] by entries (row, column, value); what has none
+    is zero.  A scale that is no number: in what one unit of it does at most.
+    """
+    take, x = entries[2] != 0.0, np.zeros(scale.size)
+    if not take.any():
+        return x
+    (rows, i), (columns, j) = (np.unique(item[take], return_inverse=True) for item in entries[:2])
+    v, most = entries[2][take], np.zeros(columns.size)
+    np.maximum.at(most, j, np.abs(v))
+    unit = np.where(np.isnan(scale[columns]), 1.0 / most, scale[columns])
+    x[columns] = unit * least_norm((rows.size, columns.size), (i, j, v * unit[j]), aim[rows])
+    return x
+
+
 def _to_size_one(i: Any, v: Floats, rows: int) -> Floats:
     """Divides entries v in rows i by the sizes [rows] of these: a row of small coefficients is no redundant one."""
     size, row = np.empty(rows), np.ascontiguousarray(i, dtype=np.int32)

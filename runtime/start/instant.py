@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.facts import Mask
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.least_change import least_norm
+from sysdyn.runtime.numerics.least_change import least_measured
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.numerics.tall import free_unknowns
 from sysdyn.runtime.start.settled import inertial_rows
@@ -230,6 +230,7 @@ class Instant:
         t, start, yd = before
         y, integral = (start if begun is None else begun), np.zeros(start.size)
         here = meant.behind[self._row] & meant.moves[self._column]
+        scale = np.stack([magnitude * meant.ease, np.full(start.size, np.nan)], axis=1).ravel()
         for _ in range(meant.iterations):
             jy, jyd = (np.where(np.isfinite(item), item, 0.0) for item in self.system.jacobian(t, y, yd))
             i, j, v = meant.integrals(jy, jyd, y)
@@ -239,23 +240,10 @@ class Instant:
             np.add.at(aim, i, -v * change[j])
             i, j = np.append(2 * self._row[here], i), np.append(2 * self._column[here], j)
             try:
-                step = _least(i, j, np.append(jy[here], v), aim, magnitude * meant.ease)
+                step = least_measured((i, j, np.append(jy[here], v)), aim, scale)
             except NotFiniteError:
                 if asked:
                     raise
                 return start, np.zeros(start.size)
             y, integral = y + step[::2], integral + step[1::2]
         return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._force, integral, 0.0)
-
-
-def _least(i: NDArray[np.int64], j: NDArray[np.int64], v: Floats, aim: Floats, scale: Floats) -> Floats:
-    """Least change [2 unknowns]: of unknowns in scale, of integrals in what they act on."""
-    take, step = v != 0.0, np.zeros(2 * scale.size)
-    if not take.any():
-        return step
-    (rows, i), (columns, j) = (np.unique(item[take], return_inverse=True) for item in (i, j))
-    v, most = v[take], np.zeros(columns.size)
-    np.maximum.at(most, j, np.abs(v))
-    unit = np.where(columns % 2 == 1, 1.0 / most, scale[columns // 2])
-    step[columns] = unit * least_norm((rows.size, columns.size), (i, j, v * unit[j]), aim[rows])
-    return step
