@@ -85,6 +85,10 @@ _TWICE = "constraints that hold at one time may say the same twice: leave one ou
 _BOUNDED = "a law that keeps it in bounds (an energy with a minimum, a stop), or an earlier end: --until"
 
 
+_BLOCKED = "where all that meets at a node may block at once, a large resistance (1 Tohm) beside one of them"
+"""Of steep laws: their currents there are less than round-off, and nothing else says what the node's potential is."""
+
+
 _RANK = "an earlier end, or lengths with which the mechanism does not reach its dead centre"
 
 
@@ -122,6 +126,7 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     usual = _REMEDIES_OF_CAUSES.get(error.cause, _REMEDIES[code])
     usual = _instead_of(partial.method if isinstance(partial, Outcome) else "") if linear or flat else usual
     usual += f"; {WITH_A_SLOPE}" if flat else ""
+    usual += f"; {_BLOCKED}" if started.system.form.scales and code != "E933" else ""
     if error.cause == "singular" and len(started.system.description.switches.places):
         usual = _TWICE
     remedy = _BOUNDED if why else _RANK if lost else usual

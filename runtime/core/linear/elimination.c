@@ -312,19 +312,17 @@ static void interpret(sd_elimination *e, const sd_list *list, const sd_number *o
 }
 
 /* multipliers are moderate, and what is left of each pivot's column is more than round-off */
-static SD_WIDE int healthy(const sd_elimination *e)
+static int healthy(const sd_elimination *e)
 {
     const sd_number *inverse = e->cell, *size = e->cell + size_of(e, 0), *growth = e->cell + growth_of(e, 0);
     const sd_number *scale = e->cell + magnitude(e, 0);
     const double *weak = e->weak;
-    const int32_t n = e->n;
-    int64_t fine = 1; /* as wide as a number: the loop runs in lanes */
-    for (int32_t k = 0; k < n; k++) {
+    for (int32_t k = 0; k < e->n; k++) { /* one by one: they were written so, and are not at hand in lanes */
         double row = sd_size(size[k]);
-        fine &= sd_size(growth[k]) <= e->growth * row;
-        fine &= sd_size(inverse[k]) * row * weak[k] <= sd_size(scale[k]);
+        if (!(sd_size(growth[k]) <= e->growth * row) || !(sd_size(inverse[k]) * row * weak[k] <= sd_size(scale[k])))
+            return 0;
     }
-    return fine != 0;
+    return 1;
 }
 
 /* the magnitudes of the pivots' columns; NULL: all of size one */

@@ -110,17 +110,21 @@ int32_t sd_first_astray(sd_system *system, double t, const double *y, const doub
                         const double *jy, const double *jyd, double h, const double *open, int all, double *s);
 /* position of the first number that is not finite, -1 where all are */
 int32_t sd_first_bad(int32_t n, const double *x);
+#define SD_FEW 32 /* numbers that are looked at one by one: what was just written so is not at hand in lanes */
+
 /* 1: all are */
 static inline int sd_finite(int32_t n, const double *x)
 {
     sd_lanes sums = {0.0}; /* x - x is 0 for a finite number and not a number otherwise */
-    const int32_t whole = n - n % SD_LANES;
+    const int32_t whole = n < SD_FEW ? 0 : n - n % SD_LANES;
     for (int32_t i = 0; i < whole; i += SD_LANES)
         sums += SD_FROM(x, i) - SD_FROM(x, i);
-    double sum = SD_TOTAL(sums);
+    if (SD_TOTAL(sums) != 0.0)
+        return 0;
     for (int32_t i = whole; i < n; i++)
-        sum += x[i] - x[i];
-    return sum == 0.0;
+        if (x[i] - x[i] != 0.0)
+            return 0;
+    return 1;
 }
 
 #endif
