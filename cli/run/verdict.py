@@ -126,7 +126,8 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
     usual = _REMEDIES_OF_CAUSES.get(error.cause, _REMEDIES[code])
     usual = _instead_of(partial.method if isinstance(partial, Outcome) else "") if linear or flat else usual
     usual += f"; {WITH_A_SLOPE}" if flat else ""
-    usual += f"; {_BLOCKED}" if started.system.form.scales and code != "E933" else ""
+    if started.system.form.scales and code in ("E931", "E934"):
+        usual = _BLOCKED if error.cause == "singular" else f"{usual}; {_BLOCKED}"
     if error.cause == "singular" and len(started.system.description.switches.places):
         usual = _TWICE
     remedy = _BOUNDED if why else _RANK if lost else usual

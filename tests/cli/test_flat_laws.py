@@ -51,6 +51,7 @@ def test_a_method_that_needs_the_slope_of_a_flat_law_says_so(tmp_path, capsys, f
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+@pytest.mark.one_in(2)
 def test_the_remedies_hold(tmp_path, capsys, formulation):
     """Other methods from rest; a laminar part; a start in motion."""
     found = []
@@ -65,7 +66,7 @@ def test_the_remedies_hold(tmp_path, capsys, formulation):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
 @pytest.mark.parametrize("law", ["e = 1e5 Pa.s^2/m^6*abs(f)*f", "f = sign(e)*sqrt(abs(e)/(1e5 Pa.s^2/m^6))"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_a_start_from_which_no_rate_follows_is_one(tmp_path, capsys, law, formulation):
     """The flow grows as the root of time: the equations hold at the start, a rate of it there is none."""
     (tmp_path / "m.sd").write_text(f"""model m {{
@@ -85,7 +86,7 @@ scene s of m {{ time 0 s to 10 s; trace C.e }}
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("source", ["flow(f = 1 l/s) ground -> a", "valve(Cr = 1e9 Pa.s^2/m^6) p -> a"])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(7)
 def test_an_empty_vessel_over_a_valve_fills(tmp_path, capsys, source, formulation):
     """What the valve passes at no pressure has no rate; the pressure of the vessel has."""
     supplied = "node p: hydraulic; P: effort(e = 1 bar) p" if "p ->" in source else ""

@@ -290,6 +290,7 @@ def test_a_check_that_is_killed_costs_no_other(project):
     assert found["spring/ring"].message.startswith("equal")
 
 
+@pytest.mark.long
 def test_two_processes_find_what_one_finds(project, capsys):
     def shown(found):
         return [{k: v for k, v in check.items() if k != "seconds"} for check in found["result"]["checks"]]

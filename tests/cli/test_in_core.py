@@ -33,7 +33,7 @@ def core(model):
 
 
 @pytest.mark.parametrize(("name", "formulation"), SEEDS)
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(9)
 def test_a_run_in_the_core_is_the_run_of_the_command(name, formulation, tmp_path):
     file = MODELS / "seed" / f"{name}.sd"
     model = load(file, scene="reference", formulation=formulation)

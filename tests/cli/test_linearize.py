@@ -105,7 +105,7 @@ def test_a_series_circuit_in_every_formulation(formulation, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("formulation", ALL)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_contrasts_of_many_decades(formulation, tmp_path, capsys):
     """Each eigenvalue to 1e-10 of itself, the slow one beside one up to 1e13 times as fast; gain and zeros too."""
     path = write(tmp_path, RLC)
@@ -426,7 +426,7 @@ def finite(e, a):
 
 
 @pytest.mark.parametrize("formulation", ALL)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_random_networks_have_the_eigenvalues_of_a_nodal_tableau(formulation, tmp_path, capsys):
     random = np.random.default_rng(11 + ALL.index(formulation))
     worst, counted = 0.0, 0

@@ -47,7 +47,7 @@ SAME = ("pendulum", "dc_motor", "bouncing_ball", "diode_circuit", "co_circuit", 
 
 
 @pytest.mark.parametrize("name", [f"seed/{name}" for name in SAME])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_runs_equal_those_of_the_command_to_the_last_bit(name, tmp_path):
     """Runs on their own: with an option that the others do not have (tests/cli/test_in_core.py looks at those)."""
     file = MODELS / f"{name}.sd"
@@ -224,7 +224,7 @@ def test_functions_of_sums_over_a_size_follow_the_size(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_ladder_of_another_length_is_that_ladder(tmp_path, n):
     """Of three sections the middle one is both the second and the last but one: no other length has its rows."""
     (tmp_path / "m.sd").write_text(LADDER)

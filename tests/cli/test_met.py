@@ -205,7 +205,7 @@ RUN = ("E608", "W920", "E931", "E932", "E933", "E934")
 
 
 @pytest.mark.parametrize("code", RUN)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_pages_of_what_a_run_finds_tell_the_truth(code, tmp_path, capsys):
     page = codes.codes()[code]
     path = tmp_path / "example.sd"
@@ -311,7 +311,7 @@ scene s of two {
         ),
     ],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_power_that_is_constant_is_no_constant_of_the_ledger(tmp_path, capsys, elements, end, formulation):
     path = tmp_path / "m.sd"
     scene = "scene s of m {\n  time 0 s to 50 s\n  trace C.e as e\n}\n"

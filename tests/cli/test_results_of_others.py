@@ -67,7 +67,7 @@ OVER = ["--over", "l=2,3"]
         (["reduce"], "trace.h5"),
     ],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_result_takes_no_other_result_s_place(model, capsys, command, output):
     before = Path(output).read_bytes()
     assert run([*command, "-q", model, "-o", output]) == 2
@@ -127,7 +127,7 @@ def test_what_is_no_number_over_time_is_not_drawn(model, capsys, recwarn, values
 @pytest.mark.parametrize(
     "line", [b"no json\n", b"\xff\xfe\n", b"[]\n", b'{"study": 1}\n', b'{"block": {"runs": 3}}\n', b'{"odd": 3}\n']
 )
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_a_damaged_journal_is_named(model, capsys, line):
     journal = Path(".runs.h5.runs")
     poison = ["sweep", "-q", model, *OVER, "-o", "runs.h5"]
@@ -173,7 +173,7 @@ def test_the_exit_that_counts_first():
     "options",
     [["--until", "1 m"], ["--max-wall", "0"], ["--max-wall", "1 V"], ["--until", "-1"], ["--set", "nosuch=1"]],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_wrong_usage_of_a_sweep_is_no_failure_of_its_runs(model, options):
     assert run(["sweep", "-q", model, *OVER, "-o", "new.h5", *options]) == 2
     assert run(["simulate", "-q", model, "-o", "new.h5", *options]) == 2

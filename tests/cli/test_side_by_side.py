@@ -38,6 +38,7 @@ def test_answers_come_in_the_order_of_the_items_whatever_is_ready_first():
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.one_in(2)
 def test_a_fault_is_raised_in_its_turn(jobs):
     seen: list[int] = []
     with pytest.raises(ValueError, match="13"):

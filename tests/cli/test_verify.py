@@ -120,7 +120,7 @@ def _without_co_kane(request, monkeypatch):
         ("seed/nonlinear_spring", (), FOUR),
     ],
 )
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(9)
 def test_models_of_each_kind_agree(name, options, formulations, capsys):
     code, found = run_json(capsys, "verify", str(MODELS / f"{name}.sd"), *options)
     assert code == 0, found["diagnostics"]
@@ -176,7 +176,7 @@ COSTLY = (
 
 
 @pytest.mark.parametrize(("file", "scene"), list(scenes()))
-@pytest.mark.one_in(102)
+@pytest.mark.one_in(204)
 def test_every_scene_agrees(file, scene, capsys):
     if (file, scene) in COSTLY and not LONG:
         pytest.skip("SYSDYN_LONG=1 verifies it")

@@ -84,7 +84,7 @@ DAMAGE = {
 
 
 @pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE.keys())
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(9)
 def test_a_damaged_entry_is_built_again(folder, damage):
     entry, other = build(TEXT % 42), build(TEXT % 7)
     kept = other.read_bytes()

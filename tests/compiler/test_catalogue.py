@@ -69,7 +69,7 @@ def known_rates(oracle, values, k):
     return t, y, yd
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_residual_on_the_solution(case):
     compiled, values, name = case
     if name == WITHOUT_VALUES:
@@ -84,7 +84,7 @@ def test_residual_on_the_solution(case):
             assert np.all(np.abs(r) <= 1e-12 * np.maximum(scale, 1e-2)), block
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_energy_balance_is_an_identity(case):
     """d(T + V)/dt + dissipated - supplied = 0 at each state of the solution."""
     compiled, values, name = case
@@ -128,7 +128,7 @@ def random_point(oracle, seed):
     return 0.37, random.uniform(0.2, 1.0, oracle.at[-1]), random.uniform(0.2, 1.0, oracle.at[-1])
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(9)
 def test_carriers_agree_with_the_oracle(case, tmp_path):
     compiled, _, name = case
     binding = compiled.bind()
@@ -147,7 +147,7 @@ def test_carriers_agree_with_the_oracle(case, tmp_path):
                         close(carrier.entries(block, part, t, y, yd), v)
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_entries_are_the_rows_derivatives(case):
     """Richardson-extrapolated central differences of the rows against the entries, scattered by the pattern."""
     compiled, _, _ = case

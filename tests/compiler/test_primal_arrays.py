@@ -200,7 +200,7 @@ def sized(net, size, **more):
 
 
 @pytest.mark.parametrize("make", CASES)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_poles_and_modes_are_those_of_the_unrolled_network(make):
     for size in (4, 7):
         net = make()

@@ -33,7 +33,7 @@ def found(tmp_path, signal):
 
 @pytest.mark.parametrize("carrier", CARRIERS)
 @pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-7])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_a_pulse_is_found_on_what_varies_by_itself(tmp_path, width, carrier):
     place = 7.2345678
     times = found(tmp_path, f"2 N*exp(-((t - {place} s)/({width * SPAN} s))^2){carrier}")
@@ -50,7 +50,7 @@ def test_a_signal_that_steps_follow_has_none(tmp_path, signal):
 
 
 @pytest.mark.parametrize("shot", shots(8, seed=3), ids=lambda s: f"{s.shape}-{s.method}")
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_no_pulse_is_missed_in_silence(tmp_path, shot):
     wrong, error = missed(shot, tmp_path)
     assert not wrong

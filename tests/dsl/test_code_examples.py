@@ -31,6 +31,7 @@ def found(text: str) -> list[str]:
     return [d.code for d in console.report]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("code", [c for c in CHECKED if c != "N101"])
 def test_bad_example_raises_its_code_alone(code):
     raised = found(PAGES[code].bad)
@@ -38,6 +39,7 @@ def test_bad_example_raises_its_code_alone(code):
     assert {c for c in raised if c[0] == "E"} <= {code}
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("code", sorted(PAGES))
 def test_good_example_is_free_of_it(code):
     raised = found(PAGES[code].good)
@@ -59,7 +61,7 @@ def said_by(command, text, folder, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("code", [*RUN, "N101"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_bad_example_of_a_run_raises_its_code_alone(code, tmp_path, monkeypatch, capsys):
     raised = said_by(PAGES[code].by, PAGES[code].bad, tmp_path, monkeypatch, capsys)
     if code == "E901":  # a finding without a place

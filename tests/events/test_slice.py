@@ -8,7 +8,7 @@ SLICE = 3 * len(FAMILIES)
 
 
 @pytest.mark.parametrize("number", range(SLICE), ids=lambda k: f"{FAMILIES[k % len(FAMILIES)].__name__}-{k}")
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(9)
 def test_ends_met_or_says_why(number, tmp_path):
     found = judge(tmp_path, drawn(number))
     assert found.kind in ("met", "refused"), found.reason

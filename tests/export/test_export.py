@@ -201,7 +201,7 @@ def test_no_underlying_equation_is_said(tmp_path, capsys):
         ("knife_edge", {"J": 0.9, "v_0": 2.0}), ("parallelogram", {}), ("rolling_disk", {"r": 0.7, "om_0": -0.4}),
     ],
 )  # fmt: skip
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(9)
 def test_starts_at_other_parameters(tmp_path, model, changed, index):
     """Outside as inside: initial values by their formulas, constraints and everything that follows from them."""
     found = inside(f"seed/{model}", index, scene="reference")

@@ -30,7 +30,7 @@ scene run of ladder {
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_closed_form(tmp_path, law, formulation):
     run = ran(tmp_path, MODEL.replace("LAW", law), formulation=formulation, accuracy=1e-6)
     assert run.met

@@ -28,7 +28,7 @@ MORE = {"alone": "", "beside a capacitor": "C: potential(q = 0.1 F*e) a -> groun
 
 @pytest.mark.parametrize("more", MORE)
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_what_follows_its_source_at_once(tmp_path, formulation, more):
     """f = v/R; a spring under a force: its rate is that of the force over k."""
     trace = trace_of(tmp_path, TEXT.format(more=MORE[more]), scene="run", formulation=formulation)

@@ -190,7 +190,7 @@ model m {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_initial_values_over_a_label_of_two_places(tmp_path, formulation):
     traced = ", ".join(f"P[{i}].M.f as f{i}, P[{i}].w as w{i}" for i in range(1, 6))
     trace = run(tmp_path, LINKS, f"{traced}, sum(i in 1..n: P[i].K.e) as total", formulation)
@@ -248,7 +248,7 @@ model m {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("law", ["gain*e", "0.3 S*e*(1 + t/(1 s))"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_source_that_reads_an_input_or_time_is_one(tmp_path, law, formulation):
     text = f"""
 model m {{

@@ -28,7 +28,7 @@ LINEAR, CHARGE = "p = 0.5 H*f", "q = 0.7 F*e"
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("read", ["0.3*L.e", "0.1 V"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_store_whose_effort_a_law_reads(tmp_path, read, formulation):
     trace = trace_of(tmp_path, COIL.format(law=LINEAR, store=CHARGE, read=read), formulation=formulation)
     assert trace["audit.kinetic"].values == pytest.approx(0.25 * trace["L.f"].values ** 2, abs=1e-9)
@@ -117,7 +117,7 @@ scene go of branches {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_what_dissipators_absorb_is_dissipated_whatever_form_their_laws_take(tmp_path, formulation):
     trace = trace_of(tmp_path, BRANCHES, formulation=formulation)
     lost = sum(trace[f"{name}.energy"].values for name in "RDM")

@@ -323,7 +323,7 @@ scene s of w { time 0 s to 0.5 s; trace r, spin.on(φ) as M; expect always: abs(
 @pytest.mark.parametrize(
     ("name", "formulation"), [(name, form) for name, (_, _, forms, _) in CASES.items() for form in forms]
 )
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_a_model_is_what_its_text_says(tmp_path, name, formulation):
     text, closed, _, within = CASES[name]
     file = tmp_path / "m.sd"
@@ -370,7 +370,7 @@ def test_negative_dry_friction_is_refused_of_other_numbers(tmp_path):
         ("content D = (4 N - 8 N/s*t)*abs(x.f)", "", "co_hamiltonian"),
     ],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_dry_friction_ends_the_run_where_it_would_drive(tmp_path, friction, pushed, formulation):
     file = tmp_path / "m.sd"
     file.write_text(driven(friction, pushed))

@@ -103,7 +103,7 @@ CASES = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.one_in(13)
+@pytest.mark.one_in(20)
 def test_contents(tmp_path, case, formulation):
     body, start = CASES[case]
     text = ("model net {{\n" + body + SCENE).format(traced=", ".join(start))
@@ -115,7 +115,7 @@ def test_contents(tmp_path, case, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_what_may_stay_stays(tmp_path, formulation):
     """What follows from the state is free to move: laws that read an effort, an inductor that is said by its flow."""
     text = (ROOT / "tests" / "mutation" / "laws.sd").read_text()

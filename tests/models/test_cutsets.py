@@ -29,7 +29,7 @@ scene go of cut {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_capacitors_behind_a_cut(tmp_path, formulation):
     trace = trace_of(tmp_path, MODEL, formulation=formulation)
     t = trace.time
@@ -148,14 +148,14 @@ def compared(tmp_path, case, n, formulation):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("case", FLOATING)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_families_behind_a_cut(tmp_path, case, formulation):
     compared(tmp_path, case, 3, formulation)
 
 
 @pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("case", FLOATING)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_families_behind_a_cut_step_as_small_ones(tmp_path, case, formulation):
     """The sum of the balances is a row of its own: without it the steps are ten times as many."""
     trace = compared(tmp_path, case, 30, formulation)
@@ -188,7 +188,7 @@ HELD = {
 
 @pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian", "lagrangian"])
 @pytest.mark.parametrize("case", HELD)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_many_pairs_behind_cuts_begin_by_the_factors_of_their_rows(tmp_path, case, formulation, monkeypatch):
     """Capacitors that float, more of them than full matrices hold: what pairs have in common follows from currents, or
     their rates; that of rates may stay open, and the saddle point of twice the size is not asked for it.

@@ -110,7 +110,7 @@ CASES = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(6)
 def test_a_step_across_stores(tmp_path, name, formulation):
     text, exact = CASES[name]
     trace = trace_of(tmp_path, text, formulation=formulation)
@@ -186,7 +186,7 @@ def random_circuit(seed):
 
 
 @pytest.mark.parametrize("seed", range(60) if os.environ.get("SYSDYN_LONG") else [0, 5, 6, 9, 17, 56])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(4)
 def test_random_circuits_behind_a_step(tmp_path, seed):
     """Charges and voltages as coordinates agree."""
     found = []

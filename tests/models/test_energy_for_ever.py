@@ -12,7 +12,7 @@ from long_runs import measure, problems
 @pytest.mark.parametrize(
     ("name", "formulation"), [(name, form) for name, problem in problems().items() for form in problem.forms]
 )
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(4)
 def test_a_thousand_periods(name, formulation):
     row = measure(name, formulation, "energy", 1e3, 1e-8)
     assert row.energy < 1e-12

@@ -34,7 +34,7 @@ def heated(t, tau):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_thermostats_side_by_side(tmp_path, formulation):
     trace = trace_of(tmp_path, HEATED, formulation=formulation, accuracy=1e-6)
     for i in (1, 2, 3):
@@ -72,7 +72,7 @@ scene s of m {
 
 @pytest.mark.parametrize("method", ["auto", "bdf", "radau"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_events_assign_elements(tmp_path, formulation, method):
     trace = trace_of(tmp_path, COUNTED, formulation=formulation, method=method, accuracy=1e-7)
 

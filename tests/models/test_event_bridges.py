@@ -49,7 +49,7 @@ def test_floating_bridge_at_every_tolerance(method, rtol, four, tmp_path):
 
 
 @pytest.mark.parametrize(("series", "parallel"), [(2, 1), (1, 2), (2, 2), (4, 4)])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_strings_and_parallels_are_as_one(series, parallel, four, tmp_path):
     """An ideal diode in series or in parallel with its like changes no voltage outside."""
     found = run(bridge(series, parallel), tmp_path, rtol=1e-8, method="radau")

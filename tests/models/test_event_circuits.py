@@ -41,7 +41,7 @@ BRIDGES = [(2, "lagrangian"), (2, "hamiltonian"), (3, "lagrangian"), (5, "lagran
 
 
 @pytest.mark.parametrize(("phases", "formulation"), BRIDGES)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_a_bridge_commutates_and_does_nothing_else(phases, formulation, tmp_path):
     trace = run(bridge(phases), tmp_path, formulation)
     waves = [10.0 * np.sin(W * trace.time + PHASE - 2.0 * np.pi * k / phases) for k in range(phases)]
@@ -130,7 +130,7 @@ scene s of m {
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["radau", "bdf"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_buck_converter_against_its_exponentials(method, formulation, tmp_path):
     trace = run(BUCK, tmp_path, formulation, method=method)
     assert trace.statistics["error_estimate"] <= 1e-6

@@ -37,7 +37,7 @@ def happened(trace, times):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("model", EVENTS)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_references(model, formulation, tmp_path):
     reference = REFERENCES[model]
     trace = run(model, tmp_path, reference["t"], formulation=formulation)
@@ -65,7 +65,7 @@ def bounce(t, h, v, g, e, least=0.0):
 @pytest.mark.parametrize(
     "changed", [{"e": 0.55, "h_0": 0.4}, {"g": 3.7, "v_0": -2.0, "M": 0.3}, {"e": 1.0, "h_0": 2.0}, {"e": 0.0}]
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_ball_with_other_parameters(changed, tmp_path):
     p = {"g": 9.81, "e": 0.8, "h_0": 1.0, "v_0": 0.0, **changed}
     times = [0.1, 0.7, 1.3, 2.4]
@@ -104,7 +104,7 @@ def test_a_ball_beyond_its_last_impact(method, tmp_path):
 
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6, 1e-8])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_low_bounces_are_resolved_at_any_tolerance(rtol, tmp_path):
     """By the bdf, whose error test does not see them: each flight is e times as long as the one before it."""
     file, end = SEED / "bouncing_ball.sd", math.sqrt(2.0 / 9.81) * (1.0 + 0.8) / (1.0 - 0.8)

@@ -44,7 +44,7 @@ def named(state, system, *names):
 @pytest.mark.parametrize(("n", "k"), [(20, 1.1), (200, 0.11), (300, 1.0)])
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(4)
 def test_a_soliton_with_tails(n, k, law, formulation):
     """Toda's lattice: V = (sinh k / cosh(k i))^2, charges ln(1 + V), currents' rates the differences of voltages.
 

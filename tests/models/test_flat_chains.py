@@ -32,7 +32,7 @@ def off(trace, n):
     return max(np.abs(trace["y0"].values - np.sin(angle)).max(), np.abs(trace["y1"].values - np.cos(angle)).max())
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(9)
 @pytest.mark.parametrize("n", [1, 2])
 @pytest.mark.parametrize("formulation", PRIMAL)
 @pytest.mark.parametrize(("method", "accuracy"), [("radau", 1e-3), ("radau", 1e-6), ("dopri", 1e-5), ("bdf", 1e-3)])

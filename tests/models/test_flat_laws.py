@@ -40,7 +40,7 @@ def _text(what):
 
 @pytest.mark.parametrize("formulation", FOUR[2:])
 @pytest.mark.parametrize("what", ["R", "C", "m", "d", "literal"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_flat_law_in_the_complementary_forms(tmp_path, what, formulation):
     found, expected = (trace_of(tmp_path, _text(what), formulation=f) for f in (formulation, "lagrangian"))
     for name in ("b.e", "Rs.f", "x.f"):

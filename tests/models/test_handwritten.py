@@ -77,7 +77,7 @@ def test_a_netlist_runs_as_it_does_element_by_element(name, tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("name", NETLISTS)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_what_is_said_is_said_of_the_lines_of_the_text(name):
     """Notes of the compiler, unknowns and rows with their lines: the same set as element by element."""
     found = network(NETLISTS[name])

@@ -204,7 +204,7 @@ def test_what_it_cannot_leave_out_is_refused_in_its_own_name(tmp_path, formulati
 
 
 @pytest.mark.parametrize("model", ["lead_filter", "two_tank", "electrical_transformer", "fluid_transformer"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_the_complementary_form_meets_the_reference_values(tmp_path, model):
     """Balances of flows projected on the efforts that effort constraints leave free."""
     reference = REFERENCES[model]

@@ -39,6 +39,7 @@ def warmth(t, part):
 
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.one_in(2)
 def test_the_core_takes_transitions_of_a_large_model_as_of_a_small_one(tmp_path, monkeypatch, method):
     """The handler is asked as often as of the small one (12 times of nine events; 19 where the core read sizes that
     were no doubles); instants and values are those of the closed form.

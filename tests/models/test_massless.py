@@ -133,7 +133,7 @@ scene run of turned { time 0 s to 8 s; trace c, s every 50 ms }
 
 @pytest.mark.parametrize(("method", "accuracy"), [("radau", 1e-6), ("bdf", 1e-3)])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_an_inertia_that_turns(tmp_path, formulation, method, accuracy):
     """Coordinates without inertia along themselves: at the start this is c alone, elsewhere both.  c = cos(t),
     s = sin(t); with roles as the start alone shows them radau stops and bdf takes 40 000 steps.

@@ -39,7 +39,7 @@ def integral(law, x):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(11)
 def test_state_functions_are_integrals_of_the_law(tmp_path, name, formulation):
     edge, side, text, law, start = LAWS[name]
     given = {"kinetic": "pf", "potential": "qe", "dissipator": "ef"}[edge].replace(side, "")
@@ -279,7 +279,7 @@ def stages():
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_components_within_components_within_an_array(tmp_path, formulation):
     """Read from within by a law, a let, an output and an init, and from outside; against the circuit's own matrix."""
     trace = trace_of(tmp_path, CELLS, formulation=formulation)

@@ -40,7 +40,7 @@ def test_reduced_sizes_are_of_models_that_exist():
 
 
 @pytest.mark.parametrize("name", FILES)
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(9)
 def test_check_is_clean(name, capsys):
     code = run(["check", "--json", "--strict", str(MODELS / f"{name}.sd")])
     found = result(capsys)
@@ -63,7 +63,7 @@ def scenes(name):
 @pytest.mark.parametrize(
     ("name", "scene"), [(name, scene) for name in FILES if not name.startswith("seed/") for scene in scenes(name)]
 )
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(9)
 def test_scenes_run_and_hold_what_they_expect(name, scene, tmp_path, capsys):
     output = tmp_path / "trace.h5"
     options = ["--scene", scene, "--json", "-o", str(output), *settings(name), "--max-wall", "120"]
@@ -177,6 +177,7 @@ def test_the_lead_filter_is_the_books(capsys):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_the_drive_closes_its_books(tmp_path, capsys, formulation):
     """Section 6.1 from network text: n = 6, m = 2; half a second of mains, speed and position come to a period."""
     found = counts("gallery/rectifier_motor_slider", capsys)["start"]
@@ -242,6 +243,7 @@ def ladder(n, times):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+@pytest.mark.one_in(2)
 def test_the_line_meets_the_exponential_of_its_ladder(tmp_path, formulation):
     times = np.arange(101) * 1e-7
     options = ("--set", "n=200", "--accuracy", "1e-6", "--formulation", formulation)

@@ -85,7 +85,7 @@ def line(times):
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize(("text", "reference"), [(TANK, tank), (LINE, line)], ids=["tank", "line"])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(6)
 def test_a_store_that_saturates_runs_from_its_start(tmp_path, text, reference, formulation):
     # energies such as ln cosh are round-off of either sign at first, and efforts at rest those of a linear solve
     path = tmp_path / "model.sd"

@@ -89,7 +89,7 @@ def test_an_orifice_between_equal_levels(tmp_path, method):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_two_vessels_in_every_formulation(tmp_path, formulation):
     """d' = -20 sqrt(d): the root of 1e5 Pa falls with 10 a second."""
     trace = trace_of(tmp_path, VESSELS, formulation=formulation)

@@ -118,7 +118,7 @@ def in_numpy(model, formulation):
     ("model", "formulation", "backend"),
     [(*case, backend) for case in CASES for backend in ("c", "numpy") if backend == "c" or in_numpy(*case)],
 )
-@pytest.mark.one_in(8)
+@pytest.mark.one_in(14)
 def test_reference_values(tmp_path, model, formulation, backend):
     reference = REFERENCES[model]
     found = simulated(tmp_path, model, formulation=formulation, backend=backend, times=reference["t"])
@@ -134,7 +134,7 @@ def twice(model):
 
 
 @pytest.mark.parametrize(("model", "formulation"), [case for case in CASES if case[1] in twice(case[0])])
-@pytest.mark.one_in(13)
+@pytest.mark.one_in(23)
 def test_reference_values_at_the_finer_accuracy(tmp_path, model, formulation):
     reference = REFERENCES[model]
     found = simulated(tmp_path, model, formulation=formulation, times=reference["t"], accuracy=FINE)
@@ -166,7 +166,7 @@ def some(model, formulation, case):
 @pytest.mark.parametrize(
     ("model", "formulation", "case"), [(*case, k) for case in CASES for k in range(3) if LONG or some(*case, k)]
 )
-@pytest.mark.one_in(34)
+@pytest.mark.one_in(51)
 def test_changed_values(tmp_path, model, formulation, case):
     worst = changed(tmp_path, model, formulation, settings_of(model, case))
     assert max(worst.values()) <= ALLOWED, worst
@@ -192,7 +192,7 @@ def test_changed_values_at_the_finer_accuracy(tmp_path, model, formulation, case
         if LONG or case % 2 == k or len(formulations(model)) == 1
     ],
 )
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(11)
 def test_extreme_values(tmp_path, model, formulation, case):
     worst = changed(tmp_path, model, formulation, EXTREME[model][case])
     assert max(worst.values()) <= ALLOWED, worst
@@ -213,7 +213,7 @@ def witness(model, settings, times):
 
 
 @pytest.mark.parametrize("model", [m for m in MODELS if "reduced_ode" in REFERENCES[m]])
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(8)
 def test_the_witness_meets_the_reference_values(model):
     reference = REFERENCES[model]
     method, rtol = STIFF.get(model, ("DOP853", 1e-12))
@@ -224,7 +224,7 @@ def test_the_witness_meets_the_reference_values(model):
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_parameters_have_the_books_names_and_values(model):
     from sysdyn.api import compile_model
 

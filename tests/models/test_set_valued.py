@@ -78,7 +78,7 @@ def test_a_block_slides_back_above_the_angle_of_friction(tmp_path, formulation):
 @PRIMAL
 @pytest.mark.parametrize(("start", "bounce"), [("0.5 m", "0"), ("1 m", "0.5")])
 @pytest.mark.parametrize("mu", [0.1, 0.9])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_an_impact_rubs_by_its_impulse(tmp_path, formulation, start, bounce, mu):
     """Friction on a reaction has an impulse with it, at most what stops the block: as that of a dissipator."""
     texts = [block(text, start, bounce).replace("mu = 0.5", f"mu = {mu}") for text in (GAMMA, TWIN)]
@@ -118,7 +118,7 @@ scene s of belt {
 
 @PRIMAL
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_sticks_and_slips_on_a_belt_as_a_dissipator_does(tmp_path, formulation, accuracy):
     """The bound falls with the speed (Stribeck): it sticks again and again."""
     law = "3 N*setsign({0})*(1 + 1/(1 + ({0})^2/(1 m^2/s^2)))"
@@ -153,7 +153,7 @@ scene s of charge {
 @ALL
 @pytest.mark.parametrize("leak", [0.0, 1e-4])
 @pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock", "auto"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_capacitor_is_charged_by_a_limited_current(tmp_path, formulation, leak, method):
     """At 1 mA + G e until nothing is left over the limiter, then by R C."""
     law = "1 mA*setsign(e)" + (" + 0.1 mS*e" if leak else "")
@@ -168,7 +168,7 @@ def test_a_capacitor_is_charged_by_a_limited_current(tmp_path, formulation, leak
 
 
 @ALL
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_limiter_stops_an_inductor_without_a_jump(tmp_path, formulation):
     """A current within its limit is held at it, and let go where the voltage turns: the same as a pair of one-way
     constraints says.
@@ -194,7 +194,7 @@ scene s of coil { time 0 s to 30 ms; trace I.f, L.e every 0.5 ms }
 
 
 @ALL
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_limiters_of_an_array_end_one_after_the_other(tmp_path, formulation):
     text = """\
 model bank {
@@ -232,7 +232,7 @@ scene s of two { time 0 s to 10 s; trace x, y every 0.1 s }
 
 @PRIMAL
 @pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_two_bodies_rub_on_each_other(tmp_path, formulation, method):
     """Which of both sticks is one question."""
     gammas = """implicit F, G: N ~ 0 N; work F on x; work -F on y; work G on y
@@ -255,7 +255,7 @@ def test_two_bodies_rub_on_each_other(tmp_path, formulation, method):
     "gamma g: F = 0 N; rub: effort(e = 3 N*setsign(x')) on x",
     "gamma g: F = 0 N; implicit s: 1 ~ 0; gamma h: s = setsign(x'); work -(3 N)*s on x",
 ])  # fmt: skip
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_one_friction_however_it_is_said(tmp_path, law):
     """Slips to a stop, sticks until 5 N sin 2t is 3 N, slips on."""
     text = f"""\
@@ -328,7 +328,7 @@ scene s of oven { time 0 s to 60 s; trace T, P every 1 s }
 
 @PRIMAL
 @pytest.mark.parametrize("speed", ["0.3 m/s", "0 m/s"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_relay_of_a_far_speed_is_a_sign(tmp_path, formulation, speed):
     """The force acts on the neighbour of what it reads: that goes through zero at once."""
     text = f"""\
@@ -392,7 +392,7 @@ scene s of play { time 0 s to 2 s; trace x, y every 0.02 s }
 @pytest.mark.parametrize("friction", [
     "implicit F: N ~ 0 N; work F on y; gamma g: F = -(3 N)*setsign(y')", "rub: dissipator(e = 3 N*setsign(f)) on y",
 ])  # fmt: skip
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_what_rubs_without_a_mass_starts_between_both_senses(tmp_path, formulation, damper, friction):
     """A spring before a friction: without a damper the play of 3/200 m (Prandtl); Euler's small steps say the same."""
     trace = run(tmp_path, PLAY.replace("DAMPER", damper).replace("FRICTION", friction), formulation)
@@ -494,7 +494,7 @@ model clamp {
 scene s of clamp { time 0 s to 40 ms; trace Z.f as a, Z.e as b, b.e as c every 0.5 ms }
 """,
 ])  # fmt: skip
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_dry_friction_is_one_in_both_families(tmp_path, formulation, text):
     one, other = (run(tmp_path, text, f, method="radau") for f in ("lagrangian", formulation))
     assert len(one.events) == len(other.events) > 3
@@ -506,7 +506,7 @@ def test_dry_friction_is_one_in_both_families(tmp_path, formulation, text):
 
 
 @ALL
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_elements_of_one_label_are_said_one_by_one(tmp_path, formulation):
     """Of frictions in two loops, and of limiters by themselves, each has a sense of its own."""
     text = """\

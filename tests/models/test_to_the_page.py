@@ -157,7 +157,7 @@ scene s of m { time 0 s to 4 s; trace L[1].c[3].e as a, L[3].c[1].e as b, K.c[2]
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_components_in_an_array_have_arrays_of_their_own_size(tmp_path, formulation):
     trace = run(tmp_path, LADDERS, formulation=formulation)
     for name, n, ohms, k in (("a", 3, 1.0, 2), ("b", 3, 3.0, 0), ("c", 2, 1.0, 1)):
@@ -221,7 +221,7 @@ scene s of m { time 0 s to 1 s; trace L[1].a[1].e as x, L[2].D[2].S.mean as mean
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_ports_that_are_arrays(tmp_path, formulation):
     trace = run(tmp_path, STARS, formulation=formulation)
     g = np.array([1, 0.5, 0.25])

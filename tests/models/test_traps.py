@@ -192,7 +192,7 @@ def voltage(e, saturation, vt=25.85e-3, r=10.0):
     ("drive", "saturation", "guess"),
     [(1000.0, 1e-12, 0.0), (1000.0, 1e-15, -1000.0), (-1000.0, 1e-12, 0.5), (20.0, 1e-16, -30.0)],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_diode_is_safe_against_overflow(tmp_path, formulation, drive, saturation, guess):
     settings = (("E", repr(drive)), ("Is", repr(saturation)), ("guess", repr(guess)))
     trace = trace_of(tmp_path, DIODE, formulation=formulation, settings=settings)
@@ -290,7 +290,7 @@ def test_the_tan_form_is_right_or_stops(tmp_path):
         ("lead_filter", (), 2),
     ],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_the_index_follows_from_the_values(tmp_path, model, settings, index):
     text = (SEED / f"{model}.sd").read_text()
     head, tail = text.split("\n}\n\nscene ")

@@ -35,6 +35,7 @@ scene fall of falling {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_a_chain_that_falls_freely_does_not_turn(tmp_path, formulation):
     """Angular velocities and joint forces have no others of their units: round-off of weights and positions alone."""
     (tmp_path / "model.sd").write_text(LINKS)
@@ -71,7 +72,7 @@ scene shut of shorted {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_two_gyrators_that_short_each_other(tmp_path, formulation):
     """Two ratios at the same ends leave no voltage, no turning: the flux stays, the inertia has the damper alone."""
     (tmp_path / "model.sd").write_text(SHORTED)

@@ -26,7 +26,7 @@ def run(made, t_end, form="3", index=0, instants=(), **request):
     ("order", "tolerances"),
     [(1, (1e-4, 1e-6)), (2, (1e-5, 1e-8)), (3, (1e-6, 1e-9)), (4, (1e-7, 1e-10)), (5, (1e-10, 1e-11))],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_observed_order(order, tolerances):
     # error ~ steps^-order where no higher order is allowed
     t = np.linspace(0, 10, 21)

@@ -96,6 +96,7 @@ def test_a_start_that_is_put_away_is_the_same_start():
 
 
 @pytest.mark.parametrize("large", [True, False])
+@pytest.mark.one_in(2)
 def test_points_settle_in_what_radau_does_not_read_between_its_steps(monkeypatch, large):
     """Rows at steps and within them write into right sides and stages: the run is the one that is not looked at.  Its
     constraints drift, so that nothing puts the stages right.

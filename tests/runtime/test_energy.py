@@ -108,7 +108,7 @@ def test_displacements_and_multipliers(form):
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-8])
 @pytest.mark.parametrize("made", [cartesian, minimal])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_energy_and_constraints_over_many_periods(made, rtol):
     t_end = (150.0 if LONG else 40.0) * SWING
     rows, _, finished = energy(made(), t_end, np.linspace(0.0, t_end, 100), rtol=rtol)
@@ -140,6 +140,7 @@ def test_no_drift_of_constraints_at_the_steps_themselves():
     assert drift(models.slider_crank(), 20.0, "0", "energy", 1e-4) < 1e-13
 
 
+@pytest.mark.long
 def test_the_phase_error_is_the_tolerance_of_a_period_times_their_number():
     periods = 100 if LONG else 40
     t = np.arange(1, periods + 1) * SWING - 0.2 * SWING

@@ -40,7 +40,7 @@ def impacts(r, number):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["radau", "bdf"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_ball_bounces_at_the_exact_instants(tmp_path, formulation, method):
     trace = run(BALL, tmp_path, formulation=formulation, method=method, accuracy=1e-9)
     times, after = impacts(0.8, 4)
@@ -75,7 +75,7 @@ scene s of leak {
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("how", [("bdf", "1"), ("radau", "1"), ("bdf", "0"), ("rosenbrock", "auto"), ("dopri", "auto")])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_resistance_jumps_in_every_index_form(tmp_path, formulation, how):
     """No flow has inertia: each follows anew, also where the rates of derived constraints stand beside them."""
     method, index = how

@@ -84,6 +84,7 @@ def test_order_on_a_smooth_ode(stages, steps, order):
 
 
 @pytest.mark.parametrize("stages", [5, 7])
+@pytest.mark.one_in(2)
 def test_order_on_the_pendulum(stages):
     """Of coordinates and multipliers 2 s - 1 with the constraint's rates, s where the constraint alone is asked."""
     steps = (0.4, 0.2)

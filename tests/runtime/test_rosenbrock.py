@@ -46,6 +46,7 @@ def test_order_five_on_a_smooth_ode():
 
 
 @pytest.mark.parametrize("family", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_order_five_of_constraints_whose_matrix_moves(family):
     errors = []
     for h in (0.1, 0.05, 0.025):
@@ -91,7 +92,7 @@ def test_values_between_steps_have_order_five_too():
 
 @pytest.mark.parametrize("rate", [1.0, 1e3, 1e5])
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_error_within_steps_of_what_is_pulled_to_a_source(rate, rtol):
     # steps alone would not see it: whatever they are, their ends lie on the source
     t = np.linspace(0, 10, 501)
@@ -122,6 +123,7 @@ def test_a_run_opens_with_the_step_that_the_one_before_found_fit(part):
     assert known.rejected_steps == 0
 
 
+@pytest.mark.long
 def test_a_stiff_diode_as_the_others_have_it():
     t = np.linspace(0, 0.05, 101)
     exact = run(models.diode_circuit(), 0.05, "3", 1, t, rtol=1e-11, method="radau")[1]
@@ -188,6 +190,7 @@ def test_auto_takes_it_for_cheap_accuracy_and_more_stages_for_dear_one(tmp_path)
 
 
 @pytest.mark.parametrize("rate", [1e7, 1e9])
+@pytest.mark.one_in(2)
 def test_auto_leaves_it_where_equations_are_nearly_of_index_two(tmp_path, rate):
     outcome, trace = simulated(tmp_path, relaxing(rate), 10.0, accuracy=1e-3)
     assert outcome.met

@@ -25,6 +25,7 @@ def test_a_slice_of_the_core_has_no_fault(tmp_path):
     assert "passed" in said or "%]" in said
 
 
+@pytest.mark.long
 def test_threads_of_the_core_have_no_race(tmp_path):
     library = build(tmp_path, THREADS)
     if run(library, ["--version"], "tsan")[0] != 0:

@@ -37,7 +37,7 @@ def outcome(made, path, t_end, **options):
 
 @pytest.mark.parametrize("name", END)
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(7)
 def test_accuracy_is_met(name, accuracy, tmp_path):
     make, t_end, values = END[name]
     result = outcome(make(), tmp_path / "o.h5", t_end, accuracy=accuracy, every=t_end / 40)
@@ -53,7 +53,7 @@ def test_accuracy_is_met(name, accuracy, tmp_path):
 
 @pytest.mark.parametrize("name", ["lead_filter", "fluid_tank"])
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_where_little_happens_the_bdf_follows_a_draft_of_radau(name, accuracy, tmp_path):
     make, t_end, _ = END[name]
     options = {"every": t_end / 200}

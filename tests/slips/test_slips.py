@@ -13,7 +13,7 @@ from sysdyn.cli.main import run
 
 
 @pytest.mark.parametrize("slip", SLIPS, ids=[f"{s.kind}: {s.new.strip()[:40]!r}" for s in SLIPS])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_slip_is_told_once_and_well(slip):
     found = answer(slip)
     assert (found.points, found.wrong) == (3, ()), [(d.code, d.message, d.help) for d in found.findings]
@@ -33,7 +33,7 @@ def test_every_class_has_slips():
 
 
 @pytest.mark.parametrize("name", STOPS)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_a_run_that_stops_speaks_the_same_language(name, tmp_path, capsys):
     """One error with its code, at the author's line, the function or cause with its value, and the last good state."""
     stop = STOPS[name]

@@ -30,7 +30,7 @@ CASES = {
 
 
 @pytest.mark.parametrize(("row", "formulation"), CASES.values(), ids=CASES)
-@pytest.mark.one_in(44)
+@pytest.mark.one_in(79)
 def test_response(row, formulation, tmp_path, record_property):
     record_property("error", row.check(tmp_path, formulation))
 

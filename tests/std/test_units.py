@@ -152,7 +152,7 @@ def model_in_si(request, tmp_path_factory):
 
 
 @pytest.mark.parametrize("system", [s for s in SYSTEMS if s != "SI"])
-@pytest.mark.one_in(10)
+@pytest.mark.one_in(18)
 def test_same_numbers_in_every_coherent_system(model_in_si, system, tmp_path, record_property):
     model, wanted = model_in_si
     error = difference(values(tmp_path, system, model), wanted)
@@ -262,7 +262,7 @@ PREFIXED = {
 
 
 @pytest.mark.parametrize("model", PREFIXED)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_prefixed_units(model, tmp_path, record_property):
     prefixed, plain, units = PREFIXED[model]
     texts = [

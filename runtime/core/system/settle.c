@@ -249,9 +249,13 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
     double limit = fmax(EXACT, settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
     /* near a law's flat place round-off leaves much; of steep ones the saddle-point matrix makes more */
     double bound = settle->system->scales > 0 ? FINE : CLOSE;
-    int fresh = settle->ready != SD_BY_BASIS, failed = fresh && choose(settle, t, y, yd, 1);
+    int fresh = settle->ready != SD_BY_BASIS, failed = fresh && !slopes(settle, t, y, yd, 1);
     double before = failed ? INFINITY : measure(settle, t, y, yd);
     settle->drift = settle->constraints;
+    if (fresh && !failed) {
+        failed = before > limit && sd_settle_choose(settle); /* a point that holds as it comes asks for none */
+        leave_slopes(settle);
+    }
     for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
         if (before <= limit && (m == 0 || moved < SMALL))
             break;
