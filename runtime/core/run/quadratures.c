@@ -67,11 +67,18 @@ static void shares(const sd_stepper *stepper, double to, double *share)
     }
 }
 
+/* length of the last step */
+static double length_of(const sd_run *run)
+{
+    return run->stepper->length ? *run->stepper->length : *run->stepper->t - run->t_from;
+}
+
 /* the method's own quadrature over the part `part` of the last step */
 static void integrate_nodes(sd_run *run, double part)
 {
     const sd_stepper *stepper = run->stepper;
-    double from = run->t_from, h = stepper->length ? *stepper->length : *stepper->t - from, share[SD_NODES + 1];
+    double from = run->t_from, h = length_of(run), share[SD_NODES + 1];
+    run->noded = stepper->collocated;
     if (part < 1.0) { /* the whole step takes nothing of its start */
         shares(stepper, part, share);
         memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
@@ -79,13 +86,17 @@ static void integrate_nodes(sd_run *run, double part)
     }
     for (int32_t k = 0; k < stepper->nodes; k++) {
         double weight = part < 1.0 ? share[k + 1] : stepper->node_weight[k];
-        if (weight == 0.0)
+        if (weight == 0.0) {
+            run->noded = 0;
             continue;
+        }
         if (stepper->show)
             stepper->show(stepper->self, k, run->point, run->point_d);
         const double *y = stepper->show ? run->point : stepper->node_y[k];
         powers(run, from + stepper->node[k] * h, y, stepper->show ? run->point_d : stepper->node_yd[k]);
         weigh(run, h * weight);
+        if (stepper->collocated)
+            memcpy(run->node_power[k], run->sample + 2, sizeof run->node_power[k]);
     }
     for (int32_t k = 2; stepper->moves && k < run->audited; k++)
         run->integral[k] += stepper->moves[k];
@@ -97,7 +108,7 @@ int sd_run_integrate(sd_run *run, double to)
     const sd_stepper *stepper = run->stepper;
     double from = run->t_from, half = 0.5 * (to - from), middle = 0.5 * (to + from);
     memset(run->integral, 0, (size_t)run->audited * sizeof(double));
-    run->sampled = 0;
+    run->sampled = run->noded = 0;
     if (!run->audit || half == 0.0)
         return 0;
     if (stepper->nodes && (to == *stepper->t || stepper->collocated)) {
@@ -130,6 +141,25 @@ int sd_run_integrate(sd_run *run, double to)
     sd_run_audit(run, to, run->point, run->point_d, run->sample);
     weigh(run, half / 6.0);
     return !run->sampled;
+}
+
+int sd_run_sum(sd_run *run, double to, double sum[2])
+{
+    const sd_stepper *stepper = run->stepper;
+    if (!run->noded) {
+        int there = sd_run_integrate(run, to);
+        memcpy(sum, run->integral + 2, 2 * sizeof *sum);
+        return there;
+    }
+    double share[SD_NODES + 1], h = length_of(run);
+    shares(stepper, (to - run->t_from) / (*stepper->t - run->t_from), share);
+    for (int i = 0; i < 2; i++) {
+        sum[i] = share[0] * run->power[2 + i];
+        for (int32_t k = 0; k < stepper->nodes; k++)
+            sum[i] += share[k + 1] * run->node_power[k][i];
+        sum[i] = h * sum[i] + (stepper->moves ? stepper->moves[2 + i] : 0.0);
+    }
+    return 0;
 }
 
 void sd_run_integrate_cut(sd_run *run, double to)

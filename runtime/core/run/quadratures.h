@@ -14,6 +14,9 @@ void sd_run_audit(const sd_run *run, double t, const double *y, const double *yd
  * the point there; sampled: sample and point do, which is the end of the step */
 int sd_run_integrate(sd_run *run, double to);
 
+/* sum: of the powers dissipated and supplied alone, by those at the nodes where they are known; else the same */
+int sd_run_sum(sd_run *run, double to, double sum[2]);
+
 /* The same where an event ends the step at `to`: Gauss's rule of degree 5, after many nodes 9, on settled points.  Within
  * a step the stages of what follows from constraints alone (the current of a source) are of lower order than their sum
  * over it. */

@@ -196,7 +196,7 @@ static void note_step(sd_run *run, double t)
 static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
     double *row = run->row + (size_t)run->rows * (size_t)(SD_ROW_HEAD + 2 * run->observed);
-    double *out = run->end, dissipated = 0.0, supplied = 0.0;
+    double *out = run->end, sum[2] = {0.0, 0.0};
     const int alone = !at_step && (int32_t)kind == SD_COMPARED;
     const int unsummed = run->unsummed > 1 || (run->unsummed && alone);
     if (run->fresh) {
@@ -204,11 +204,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         memcpy(run->point_d, run->start_rate, (size_t)run->stepper->n * sizeof(double));
     } else {
         int there = 0;
-        if (!at_step && !unsummed) {
-            there = sd_run_integrate(run, t);
-            dissipated = run->integral[2];
-            supplied = run->integral[3];
-        }
+        if (!at_step && !unsummed)
+            there = sd_run_sum(run, t, sum);
         if (!there)
             run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
     }
@@ -220,8 +217,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     settle_row(run, t, (int32_t)kind);
     if (run->magnitude && !at_step)
         note_beyond(run);
-    dissipated = at_step ? run->dissipated : run->step_dissipated + dissipated;
-    supplied = at_step ? run->supplied : run->step_supplied + supplied;
+    double dissipated = at_step ? run->dissipated : run->step_dissipated + sum[0];
+    double supplied = at_step ? run->supplied : run->step_supplied + sum[1];
     if (run->unsummed && alone)
         memset(out, 0, (size_t)run->audited * sizeof *out);
     else
@@ -392,7 +389,7 @@ static void measure(sd_run *run, double from, double t)
 {
     run->t_from = from;
     run->t_to = t;
-    run->sampled = 0;
+    run->sampled = run->noded = 0;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
     if (run->unsummed > 1)

@@ -77,6 +77,8 @@ typedef struct sd_run {
     double t_clear, t_seen;           /* within the last step, between which something watched has been seen to change */
     double turns;                     /* s: in which something that is read turns; 0: nothing does */
     double *looked;                   /* [SD_PARTS + 1][observed] values at the ends of parts */
+    int32_t noded;                    /* the powers at the method's nodes of the last step are known: */
+    double node_power[SD_NODES][2];   /* dissipated, supplied */
 } sd_run;
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,

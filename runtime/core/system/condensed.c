@@ -106,16 +106,21 @@ static void gather(int32_t spans, const sd_span *span, const double *x, double *
         copy(z + span[s].kept, x + span[s].full, span[s].number);
 }
 
-void sd_condensed_expand(const sd_condensed *condensed, const double *z, double *x, int rate)
+void sd_condensed_put(const sd_condensed *condensed, const double *z, double *x)
 {
     scatter(condensed->unknown_spans, condensed->unknown, z, x);
+}
+
+void sd_condensed_expand(const sd_condensed *condensed, const double *z, double *x, int rate)
+{
+    sd_condensed_put(condensed, z, x);
     sd_condensed_complete(condensed, x, rate);
 }
 
 void sd_condensed_show(const sd_condensed *condensed, const double *z, const double *zd, double *y, double *yd)
 {
     sd_condensed_expand(condensed, z, y, 0);
-    scatter(condensed->unknown_spans, condensed->unknown, zd, yd);
+    sd_condensed_put(condensed, zd, yd);
     if (condensed->observed_rates)
         sd_condensed_complete(condensed, yd, 1);
 }

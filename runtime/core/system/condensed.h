@@ -73,6 +73,8 @@ void sd_condensed_place_rates(const sd_condensed *condensed, const double *zd);
 void sd_condensed_rows(const sd_condensed *condensed, double t, const double *zd, double *r);
 int sd_condensed_in_place(const sd_condensed *condensed);
 
+/* the kept ones of x from z */
+void sd_condensed_put(const sd_condensed *condensed, const double *z, double *x);
 /* all unknowns x of the full system from kept values z; rate: x and z are derivatives.  What is neither kept nor
  * eliminated stays as it is */
 void sd_condensed_expand(const sd_condensed *condensed, const double *z, double *x, int rate);

@@ -495,7 +495,7 @@ static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
     sd_condensed_gather(condensed, yd, zd);
     int failed = settle_unknowns(settle, t, z, zd);
     sd_condensed_expand(condensed, z, y, 0);
-    sd_condensed_expand(condensed, zd, yd, 1);
+    sd_condensed_put(condensed, zd, yd);
     for (int32_t i = 0; i < settle->kinematics; i++)
         yd[settle->k_q[i]] = y[settle->k_f[i]];
     sd_condensed_complete(condensed, yd, 1); /* what follows from displacements follows them in its rate */

@@ -7,6 +7,8 @@ import ctypes as c
 from sysdyn.runtime.model.structures.c_types import D, I, L, P
 
 ROW_HEAD = 8
+NODES = 7
+"""SD_NODES: of a method, at most."""
 OWN = 2**31 - 1
 """SD_OWN: the mode that the core has found by itself."""
 
@@ -192,6 +194,8 @@ class Run(c.Structure):
         ("t_seen", D),
         ("turns", D),
         ("looked", P),
+        ("noded", I),
+        ("node_power", D * (2 * NODES)),
     ]
 
 
