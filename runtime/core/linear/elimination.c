@@ -9,7 +9,8 @@
 #include <string.h>
 
 #define GROWTH 1e4         /* of multipliers, where a solution is a correction that the next one corrects */
-#define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
+#define WEAK 1e-8          /* pivots below this part of their column: what is solved with them is to be refined; */
+#define FAINT 1e-12        /* they may be what round-off left */
 #define FIRST 3            /* matrices seen before an order is looked for: one-off systems do not pay for it, */
 #define SHARE 8            /* nor do large ones before this part of n */
 #define MISSES 3           /* matrices that an order did not serve, each of which costs a fortieth of a search, before another is */
@@ -45,22 +46,41 @@ static void drop_order(sd_elimination *e)
     e->cell = NULL;
 }
 
+static void free_one(sd_elimination *e)
+{
+    drop_order(e);
+    free(e->sample);
+    free(e->pivot_row);
+    free(e->weak);
+    free(e);
+}
+
+static void free_others(sd_elimination *e)
+{
+    while (e->other) {
+        sd_elimination *other = e->other;
+        e->other = other->other;
+        free_one(other);
+    }
+}
+
 void sd_elimination_forget(sd_elimination *elimination)
 {
-    drop_order(elimination);
-    elimination->samples = elimination->seen = elimination->waited = elimination->missed = 0;
-    elimination->wait = FIRST > elimination->n / SHARE ? FIRST : elimination->n / SHARE;
+    sd_elimination *e = elimination;
+    free_others(e);
+    drop_order(e);
+    e->samples = e->seen = e->waited = e->missed = 0;
+    e->tries = e->served = 0;
+    e->serves = e;
+    e->wait = FIRST > e->n / SHARE ? FIRST : e->n / SHARE;
 }
 
 void sd_elimination_free(sd_elimination *elimination)
 {
     if (!elimination)
         return;
-    drop_order(elimination);
-    free(elimination->sample);
-    free(elimination->pivot_row);
-    free(elimination->weak);
-    free(elimination);
+    free_others(elimination);
+    free_one(elimination);
 }
 
 sd_elimination *sd_elimination_new(int32_t n, const int32_t *column, const int32_t *row)
@@ -76,7 +96,7 @@ sd_elimination *sd_elimination_new(int32_t n, const int32_t *column, const int32
     e->pivot_row = calloc(2 * (size_t)n + 1, sizeof(int32_t));
     e->weak = calloc((size_t)n + 1, sizeof(double));
     if (!e->sample || !e->pivot_row || !e->weak) {
-        sd_elimination_free(e);
+        free_one(e);
         return NULL;
     }
     e->pivot_column = e->pivot_row + n;
@@ -262,9 +282,26 @@ static SD_APART void write_code(sd_elimination *e)
         e->code = sd_code_new(&e->factor, &e->solve, e->inside, NUMBERS);
 }
 
+/* Who learns of a matrix that no order served: one that has none yet, or that served longest ago. */
+static sd_elimination *pupil(sd_elimination *first)
+{
+    sd_elimination *found = first, *last = first;
+    int orders = 0;
+    for (sd_elimination *e = first; e; last = e, e = e->other, orders++) {
+        if (!e->ready)
+            return e;
+        found = e->served < found->served ? e : found;
+    }
+    if (orders < SD_ORDERS && (last->other = sd_elimination_new(first->n, first->column, first->row))) {
+        last->other->growth = first->growth;
+        found = last->other;
+    }
+    return found;
+}
+
 void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
 {
-    sd_elimination *e = elimination;
+    sd_elimination *e = pupil(elimination);
     size_t size = (size_t)e->entries;
     e->seen++;
     e->missed += e->ready;
@@ -311,18 +348,21 @@ static void interpret(sd_elimination *e, const sd_list *list, const sd_number *o
         cell[sum->target] = sum_of(sum, list->pair, cell);
 }
 
-/* multipliers are moderate, and what is left of each pivot's column is more than round-off */
+/* 0: a multiplier is large, or what is left of a pivot's column may be round-off; 2: a pivot is weak; else 1 */
 static int healthy(const sd_elimination *e)
 {
     const sd_number *inverse = e->cell, *size = e->cell + size_of(e, 0), *growth = e->cell + growth_of(e, 0);
     const sd_number *scale = e->cell + magnitude(e, 0);
     const double *weak = e->weak;
+    int found = 1;
     for (int32_t k = 0; k < e->n; k++) { /* one by one: they were written so, and are not at hand in lanes */
-        double row = sd_size(size[k]);
-        if (!(sd_size(growth[k]) <= e->growth * row) || !(sd_size(inverse[k]) * row * weak[k] <= sd_size(scale[k])))
+        double row = sd_size(size[k]), lost = sd_size(inverse[k]) * row * weak[k], whole = sd_size(scale[k]);
+        if (!(sd_size(growth[k]) <= e->growth * row) || !(lost * (FAINT / WEAK) <= whole))
             return 0;
+        if (lost > whole)
+            found = 2;
     }
-    return 1;
+    return found;
 }
 
 /* the magnitudes of the pivots' columns; NULL: all of size one */
@@ -341,10 +381,9 @@ static SD_APART void measure(sd_elimination *e, const double *scale)
     }
 }
 
-int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale)
+/* by the order of this one */
+static int factor(sd_elimination *e, const sd_number *values, const double *scale)
 {
-    sd_elimination *e = elimination;
-    e->waited++;
     if (!e->ready)
         return 0;
     if (scale || e->scaled)
@@ -358,9 +397,24 @@ int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, 
     return healthy(e);
 }
 
+int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale)
+{
+    sd_elimination *const first = elimination, *const last = first->serves;
+    first->tries++;
+    for (sd_elimination *e = first; e; e = e->other)
+        e->waited++;
+    int found = factor(last, values, scale);
+    for (sd_elimination *e = first; e && !found; e = e->other)
+        if (e != last && (found = factor(e, values, scale)))
+            first->serves = e;
+    if (found)
+        first->serves->served = first->tries;
+    return found;
+}
+
 void sd_elimination_solve(sd_elimination *elimination, sd_number *x)
 {
-    sd_elimination *e = elimination;
+    sd_elimination *e = elimination->serves;
     if (e->code) {
         e->code->solve(x, e->cell);
         return;

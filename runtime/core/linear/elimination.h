@@ -4,7 +4,8 @@
  * met; no row is exchanged later.  What is done then is a list of sums over fixed cells, which an interpreter runs, or
  * straight machine code (machine_code.h).  Values are not scaled: a factorisation without exchanges is the same under any
  * scaling of rows and columns.  Its growth is judged in scaled terms: columns by magnitudes of the unknowns, rows by their
- * largest entry; multipliers and pivots beyond the limits say that another order is wanted.
+ * largest entry; multipliers and pivots beyond the limits say that another order is wanted.  Of laws that switch (diodes) one
+ * order serves the matrices of some states: up to SD_ORDERS are kept, and the one that served last is tried first.
  */
 #ifndef SYSDYN_ELIMINATION_H
 #define SYSDYN_ELIMINATION_H
@@ -16,6 +17,7 @@
 #define SD_REPLAYED 100 /* largest matrix; above, loops over a pattern cost little more than the numbers themselves */
 
 #define SD_SAMPLES 6    /* matrices of which an order is found */
+#define SD_ORDERS 4     /* that are kept */
 
 /* how the target of a sum is made of S = source - sum over pairs of a b */
 enum sd_sum_kind { SD_SUM_PLAIN, SD_SUM_TIMES, SD_SUM_INVERSE, SD_SUM_LARGEST }; /* S; S times the cell `by`; 1 / S; largest |a b| */
@@ -34,7 +36,8 @@ typedef struct sd_list {
 
 typedef struct sd_code sd_code;
 
-typedef struct sd_elimination {
+typedef struct sd_elimination sd_elimination;
+struct sd_elimination {
     int32_t n, entries;
     const int32_t *column, *row; /* pattern, compressed columns, of the caller */
     int32_t ready, scaled;       /* an order was found; the magnitudes of its columns are not all one */
@@ -50,16 +53,19 @@ typedef struct sd_elimination {
     sd_list factor, solve;
     int64_t interpreted;         /* operations so far */
     sd_code *code;               /* NULL: interpreted */
-} sd_elimination;
+    sd_elimination *other;       /* with another order; NULL: there is none */
+    sd_elimination *serves;      /* of the first: the one whose factors were the last that served */
+    int64_t tries, served;       /* of the first: matrices so far; the last of them that it served */
+};
 
 sd_elimination *sd_elimination_new(int32_t n, const int32_t *column, const int32_t *row);
 void sd_elimination_free(sd_elimination *elimination);
 /* as new: nothing is known of any matrix */
 void sd_elimination_forget(sd_elimination *elimination);
-/* a matrix [entries] with rows of largest entry 1 that was factorised otherwise; in time an order is found for it and
- * those before it */
+/* a matrix [entries] with rows of largest entry 1 that no order served; in time one is found for it and those before it */
 void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled);
-/* values [entries], scale [n] magnitudes of the unknowns or NULL.  1: factorised; 0: no order yet, or not a healthy one */
+/* values [entries], scale [n] magnitudes of the unknowns or NULL.  0: no order yet, or no healthy one;
+ * 1: factorised; 2: with a pivot so weak that what is solved is to be refined once */
 int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale);
 /* x [n]: right side in, solution out */
 void sd_elimination_solve(sd_elimination *elimination, sd_number *x);
