@@ -9,8 +9,7 @@
 #include <string.h>
 
 #define GROWTH 1e4         /* of multipliers, where a solution is a correction that the next one corrects */
-#define WEAK 1e-8          /* pivots below this part of their column: what is solved with them is to be refined; */
-#define FAINT 1e-12        /* they may be what round-off left */
+#define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
 #define FIRST 3            /* matrices seen before an order is looked for: one-off systems do not pay for it, */
 #define SHARE 8            /* nor do large ones before this part of n */
 #define MISSES 3           /* matrices that an order did not serve, each of which costs a fortieth of a search, before another is */
@@ -348,21 +347,18 @@ static void interpret(sd_elimination *e, const sd_list *list, const sd_number *o
         cell[sum->target] = sum_of(sum, list->pair, cell);
 }
 
-/* 0: a multiplier is large, or what is left of a pivot's column may be round-off; 2: a pivot is weak; else 1 */
+/* multipliers are moderate, and what is left of each pivot's column is more than round-off */
 static int healthy(const sd_elimination *e)
 {
     const sd_number *inverse = e->cell, *size = e->cell + size_of(e, 0), *growth = e->cell + growth_of(e, 0);
     const sd_number *scale = e->cell + magnitude(e, 0);
     const double *weak = e->weak;
-    int found = 1;
     for (int32_t k = 0; k < e->n; k++) { /* one by one: they were written so, and are not at hand in lanes */
-        double row = sd_size(size[k]), lost = sd_size(inverse[k]) * row * weak[k], whole = sd_size(scale[k]);
-        if (!(sd_size(growth[k]) <= e->growth * row) || !(lost * (FAINT / WEAK) <= whole))
+        double row = sd_size(size[k]);
+        if (!(sd_size(growth[k]) <= e->growth * row) || !(sd_size(inverse[k]) * row * weak[k] <= sd_size(scale[k])))
             return 0;
-        if (lost > whole)
-            found = 2;
     }
-    return found;
+    return 1;
 }
 
 /* the magnitudes of the pivots' columns; NULL: all of size one */

@@ -64,8 +64,7 @@ void sd_elimination_free(sd_elimination *elimination);
 void sd_elimination_forget(sd_elimination *elimination);
 /* a matrix [entries] with rows of largest entry 1 that no order served; in time one is found for it and those before it */
 void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled);
-/* values [entries], scale [n] magnitudes of the unknowns or NULL.  0: no order yet, or no healthy one;
- * 1: factorised; 2: with a pivot so weak that what is solved is to be refined once */
+/* values [entries], scale [n] magnitudes of the unknowns or NULL.  1: factorised; 0: no order yet, or no healthy one */
 int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale);
 /* x [n]: right side in, solution out */
 void sd_elimination_solve(sd_elimination *elimination, sd_number *x);

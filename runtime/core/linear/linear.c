@@ -218,28 +218,15 @@ void sd_linear_left(const sd_linear *linear, char *left)
             left[linear->dense ? linear->place[k] : linear->sparse->order[k]] = 1;
 }
 
-/* scaled := values, of what is to be refined; 0: there is no room */
-static int keep(sd_linear *linear, const sd_number *values)
-{
-    if (!linear->work2)
-        linear->work2 = calloc((size_t)linear->n + 1, sizeof(sd_number));
-    if (linear->scaled && values != linear->scaled)
-        memcpy(linear->scaled, values, (size_t)linear->entries * sizeof *values);
-    return linear->scaled && linear->work2;
-}
-
 /* by the list of operations, if there is one and it serves: a column that nothing determines has no pivot there, which shows.
  * Where weak pivots are to be left, rows are exchanged */
 static int replay(sd_linear *linear, const sd_number *values, const double *scale)
 {
-    if (!linear->elimination || linear->null_pivot > SD_LEAST_PIVOT)
-        return 0;
-    int found = sd_elimination_factor(linear->elimination, values, scale);
-    if (!found || (found == 2 && !keep(linear, values)))
+    if (!linear->elimination || linear->null_pivot > SD_LEAST_PIVOT || !sd_elimination_factor(linear->elimination, values, scale))
         return 0;
     linear->smallest = 1.0;
     linear->rank = linear->n;
-    return found;
+    return 1;
 }
 
 /* which columns the sparse factors may leave */
@@ -489,16 +476,6 @@ void sd_linear_again(sd_linear *linear)
     linear->replayed = 0;
 }
 
-/* rest -= A x */
-static void subtract_product(const sd_linear *linear, const sd_matrix *matrix, const sd_number *x, sd_number *rest)
-{
-    for (int32_t j = 0; j < linear->n; j++) {
-        const sd_number *value = sd_column_of(matrix, j);
-        for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
-            rest[linear->row[e]] -= *value++ * x[j];
-    }
-}
-
 static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
 {
     int32_t n = linear->n;
@@ -512,7 +489,11 @@ static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
     scaled_solve(linear, x);
     if (linear->smallest < REFINE) {
         const sd_matrix matrix = scaled_matrix(linear);
-        subtract_product(linear, &matrix, x, rest);
+        for (int32_t j = 0; j < n; j++) {
+            const sd_number *value = sd_column_of(&matrix, j);
+            for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
+                rest[linear->row[e]] -= *value++ * x[j];
+        }
         scaled_solve(linear, rest);
         for (int32_t i = 0; i < n; i++)
             x[i] += isfinite(sd_size(rest[i])) ? rest[i] : 0.0;
@@ -523,25 +504,9 @@ static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
         x[i] *= linear->column_scale[i];
 }
 
-/* by the list of operations, and once more for what it is off */
-static SD_APART void solve_refined(sd_linear *linear, sd_number *x)
-{
-    const int32_t n = linear->n;
-    sd_number *rest = linear->work2;
-    memcpy(rest, x, (size_t)n * sizeof *x);
-    sd_elimination_solve(linear->elimination, x);
-    const sd_matrix matrix = {.column = linear->column, .row = linear->row, .value = linear->scaled};
-    subtract_product(linear, &matrix, x, rest);
-    sd_elimination_solve(linear->elimination, rest);
-    for (int32_t i = 0; i < n; i++)
-        x[i] += isfinite(sd_size(rest[i])) ? rest[i] : 0.0;
-}
-
 void sd_linear_solve(sd_linear *linear, sd_number *x)
 {
-    if (linear->replayed == 2)
-        solve_refined(linear, x);
-    else if (linear->replayed)
+    if (linear->replayed)
         sd_elimination_solve(linear->elimination, x);
     else
         solve_pivoted(linear, x);

@@ -52,8 +52,7 @@ typedef struct sd_linear {
     size_t null_room;
     int32_t nulls;               /* n - rank, or 0 where those would be too many */
     int32_t pivoted;             /* 0: pivots are chosen anew */
-    int32_t replayed;            /* the last factors are those of `elimination`; 2: what they solve is refined, `scaled` is the
-                                    matrix as it came */
+    int32_t replayed;            /* the last factors are those of `elimination` */
     sd_elimination *elimination; /* NULL: every matrix is pivoted */
     const int32_t *otherwise;    /* of sd_order; NULL: the order stays */
     sd_matrix *sum;              /* R (A + c B) C instead of `scaled`, of which there is none; NULL: there is */
