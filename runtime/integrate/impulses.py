@@ -16,7 +16,7 @@ from sysdyn.runtime.model.facts import Mask
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import least_measured
-from sysdyn.runtime.start.instant import FORCES
+from sysdyn.runtime.start.integrated import integrated
 from sysdyn.runtime.start.restart import STILL
 from sysdyn.values import dataclass
 
@@ -54,25 +54,16 @@ class Impulses:
         """
         self._assigned = assigned
         settled = self.system = system.another("settled")
-        pattern, (in_y, in_rate) = settled.pattern, settled.structural()
-        self._row, self._column = pattern.row.astype(np.int64), pattern.columns_of()
-        states, rates = settled.kinds == "s", settled.of_groups("lambda")
-        read = np.zeros(settled.unknowns, dtype=bool)
-        read[self._column[in_y | (in_rate & ~rates[self._row])]] = True
-        own = in_rate & (states & ~read)[self._column]
-        many = np.bincount(self._column[own], minlength=settled.unknowns) > 1
-        own &= ~many[self._column]
-        self.states, self.rows = self._column[own], self._row[own]
-        self._in_y, self._in_rate = in_y, in_rate
-        form = settled.another("3").form
-        self._moved: Ints = np.full(settled.unknowns, -1, dtype=np.int64)
-        self._moved[form.k_f] = np.where(np.isin(form.k_q, unread), -1, form.k_q)
+        over = self._over = integrated(settled)
+        self._row, self._column, in_y, in_rate = over.row, over.column, over.in_y, over.in_rate
+        self._in_y, self._in_rate, (self.rows, self.states) = in_y, in_rate, over.unread
+        form, self._moved = settled.another("3").form, np.where(np.isin(over.moved, unread), -1, over.moved)
         self._read = self._may_pulse()
         inertia = in_rate & settled.of_groups("dynamics", "gamma")[self._row]
         inertia |= in_y & settled.of_groups("momentum")[self._row] & (settled.kinds == "f")[self._column]
         inert = np.isin(np.arange(settled.unknowns), self._column[inertia])
         # displacements tell the pulses of their flows
-        self._given = np.isin(settled.kinds, FORCES) | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
+        self._given = over.force | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
         self._balances, self._others = self._by_order()
         self._carries = ((settled.kinds == "q") & ~np.isin(np.arange(settled.unknowns), unread)) | inert
         held = form.k_q[inert[form.k_f]]
@@ -84,9 +75,10 @@ class Impulses:
         return bool(self.states.size or self._read.size)
 
     def _may_pulse(self) -> Ints:
-        """Rows of rates that may have impulses, of dynamic variables that other rows read."""
-        kinds, rates = self.system.kinds, self.system.of_groups("lambda")
-        pulses = np.isin(kinds, ("kappa", "mu")) | ((kinds == "f") & (self._moved >= 0))
+        """Rows of rates that may have impulses, of dynamic variables that other rows read and that do not gain by them
+        (start/instant.py).
+        """
+        rates, pulses = self.system.of_groups("lambda") & ~self._over.rates, self._over.force | (self._moved >= 0)
         found = self._row[rates[self._row] & self._in_y & pulses[self._column]]
         return np.setdiff1d(found, self.rows)
 

@@ -28,36 +28,47 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import least_measured
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.numerics.tall import free_unknowns
+from sysdyn.runtime.start.integrated import BROKEN, integrated, missed
 from sysdyn.runtime.start.settled import inertial_rows
 from sysdyn.values import dataclass
 
 FOLLOWS = ("f", "p", "e", "kappa", "mu")
-FORCES = ("e", "kappa", "mu")
 LOOSE = 1e3
 """Times its magnitude, what follows may jump more easily than what nothing else decides about."""
-BROKEN = 1e-10
-"""Of its terms: what a row is missed by, or an impulse, that is no round-off."""
 ROUND_OFF = 1e-14
 """Of its magnitude: what an unknown is moved by that stays where it is."""
-ITERATIONS, BALANCED = 3, 6
+ITERATIONS = 30
+CONVERGED = 1e-10
+"""Of their magnitudes: a step of Newton's method behind which the next is round-off."""
+POINTS = (2, 4, 8, 16, 32)
+"""Points of Gauss's rule, until two agree within BROKEN."""
 
-Entries = tuple[NDArray[Any], NDArray[Any], Floats]
-"""Row, column, value.  Row 2 k is row k behind the instant, 2 k + 1 its integral; column 2 k is unknown k, 2 k + 1 its
-integral over the instant, of flows and momenta their rate behind it.
+Entries = tuple[NDArray[Any], NDArray[Any], Floats, Floats]
+"""Row, column, value, its mean over the way so far.  Row 2 k is row k behind the instant, 2 k + 1 its integral; column
+2 k is unknown k, 2 k + 1 its integral over the instant, of flows and momenta their rate behind it.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """Rows [rows] that hold behind the instant, in unknowns that move [unknowns]; the entries of those that are linear
-    in moves and integrals, from dF/dy, dF/dyd and y; ease [unknowns]: times their magnitudes, how far these may move.
+    """Rows [rows] that hold behind the instant, in unknowns that move [unknowns]; rows [rows] whose integrals must be
+    met; the entries of those that are linear in moves and integrals, from dF/dy, dF/dyd and y; ease [unknowns]: times
+    their magnitudes, how far these may move.
     """
 
     behind: Mask
     moves: Mask
+    met: Mask
     integrals: Callable[[Floats, Floats, Floats], Entries]
     ease: Floats | float = 1.0
-    iterations: int = ITERATIONS
+
+
+class UnbalancedError(Exception):
+    """row: one whose integral over an instant nothing meets."""
+
+    def __init__(self, row: int) -> None:
+        super().__init__(row)
+        self.row = row
 
 
 class Instant:
@@ -65,16 +76,14 @@ class Instant:
 
     def __init__(self, settled: System) -> None:
         self.system, kinds = settled, settled.kinds
-        pattern, form = settled.pattern, settled.another("3").form
-        self._row, self._column = pattern.row.astype(np.int64), pattern.columns_of()
+        over = self._over = integrated(settled)
+        self._row, self._column, self._moved, self._force = over.row, over.column, over.moved, over.force
         self._balances = settled.of_groups("dynamics")
         self._momenta = settled.of_groups("momentum")
         self._states, self._constraints = settled.of_groups("momentum", "gamma"), settled.of_groups("phi_rate", "psi")
-        self._moving, self._force = np.isin(kinds, ("f", "p", "e")), np.isin(kinds, FORCES)
+        self._moving = np.isin(kinds, ("f", "p", "e")) | over.contents
         self._told, self._struck = self._reacting()
-        self._moved = np.full(settled.unknowns, -1, dtype=np.int64)
-        self._moved[form.k_f] = form.k_q
-        inertial, (in_y, in_rate) = inertial_rows(settled), settled.structural()
+        inertial, in_y, in_rate = inertial_rows(settled), over.in_y, over.in_rate
         self._light, self._heavy = settled.of_groups("dynamics", "psi", "gamma") & ~inertial, self._balances & inertial
         flow = (self._moved >= 0)[self._column]
         self._held = flow & in_rate & self._heavy[self._row], flow & in_y & settled.of_groups("momentum")[self._row]
@@ -83,14 +92,15 @@ class Instant:
         self._given = settled.of_groups("phi", "dynamics", "gamma") & ~answered
 
     def _reacting(self) -> tuple[Mask, Mask]:
-        """Gammas [rows] of implicit efforts that follow from multipliers (friction on a reaction); which forces have
-        impulses where flows jump [unknowns]: those efforts, and multipliers.
+        """Gammas [rows] of implicit efforts that follow from multipliers (friction on a reaction) or that contents of
+        stores gain; which forces have impulses where flows jump [unknowns]: those efforts, and multipliers.
         """
         kinds, gammas = self.system.kinds, self.system.of_groups("gamma")[self._row]
         reactions = np.isin(kinds, ("kappa", "mu"))
         reads = np.zeros(self.system.rows, dtype=bool)
         reads[self._row[gammas & reactions[self._column]]] = True
         follows = reactions.copy()
+        reads |= self._over.rates
         follows[self._column[reads[self._row] & (kinds == "e")[self._column]]] = True
         told = np.zeros(self.system.rows, dtype=bool)
         told[self._row[gammas & (follows & ~reactions)[self._column]]] = True
@@ -129,18 +139,23 @@ class Instant:
         slope, inertia = self._slopes(t, y, yd, magnitude)
         heavy, carried = self._held
         light, flow = self._now(self._light)[self._row], (self._moved >= 0)[self._column]
-        through = np.flatnonzero(((light & flow) | heavy | carried) & (np.where(heavy, inertia, slope) != 0.0))
-        forced = np.flatnonzero(light & self._acting())
-        at = np.append(through, forced)
-        columns = np.append(2 * self._moved[self._column[through]], 2 * self._column[forced] + 1)
-        integrals = 2 * self._row[at] + 1, columns, np.where(heavy, inertia, slope)[at]
+        gains = self._over.rates[self._row]
+        gained = gains & self._over.contents[self._column]
+        light |= gains
+        v = np.where(heavy | gained, inertia, slope)
+        through = np.flatnonzero(((light & flow) | heavy | carried) & (v != 0.0))
+        forced, gained = np.flatnonzero(light & self._acting()), np.flatnonzero(gained)
+        at = np.concatenate([through, forced, gained])
+        columns = [2 * self._moved[self._column[through]], 2 * self._column[forced] + 1, 2 * self._column[gained]]
+        integrals = 2 * self._row[at] + 1, np.concatenate(columns), v[at]
         ease = np.where(np.isin(self.system.kinds, FOLLOWS), LOOSE, 1.0)
         behind = self._given.copy()
         behind[self.system.held[0]] = True  # they read "multiplier = 0"
-        # dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
-        rows = _Rows(behind, self.system.kinds != "s", lambda *_: integrals, ease)
+        # other dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
+        moves, met = (self.system.kinds != "s") | self._over.contents, self._now(self._light) | self._over.rates
+        rows = _Rows(behind, moves, met, lambda *_: (*integrals, integrals[2]), ease)
         found, impulse = self._jump((t, y, yd), magnitude, rows)
-        found = np.where(self.system.kinds == "q", found, y)
+        found = np.where((self.system.kinds == "q") | self._over.contents, found, y)
         return found, self._pushed(slope, found - y, impulse, inertia * magnitude[self._column])
 
     def _slopes(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
@@ -170,28 +185,48 @@ class Instant:
         push, open_ = np.zeros(self.system.rows) if push is None else push, self._leaves_open(t, y, yd, magnitude)
         if aims is None and not (push.any() or open_ or self.broken(t, y, yd, magnitude)):
             return y, np.zeros(y.size)
-        moving, acts = self._moving[self._column], self._acting() & self._struck[self._column]
-        at = np.flatnonzero((self._balances[self._row] & (moving | acts)) | (self._told[self._row] & acts))
+        moves = self._moving
+        moving, acts = moves[self._column], self._acting() & self._struck[self._column]
+        at = (self._balances | self._over.rates)[self._row] & (moving | acts)
+        at = np.flatnonzero(at | (self._told[self._row] & acts))
         rows, columns = 2 * self._row[at] + 1, 2 * self._column[at] + acts[at]
-        behind, moves, ease = self._now(self._constraints) | self._states, self._moving, 1.0
+        behind, ease = self._now(self._constraints) | self._states, 1.0
         rated = at[:0]
         if open_:  # finite terms decide, rates of the others among them
             rated, ease = at[moving[at]], 1.0 / LOOSE
             behind, moves = behind | self._balances, moves | self._force
             rows, columns = np.append(rows, 2 * self._row[rated]), np.append(columns, 2 * self._column[rated] + 1)
 
-        reacts = self._struck & (self.system.kinds != "e")
         told = self._told[self._row] if self._told.any() else None
+        curved = bool((~self._over.affine[self._row[at]] & ~acts[at]).any())
 
         def integrals(jy: Floats, jyd: Floats, here: Floats) -> Entries:
             if told is not None:  # friction on a reaction that is nothing yet
-                jy = np.where(told, self.system.jacobian(t, np.where(reacts, here + magnitude, here), yd)[0], jy)
-            return rows, columns, np.append(np.where(acts, jy, jyd)[at], jyd[rated])
+                jy = np.where(told, self.system.jacobian(t, np.where(self._struck, here + magnitude, here), yd)[0], jy)
+            mean = self._mean(t, (y, here), yd, jyd) if curved else jyd
+            means, slopes = (np.append(np.where(acts, jy, item)[at], jyd[rated]) for item in (mean, jyd))
+            return rows, columns, slopes, means
 
         aim = np.stack([np.zeros(self.system.rows) if aims is None else aims, -push], axis=1)
-        meant = _Rows(behind, moves, integrals, ease, BALANCED if rated.size else ITERATIONS)
+        meant = _Rows(behind, moves, self._balances | self._over.rates | self._told, integrals, ease)
         begun = self._sloping(t, y, yd, magnitude)
         return self._jump((t, y, yd), magnitude, meant, begun, aim, asked=aims is not None)
+
+    def _mean(self, t: float, way: tuple[Floats, Floats], yd: Floats, jyd: Floats) -> Floats:
+        """Mean of dF/dyd [entries] along the straight way, jyd at its end: times the jumps of flows and contents what
+        momenta and contents of nonlinear stores jump by, whatever the way is.
+        """
+        (begin, end), last = way, jyd
+        if np.array_equal(last, self.system.jacobian(t, 0.5 * (begin + end), yd)[1], equal_nan=True):
+            return last
+        for number in POINTS:
+            parts, weights = np.polynomial.legendre.leggauss(number)
+            at = [begin + 0.5 * (1.0 + part) * (end - begin) for part in parts.tolist()]
+            found = 0.5 * np.asarray(weights) @ [self.system.jacobian(t, y, yd)[1] for y in at]
+            if (np.abs(found - last) <= BROKEN * np.abs(found)).all():
+                break
+            last = found
+        return np.where(np.isfinite(found), found, 0.0)
 
     def _leaves_open(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> bool:
         """Whether inertia leaves flows open that it has: nodes that stores only tie together."""
@@ -222,28 +257,35 @@ class Instant:
         asked: bool = False,
     ) -> tuple[Floats, Floats]:
         """The least change of y that meets the rows, from where it has begun, without its round-off; impulses of forces
-        [unknowns].  Where that comes to no numbers y is as it was, and there are none.
+        [unknowns]; UnbalancedError.  Where that comes to no numbers y is as it was, and there are none.
 
         before: t, y, yd; aims [rows, 2]: what the rows behind the instant shall be, and the integrals.  asked: numbers
         there must be, else NotFiniteError.
         """
         t, start, yd = before
-        y, integral = (start if begun is None else begun), np.zeros(start.size)
+        y, integral, step = start if begun is None else begun, np.zeros(start.size), np.inf
         here = meant.behind[self._row] & meant.moves[self._column]
         scale = np.stack([magnitude * meant.ease, np.full(start.size, np.nan)], axis=1).ravel()
-        for _ in range(meant.iterations):
+        for _ in range(ITERATIONS):
             jy, jyd = (np.where(np.isfinite(item), item, 0.0) for item in self.system.jacobian(t, y, yd))
-            i, j, v = meant.integrals(jy, jyd, y)
+            i, j, v, mean = meant.integrals(jy, jyd, y)
             aim = np.zeros((self.system.rows, 2)) + aims
             aim[meant.behind, 0] -= self.system.residual(t, y, yd)[meant.behind]
             change, aim = np.stack([y - start, integral], axis=1).ravel(), aim.ravel()
-            np.add.at(aim, i, -v * change[j])
-            i, j = np.append(2 * self._row[here], i), np.append(2 * self._column[here], j)
+            np.add.at(aim, i, -mean * change[j])
+            if step <= CONVERGED:
+                break
+            entries = np.append(2 * self._row[here], i), np.append(2 * self._column[here], j), np.append(jy[here], v)
             try:
-                step = least_measured((i, j, np.append(jy[here], v)), aim, scale)
+                move = least_measured(entries, aim, scale)
             except NotFiniteError:
                 if asked:
                     raise
                 return start, np.zeros(start.size)
-            y, integral = y + step[::2], integral + step[1::2]
+            y, integral = y + move[::2], integral + move[1::2]
+            step = float((np.abs(move[::2]) / np.maximum(magnitude, np.abs(y))).max(initial=0.0))
+        wanted = (np.zeros((self.system.rows, 2)) + aims).ravel()
+        off = np.where(meant.met, missed((i, j, mean), np.nan_to_num(scale), (aim, wanted))[1::2], 0.0)
+        if off.any():
+            raise UnbalancedError(int(np.argmax(off)))
         return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._force, integral, 0.0)

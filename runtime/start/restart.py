@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.start.instant import Instant
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.start.instant import Instant, UnbalancedError
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.runtime.start.strategies import behind
@@ -50,8 +51,13 @@ class Restart:
         self.instant = Instant(settler.system)
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
-        """y, yd [unknowns as written] on the far side at t; None where none was found."""
-        found = self._struck(t, y, yd, self.magnitude(y.size))
+        """y, yd [unknowns as written] on the far side at t; None where none was found, SolverFailure where a balance
+        over the instant is not met.
+        """
+        try:
+            found = self._struck(t, y, yd, self.magnitude(y.size))
+        except UnbalancedError as error:
+            raise SolverFailure("unbalanced", t, 0.0, row=self.settler.system.row_label(error.row)) from error
         return None if found is None else found[:2]
 
     def struck(self, t: float, y: Floats, yd: Floats, *, quickly: bool = False) -> tuple[Floats, Floats, Floats] | None:
@@ -60,7 +66,10 @@ class Restart:
         bound.
         """
         known = self.magnitude(y.size)
-        found = self._struck(t, y, yd, known, quickly=quickly)
+        try:
+            found = self._struck(t, y, yd, known, quickly=quickly)
+        except UnbalancedError:
+            found = None
         lib.reader(self.settler.core.contents.scale, y.size)[:] = known
         return found
 
