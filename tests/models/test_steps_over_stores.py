@@ -110,6 +110,7 @@ KINETIC = {
     "kinetic(p = {c} H*(f + {a}*f^3/(1 A)^2))": lambda c, a, f: c * (f + a * f**3),
     "kinetic(f = {c} A*(p/(1 Wb) + {a}*(p/(1 Wb))^3))": lambda c, a, f: _root(lambda p: c * (p + a * p**3), f),
 }
+HELD = {"potential": "e", "kinetic": "f"}
 STEP = "(if t < 0.1 s then 0 {unit} else if t < 0.2 s then {v1} {unit} else {v2} {unit})"
 
 
@@ -136,7 +137,7 @@ def _drawn(seed):
             text = f"{kind}({letter} = {STEP.format(unit=unit, v1=v1, v2=v2)})"
         lines.append(f"  X{k}: {text} {a} -> {b}")
         elements.append((f"X{k}", kind, a, b, content))
-    traced = ", ".join(f"X{k}.e as e{k}, X{k}.f as f{k}" for k in range(len(wanted)))
+    traced = ", ".join(f"X{k}.{HELD[kind]} as x{k}" for k, (kind, *_) in enumerate(wanted) if kind in HELD)
     scene = f"scene s of m {{ time 0 s to 0.3 s; trace {traced} every 0.1 s; accuracy 1e-6 }}"
     return (
         f"model m {{\n  node {', '.join(nodes)}: electrical\n" + "\n".join(lines) + f"\n}}\n{scene}\n",
@@ -156,8 +157,7 @@ def test_charge_and_flux_are_balanced_over_steps_in_random_nets(tmp_path, seed, 
         charge, sources, ends, flux = np.zeros(len(nodes)), [], [], []
         for k, (_, kind, a, b, content) in enumerate(elements):
             along = np.array([(node == a) - (node == b) for node in nodes], dtype=float)
-            sides = _sides(trace, f"{'f' if kind == 'kinetic' else 'e'}{k}", instant)
-            gained = np.subtract(*[content(x) for x in sides[::-1]]) if content else 0.0
+            gained = np.subtract(*[content(x) for x in _sides(trace, f"x{k}", instant)[::-1]]) if content else 0.0
             if kind == "potential":
                 charge -= along * gained
             if kind == "effort":
