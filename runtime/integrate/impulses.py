@@ -65,6 +65,8 @@ class Impulses:
         # displacements tell the pulses of their flows
         self._given = over.force | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
         self._balances, self._others = self._by_order()
+        forced = np.isin(np.arange(settled.rows), self._row[in_y & over.force[self._column]])
+        self._laws = settled.of_groups("gamma") & ~forced  # at each point too where their flows are no pulses
         self._carries = ((settled.kinds == "q") & ~np.isin(np.arange(settled.unknowns), unread)) | inert
         held = form.k_q[inert[form.k_f]]
         self._stays = np.isin(np.arange(settled.unknowns), np.concatenate([self.states, held, unread]))
@@ -104,13 +106,20 @@ class Impulses:
         assigned, way[self.states] = way[self.states] != 0.0, 0.0
         if not way[self._carries].any():
             return none
-        found, balanced, faithful = self._straight(before, behind, way)
+        others = self._others | (self._laws & ~self._pulsed(way))
+        found, balanced, faithful = self._straight(before, behind, way, others)
         if not (balanced and faithful):
-            curved = self._curved(before, behind, way, magnitude)
+            curved = self._curved(before, behind, way, (magnitude, others))
             if curved is None and not balanced and not self._assigned:
                 raise SolverFailure("unbalanced", behind.t, 0.0)
             found = found if curved is None else curved
         return np.where(assigned, 0.0, found)
+
+    def _pulsed(self, way: Floats) -> Mask:
+        """Rows [rows] that read flows which are pulses."""
+        found = np.zeros(self.system.rows, dtype=bool)
+        found[self._row[self._in_y & (self._pulse(way) != 0.0)[self._column]]] = True
+        return found
 
     # -- the rise ------------------------------------------------------------------------------------------------
 
@@ -144,8 +153,8 @@ class Impulses:
 
     # -- straight ------------------------------------------------------------------------------------------------
 
-    def _straight(self, before: Side, behind: Side, way: Floats) -> tuple[Floats, bool, bool]:
-        """The gains [states] where all unknowns go straight; whether impulses balance there, and others hold."""
+    def _straight(self, before: Side, behind: Side, way: Floats, others: Mask) -> tuple[Floats, bool, bool]:
+        """The gains [states] where all unknowns go straight; whether impulses balance there, and others [rows] hold."""
         gained, balanced, faithful = np.zeros(self.states.size), True, True
         pulse = self._pulse(way)
         for part in GAUSS:
@@ -158,7 +167,7 @@ class Impulses:
                 self._finite(rate, self._rate(self._slopes((before, behind), part, y, pulse), way, impulse), behind.t)
             gained += 0.5 * rate
             balanced &= met
-            faithful &= self._holds(before, behind, part, y)
+            faithful &= self._holds((before, behind), part, y, others)
         return gained, balanced, faithful
 
     def _still(self, slopes: _Slopes, way: Floats, impulse: Floats, t: float) -> None:
@@ -197,45 +206,50 @@ class Impulses:
         size, left = (np.bincount(self._row, w, aim.size) for w in (np.abs(carried) + np.abs(acted), carried + acted))
         return impulse, bool((np.abs(left) <= BROKEN * size.max(initial=0.0))[self._balances].all())
 
-    def _holds(self, before: Side, behind: Side, part: float, y: Floats) -> bool:
+    def _holds(self, sides: tuple[Side, Side], part: float, y: Floats, others: Mask) -> bool:
         """Whether rows without impulses hold at y, where the text and all else asked are a part of their way along."""
-        ends = [self.system.residual(behind.t, z, behind.yd)[self._others] for z in (before.y, y, behind.y)]
+        before, behind = sides
+        ends = [self.system.residual(behind.t, z, behind.yd)[others] for z in (before.y, y, behind.y)]
         off = ends[1] - (1.0 - part) * ends[0] - part * ends[2]
         return bool((np.abs(off) <= BROKEN * (np.abs(ends[0]) + np.abs(ends[2]))).all())
 
     # -- curved --------------------------------------------------------------------------------------------------
 
-    def _curved(self, before: Side, behind: Side, way: Floats, magnitude: Floats) -> Floats | None:
-        """The gains [states] along the rise itself; None where rows do not tell it: it ends elsewhere."""
-        last, size = None, np.maximum(magnitude, np.abs(way))
+    def _curved(self, before: Side, behind: Side, way: Floats, along: tuple[Floats, Mask]) -> Floats | None:
+        """The gains [states] along the rise itself; None where rows do not tell it: it ends elsewhere.  along:
+        magnitudes [unknowns], rows [rows] that hold at each point.
+        """
+        (magnitude, others), last = along, None
+        size = np.maximum(magnitude, np.abs(way))
         for number in PARTS:
-            y, gained = self._followed(before, behind, size, number)
+            y, gained = self._followed((before, behind), size, others, number)
             if last is not None and (np.abs(gained - last) <= AGREED * np.abs(gained).max()).all():
                 near = np.abs(y - before.y - way) <= AWAY * size
                 return gained if near[self._carries].all() else None
             last = gained
         return None
 
-    def _followed(self, before: Side, behind: Side, size: Floats, number: int) -> tuple[Floats, Floats]:
+    def _followed(self, sides: tuple[Side, Side], size: Floats, others: Mask, number: int) -> tuple[Floats, Floats]:
         """Y [unknowns] and gains [states] at the end, in a number of steps of the classical Runge-Kutta method."""
+        before, behind = sides
         y, gained, step = before.y.copy(), np.zeros(self.states.size), 1.0 / number
         ends = [self.system.residual(behind.t, z, behind.yd) for z in (before.y, behind.y)]
-        asked = np.where(self._others, ends[1] - ends[0], 0.0)
+        asked = np.where(others, ends[1] - ends[0], 0.0)
         for k in range(number):
             way, total, gain = np.zeros(y.size), np.zeros(y.size), np.zeros(self.states.size)
             for part, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
                 at = y + part * step * way
-                slopes = self._slopes((before, behind), (k + part) * step, at)
-                way, impulse = self._direction(slopes, asked, size)
+                slopes = self._slopes(sides, (k + part) * step, at)
+                way, impulse = self._direction(slopes, asked, size, others)
                 total += weight / 6.0 * way
                 gain += weight / 6.0 * self._rate(slopes, way, impulse)
             y, gained = y + step * total, gained + step * gain
         return y, gained
 
-    def _direction(self, slopes: _Slopes, asked: Floats, size: Floats) -> tuple[Floats, Floats]:
+    def _direction(self, slopes: _Slopes, asked: Floats, size: Floats, holds: Mask) -> tuple[Floats, Floats]:
         """What y moves by along the rise, and the impulses [unknowns]: what the rows ask for, at least of all."""
         n, rows, moved = size.size, self.system.rows, self._moved[self._column]
-        balances, others = self._balances[self._row], self._others[self._row]
+        balances, others = self._balances[self._row], holds[self._row]
         parts = (  # two rows each: at the point, and integrated; two columns: moves, and impulses
             (others & self._in_y, self._row, self._column, slopes[0]),
             (balances & self._in_rate, rows + self._row, self._column, slopes[1]),

@@ -168,3 +168,26 @@ def test_charge_and_flux_are_balanced_over_steps_in_random_nets(tmp_path, seed, 
         for matrix, aim in ((np.array(sources).T, charge), (np.array(ends), np.array(flux))):
             found = np.linalg.lstsq(matrix, aim)[0]
             assert np.abs(matrix @ found - aim).max() < 1e-7
+
+
+ENERGY = """\
+model m {
+  node n0, n1, n2: electrical
+  V0: effort(e = (if t < 0.2 s then 1 V else 3 V)) n0 -> n1
+  C1: potential(q = 0.3 F*e) n1 -> n2
+  N2: potential(e = 2 V*(q/(1 C) + 2*(q/(1 C))^3)) n2 -> ground
+  C3: potential(q = 0.3 F*(e + e^3/(1 V)^2)) ground -> n0
+  R: dissipator(e = 1 ohm*f) n2 -> n0
+}
+scene s of m { time 0 s to 0.5 s
+  trace V0.energy + C1.energy + N2.energy + C3.energy + R.energy as sum, V0.energy as V every 25 ms; accuracy 1e-6 }
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_a_source_pays_what_contents_of_any_law_take_along_the_rise(tmp_path, formulation):
+    """In co-Hamilton's form the sum was off by 2 mJ, told as met, for the law of N2 does not hold on a straight way."""
+    (tmp_path / "m.sd").write_text(ENERGY)
+    trace = api.simulate(tmp_path / "m.sd", formulation=formulation, output=tmp_path / "m.h5")
+    assert np.abs(trace["V"].values).max() > 1.0
+    assert np.abs(trace["sum"].values).max() < 1e-6
