@@ -64,6 +64,7 @@ class Impulses:
         inert = np.isin(np.arange(settled.unknowns), self._column[inertia])
         # displacements tell the pulses of their flows
         self._given = over.force | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
+        self._pulses = over.pulses(self._moved, self._given)
         self._balances, self._others = self._by_order()
         forced = np.isin(np.arange(settled.rows), self._row[in_y & over.force[self._column]])
         self._laws = settled.of_groups("gamma") & ~forced  # at each point too where their flows are no pulses
@@ -136,20 +137,22 @@ class Impulses:
         (jy, jyd), (ky, kyd) = found
         return (1.0 - part) * jy + part * ky, (1.0 - part) * jyd + part * kyd
 
-    def _carried(self, slopes: _Slopes, way: Floats) -> Floats:
-        """What rows gain [entries] by moves of y along the way [unknowns]: by rates, and by pulses of flows."""
-        rated = np.where(self._in_rate, slopes[1] * way[self._column], 0.0)
-        return rated + np.where(self._in_y, slopes[0] * self._pulse(way)[self._column], 0.0)
+    def _terms(self, slopes: _Slopes, way: Floats, impulse: Floats | float = 0.0) -> Floats:
+        """What rows gain [terms of the pulses] by moves of y along the way and impulses [unknowns]."""
+        gains = np.stack([way, np.zeros(way.size) + impulse], axis=1).ravel()
+        return self._pulses.values(*slopes) * gains[self._pulses.column]
+
+    def _gained(self, terms: Floats) -> Floats:
+        """Of terms, the sums [rows]."""
+        return np.bincount(self._pulses.row, terms, self.system.rows)
 
     def _pulse(self, way: Floats) -> Floats:
         """Flows [unknowns] that are pulses, integrated."""
         return np.where(self._moved >= 0, way[self._moved], 0.0)
 
-    def _rate(self, slopes: _Slopes, way: Floats, impulse: Floats) -> Floats:
+    def _rate(self, terms: Floats) -> Floats:
         """What the states gain [states]: their rows read s' - g."""
-        given = np.where(self._in_y, slopes[0] * impulse[self._column], 0.0)
-        total = np.bincount(self._row, self._carried(slopes, way) + given, self.system.rows)
-        return np.asarray(-total[self.rows], dtype=np.float64)
+        return -self._gained(terms)[self.rows]
 
     # -- straight ------------------------------------------------------------------------------------------------
 
@@ -161,23 +164,22 @@ class Impulses:
             y = before.y + part * way
             slopes = self._slopes((before, behind), part, y)
             impulse, met = self._impulse(slopes, way)
-            rate = self._rate(slopes, way, impulse)
-            self._still(slopes, way, impulse, behind.t)
+            rate = self._rate(terms := self._terms(slopes, way, impulse))
+            self._still(terms, behind.t)
             if pulse.any():
-                self._finite(rate, self._rate(self._slopes((before, behind), part, y, pulse), way, impulse), behind.t)
+                pulsed = self._terms(self._slopes((before, behind), part, y, pulse), way, impulse)
+                self._finite(rate, self._rate(pulsed), behind.t)
             gained += 0.5 * rate
             balanced &= met
             faithful &= self._holds((before, behind), part, y, others)
         return gained, balanced, faithful
 
-    def _still(self, slopes: _Slopes, way: Floats, impulse: Floats, t: float) -> None:
+    def _still(self, terms: Floats, t: float) -> None:
         """SolverFailure where a dynamic variable that others read has a rate with an impulse: it would jump."""
         rows = self._read
         if not rows.size:
             return
-        given = np.where(self._in_y, slopes[0] * impulse[self._column], 0.0)
-        terms = self._carried(slopes, way) + given
-        left, size = (np.bincount(self._row, w, self.system.rows)[rows] for w in (terms, np.abs(terms)))
+        left, size = (self._gained(w)[rows] for w in (terms, np.abs(terms)))
         if (missed := np.abs(left) > BROKEN * size).any():
             raise SolverFailure("pulsed", t, 0.0, self._state_of(rows[np.argmax(missed)]))
 
@@ -196,14 +198,13 @@ class Impulses:
         """Impulses of forces, and pulses of flows that no displacement tells [unknowns], that rows ask for along the
         way; whether these are met.
         """
-        balances, given = self._balances[self._row], self._given[self._column] & self._in_y
-        carried = np.where(balances, self._carried(slopes, way), 0.0)
-        at = np.flatnonzero(balances & given & (slopes[0] != 0.0))
-        aim = np.asarray(-np.bincount(self._row, carried, self.system.rows), dtype=np.float64)
-        entries = self._row[at], self._column[at], slopes[0][at]
+        pulses = self._pulses
+        at = np.flatnonzero(self._balances[pulses.row] & (pulses.column % 2 == 1))
+        aim = -self._gained(self._terms(slopes, way))
+        entries = pulses.row[at], pulses.column[at] // 2, pulses.values(*slopes)[at]
         impulse = least_measured(entries, aim, np.full(way.size, np.nan))
-        acted = np.where(balances & given, slopes[0] * impulse[self._column], 0.0)
-        size, left = (np.bincount(self._row, w, aim.size) for w in (np.abs(carried) + np.abs(acted), carried + acted))
+        terms = np.where(self._balances[pulses.row], self._terms(slopes, way, impulse), 0.0)
+        size, left = self._gained(np.abs(terms)), self._gained(terms)
         return impulse, bool((np.abs(left) <= BROKEN * size.max(initial=0.0))[self._balances].all())
 
     def _holds(self, sides: tuple[Side, Side], part: float, y: Floats, others: Mask) -> bool:
@@ -242,22 +243,18 @@ class Impulses:
                 slopes = self._slopes(sides, (k + part) * step, at)
                 way, impulse = self._direction(slopes, asked, size, others)
                 total += weight / 6.0 * way
-                gain += weight / 6.0 * self._rate(slopes, way, impulse)
+                gain += weight / 6.0 * self._rate(self._terms(slopes, way, impulse))
             y, gained = y + step * total, gained + step * gain
         return y, gained
 
     def _direction(self, slopes: _Slopes, asked: Floats, size: Floats, holds: Mask) -> tuple[Floats, Floats]:
         """What y moves by along the rise, and the impulses [unknowns]: what the rows ask for, at least of all."""
-        n, rows, moved = size.size, self.system.rows, self._moved[self._column]
-        balances, others = self._balances[self._row], holds[self._row]
-        parts = (  # two rows each: at the point, and integrated; two columns: moves, and impulses
-            (others & self._in_y, self._row, self._column, slopes[0]),
-            (balances & self._in_rate, rows + self._row, self._column, slopes[1]),
-            (balances & self._in_y & (moved >= 0), rows + self._row, moved, slopes[0]),
-            (balances & self._in_y & self._given[self._column], rows + self._row, n + self._column, slopes[0]),
-        )
-        takes = [take & (v != 0.0) & ~self._stays[j % n] for take, _, j, v in parts]
-        i, j, v = (np.concatenate([part[k][take] for part, take in zip(parts, takes, strict=True)]) for k in (1, 2, 3))
-        aim = np.append(asked, np.zeros(rows))
-        found = least_measured((i, j, v), aim, np.append(size, np.full(n, np.nan)))
-        return found[:n], found[n:]
+        pulses = self._pulses
+        over = np.flatnonzero(self._balances[pulses.row] & ~self._stays[pulses.column // 2])
+        here = np.flatnonzero(holds[self._row] & self._in_y & ~self._stays[self._column])
+        i = np.append(2 * self._row[here], 2 * pulses.row[over] + 1)
+        j = np.append(2 * self._column[here], pulses.column[over])
+        v = np.append(slopes[0][here], pulses.values(*slopes)[over])
+        aim = np.stack([asked, np.zeros(asked.size)], axis=1).ravel()
+        found = least_measured((i, j, v), aim, np.stack([size, np.full(size.size, np.nan)], axis=1).ravel())
+        return found[::2], found[1::2]

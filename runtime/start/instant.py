@@ -77,7 +77,8 @@ class Instant:
     def __init__(self, settled: System) -> None:
         self.system, kinds = settled, settled.kinds
         over = self._over = integrated(settled)
-        self._row, self._column, self._moved, self._force = over.row, over.column, over.moved, over.force
+        self._row, self._column, self._moved = over.row, over.column, over.moved
+        self._pulses = over.pulses(over.moved, over.force)
         self._balances = settled.of_groups("dynamics")
         self._momenta = settled.of_groups("momentum")
         self._states, self._constraints = settled.of_groups("momentum", "gamma"), settled.of_groups("phi_rate", "psi")
@@ -126,10 +127,16 @@ class Instant:
         return found
 
     def _acting(self) -> Mask:
-        """Entries of forces; what does not hold has no multiplier, and no impulse of one."""
-        acts = self._force.copy()
+        """Forces [unknowns]; what does not hold has no multiplier, and no impulse of one."""
+        acts = self._over.force.copy()
         acts[self.system.held[1]] = False
-        return acts[self._column]
+        return acts
+
+    def _taken(self, rows: Mask, moves: Mask, acts: Mask) -> NDArray[np.int64]:
+        """Terms of rows [rows] in unknowns that move, and that have impulses [unknowns]."""
+        pulses = self._pulses
+        unknown, integral = np.divmod(pulses.column, 2)
+        return np.flatnonzero(rows[pulses.row] & np.where(integral == 1, acts[unknown], moves[unknown]))
 
     def displacements(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
         """Y with the displacements behind the jump at t; the impulses of effort on balances with inertia [rows].
@@ -138,24 +145,18 @@ class Instant:
         """
         slope, inertia = self._slopes(t, y, yd, magnitude)
         heavy, carried = self._held
-        light, flow = self._now(self._light)[self._row], (self._moved >= 0)[self._column]
-        gains = self._over.rates[self._row]
-        gained = gains & self._over.contents[self._column]
-        light |= gains
-        v = np.where(heavy | gained, inertia, slope)
-        through = np.flatnonzero(((light & flow) | heavy | carried) & (v != 0.0))
-        forced, gained = np.flatnonzero(light & self._acting()), np.flatnonzero(gained)
-        at = np.concatenate([through, forced, gained])
-        columns = [2 * self._moved[self._column[through]], 2 * self._column[forced] + 1, 2 * self._column[gained]]
-        integrals = 2 * self._row[at] + 1, np.concatenate(columns), v[at]
+        jumps, met = (self.system.kinds == "q") | self._over.contents, self._now(self._light) | self._over.rates
+        taken, held = self._taken(met, jumps, self._acting()), np.flatnonzero(heavy | carried)
+        i = 2 * np.append(self._pulses.row[taken], self._row[held]) + 1
+        j = np.append(self._pulses.column[taken], 2 * self._moved[self._column[held]])
+        v = np.append(self._pulses.values(slope, inertia)[taken], np.where(heavy, inertia, slope)[held])
         ease = np.where(np.isin(self.system.kinds, FOLLOWS), LOOSE, 1.0)
         behind = self._given.copy()
         behind[self.system.held[0]] = True  # they read "multiplier = 0"
         # other dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
-        moves, met = (self.system.kinds != "s") | self._over.contents, self._now(self._light) | self._over.rates
-        rows = _Rows(behind, moves, met, lambda *_: (*integrals, integrals[2]), ease)
+        rows = _Rows(behind, (self.system.kinds != "s") | jumps, met, lambda *_: (i, j, v, v), ease)
         found, impulse = self._jump((t, y, yd), magnitude, rows)
-        found = np.where((self.system.kinds == "q") | self._over.contents, found, y)
+        found = np.where(jumps, found, y)
         return found, self._pushed(slope, found - y, impulse, inertia * magnitude[self._column])
 
     def _slopes(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
@@ -185,30 +186,30 @@ class Instant:
         push, open_ = np.zeros(self.system.rows) if push is None else push, self._leaves_open(t, y, yd, magnitude)
         if aims is None and not (push.any() or open_ or self.broken(t, y, yd, magnitude)):
             return y, np.zeros(y.size)
-        moves = self._moving
-        moving, acts = moves[self._column], self._acting() & self._struck[self._column]
-        at = (self._balances | self._over.rates)[self._row] & (moving | acts)
-        at = np.flatnonzero(at | (self._told[self._row] & acts))
-        rows, columns = 2 * self._row[at] + 1, 2 * self._column[at] + acts[at]
-        behind, ease = self._now(self._constraints) | self._states, 1.0
-        rated = at[:0]
+        moves, behind, ease = self._moving, self._now(self._constraints) | self._states, 1.0
+        met, pulses = self._balances | self._over.rates | self._told, self._pulses
+        taken = self._taken(met, moves, self._acting() & self._struck)
+        i, j = 2 * pulses.row[taken] + 1, pulses.column[taken]
+        rated = taken[j % 2 == 0]
+        curved = bool((~self._over.affine[pulses.row[rated]]).any())
+        rated = rated[self._balances[pulses.row[rated]]] if open_ else rated[:0]
         if open_:  # finite terms decide, rates of the others among them
-            rated, ease = at[moving[at]], 1.0 / LOOSE
-            behind, moves = behind | self._balances, moves | self._force
-            rows, columns = np.append(rows, 2 * self._row[rated]), np.append(columns, 2 * self._column[rated] + 1)
-
+            behind, moves, ease = behind | self._balances, moves | self._over.force, 1.0 / LOOSE
+            i, j = np.append(i, 2 * pulses.row[rated]), np.append(j, pulses.column[rated] + 1)
+        at = np.append(taken, rated)
         told = self._told[self._row] if self._told.any() else None
-        curved = bool((~self._over.affine[self._row[at]] & ~acts[at]).any())
 
         def integrals(jy: Floats, jyd: Floats, here: Floats) -> Entries:
             if told is not None:  # friction on a reaction that is nothing yet
                 jy = np.where(told, self.system.jacobian(t, np.where(self._struck, here + magnitude, here), yd)[0], jy)
-            mean = self._mean(t, (y, here), yd, jyd) if curved else jyd
-            means, slopes = (np.append(np.where(acts, jy, item)[at], jyd[rated]) for item in (mean, jyd))
-            return rows, columns, slopes, means
+            slopes = pulses.values(jy, jyd)[at]
+            if not curved:
+                return i, j, slopes, slopes
+            means = pulses.values(jy, self._mean(t, (y, here), yd, jyd))
+            return i, j, slopes, np.append(means[taken], slopes[taken.size :])
 
         aim = np.stack([np.zeros(self.system.rows) if aims is None else aims, -push], axis=1)
-        meant = _Rows(behind, moves, self._balances | self._over.rates | self._told, integrals, ease)
+        meant = _Rows(behind, moves, met, integrals, ease)
         begun = self._sloping(t, y, yd, magnitude)
         return self._jump((t, y, yd), magnitude, meant, begun, aim, asked=aims is not None)
 
@@ -285,7 +286,8 @@ class Instant:
             y, integral = y + move[::2], integral + move[1::2]
             step = float((np.abs(move[::2]) / np.maximum(magnitude, np.abs(y))).max(initial=0.0))
         wanted = (np.zeros((self.system.rows, 2)) + aims).ravel()
-        off = np.where(meant.met, missed((i, j, mean), np.nan_to_num(scale), (aim, wanted))[1::2], 0.0)
+        size = np.fmax(scale, np.stack([np.maximum(np.abs(y), np.abs(start)), 0.0 * y], axis=1).ravel())
+        off = np.where(meant.met, missed((i, j, mean), size, (aim, wanted))[1::2], 0.0)
         if off.any():
             raise UnbalancedError(int(np.argmax(off)))
-        return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._force, integral, 0.0)
+        return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._over.force, integral, 0.0)

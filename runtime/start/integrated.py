@@ -19,11 +19,27 @@ BROKEN = 1e-10
 
 
 @dataclass(frozen=True, slots=True)
+class Pulses:
+    """Terms of rows [terms] whose integrals count: row; column, 2 k of what unknown k moves by, 2 k + 1 of its
+    integral; entry, those of dF/dyd first, `rated` many.
+    """
+
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    entry: NDArray[np.int64]
+    rated: int
+
+    def values(self, jy: Floats, jyd: Floats) -> Floats:
+        """Of the terms, from dF/dy, dF/dyd [entries]."""
+        return np.append(jyd[self.entry[: self.rated]], jy[self.entry[self.rated :]])
+
+
+@dataclass(frozen=True, slots=True)
 class Integrated:
     """row, column [entries]; in_y, in_rate [entries]: in dF/dy, dF/dyd; moved [unknowns]: the displacement of a flow,
     -1 of what is none; force [unknowns]; affine [rows].
 
-    rates [rows]: those that constants make, of contents [unknowns], the dynamic variables that other rows read; told:
+    rates [rows]: those that constants make, of contents [unknowns], the dynamic variables that other rows read; unread:
     rows and places of the dynamic variables that none does, of each with a rate of its own.
     """
 
@@ -37,6 +53,14 @@ class Integrated:
     rates: Mask
     contents: Mask
     unread: tuple[NDArray[np.int64], Ints]
+
+    def pulses(self, moved: NDArray[np.int64], force: Mask) -> Pulses:
+        """The terms of rates, of flows by the displacements that they move, of forces (both [unknowns])."""
+        flows = moved[self.column]
+        at = [np.flatnonzero(of) for of in (self.in_rate, self.in_y & (flows >= 0), self.in_y & force[self.column])]
+        columns = 2 * self.column[at[0]].astype(np.int64), 2 * flows[at[1]], 2 * self.column[at[2]].astype(np.int64) + 1
+        entry = np.concatenate(at)
+        return Pulses(self.row[entry], np.concatenate(columns), entry, at[0].size)
 
 
 def integrated(settled: System) -> Integrated:

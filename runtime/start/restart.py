@@ -57,8 +57,12 @@ class Restart:
         try:
             found = self._struck(t, y, yd, self.magnitude(y.size))
         except UnbalancedError as error:
-            raise SolverFailure("unbalanced", t, 0.0, row=self.settler.system.row_label(error.row)) from error
+            raise self.failure(t, error) from error
         return None if found is None else found[:2]
+
+    def failure(self, t: float, error: UnbalancedError) -> SolverFailure:
+        """What a balance over the instant t that is not met is told as."""
+        return SolverFailure("unbalanced", t, 0.0, row=self.settler.system.row_label(error.row))
 
     def struck(self, t: float, y: Floats, yd: Floats, *, quickly: bool = False) -> tuple[Floats, Floats, Floats] | None:
         """The same with the impulses [unknowns as written] that took the flows there, of a set of constraints that is
