@@ -76,7 +76,7 @@ typedef struct sd_run {
     sd_modes *modes;                  /* NULL: every event goes to its handler */
     double t_clear, t_seen;           /* within the last step, between which something watched has been seen to change */
     double turns;                     /* s: in which something that is read turns; 0: nothing does */
-    double *looked;                   /* [SD_PARTS + 1][observed] values at the ends of parts */
+    double *looked;                   /* [SD_PARTS + 2][observed] values at the ends of parts, and within one */
 } sd_run;
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
