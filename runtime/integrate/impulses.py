@@ -144,7 +144,7 @@ class Impulses:
 
     def _gained(self, terms: Floats) -> Floats:
         """Of terms, the sums [rows]."""
-        return np.bincount(self._pulses.row, terms, self.system.rows)
+        return np.asarray(np.bincount(self._pulses.row, terms, self.system.rows), dtype=np.float64)
 
     def _pulse(self, way: Floats) -> Floats:
         """Flows [unknowns] that are pulses, integrated."""

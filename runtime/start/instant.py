@@ -6,8 +6,9 @@ multipliers (Lambda); finite terms do not count:
 
     M (f+ - f-) + dF/df dq + dF/de E + dF/dkappa Lambda = 0    of balances F, and of psi and gamma, which have no M,
     M dq = 0                                                   of those with inertia, and of momenta p - M f,
+    s+ - s- = dg/df dq + dg/de E + dg/dkappa Lambda            of rates s' = g that constants make,
 
-while what holds between displacements and efforts, Phi_q f+ + Phi_t = 0, Psi(f+) = 0, p = M f and gammas hold behind
+M its mean along the way, while what holds between displacements and efforts, Phi_q f+ + Phi_t = 0, Psi(f+) = 0, p = M f and gammas hold behind
 it: the limit of a fast rise.  So no charge passes a resistor at once, a damper takes along what hangs on it and pushes
 what has inertia, and flows change least in the metric of the inertia (Gauss's principle for impulses); those that M
 leaves open follow from their balances behind it, in which the others have rates.
