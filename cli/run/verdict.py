@@ -43,7 +43,7 @@ _CAUSES = {
     "drives": ("E933", "the bound c of dry friction, c*setsign(u) or c*abs(u), falls below zero: it would drive"),
     "unbalanced": ("E930", "what jumps there is not where a fast rise would lead"),
     "endless": ("E933", "a pulse meets a finite resistance there: the power has no integral"),
-    "pulsed": ("E933", "a dynamic variable that the model reads would jump there: its rate has a pulse"),
+    "pulsed": ("E933", "a dynamic variable that the model reads would jump there: its curved rate has a pulse"),
     "conflict": ("E704", "two events assign one variable at one instant"),
     "memory": ("E934", "there is no memory left"),
 }

@@ -18,6 +18,7 @@ from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.numerics.rank import NotFiniteError
+from sysdyn.runtime.start.instant import UnbalancedError
 from sysdyn.runtime.start.restart import Restart
 
 AHEAD = (1e-9, 1e-7, 1e-5, 1e-3)
@@ -222,6 +223,8 @@ class Succession:
             return self._restart.instant.flows(t, y, yd, self._restart.magnitude(y.size), aims)
         except NotFiniteError as error:
             raise SolverFailure("nonfinite", t, 0.0) from error
+        except UnbalancedError as error:
+            raise self._restart.failure(t, error) from error
 
     def _guards(self, t: float, y: Floats, yd: Floats) -> None:
         values = self.observer(t, y, yd)

@@ -16,7 +16,7 @@ from sysdyn.runtime.model.facts import Mask
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import least_measured
-from sysdyn.runtime.start.instant import FORCES
+from sysdyn.runtime.start.integrated import integrated
 from sysdyn.runtime.start.restart import STILL
 from sysdyn.values import dataclass
 
@@ -54,26 +54,20 @@ class Impulses:
         """
         self._assigned = assigned
         settled = self.system = system.another("settled")
-        pattern, (in_y, in_rate) = settled.pattern, settled.structural()
-        self._row, self._column = pattern.row.astype(np.int64), pattern.columns_of()
-        states, rates = settled.kinds == "s", settled.of_groups("lambda")
-        read = np.zeros(settled.unknowns, dtype=bool)
-        read[self._column[in_y | (in_rate & ~rates[self._row])]] = True
-        own = in_rate & (states & ~read)[self._column]
-        many = np.bincount(self._column[own], minlength=settled.unknowns) > 1
-        own &= ~many[self._column]
-        self.states, self.rows = self._column[own], self._row[own]
-        self._in_y, self._in_rate = in_y, in_rate
-        form = settled.another("3").form
-        self._moved: Ints = np.full(settled.unknowns, -1, dtype=np.int64)
-        self._moved[form.k_f] = np.where(np.isin(form.k_q, unread), -1, form.k_q)
+        over = self._over = integrated(settled)
+        self._row, self._column, in_y, in_rate = over.row, over.column, over.in_y, over.in_rate
+        self._in_y, self._in_rate, (self.rows, self.states) = in_y, in_rate, over.unread
+        form, self._moved = settled.another("3").form, np.where(np.isin(over.moved, unread), -1, over.moved)
         self._read = self._may_pulse()
         inertia = in_rate & settled.of_groups("dynamics", "gamma")[self._row]
         inertia |= in_y & settled.of_groups("momentum")[self._row] & (settled.kinds == "f")[self._column]
         inert = np.isin(np.arange(settled.unknowns), self._column[inertia])
         # displacements tell the pulses of their flows
-        self._given = np.isin(settled.kinds, FORCES) | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
+        self._given = over.force | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
+        self._pulses = over.pulses(self._moved, self._given)
         self._balances, self._others = self._by_order()
+        forced = np.isin(np.arange(settled.rows), self._row[in_y & over.force[self._column]])
+        self._laws = settled.of_groups("gamma") & ~forced  # at each point too where their flows are no pulses
         self._carries = ((settled.kinds == "q") & ~np.isin(np.arange(settled.unknowns), unread)) | inert
         held = form.k_q[inert[form.k_f]]
         self._stays = np.isin(np.arange(settled.unknowns), np.concatenate([self.states, held, unread]))
@@ -84,9 +78,10 @@ class Impulses:
         return bool(self.states.size or self._read.size)
 
     def _may_pulse(self) -> Ints:
-        """Rows of rates that may have impulses, of dynamic variables that other rows read."""
-        kinds, rates = self.system.kinds, self.system.of_groups("lambda")
-        pulses = np.isin(kinds, ("kappa", "mu")) | ((kinds == "f") & (self._moved >= 0))
+        """Rows of rates that may have impulses, of dynamic variables that other rows read and that do not gain by them
+        (start/instant.py).
+        """
+        rates, pulses = self.system.of_groups("lambda") & ~self._over.rates, self._over.force | (self._moved >= 0)
         found = self._row[rates[self._row] & self._in_y & pulses[self._column]]
         return np.setdiff1d(found, self.rows)
 
@@ -112,13 +107,20 @@ class Impulses:
         assigned, way[self.states] = way[self.states] != 0.0, 0.0
         if not way[self._carries].any():
             return none
-        found, balanced, faithful = self._straight(before, behind, way)
+        others = self._others | (self._laws & ~self._pulsed(way))
+        found, balanced, faithful = self._straight(before, behind, way, others)
         if not (balanced and faithful):
-            curved = self._curved(before, behind, way, magnitude)
+            curved = self._curved(before, behind, way, (magnitude, others))
             if curved is None and not balanced and not self._assigned:
                 raise SolverFailure("unbalanced", behind.t, 0.0)
             found = found if curved is None else curved
         return np.where(assigned, 0.0, found)
+
+    def _pulsed(self, way: Floats) -> Mask:
+        """Rows [rows] that read flows which are pulses."""
+        found = np.zeros(self.system.rows, dtype=bool)
+        found[self._row[self._in_y & (self._pulse(way) != 0.0)[self._column]]] = True
+        return found
 
     # -- the rise ------------------------------------------------------------------------------------------------
 
@@ -135,48 +137,49 @@ class Impulses:
         (jy, jyd), (ky, kyd) = found
         return (1.0 - part) * jy + part * ky, (1.0 - part) * jyd + part * kyd
 
-    def _carried(self, slopes: _Slopes, way: Floats) -> Floats:
-        """What rows gain [entries] by moves of y along the way [unknowns]: by rates, and by pulses of flows."""
-        rated = np.where(self._in_rate, slopes[1] * way[self._column], 0.0)
-        return rated + np.where(self._in_y, slopes[0] * self._pulse(way)[self._column], 0.0)
+    def _terms(self, slopes: _Slopes, way: Floats, impulse: Floats | float = 0.0) -> Floats:
+        """What rows gain [terms of the pulses] by moves of y along the way and impulses [unknowns]."""
+        gains = np.stack([way, np.zeros(way.size) + impulse], axis=1).ravel()
+        return self._pulses.values(*slopes) * gains[self._pulses.column]
+
+    def _gained(self, terms: Floats) -> Floats:
+        """Of terms, the sums [rows]."""
+        return np.asarray(np.bincount(self._pulses.row, terms, self.system.rows), dtype=np.float64)
 
     def _pulse(self, way: Floats) -> Floats:
         """Flows [unknowns] that are pulses, integrated."""
         return np.where(self._moved >= 0, way[self._moved], 0.0)
 
-    def _rate(self, slopes: _Slopes, way: Floats, impulse: Floats) -> Floats:
+    def _rate(self, terms: Floats) -> Floats:
         """What the states gain [states]: their rows read s' - g."""
-        given = np.where(self._in_y, slopes[0] * impulse[self._column], 0.0)
-        total = np.bincount(self._row, self._carried(slopes, way) + given, self.system.rows)
-        return np.asarray(-total[self.rows], dtype=np.float64)
+        return -self._gained(terms)[self.rows]
 
     # -- straight ------------------------------------------------------------------------------------------------
 
-    def _straight(self, before: Side, behind: Side, way: Floats) -> tuple[Floats, bool, bool]:
-        """The gains [states] where all unknowns go straight; whether impulses balance there, and others hold."""
+    def _straight(self, before: Side, behind: Side, way: Floats, others: Mask) -> tuple[Floats, bool, bool]:
+        """The gains [states] where all unknowns go straight; whether impulses balance there, and others [rows] hold."""
         gained, balanced, faithful = np.zeros(self.states.size), True, True
         pulse = self._pulse(way)
         for part in GAUSS:
             y = before.y + part * way
             slopes = self._slopes((before, behind), part, y)
             impulse, met = self._impulse(slopes, way)
-            rate = self._rate(slopes, way, impulse)
-            self._still(slopes, way, impulse, behind.t)
+            rate = self._rate(terms := self._terms(slopes, way, impulse))
+            self._still(terms, behind.t)
             if pulse.any():
-                self._finite(rate, self._rate(self._slopes((before, behind), part, y, pulse), way, impulse), behind.t)
+                pulsed = self._terms(self._slopes((before, behind), part, y, pulse), way, impulse)
+                self._finite(rate, self._rate(pulsed), behind.t)
             gained += 0.5 * rate
             balanced &= met
-            faithful &= self._holds(before, behind, part, y)
+            faithful &= self._holds((before, behind), part, y, others)
         return gained, balanced, faithful
 
-    def _still(self, slopes: _Slopes, way: Floats, impulse: Floats, t: float) -> None:
+    def _still(self, terms: Floats, t: float) -> None:
         """SolverFailure where a dynamic variable that others read has a rate with an impulse: it would jump."""
         rows = self._read
         if not rows.size:
             return
-        given = np.where(self._in_y, slopes[0] * impulse[self._column], 0.0)
-        terms = self._carried(slopes, way) + given
-        left, size = (np.bincount(self._row, w, self.system.rows)[rows] for w in (terms, np.abs(terms)))
+        left, size = (self._gained(w)[rows] for w in (terms, np.abs(terms)))
         if (missed := np.abs(left) > BROKEN * size).any():
             raise SolverFailure("pulsed", t, 0.0, self._state_of(rows[np.argmax(missed)]))
 
@@ -195,63 +198,63 @@ class Impulses:
         """Impulses of forces, and pulses of flows that no displacement tells [unknowns], that rows ask for along the
         way; whether these are met.
         """
-        balances, given = self._balances[self._row], self._given[self._column] & self._in_y
-        carried = np.where(balances, self._carried(slopes, way), 0.0)
-        at = np.flatnonzero(balances & given & (slopes[0] != 0.0))
-        aim = np.asarray(-np.bincount(self._row, carried, self.system.rows), dtype=np.float64)
-        entries = self._row[at], self._column[at], slopes[0][at]
+        pulses = self._pulses
+        at = np.flatnonzero(self._balances[pulses.row] & (pulses.column % 2 == 1))
+        aim = -self._gained(self._terms(slopes, way))
+        entries = pulses.row[at], pulses.column[at] // 2, pulses.values(*slopes)[at]
         impulse = least_measured(entries, aim, np.full(way.size, np.nan))
-        acted = np.where(balances & given, slopes[0] * impulse[self._column], 0.0)
-        size, left = (np.bincount(self._row, w, aim.size) for w in (np.abs(carried) + np.abs(acted), carried + acted))
+        terms = np.where(self._balances[pulses.row], self._terms(slopes, way, impulse), 0.0)
+        size, left = self._gained(np.abs(terms)), self._gained(terms)
         return impulse, bool((np.abs(left) <= BROKEN * size.max(initial=0.0))[self._balances].all())
 
-    def _holds(self, before: Side, behind: Side, part: float, y: Floats) -> bool:
+    def _holds(self, sides: tuple[Side, Side], part: float, y: Floats, others: Mask) -> bool:
         """Whether rows without impulses hold at y, where the text and all else asked are a part of their way along."""
-        ends = [self.system.residual(behind.t, z, behind.yd)[self._others] for z in (before.y, y, behind.y)]
+        before, behind = sides
+        ends = [self.system.residual(behind.t, z, behind.yd)[others] for z in (before.y, y, behind.y)]
         off = ends[1] - (1.0 - part) * ends[0] - part * ends[2]
         return bool((np.abs(off) <= BROKEN * (np.abs(ends[0]) + np.abs(ends[2]))).all())
 
     # -- curved --------------------------------------------------------------------------------------------------
 
-    def _curved(self, before: Side, behind: Side, way: Floats, magnitude: Floats) -> Floats | None:
-        """The gains [states] along the rise itself; None where rows do not tell it: it ends elsewhere."""
-        last, size = None, np.maximum(magnitude, np.abs(way))
+    def _curved(self, before: Side, behind: Side, way: Floats, along: tuple[Floats, Mask]) -> Floats | None:
+        """The gains [states] along the rise itself; None where rows do not tell it: it ends elsewhere.  along:
+        magnitudes [unknowns], rows [rows] that hold at each point.
+        """
+        (magnitude, others), last = along, None
+        size = np.maximum(magnitude, np.abs(way))
         for number in PARTS:
-            y, gained = self._followed(before, behind, size, number)
+            y, gained = self._followed((before, behind), size, others, number)
             if last is not None and (np.abs(gained - last) <= AGREED * np.abs(gained).max()).all():
                 near = np.abs(y - before.y - way) <= AWAY * size
                 return gained if near[self._carries].all() else None
             last = gained
         return None
 
-    def _followed(self, before: Side, behind: Side, size: Floats, number: int) -> tuple[Floats, Floats]:
+    def _followed(self, sides: tuple[Side, Side], size: Floats, others: Mask, number: int) -> tuple[Floats, Floats]:
         """Y [unknowns] and gains [states] at the end, in a number of steps of the classical Runge-Kutta method."""
+        before, behind = sides
         y, gained, step = before.y.copy(), np.zeros(self.states.size), 1.0 / number
         ends = [self.system.residual(behind.t, z, behind.yd) for z in (before.y, behind.y)]
-        asked = np.where(self._others, ends[1] - ends[0], 0.0)
+        asked = np.where(others, ends[1] - ends[0], 0.0)
         for k in range(number):
             way, total, gain = np.zeros(y.size), np.zeros(y.size), np.zeros(self.states.size)
             for part, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
                 at = y + part * step * way
-                slopes = self._slopes((before, behind), (k + part) * step, at)
-                way, impulse = self._direction(slopes, asked, size)
+                slopes = self._slopes(sides, (k + part) * step, at)
+                way, impulse = self._direction(slopes, asked, size, others)
                 total += weight / 6.0 * way
-                gain += weight / 6.0 * self._rate(slopes, way, impulse)
+                gain += weight / 6.0 * self._rate(self._terms(slopes, way, impulse))
             y, gained = y + step * total, gained + step * gain
         return y, gained
 
-    def _direction(self, slopes: _Slopes, asked: Floats, size: Floats) -> tuple[Floats, Floats]:
+    def _direction(self, slopes: _Slopes, asked: Floats, size: Floats, holds: Mask) -> tuple[Floats, Floats]:
         """What y moves by along the rise, and the impulses [unknowns]: what the rows ask for, at least of all."""
-        n, rows, moved = size.size, self.system.rows, self._moved[self._column]
-        balances, others = self._balances[self._row], self._others[self._row]
-        parts = (  # two rows each: at the point, and integrated; two columns: moves, and impulses
-            (others & self._in_y, self._row, self._column, slopes[0]),
-            (balances & self._in_rate, rows + self._row, self._column, slopes[1]),
-            (balances & self._in_y & (moved >= 0), rows + self._row, moved, slopes[0]),
-            (balances & self._in_y & self._given[self._column], rows + self._row, n + self._column, slopes[0]),
-        )
-        takes = [take & (v != 0.0) & ~self._stays[j % n] for take, _, j, v in parts]
-        i, j, v = (np.concatenate([part[k][take] for part, take in zip(parts, takes, strict=True)]) for k in (1, 2, 3))
-        aim = np.append(asked, np.zeros(rows))
-        found = least_measured((i, j, v), aim, np.append(size, np.full(n, np.nan)))
-        return found[:n], found[n:]
+        pulses = self._pulses
+        over = np.flatnonzero(self._balances[pulses.row] & ~self._stays[pulses.column // 2])
+        here = np.flatnonzero(holds[self._row] & self._in_y & ~self._stays[self._column])
+        i = np.append(2 * self._row[here], 2 * pulses.row[over] + 1)
+        j = np.append(2 * self._column[here], pulses.column[over])
+        v = np.append(slopes[0][here], pulses.values(*slopes)[over])
+        aim = np.stack([asked, np.zeros(asked.size)], axis=1).ravel()
+        found = least_measured((i, j, v), aim, np.stack([size, np.full(size.size, np.nan)], axis=1).ravel())
+        return found[::2], found[1::2]

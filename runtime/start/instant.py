@@ -6,8 +6,9 @@ multipliers (Lambda); finite terms do not count:
 
     M (f+ - f-) + dF/df dq + dF/de E + dF/dkappa Lambda = 0    of balances F, and of psi and gamma, which have no M,
     M dq = 0                                                   of those with inertia, and of momenta p - M f,
+    s+ - s- = dg/df dq + dg/de E + dg/dkappa Lambda            of rates s' = g that constants make,
 
-while what holds between displacements and efforts, Phi_q f+ + Phi_t = 0, Psi(f+) = 0, p = M f and gammas hold behind
+M its mean along the way, while what holds between displacements and efforts, Phi_q f+ + Phi_t = 0, Psi(f+) = 0, p = M f and gammas hold behind
 it: the limit of a fast rise.  So no charge passes a resistor at once, a damper takes along what hangs on it and pushes
 what has inertia, and flows change least in the metric of the inertia (Gauss's principle for impulses); those that M
 leaves open follow from their balances behind it, in which the others have rates.
@@ -28,36 +29,47 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import least_measured
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.numerics.tall import free_unknowns
+from sysdyn.runtime.start.integrated import BROKEN, integrated, missed
 from sysdyn.runtime.start.settled import inertial_rows
 from sysdyn.values import dataclass
 
 FOLLOWS = ("f", "p", "e", "kappa", "mu")
-FORCES = ("e", "kappa", "mu")
 LOOSE = 1e3
 """Times its magnitude, what follows may jump more easily than what nothing else decides about."""
-BROKEN = 1e-10
-"""Of its terms: what a row is missed by, or an impulse, that is no round-off."""
 ROUND_OFF = 1e-14
 """Of its magnitude: what an unknown is moved by that stays where it is."""
-ITERATIONS, BALANCED = 3, 6
+ITERATIONS = 30
+CONVERGED = 1e-10
+"""Of their magnitudes: a step of Newton's method behind which the next is round-off."""
+POINTS = (2, 4, 8, 16, 32)
+"""Points of Gauss's rule, until two agree within BROKEN."""
 
-Entries = tuple[NDArray[Any], NDArray[Any], Floats]
-"""Row, column, value.  Row 2 k is row k behind the instant, 2 k + 1 its integral; column 2 k is unknown k, 2 k + 1 its
-integral over the instant, of flows and momenta their rate behind it.
+Entries = tuple[NDArray[Any], NDArray[Any], Floats, Floats]
+"""Row, column, value, its mean over the way so far.  Row 2 k is row k behind the instant, 2 k + 1 its integral; column
+2 k is unknown k, 2 k + 1 its integral over the instant, of flows and momenta their rate behind it.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """Rows [rows] that hold behind the instant, in unknowns that move [unknowns]; the entries of those that are linear
-    in moves and integrals, from dF/dy, dF/dyd and y; ease [unknowns]: times their magnitudes, how far these may move.
+    """Rows [rows] that hold behind the instant, in unknowns that move [unknowns]; rows [rows] whose integrals must be
+    met; the entries of those that are linear in moves and integrals, from dF/dy, dF/dyd and y; ease [unknowns]: times
+    their magnitudes, how far these may move.
     """
 
     behind: Mask
     moves: Mask
+    met: Mask
     integrals: Callable[[Floats, Floats, Floats], Entries]
     ease: Floats | float = 1.0
-    iterations: int = ITERATIONS
+
+
+class UnbalancedError(Exception):
+    """row: one whose integral over an instant nothing meets."""
+
+    def __init__(self, row: int) -> None:
+        super().__init__(row)
+        self.row = row
 
 
 class Instant:
@@ -65,16 +77,15 @@ class Instant:
 
     def __init__(self, settled: System) -> None:
         self.system, kinds = settled, settled.kinds
-        pattern, form = settled.pattern, settled.another("3").form
-        self._row, self._column = pattern.row.astype(np.int64), pattern.columns_of()
+        over = self._over = integrated(settled)
+        self._row, self._column, self._moved = over.row, over.column, over.moved
+        self._pulses = over.pulses(over.moved, over.force)
         self._balances = settled.of_groups("dynamics")
         self._momenta = settled.of_groups("momentum")
         self._states, self._constraints = settled.of_groups("momentum", "gamma"), settled.of_groups("phi_rate", "psi")
-        self._moving, self._force = np.isin(kinds, ("f", "p", "e")), np.isin(kinds, FORCES)
+        self._moving = np.isin(kinds, ("f", "p", "e")) | over.contents
         self._told, self._struck = self._reacting()
-        self._moved = np.full(settled.unknowns, -1, dtype=np.int64)
-        self._moved[form.k_f] = form.k_q
-        inertial, (in_y, in_rate) = inertial_rows(settled), settled.structural()
+        inertial, in_y, in_rate = inertial_rows(settled), over.in_y, over.in_rate
         self._light, self._heavy = settled.of_groups("dynamics", "psi", "gamma") & ~inertial, self._balances & inertial
         flow = (self._moved >= 0)[self._column]
         self._held = flow & in_rate & self._heavy[self._row], flow & in_y & settled.of_groups("momentum")[self._row]
@@ -83,14 +94,15 @@ class Instant:
         self._given = settled.of_groups("phi", "dynamics", "gamma") & ~answered
 
     def _reacting(self) -> tuple[Mask, Mask]:
-        """Gammas [rows] of implicit efforts that follow from multipliers (friction on a reaction); which forces have
-        impulses where flows jump [unknowns]: those efforts, and multipliers.
+        """Gammas [rows] of implicit efforts that follow from multipliers (friction on a reaction) or that contents of
+        stores gain; which forces have impulses where flows jump [unknowns]: those efforts, and multipliers.
         """
         kinds, gammas = self.system.kinds, self.system.of_groups("gamma")[self._row]
         reactions = np.isin(kinds, ("kappa", "mu"))
         reads = np.zeros(self.system.rows, dtype=bool)
         reads[self._row[gammas & reactions[self._column]]] = True
         follows = reactions.copy()
+        reads |= self._over.rates
         follows[self._column[reads[self._row] & (kinds == "e")[self._column]]] = True
         told = np.zeros(self.system.rows, dtype=bool)
         told[self._row[gammas & (follows & ~reactions)[self._column]]] = True
@@ -116,10 +128,16 @@ class Instant:
         return found
 
     def _acting(self) -> Mask:
-        """Entries of forces; what does not hold has no multiplier, and no impulse of one."""
-        acts = self._force.copy()
+        """Forces [unknowns]; what does not hold has no multiplier, and no impulse of one."""
+        acts = self._over.force.copy()
         acts[self.system.held[1]] = False
-        return acts[self._column]
+        return acts
+
+    def _taken(self, rows: Mask, moves: Mask, acts: Mask) -> NDArray[np.int64]:
+        """Terms of rows [rows] in unknowns that move, and that have impulses [unknowns]."""
+        pulses = self._pulses
+        unknown, integral = np.divmod(pulses.column, 2)
+        return np.flatnonzero(rows[pulses.row] & np.where(integral == 1, acts[unknown], moves[unknown]))
 
     def displacements(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
         """Y with the displacements behind the jump at t; the impulses of effort on balances with inertia [rows].
@@ -128,19 +146,18 @@ class Instant:
         """
         slope, inertia = self._slopes(t, y, yd, magnitude)
         heavy, carried = self._held
-        light, flow = self._now(self._light)[self._row], (self._moved >= 0)[self._column]
-        through = np.flatnonzero(((light & flow) | heavy | carried) & (np.where(heavy, inertia, slope) != 0.0))
-        forced = np.flatnonzero(light & self._acting())
-        at = np.append(through, forced)
-        columns = np.append(2 * self._moved[self._column[through]], 2 * self._column[forced] + 1)
-        integrals = 2 * self._row[at] + 1, columns, np.where(heavy, inertia, slope)[at]
+        jumps, met = (self.system.kinds == "q") | self._over.contents, self._now(self._light) | self._over.rates
+        taken, held = self._taken(met, jumps, self._acting()), np.flatnonzero(heavy | carried)
+        i = 2 * np.append(self._pulses.row[taken], self._row[held]) + 1
+        j = np.append(self._pulses.column[taken], 2 * self._moved[self._column[held]])
+        v = np.append(self._pulses.values(slope, inertia)[taken], np.where(heavy, inertia, slope)[held])
         ease = np.where(np.isin(self.system.kinds, FOLLOWS), LOOSE, 1.0)
         behind = self._given.copy()
         behind[self.system.held[0]] = True  # they read "multiplier = 0"
-        # dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
-        rows = _Rows(behind, self.system.kinds != "s", lambda *_: integrals, ease)
+        # other dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
+        rows = _Rows(behind, (self.system.kinds != "s") | jumps, met, lambda *_: (i, j, v, v), ease)
         found, impulse = self._jump((t, y, yd), magnitude, rows)
-        found = np.where(self.system.kinds == "q", found, y)
+        found = np.where(jumps, found, y)
         return found, self._pushed(slope, found - y, impulse, inertia * magnitude[self._column])
 
     def _slopes(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
@@ -170,28 +187,48 @@ class Instant:
         push, open_ = np.zeros(self.system.rows) if push is None else push, self._leaves_open(t, y, yd, magnitude)
         if aims is None and not (push.any() or open_ or self.broken(t, y, yd, magnitude)):
             return y, np.zeros(y.size)
-        moving, acts = self._moving[self._column], self._acting() & self._struck[self._column]
-        at = np.flatnonzero((self._balances[self._row] & (moving | acts)) | (self._told[self._row] & acts))
-        rows, columns = 2 * self._row[at] + 1, 2 * self._column[at] + acts[at]
-        behind, moves, ease = self._now(self._constraints) | self._states, self._moving, 1.0
-        rated = at[:0]
+        moves, behind, ease = self._moving, self._now(self._constraints) | self._states, 1.0
+        met, pulses = self._balances | self._over.rates | self._told, self._pulses
+        taken = self._taken(met, moves, self._acting() & self._struck)
+        i, j = 2 * pulses.row[taken] + 1, pulses.column[taken]
+        rated = taken[j % 2 == 0]
+        curved = bool((~self._over.affine[pulses.row[rated]]).any())
+        rated = rated[self._balances[pulses.row[rated]]] if open_ else rated[:0]
         if open_:  # finite terms decide, rates of the others among them
-            rated, ease = at[moving[at]], 1.0 / LOOSE
-            behind, moves = behind | self._balances, moves | self._force
-            rows, columns = np.append(rows, 2 * self._row[rated]), np.append(columns, 2 * self._column[rated] + 1)
-
-        reacts = self._struck & (self.system.kinds != "e")
+            behind, moves, ease = behind | self._balances, moves | self._over.force, 1.0 / LOOSE
+            i, j = np.append(i, 2 * pulses.row[rated]), np.append(j, pulses.column[rated] + 1)
+        at = np.append(taken, rated)
         told = self._told[self._row] if self._told.any() else None
 
         def integrals(jy: Floats, jyd: Floats, here: Floats) -> Entries:
             if told is not None:  # friction on a reaction that is nothing yet
-                jy = np.where(told, self.system.jacobian(t, np.where(reacts, here + magnitude, here), yd)[0], jy)
-            return rows, columns, np.append(np.where(acts, jy, jyd)[at], jyd[rated])
+                jy = np.where(told, self.system.jacobian(t, np.where(self._struck, here + magnitude, here), yd)[0], jy)
+            slopes = pulses.values(jy, jyd)[at]
+            if not curved:
+                return i, j, slopes, slopes
+            means = pulses.values(jy, self._mean(t, (y, here), yd, jyd))
+            return i, j, slopes, np.append(means[taken], slopes[taken.size :])
 
         aim = np.stack([np.zeros(self.system.rows) if aims is None else aims, -push], axis=1)
-        meant = _Rows(behind, moves, integrals, ease, BALANCED if rated.size else ITERATIONS)
+        meant = _Rows(behind, moves, met, integrals, ease)
         begun = self._sloping(t, y, yd, magnitude)
         return self._jump((t, y, yd), magnitude, meant, begun, aim, asked=aims is not None)
+
+    def _mean(self, t: float, way: tuple[Floats, Floats], yd: Floats, jyd: Floats) -> Floats:
+        """Mean of dF/dyd [entries] along the straight way, jyd at its end: times the jumps of flows and contents what
+        momenta and contents of nonlinear stores jump by, whatever the way is.
+        """
+        (begin, end), last = way, jyd
+        if np.array_equal(last, self.system.jacobian(t, 0.5 * (begin + end), yd)[1], equal_nan=True):
+            return last
+        for number in POINTS:
+            parts, weights = np.polynomial.legendre.leggauss(number)
+            at = [begin + 0.5 * (1.0 + part) * (end - begin) for part in parts.tolist()]
+            found = 0.5 * np.asarray(weights) @ [self.system.jacobian(t, y, yd)[1] for y in at]
+            if (np.abs(found - last) <= BROKEN * np.abs(found)).all():
+                break
+            last = found
+        return np.where(np.isfinite(found), found, 0.0)
 
     def _leaves_open(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> bool:
         """Whether inertia leaves flows open that it has: nodes that stores only tie together."""
@@ -222,28 +259,36 @@ class Instant:
         asked: bool = False,
     ) -> tuple[Floats, Floats]:
         """The least change of y that meets the rows, from where it has begun, without its round-off; impulses of forces
-        [unknowns].  Where that comes to no numbers y is as it was, and there are none.
+        [unknowns]; UnbalancedError.  Where that comes to no numbers y is as it was, and there are none.
 
         before: t, y, yd; aims [rows, 2]: what the rows behind the instant shall be, and the integrals.  asked: numbers
         there must be, else NotFiniteError.
         """
         t, start, yd = before
-        y, integral = (start if begun is None else begun), np.zeros(start.size)
+        y, integral, step = start if begun is None else begun, np.zeros(start.size), np.inf
         here = meant.behind[self._row] & meant.moves[self._column]
         scale = np.stack([magnitude * meant.ease, np.full(start.size, np.nan)], axis=1).ravel()
-        for _ in range(meant.iterations):
+        for _ in range(ITERATIONS):
             jy, jyd = (np.where(np.isfinite(item), item, 0.0) for item in self.system.jacobian(t, y, yd))
-            i, j, v = meant.integrals(jy, jyd, y)
+            i, j, v, mean = meant.integrals(jy, jyd, y)
             aim = np.zeros((self.system.rows, 2)) + aims
             aim[meant.behind, 0] -= self.system.residual(t, y, yd)[meant.behind]
             change, aim = np.stack([y - start, integral], axis=1).ravel(), aim.ravel()
-            np.add.at(aim, i, -v * change[j])
-            i, j = np.append(2 * self._row[here], i), np.append(2 * self._column[here], j)
+            np.add.at(aim, i, -mean * change[j])
+            if step <= CONVERGED:
+                break
+            entries = np.append(2 * self._row[here], i), np.append(2 * self._column[here], j), np.append(jy[here], v)
             try:
-                step = least_measured((i, j, np.append(jy[here], v)), aim, scale)
+                move = least_measured(entries, aim, scale)
             except NotFiniteError:
                 if asked:
                     raise
                 return start, np.zeros(start.size)
-            y, integral = y + step[::2], integral + step[1::2]
-        return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._force, integral, 0.0)
+            y, integral = y + move[::2], integral + move[1::2]
+            step = float((np.abs(move[::2]) / np.maximum(magnitude, np.abs(y))).max(initial=0.0))
+        wanted = (np.zeros((self.system.rows, 2)) + aims).ravel()
+        size = np.fmax(scale, np.stack([np.maximum(np.abs(y), np.abs(start)), 0.0 * y], axis=1).ravel())
+        off = np.where(meant.met, missed((i, j, mean), size, (aim, wanted))[1::2], 0.0)
+        if off.any():
+            raise UnbalancedError(int(np.argmax(off)))
+        return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._over.force, integral, 0.0)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.start.instant import Instant
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.start.instant import Instant, UnbalancedError
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.runtime.start.strategies import behind
@@ -50,9 +51,18 @@ class Restart:
         self.instant = Instant(settler.system)
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
-        """y, yd [unknowns as written] on the far side at t; None where none was found."""
-        found = self._struck(t, y, yd, self.magnitude(y.size))
+        """y, yd [unknowns as written] on the far side at t; None where none was found, SolverFailure where a balance
+        over the instant is not met.
+        """
+        try:
+            found = self._struck(t, y, yd, self.magnitude(y.size))
+        except UnbalancedError as error:
+            raise self.failure(t, error) from error
         return None if found is None else found[:2]
+
+    def failure(self, t: float, error: UnbalancedError) -> SolverFailure:
+        """What a balance over the instant t that is not met is told as."""
+        return SolverFailure("unbalanced", t, 0.0, row=self.settler.system.row_label(error.row))
 
     def struck(self, t: float, y: Floats, yd: Floats, *, quickly: bool = False) -> tuple[Floats, Floats, Floats] | None:
         """The same with the impulses [unknowns as written] that took the flows there, of a set of constraints that is
@@ -60,7 +70,10 @@ class Restart:
         bound.
         """
         known = self.magnitude(y.size)
-        found = self._struck(t, y, yd, known, quickly=quickly)
+        try:
+            found = self._struck(t, y, yd, known, quickly=quickly)
+        except UnbalancedError:
+            found = None
         lib.reader(self.settler.core.contents.scale, y.size)[:] = known
         return found
 

@@ -167,18 +167,30 @@ scene s of m { time 0 s to 0.5 s; trace K.energy as K, M.energy as M, x.f as v e
         np.testing.assert_allclose(stored + moved, 0.0, atol=1e-6)
 
 
-def test_an_integral_that_the_model_reads_and_that_would_jump_is_refused(tmp_path):
-    text = (
-        VOLTAGE.replace("QTRACE", ", D.f")
-        .replace("a, b:", "a, b, d:")
-        .replace(
-            "  state Q",
-            """\
+READ = (
+    VOLTAGE.replace("QTRACE", ", D.f as D")
+    .replace("a, b:", "a, b, d:")
+    .replace(
+        "  state Q",
+        """\
   W: effort(e = Q/(1 F)) d -> ground
   D: dissipator(e = 1 ohm*f) d -> ground
   state Q""",
-        )
     )
+)
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_an_integral_that_the_model_reads_jumps_by_the_charge_that_passes_at_once(tmp_path, formulation):
+    """2 V more over 2/3 F: 4/3 C.  It was refused, where its rate was no pulse of its own it stayed."""
+    found = _run(READ, tmp_path, formulation=formulation)
+    at = np.flatnonzero(np.abs(found.time - 0.2) < 1e-9)
+    before, behind = found["D"].values[at[[0, -1]]]
+    assert abs(abs(behind - before) - 4.0 / 3.0) < 1e-6
+
+
+def test_an_integral_that_the_model_reads_and_whose_rate_is_curved_is_refused_where_it_would_jump(tmp_path):
+    text = READ.replace("Q' = V.f", "Q' = V.f*(2 + Q/(1 C))")
     with pytest.raises(api.SolverFailure, match=r"pulsed.*unknown Q"):
         _run(text, tmp_path, formulation="lagrangian")
 

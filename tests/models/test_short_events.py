@@ -51,3 +51,42 @@ def test_at_every_tolerance(rtol, tmp_path):
     (tmp_path / "clamp.sd").write_text(CLAMP)
     trace = api.simulate(tmp_path / "clamp.sd", method="radau", rtol=float(rtol), output=tmp_path / "out.h5")
     assert len(trace.events) == 21
+
+
+SWING = """\
+model m {
+  param w = 1 um
+  param c = 0.3 m
+  coord x: translation = 1 m
+  energy T* = 1/2*(1 kg)*x'^2
+  energy V = 1/2*(100 N/m)*x^2
+  init x' = 0 m/s
+  discrete n = 0
+  discrete at = 0 s
+  when CONDITION { n := n + 1 }
+  when CONDITION { at := t }
+}
+scene s of m { time 0 s to 3 s; trace n, at; accuracy 1e-6 }
+"""
+WINDOWS = {
+    "abs": ("abs(x - c) < w", (1e-4, 1e-6, 1e-7)),
+    "max": ("max(x - c, c - x) < w", (1e-4, 1e-6, 1e-7)),
+    "square": ("(x - c)^2 < w^2", (1e-2, 1e-3, 1e-4)),
+}
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau", "dopri"])
+@pytest.mark.parametrize("window", WINDOWS)
+@pytest.mark.one_in(3)
+def test_a_window_as_narrow_as_the_accuracy_is_not_passed_over(window, method, tmp_path):
+    """It is open for 0.2 us of steps of 30 ms: |x - c| falls below zero and comes back between two looks at a step."""
+    condition, widths = WINDOWS[window]
+    (tmp_path / "swing.sd").write_text(SWING.replace("CONDITION", condition))
+    for c in np.linspace(-0.8, 0.9, 7):
+        passes = np.sort([(k * 2.0 * np.pi + sign * np.arccos(c)) / 10.0 for k in range(6) for sign in (-1.0, 1.0)])
+        passes = passes[(passes > 0.0) & (passes < 3.0)]
+        for w in widths:
+            settings = {"w": f"{w} m", "c": f"{c} m"}
+            trace = api.simulate(tmp_path / "swing.sd", method=method, set=settings, output=tmp_path / "out.h5")
+            assert trace["n"].values[-1] == passes.size
+            assert abs(trace["at"].values[-1] - passes[-1]) < w + 1e-6

@@ -12,6 +12,9 @@
 #define FOURTH (3.0 + SHIFT)
 /* of the cubic through four points: what the value at k counts at 2 beside those at a, b and c */
 #define IN_THE_MIDDLE(k, a, b, c) ((2.0 - (a)) / ((k) - (a)) * ((2.0 - (b)) / ((k) - (b))) * ((2.0 - (c)) / ((k) - (c))))
+#define GOLDEN 0.6180339887498949 /* of what the bottom lies within: what is kept */
+#define DEEP 70        /* of these: to the spacing of t */
+#define STEEPER 2.0    /* times the slopes met: as steep it may fall between two looks */
 #define FAINT 1e-9    /* of the largest value of what is watched: what it is off by unseen */
 
 /* The parabola through three points: its rise from the first to the second, and half of its second derivative. */
@@ -67,6 +70,60 @@ static int unfollowed(const sd_run *run, const sd_watch *watch, int first)
     return fabs(off) > fmax(0.25 * least, unseen) || low - wrong < -unseen;
 }
 
+/* What watch has at t. */
+static double value_of(sd_run *run, const sd_watch *watch, double t)
+{
+    double *values = run->looked + (size_t)(SD_PARTS + 1) * (size_t)run->observed;
+    sd_run_look(run, t, values);
+    return watch->side * values[watch->row];
+}
+
+/* The bottom of a watch within a..b, where it has fa, fb, by golden section; whether it has fallen there (*seen)
+ * and not before (*clear).  It is given up where slopes like those met so far lead to no fall. */
+static int bottomed(sd_run *run, const sd_watch *watch, double a, double fa, double b, double fb, double *clear, double *seen)
+{
+    double x = b - GOLDEN * (b - a), y = a + GOLDEN * (b - a);
+    double fx = value_of(run, watch, x), fy = value_of(run, watch, y);
+    for (int k = 0; k < DEEP; k++) {
+        double least = fmin(fx, fy), slope = fmax(fabs(fx - fa) / (x - a), fabs(fb - fy) / (b - y));
+        int fell = least < -watch->tolerance, apart = a < x && x < y && y < b;
+        if (fell && (!apart || slope * (b - a) <= -least)) {
+            *seen = fx < fy ? x : y;
+            return 1;
+        }
+        if (!apart || (!fell && least - STEEPER * slope * (b - a) >= -watch->tolerance))
+            return 0;
+        if (fx < fy) {
+            b = y, fb = fy, y = x, fy = fx;
+            x = b - GOLDEN * (b - a), fx = value_of(run, watch, x);
+        } else {
+            a = x, fa = fx, x = y, fx = fy;
+            *clear = fa < -watch->tolerance ? *clear : a;
+            y = a + GOLDEN * (b - a), fy = value_of(run, watch, y);
+        }
+    }
+    return 0;
+}
+
+/* The first fall of a watch that comes back between two of the points t[0..SD_PARTS] it was looked at: where it
+ * falls before them and rises behind (|u| - a at a corner).  first: as unfollowed. */
+static int dips(sd_run *run, const sd_watch *watch, const double *t, int first)
+{
+    double f[SD_PARTS + 1];
+    for (int k = 0; k <= SD_PARTS; k++)
+        f[k] = watch->side * run->looked[(size_t)k * (size_t)run->observed + (size_t)watch->row];
+    for (int k = first && f[0] <= watch->tolerance; k < SD_PARTS; k++) {
+        double clear = t[k], seen = t[k + 1];
+        int falls = k == 0 || f[k] < f[k - 1], rises = k + 2 > SD_PARTS || f[k + 2] > f[k + 1];
+        if (falls && rises && bottomed(run, watch, t[k], f[k], t[k + 1], f[k + 1], &clear, &seen)) {
+            if (seen < run->t_seen)
+                run->t_clear = clear, run->t_seen = seen;
+            return 1;
+        }
+    }
+    return 0;
+}
+
 static int fallen(const sd_run *run, const double *values)
 {
     for (int32_t i = 0; i < run->watches; i++)
@@ -76,11 +133,12 @@ static int fallen(const sd_run *run, const double *values)
 }
 
 /* Looks at `parts` parts of begin..end, up to the first at whose end something watched has changed, which is then
- * t_clear..t_seen; whether what is watched is not followed by so many. */
-static int scan(sd_run *run, double begin, double end, int parts, int *fell)
+ * t_clear..t_seen; whether what is watched is not followed by so many.  seek: nor falls and comes back between two. */
+static int scan(sd_run *run, double begin, double end, int parts, int seek, int *fell)
 {
     size_t row = (size_t)run->observed;
     int more = 0;
+    double at[SD_PARTS + 1] = {begin};
     sd_run_look(run, begin, run->looked);
     run->t_seen = begin;
     *fell = 0;
@@ -90,12 +148,19 @@ static int scan(sd_run *run, double begin, double end, int parts, int *fell)
         double t = part == parts ? end : begin + (end - begin) * (part + (part % 2 ? SHIFT : 0.0)) / parts;
         sd_run_look(run, t, values);
         run->t_clear = run->t_seen;
-        run->t_seen = t;
+        run->t_seen = at[k] = t;
         *fell = fallen(run, values);
-        for (int32_t i = 0; i < run->watches && k == SD_PARTS && !more && !*fell; i++)
-            more = unfollowed(run, &run->watch[i], part == SD_PARTS);
-        if (k == SD_PARTS)
-            memcpy(run->looked, values, row * sizeof(double));
+        if (k < SD_PARTS)
+            continue;
+        int dip = 0;
+        for (int32_t i = 0; i < run->watches && (seek || !more) && !*fell; i++) {
+            const int turns = unfollowed(run, &run->watch[i], part == SD_PARTS);
+            more |= turns;
+            dip |= turns && seek && dips(run, &run->watch[i], at, part == SD_PARTS);
+        }
+        *fell |= dip;
+        memcpy(run->looked, values, row * sizeof(double));
+        at[0] = t;
     }
     return more;
 }
@@ -108,20 +173,20 @@ int sd_run_changes(sd_run *run, double from)
     run->t_seen = to;
     if (!run->watches)
         return 0;
-    if (!run->looked && !(run->looked = malloc((SD_PARTS + 1) * (size_t)run->observed * sizeof(double))))
+    if (!run->looked && !(run->looked = malloc((SD_PARTS + 2) * (size_t)run->observed * sizeof(double))))
         return 1; /* it is sought without */
     while (run->turns > 0.0 && parts < SD_FINEST && to - from > (double)parts * A_TURN * run->turns)
         parts *= SD_PARTS; /* of what turns several times between two looks they may say nothing */
     const int known = parts > SD_PARTS;
-    int more = scan(run, from, to, parts, &fell);
+    int more = scan(run, from, to, parts, 1, &fell);
     const int parted = more || known;
-    for (; more && parts < SD_FINEST; more = scan(run, from, end, parts, &fell)) {
+    for (; more && parts < SD_FINEST; more = scan(run, from, end, parts, 0, &fell)) {
         end = fell ? run->t_seen : end;
         parts *= SD_PARTS;
     }
     for (int k = 0; parted && fell && k < NARROWER; k++) { /* of several changes between two looks the first */
         double clear = run->t_clear, seen = run->t_seen;
-        scan(run, clear, seen, SD_PARTS, &fell);
+        scan(run, clear, seen, SD_PARTS, 0, &fell);
         if (!fell)
             run->t_clear = clear, run->t_seen = seen;
         if (run->t_seen == seen)
