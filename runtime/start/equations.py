@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
-from sysdyn.runtime.model.description import Ints
-from sysdyn.runtime.model.inertia import joined, with_flows
+from sysdyn.runtime.model.description import Ints, Places
+from sysdyn.runtime.model.inertia import joined, own_unknown, with_flows
 from sysdyn.runtime.model.redirected import redirected
 from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import LARGE, System
@@ -27,7 +27,8 @@ class Equations:
     guessed: (rows of block initial that are guesses, the unknowns that they miss); unsettled [rows]: they need not
     hold; rows, columns [entries]: of what some block writes in the matrix; alike [unknowns]: number of the kind and
     unit of each; member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them;
-    joined [unknowns of y]: flows whose coordinates hold inertia of each other.
+    joined [unknowns of y]: flows whose coordinates hold inertia of each other; momenta: (unknowns beside flows and
+    momenta that are contents of their kind, one of these flows each).
     """
 
     def __init__(self, system: System, settled: System) -> None:
@@ -41,6 +42,7 @@ class Equations:
         self.guessed = self.rows[misses], self.columns[misses]
         self._kinds(settled)
         self.measured = self._measured(settled)
+        self.momenta = self._momenta(settled)
         self.joined = joined(settled)
         self.rated_rows = settled.of_groups("dynamics_rate")
 
@@ -71,12 +73,18 @@ class Equations:
         self.member = np.array([*of_family, 0], dtype=np.int32)[settled.family_of]
         self.members = len(number)
 
-    def _measured(self, settled: System) -> Mask:
-        """Unknowns of y that the contents of stores measure; a momentum with its flow."""
-        mask, contents = np.zeros(self.n, dtype=bool), np.zeros(settled.rows, dtype=bool)
+    @staticmethod
+    def _contents(settled: System) -> Mask:
+        """Rows that guess contents of stores [rows]."""
+        found = np.zeros(settled.rows, dtype=bool)
         for group, family, first in settled.form.groups:
             rows = settled.description.rows[family]
-            contents[first : first + rows.size] = group == "initial" and rows.content
+            found[first : first + rows.size] = group == "initial" and rows.content
+        return found
+
+    def _measured(self, settled: System) -> Mask:
+        """Unknowns of y that the contents of stores measure; a momentum with its flow."""
+        mask, contents = np.zeros(self.n, dtype=bool), self._contents(settled)
         own = contents[self.rows] & (self.columns < self.written)
         row, column = self.rows[own], self.columns[own]
         flow, moving = settled.are("f")[column], np.zeros(settled.rows, dtype=bool)
@@ -84,6 +92,24 @@ class Equations:
         mask[column[flow | ~moving[row]]] = True
         mask[self.momentum] |= mask[self.flow]
         return mask
+
+    def _momenta(self, settled: System) -> tuple[Places, Places]:
+        """Unknowns that are contents of the kind of momenta, and a flow with such a content each: what guesses of
+        contents made of flows miss, dynamic variables that integrate efforts of a balance.
+        """
+        made, contents = np.full(settled.rows, -1, dtype=np.int64), self._contents(settled)
+        flows = np.flatnonzero(contents[self.rows] & np.append(settled.are("f"), self.rates < 0)[self.columns])
+        made[self.rows[flows]] = self.columns[flows]
+        row, column, (in_y, in_rate) = settled.pattern.row, settled.pattern.columns_of(), settled.structural()
+        own, acts = own_unknown(settled, "dynamics", "f"), np.full(self.n, -1, dtype=np.int64)
+        effort, rates = in_y & settled.are("e")[column], settled.of_groups("lambda")
+        told, read = np.flatnonzero(effort & (own >= 0)[row]), np.flatnonzero(effort & rates[row])
+        acts[column[told]] = own[row[told]]
+        made[row[read]] = acts[column[read]]
+        gains = np.flatnonzero(in_rate & rates[row] & settled.are("s")[column])
+        rows, missed = self.guessed
+        unknown, flow = np.append(missed, column[gains]), made[np.append(rows, row[gains])]
+        return unknown[flow >= 0], flow[flow >= 0]
 
     def core(self, system: System, settled: System) -> lib.RowsOfStart:
         """The core's structure for the rows of one settled system."""

@@ -351,6 +351,8 @@ class Starter:
         number: dict[str, int] = {}
         of_family = np.array([*(number.setdefault(s, len(number)) for s in named), 0], dtype=np.int32)
         of_y = of_family[self.settled.family_of]
+        contents, flow = self.equations.momenta
+        of_y[contents] = of_y[flow]
         return np.append(of_y, np.full(self.rates.size, len(number), dtype=np.int32))
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:

@@ -7,6 +7,7 @@ import pytest
 from model_runs import FOUR, attempt, trace_of
 from random_starts import judged
 from reduced import ROOT
+from scipy.optimize import minimize_scalar
 from start_strategies import strategies
 from sysdyn import api
 from sysdyn.cli.options import EVERY
@@ -192,6 +193,55 @@ def test_a_flow_that_is_said_counts_in_what_it_holds_with_others(tmp_path, formu
     y = np.linalg.lstsq(np.array([[1.0], [1.0]]), -np.array([0.8, 0.4 + 0.6]), rcond=None)[0][0]
     found = [trace[name].values[0] for name in ("x'", "y'", "z'")]
     np.testing.assert_allclose(found, [0.4, y, 0.6 - y], atol=1e-9)
+
+
+LOOP = """model loop {{
+  node a, b, c: electrical
+  V0: effort(e = 1 V) a -> b
+  C1: potential(q = 0.3 F*e) b -> c
+  C2: potential({law}) c -> ground
+  C3: potential(q = 0.3 F*e) ground -> a
+  R: dissipator(e = 2 ohm*f) c -> a
+}}
+scene s of loop {{ time 0 s to 1 ms; trace C1.e as c1, C2.e as c2, C3.e as c3 every 1 ms; accuracy 1e-6 }}
+"""
+NODE = """model cut {{
+  node a, b, c, d: electrical
+  I0: flow(f = 1 A) ground -> a
+  L1: kinetic(p = 0.3 H*f) a -> b
+  L2: kinetic({law}) a -> c
+  L3: kinetic(p = 0.3 H*f) a -> d
+  R1: dissipator(e = 1 ohm*f) b -> ground
+  R2: dissipator(e = 2 ohm*f) c -> ground
+  R3: dissipator(e = 3 ohm*f) d -> ground
+}}
+scene s of cut {{ time 0 s to 1 ms; trace L1.f as c1, L2.f as c2, L3.f as c3 every 1 ms; accuracy 1e-6 }}
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.parametrize(
+    ("text", "law", "inverse", "total"),
+    [
+        (LOOP, "q = 0.5 F*e", lambda q: 2.0 * q, -1.0),
+        (LOOP, "e = 2 V*(q/(1 C) + 0.2*(q/(1 C))^3)", lambda q: 2.0 * (q + 0.2 * q**3), -1.0),
+        (NODE, "p = 0.5 H*f", lambda p: 2.0 * p, 1.0),
+        (NODE, "f = 2 A*(p/(1 Wb) + 0.2*(p/(1 Wb))^3)", lambda p: 2.0 * (p + 0.2 * p**3), 1.0),
+    ],
+    ids=["capacitors", "capacitors, one of them a curve", "inductors", "inductors, one of them a curve"],
+)
+def test_what_is_not_said_is_the_least_that_stores_hold(tmp_path, text, law, inverse, total, formulation):
+    """Charges of a loop around a source, fluxes at a node: the least sum of their squares, whoever the unknowns are."""
+
+    def rest(content):
+        return total - inverse(content)
+
+    found = minimize_scalar(
+        lambda c: c**2 + 2.0 * (0.3 * rest(c) / 2.0) ** 2, bounds=(-1.0, 1.0), options={"xatol": 1e-12}
+    )
+    wanted = [rest(found.x) / 2.0, inverse(found.x), rest(found.x) / 2.0]
+    trace = trace_of(tmp_path, text.format(law=law), scene="s", formulation=formulation)
+    assert [trace[name].values[0] for name in ("c1", "c2", "c3")] == pytest.approx(wanted, abs=1e-6)
 
 
 def test_a_source_across_what_conducts_without_loss_is_told_to_have_a_resistance(tmp_path):
