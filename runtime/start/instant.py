@@ -8,10 +8,10 @@ multipliers (Lambda); finite terms do not count:
     M dq = 0                                                   of those with inertia, and of momenta p - M f,
     s+ - s- = dg/df dq + dg/de E + dg/dkappa Lambda            of rates s' = g that constants make,
 
-M its mean along the way, while what holds between displacements and efforts, Phi_q f+ + Phi_t = 0, Psi(f+) = 0, p = M f and gammas hold behind
-it: the limit of a fast rise.  So no charge passes a resistor at once, a damper takes along what hangs on it and pushes
-what has inertia, and flows change least in the metric of the inertia (Gauss's principle for impulses); those that M
-leaves open follow from their balances behind it, in which the others have rates.
+M its mean along the way, while what holds between displacements and efforts, Phi_q f+ + Phi_t = 0, Psi(f+) = 0,
+p = M f and gammas hold behind it: the limit of a fast rise.  So no charge passes a resistor at once, a damper takes
+along what hangs on it and pushes what has inertia, and flows change least in the metric of the inertia (Gauss's
+principle for impulses); those that M leaves open follow from their balances behind it, in which the others have rates.
 
 Displacements come first: where they go does not depend on how flows jump.
 """
