@@ -199,10 +199,12 @@ class Instant:
             i, j = np.append(i, 2 * pulses.row[rated]), np.append(j, pulses.column[rated] + 1)
         at = np.append(taken, rated)
         told = self._told[self._row] if self._told.any() else None
+        brings = np.isin(np.arange(y.size), self._column[self._over.rates[self._row]])  # a law may be flat at rest
+        reacts = self._struck & ((self.system.kinds != "e") | brings)
 
         def integrals(jy: Floats, jyd: Floats, here: Floats) -> Entries:
             if told is not None:  # friction on a reaction that is nothing yet
-                jy = np.where(told, self.system.jacobian(t, np.where(self._struck, here + magnitude, here), yd)[0], jy)
+                jy = np.where(told, self.system.jacobian(t, np.where(reacts, here + magnitude, here), yd)[0], jy)
             slopes = pulses.values(jy, jyd)[at]
             if not curved:
                 return i, j, slopes, slopes
