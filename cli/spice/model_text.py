@@ -10,6 +10,8 @@ from sysdyn.cli.spice.circuit import Circuit, Netlist, pairs
 from sysdyn.cli.spice.devices import DEVICES, LOCAL, Element, Scope, coupled
 from sysdyn.cli.spice.netlist import Card, Unreadable, value
 from sysdyn.cli.spice.writing import names, quantity
+from sysdyn.dsl.elaborate.files import exported
+from sysdyn.dsl.elaborate.instances import BUILTINS
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 
@@ -39,12 +41,14 @@ class Writer:
         self.written = _Written()
         step, end, _ = netlist.tran or (1e-3, 1.0, 0.0)
         self.asked = ("V", step, end)
-        self.components = names(list(_inner(netlist.top)), set(LOCAL), "x_")
+        library = {name for name, module in exported().items() if module == "electrical"}
+        self.taken = library.union(BUILTINS, LOCAL)  # names of parts
+        self.components = names(list(_inner(netlist.top)), self.taken, "x_")
 
     def text(self) -> str:
         """The model's text; its layout is the formatter's."""
         netlist = self.netlist
-        taken = {*self.components.values(), *LOCAL}
+        taken = self.taken.union(self.components.values())
         model = names([netlist.top.name], taken, "m_")[netlist.top.name]
         for circuit in _depth_first(netlist.top):
             self.written.components.append(self._component(circuit))
@@ -117,9 +121,7 @@ class Writer:
 
     def _instance(self, card: Card, scope: Scope, circuit: Circuit) -> Element:
         """`X1 a b NAME p=1`."""
-        plain_words = [w for w in card.words if w not in ("params", "params:", ":")]
-        first = next((k - 1 for k, w in enumerate(plain_words) if w == "="), len(plain_words))
-        name, at = plain_words[first - 1], plain_words[1 : first - 1]
+        name, at, words = _call(card)
         inner = self._found(circuit, name)
         if inner is None:
             raise Unreadable(f"there is no subcircuit '{name}'")
@@ -128,7 +130,7 @@ class Writer:
         units = _units(inner)
         written, nodes, _ = self._names(inner)
         given = []
-        for key, text in pairs(plain_words[first:]):
+        for key, text in pairs(words):
             if key not in inner.parameters:
                 raise Unreadable(f"'{name}' has no parameter '{key}'")
             if not units.get(key):
@@ -156,8 +158,7 @@ class Writer:
         """Nodes of a card."""
         letter, words = card.head[0], [w for w in card.words if w not in ("(", ")", ",")]
         if letter == "x":
-            first = next((k - 1 for k, w in enumerate(words) if w == "="), len(words))
-            return words[1 : first - 1]
+            return _call(card)[1]
         count = {"e": 4, "g": 4, "q": 3, "m": 3, "k": 0}.get(letter, 2)
         return words[1 : 1 + count]
 
@@ -193,6 +194,13 @@ class Writer:
         if traced:
             yield f"  trace {', '.join(dict.fromkeys(traced))} every {every}"
         yield "}"
+
+
+def _call(card: Card) -> tuple[str, list[str], list[str]]:
+    """`X1 a b NAME p=1`: the subcircuit, the nodes, the words of what is given."""
+    words = [w for w in card.words if w not in ("params", "params:", ":")]
+    first = next((k - 1 for k, w in enumerate(words) if w == "="), len(words))
+    return words[first - 1], words[1 : first - 1], words[first:]
 
 
 def _node(name: str, nodes: dict[str, str]) -> str:

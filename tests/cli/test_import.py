@@ -115,6 +115,20 @@ def test_subcircuits_become_components(tmp_path, capsys):
     assert "beta = 0.00022 A/V^2" in text
 
 
+def test_subcircuits_and_files_called_as_parts_are(tmp_path, capsys):
+    """A call with PARAMS: makes no node of the subcircuit's name."""
+    path = tmp_path / "voltage.cir"
+    path.write_text(
+        "t\n.subckt resistor a b PARAMS: r=1k\nR1 a b {r}\n.ends\n"
+        "V1 in 0 4\nX1 in diode resistor PARAMS: r=3k\nR2 diode 0 1k\n.tran 1u 1m\n"
+    )
+    code, found, out = imported(path, tmp_path, capsys)
+    assert code == 0
+    assert "node in_, diode: electrical" in found["result"]["text"]
+    assert "model voltage_2 {" in found["result"]["text"]
+    assert run(["check", str(out)]) == 0
+
+
 FRONTS = {"inv": 1e-4, "latch": 1e-4}
 """Accuracy asked where gates switch: runs at 1e-5 and finer do not come closer to each other than 2e-6 to 2e-5."""
 RELTOL = {"colpitts": "1e-6"}
