@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from sysdyn.cli.spice.circuit import Circuit, Netlist, pairs
-from sysdyn.cli.spice.devices import DEVICES, LOCAL, Element, Scope, coupled
+from sysdyn.cli.spice.devices import DEVICES, LOCAL, Element, Scope
 from sysdyn.cli.spice.netlist import Card, Unreadable, value
+from sysdyn.cli.spice.windings import component, coupled, joined
 from sysdyn.cli.spice.writing import names, quantity
 from sysdyn.dsl.elaborate.files import exported
 from sysdyn.dsl.elaborate.instances import BUILTINS
@@ -42,7 +43,10 @@ class Writer:
         step, end, _ = netlist.tran or (1e-3, 1.0, 0.0)
         self.asked = ("V", step, end)
         library = {name for name, module in exported().items() if module == "electrical"}
-        self.taken = library.union(BUILTINS, LOCAL)  # names of parts
+        coils = sum(
+            c.head.startswith("l") for circuit in (*_depth_first(netlist.top), netlist.top) for c in circuit.elements
+        )
+        self.taken = library.union(BUILTINS, LOCAL, (f"coils_{n}" for n in range(3, coils + 1)))  # names of parts
         self.components = names(list(_inner(netlist.top)), self.taken, "x_")
 
     def text(self) -> str:
@@ -56,7 +60,7 @@ class Writer:
         scene = self._scene(model, netlist.top, nodes)
         head = [f"## {_told(netlist.title)}"] if _told(netlist.title) else []
         imports = f"from std.electrical import {', '.join(sorted(self.written.uses))}\n" if self.written.uses else ""
-        local = "\n".join(LOCAL[name] for name in dict.fromkeys(self.written.local))
+        local = "\n".join(self._local(name) for name in dict.fromkeys(self.written.local))
         parts = [*head, imports, local, *self.written.components, f"model {model} {{", *body, "}", "", *scene]
         return "\n".join(parts) + "\n"
 
@@ -65,6 +69,11 @@ class Writer:
     def _component(self, circuit: Circuit) -> str:
         body, _ = self._body(circuit, circuit.parameters)
         return "\n".join([f"component {self.components[circuit.name]} {{", *body, "}", ""])
+
+    @staticmethod
+    def _local(name: str) -> str:
+        """The text of a component that std.electrical lacks."""
+        return LOCAL[name] if name in LOCAL else component(int(name.removeprefix("coils_")))
 
     def _body(self, circuit: Circuit, defaults: dict[str, float]) -> tuple[list[str], dict[str, str]]:
         """Lines of a model or component, and its nodes."""
@@ -84,11 +93,10 @@ class Writer:
             lines.append(f"  port {', '.join(nodes[p] for p in circuit.ports)}: electrical")
         if inside:
             lines.append(f"  node {', '.join(nodes[n] for n in inside)}: electrical")
-        coils = {c.head: c for c in cards if c.head.startswith("l")}
-        joined = {w for c in cards if c.head.startswith("k") for w in c.words[1:3]}
+        coils, on_cores = _coils(circuit), joined(cards, _coils(circuit))
         initial: list[str] = []
         for card in cards:
-            if card.head in joined and card.head in coils:
+            if card.head in on_cores:
                 continue
             element = self._element(card, scope, coils, circuit)
             lines += [f"  {line}" for line in element.lines]
@@ -104,7 +112,7 @@ class Writer:
             if letter == "x":
                 found = self._instance(card, scope, circuit)
             elif letter == "k":
-                found = coupled(card, scope, coils)
+                found = coupled(card, scope, coils, circuit.elements)
             elif letter in DEVICES:
                 found = DEVICES[letter](card, scope)
             else:
@@ -186,6 +194,9 @@ class Writer:
         if begin > 0.0:
             self.report.note("N941", f"the trace begins at 0 s, not at {begin:g} s", self.source.place(0, 0))
         labels = self._names(top)[2]
+        labels |= {
+            coil: f"{labels[card]}.{branch}" for coil, (card, branch) in joined(top.elements, _coils(top)).items()
+        }
         traced = [t for text in self.netlist.shown if (t := _read(text, nodes, labels)) is not None]
         traced = traced or [f"{n}.e as v_{_plain(word)}" for word, n in list(nodes.items())[:SHOWN]]
         yield f"scene tran of {model} {{"
@@ -194,6 +205,11 @@ class Writer:
         if traced:
             yield f"  trace {', '.join(dict.fromkeys(traced))} every {every}"
         yield "}"
+
+
+def _coils(circuit: Circuit) -> dict[str, Card]:
+    """The coils of a circuit by name."""
+    return {c.head: c for c in circuit.elements if c.head.startswith("l")}
 
 
 def _call(card: Card) -> tuple[str, list[str], list[str]]:

@@ -115,6 +115,20 @@ def test_subcircuits_become_components(tmp_path, capsys):
     assert "beta = 0.00022 A/V^2" in text
 
 
+@pytest.mark.parametrize("cards", ["K1 L1 L2 0.9\nK2 L3 L2 0.9\nK3 L1 L3 0.9\n", "K1 L1 L2 L3 0.9\n"])
+def test_three_coils_on_one_core(cards, tmp_path, capsys):
+    """A ramp of current through L1, the others open: i k sqrt(L1 L) over each; each coil is there once."""
+    coils = "L1 a 0 1m\nL2 b 0 4m\nL3 0 c 9m\n"
+    loads = "R1 a 0 1meg\nR2 b 0 1meg\nR3 c 0 1meg\n"
+    path = tmp_path / "n.cir"
+    path.write_text(f"t\nI1 0 a PWL(0 0 1m 1)\n{coils}{cards}{loads}.tran 10u 1m uic\n.print v(a) v(b) v(c) i(L1)\n")
+    code, _, out = imported(path, tmp_path, capsys)
+    assert code == 0
+    trace = simulate(str(out), accuracy=1e-6, output=str(tmp_path / "t.h5"))
+    for name, wanted in (("v_a", 1.0), ("v_b", 1.8), ("v_c", -2.7), ("i_l1", 1.0)):
+        assert trace[name].values[-1] == pytest.approx(wanted, rel=2e-5), name
+
+
 def test_subcircuits_and_files_called_as_parts_are(tmp_path, capsys):
     """A call with PARAMS: makes no node of the subcircuit's name."""
     path = tmp_path / "voltage.cir"
