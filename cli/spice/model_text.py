@@ -46,7 +46,7 @@ class Writer:
         coils = sum(
             c.head.startswith("l") for circuit in (*_depth_first(netlist.top), netlist.top) for c in circuit.elements
         )
-        self.taken = library.union(BUILTINS, LOCAL, (f"coils_{n}" for n in range(3, coils + 1)))  # names of parts
+        self.taken = library.union(BUILTINS, LOCAL, (f"coils_{n}" for n in range(2, coils + 1)))  # names of parts
         self.components = names(list(_inner(netlist.top)), self.taken, "x_")
 
     def text(self) -> str:

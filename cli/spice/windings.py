@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
@@ -74,37 +75,48 @@ def coupled(card: Card, scope: Scope, coils: Mapping[str, Card], cards: Sequence
     if first is not card:
         return Element(())
     name, size = scope.name[card.head], len(names)
+    strength = {two: value(factor, scope.known) for two, factor in factors.items()}
+    if not all(abs(k) <= 1.0 for k in strength.values()):
+        raise Unreadable(f"'{card.head}': a factor beyond 1")
+    whole = any(abs(k) == 1.0 for k in strength.values())  # what two coils carry is one flux: no current is given
+    pair = size == 2 and not whole
     cards_of = [enough(coils[w], 4) for w in names]
     given = [f"L{k} = {number_of(scope, words[3], 'H')}" for k, words in enumerate(cards_of, 1)]
     place = {coil: k for k, coil in enumerate(names, 1)}
-    for two, factor in factors.items():
-        i, j = sorted(place[coil] for coil in two)
-        given.append(f"{'k' if size == 2 else f'k{i}_{j}'} = {plain(value(factor, scope.known))}")
-    ends, initial = [], []
+    for (i, j), k in sorted((sorted(place[coil] for coil in two), k) for two, k in strength.items()):
+        given.append(f"{'k' if pair else f'k{i}_{j}'} = {plain(k)}")
+    ends, initial, currents = [], [], []
     for k, words in enumerate(cards_of):
         branch = _branch(k, size)
         ends.append(f"{branch} = {scope.node(words[1])} -> {scope.node(words[2])}")
         at = dict(pairs(words[4:])) if "=" in words[4:] else {}
-        start = quantity(value(at.get("ic", "0"), scope.known), "A") if scope.uic else "0 V"
-        initial.append(f"init {name}.{branch}.{'f' if scope.uic else 'e'} = {start}")
-    kind = "coupled_inductors" if size == 2 else f"coils_{size}"
+        currents.append(value(at.get("ic", "0"), scope.known))
+        said = f"f {'~' if whole else '='} {quantity(currents[-1], 'A')}" if scope.uic else "e = 0 V"
+        initial.append(f"init {name}.{branch}.{said}")
+    if scope.uic and whole and size == 2:
+        sizes = [value(words[3], scope.known) for words in cards_of]
+        mutual = next(iter(strength.values())) * math.sqrt(math.prod(sizes))
+        flux = sizes[0] * currents[0] + mutual * currents[1]
+        initial = [f"init {name}.one.p = {quantity(flux, 'Wb')}"]
+    kind = "coupled_inductors" if pair else f"coils_{size}"
     line = f"{name}: {kind}({', '.join(given)}) {', '.join(ends)}"
-    uses, local = ((kind,), ()) if size == 2 else ((), (kind,))
+    uses, local = ((kind,), ()) if pair else ((), (kind,))
     return Element((line,), uses, local, tuple(initial))
 
 
 def component(size: int) -> str:
     """Coils on one core, any two of them coupled by a factor of their own."""
     numbers = range(1, size + 1)
+    of = {i: _branch(i - 1, size) for i in numbers}
     two = [(i, j) for i in numbers for j in range(i + 1, size + 1)]
     return "\n".join([
         "## Coils on one core; k1_2 couples the first and the second.",
         f"component coils_{size} {{",
         *(f"  param L{i}: H" for i in numbers),
         *(f"  param k{i}_{j} = 0" for i, j in two),
-        f"  branch {', '.join(f'c{i}' for i in numbers)}: electrical",
-        *(f"  energy T* = 1/2*L{i}*c{i}.f^2" for i in numbers),
-        *(f"  energy T* = k{i}_{j}*sqrt(L{i}*L{j})*c{i}.f*c{j}.f" for i, j in two),
+        f"  branch {', '.join(of.values())}: electrical",
+        *(f"  energy T* = 1/2*L{i}*{of[i]}.f^2" for i in numbers),
+        *(f"  energy T* = k{i}_{j}*sqrt(L{i}*L{j})*{of[i]}.f*{of[j]}.f" for i, j in two),
         "}",
         "",
     ])  # fmt: skip

@@ -129,6 +129,18 @@ def test_three_coils_on_one_core(cards, tmp_path, capsys):
         assert trace[name].values[-1] == pytest.approx(wanted, rel=2e-5), name
 
 
+def test_perfect_coupling(tmp_path, capsys):
+    """V = 1 ohm i1 + v, v2 = v/10, i1 + i2/10 = im, v = 1 H im': im' = (V - im)/1.001 s."""
+    path = tmp_path / "n.cir"
+    path.write_text(
+        "t\nV1 a 0 10\nR1 a p 1\nL1 p 0 1\nL2 s 0 10m\nK1 L1 L2 1\nR2 s 0 10\n.tran 1m 1 uic\n.print v(s)\n"
+    )
+    code, _, out = imported(path, tmp_path, capsys)
+    assert code == 0
+    trace = simulate(str(out), accuracy=1e-6, output=str(tmp_path / "t.h5"))
+    assert trace["v_s"].values[-1] == pytest.approx(np.exp(-1.0 / 1.001) / 1.001, rel=1e-5)
+
+
 def test_subcircuits_and_files_called_as_parts_are(tmp_path, capsys):
     """A call with PARAMS: makes no node of the subcircuit's name."""
     path = tmp_path / "voltage.cir"
