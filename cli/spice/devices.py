@@ -82,13 +82,14 @@ class Scope:
     """Parameters that stay names: by name, their unit."""
 
 
-def _wanted(card: Card, least: int) -> tuple[str, ...]:
+def enough(card: Card, least: int) -> tuple[str, ...]:
+    """The words of a card, so many at least."""
     if len(card.words) < least:
         raise Unreadable(f"'{card.text[:60]}' ends too early")
     return card.words
 
 
-def _number(scope: Scope, text: str, unit: str) -> str:
+def number_of(scope: Scope, text: str, unit: str) -> str:
     """A quantity; the name of a parameter that has this unit stays one."""
     name = text.strip("{}'").strip()
     if scope.written.get(name) == unit:
@@ -124,10 +125,10 @@ def _more(words: tuple[str, ...], scope: Scope, *, areas: bool) -> tuple[float, 
 
 def _passive(kind: str, letter: str, unit: str, state: str, state_unit: str) -> Callable[[Card, Scope], Element]:
     def element(card: Card, scope: Scope) -> Element:
-        words = _wanted(card, 4)
+        words = enough(card, 4)
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
         times, given, left = _more(words[4:], scope, areas=False)
-        amount = _number(scope, words[3], unit)
+        amount = number_of(scope, words[3], unit)
         if times != 1.0:
             amount = f"{plain(times)}*({amount})" if kind == "capacitor" else f"({amount})/{plain(times)}"
         line = f"{name}: {kind}({letter} = {amount}) {a} -> {b}"
@@ -146,7 +147,7 @@ def _source(unit: str) -> Callable[[Card, Scope], Element]:
     kind, letter = ("voltage", "v") if unit == "V" else ("current", "i")
 
     def element(card: Card, scope: Scope) -> Element:
-        words = _wanted(card, 3)
+        words = enough(card, 3)
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
         shape = _shape(list(words[3:]), scope, unit)
         if shape.component:
@@ -186,7 +187,7 @@ def _beyond(model: Model, said: tuple[str, ...], harmless: tuple[str, ...] = ())
 
 
 def _diode(card: Card, scope: Scope) -> Element:
-    words = _wanted(card, 4)
+    words = enough(card, 4)
     name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
     model = _model(card, scope, words[3], ("d",))
     area, _, more = _more(words[4:], scope, areas=True)
@@ -207,7 +208,7 @@ def _diode(card: Card, scope: Scope) -> Element:
 
 def _bipolar(card: Card, scope: Scope) -> Element:
     """Ebers and Moll from the transport form: aF Ies = aR Ics = IS, aF = BF/(1 + BF)."""
-    words = _wanted(card, 5)
+    words = enough(card, 5)
     at = next((k for k in (4, 5) if k < len(words) and words[k] in scope.models), 4)
     model = _model(card, scope, words[at], ("npn", "pnp"))
     v = model.values
@@ -233,7 +234,7 @@ def _bipolar(card: Card, scope: Scope) -> Element:
 
 
 def _mos(card: Card, scope: Scope) -> Element:
-    words = _wanted(card, 6)
+    words = enough(card, 6)
     model = _model(card, scope, words[5], ("nmos", "pmos"))
     v = model.values
     if v.get("level", 1.0) != 1.0:
@@ -252,7 +253,7 @@ def _mos(card: Card, scope: Scope) -> Element:
 
 def _controlled(kind: str, letter: str, unit: str, *, by_current: bool) -> Callable[[Card, Scope], Element]:
     def element(card: Card, scope: Scope) -> Element:
-        words = tuple(w for w in _wanted(card, 5) if w not in ("(", ")", ","))
+        words = tuple(w for w in enough(card, 5) if w not in ("(", ")", ","))
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
         if by_current:
             if words[3] not in scope.name:
@@ -294,22 +295,3 @@ DEVICES: dict[str, Callable[[Card, Scope], Element]] = {
     "h": _controlled("effort", "e", "ohm", by_current=True),
 }
 """By the first letter of a name; X and K are the circuit's."""
-
-
-def coupled(card: Card, scope: Scope, coils: Mapping[str, Card]) -> Element:
-    """`K1 L1 L2 k`: both coils as one element."""
-    words = _wanted(card, 4)
-    if len(words) > 4 or any(w not in coils for w in words[1:3]):
-        raise Unreadable(f"'{card.text[:60]}': two coils of this circuit and a factor are wanted")
-    one, two = (_wanted(coils[w], 4) for w in words[1:3])
-    name = scope.name[card.head]
-    first, second = (_number(scope, coil[3], "H") for coil in (one, two))
-    given = f"L1 = {first}, L2 = {second}, k = {plain(value(words[3], scope.known))}"
-    both = (("one", one), ("two", two))
-    ends = ", ".join(f"{branch} = {scope.node(w[1])} -> {scope.node(w[2])}" for branch, w in both)
-    initial = []
-    for branch, coil in both:
-        at = dict(pairs(coil[4:])) if "=" in coil[4:] else {}
-        start = quantity(value(at.get("ic", "0"), scope.known), "A") if scope.uic else "0 V"
-        initial.append(f"init {name}.{branch}.{'f' if scope.uic else 'e'} = {start}")
-    return Element((f"{name}: coupled_inductors({given}) {ends}",), ("coupled_inductors",), (), tuple(initial))

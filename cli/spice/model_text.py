@@ -7,9 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from sysdyn.cli.spice.circuit import Circuit, Netlist, pairs
-from sysdyn.cli.spice.devices import DEVICES, LOCAL, Element, Scope, coupled
+from sysdyn.cli.spice.devices import DEVICES, LOCAL, Element, Scope
 from sysdyn.cli.spice.netlist import Card, Unreadable, value
+from sysdyn.cli.spice.windings import component, coupled, joined
 from sysdyn.cli.spice.writing import names, quantity
+from sysdyn.dsl.elaborate.files import exported
+from sysdyn.dsl.elaborate.instances import BUILTINS
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 
@@ -39,12 +42,17 @@ class Writer:
         self.written = _Written()
         step, end, _ = netlist.tran or (1e-3, 1.0, 0.0)
         self.asked = ("V", step, end)
-        self.components = names(list(_inner(netlist.top)), set(LOCAL), "x_")
+        library = {name for name, module in exported().items() if module == "electrical"}
+        coils = sum(
+            c.head.startswith("l") for circuit in (*_depth_first(netlist.top), netlist.top) for c in circuit.elements
+        )
+        self.taken = library.union(BUILTINS, LOCAL, (f"coils_{n}" for n in range(2, coils + 1)))  # names of parts
+        self.components = names(list(_inner(netlist.top)), self.taken, "x_")
 
     def text(self) -> str:
         """The model's text; its layout is the formatter's."""
         netlist = self.netlist
-        taken = {*self.components.values(), *LOCAL}
+        taken = self.taken.union(self.components.values())
         model = names([netlist.top.name], taken, "m_")[netlist.top.name]
         for circuit in _depth_first(netlist.top):
             self.written.components.append(self._component(circuit))
@@ -52,7 +60,7 @@ class Writer:
         scene = self._scene(model, netlist.top, nodes)
         head = [f"## {_told(netlist.title)}"] if _told(netlist.title) else []
         imports = f"from std.electrical import {', '.join(sorted(self.written.uses))}\n" if self.written.uses else ""
-        local = "\n".join(LOCAL[name] for name in dict.fromkeys(self.written.local))
+        local = "\n".join(self._local(name) for name in dict.fromkeys(self.written.local))
         parts = [*head, imports, local, *self.written.components, f"model {model} {{", *body, "}", "", *scene]
         return "\n".join(parts) + "\n"
 
@@ -61,6 +69,11 @@ class Writer:
     def _component(self, circuit: Circuit) -> str:
         body, _ = self._body(circuit, circuit.parameters)
         return "\n".join([f"component {self.components[circuit.name]} {{", *body, "}", ""])
+
+    @staticmethod
+    def _local(name: str) -> str:
+        """The text of a component that std.electrical lacks."""
+        return LOCAL[name] if name in LOCAL else component(int(name.removeprefix("coils_")))
 
     def _body(self, circuit: Circuit, defaults: dict[str, float]) -> tuple[list[str], dict[str, str]]:
         """Lines of a model or component, and its nodes."""
@@ -80,11 +93,10 @@ class Writer:
             lines.append(f"  port {', '.join(nodes[p] for p in circuit.ports)}: electrical")
         if inside:
             lines.append(f"  node {', '.join(nodes[n] for n in inside)}: electrical")
-        coils = {c.head: c for c in cards if c.head.startswith("l")}
-        joined = {w for c in cards if c.head.startswith("k") for w in c.words[1:3]}
+        coils, on_cores = _coils(circuit), joined(cards, _coils(circuit))
         initial: list[str] = []
         for card in cards:
-            if card.head in joined and card.head in coils:
+            if card.head in on_cores:
                 continue
             element = self._element(card, scope, coils, circuit)
             lines += [f"  {line}" for line in element.lines]
@@ -100,7 +112,7 @@ class Writer:
             if letter == "x":
                 found = self._instance(card, scope, circuit)
             elif letter == "k":
-                found = coupled(card, scope, coils)
+                found = coupled(card, scope, coils, circuit.elements)
             elif letter in DEVICES:
                 found = DEVICES[letter](card, scope)
             else:
@@ -117,9 +129,7 @@ class Writer:
 
     def _instance(self, card: Card, scope: Scope, circuit: Circuit) -> Element:
         """`X1 a b NAME p=1`."""
-        plain_words = [w for w in card.words if w not in ("params", "params:", ":")]
-        first = next((k - 1 for k, w in enumerate(plain_words) if w == "="), len(plain_words))
-        name, at = plain_words[first - 1], plain_words[1 : first - 1]
+        name, at, words = _call(card)
         inner = self._found(circuit, name)
         if inner is None:
             raise Unreadable(f"there is no subcircuit '{name}'")
@@ -128,7 +138,7 @@ class Writer:
         units = _units(inner)
         written, nodes, _ = self._names(inner)
         given = []
-        for key, text in pairs(plain_words[first:]):
+        for key, text in pairs(words):
             if key not in inner.parameters:
                 raise Unreadable(f"'{name}' has no parameter '{key}'")
             if not units.get(key):
@@ -156,8 +166,7 @@ class Writer:
         """Nodes of a card."""
         letter, words = card.head[0], [w for w in card.words if w not in ("(", ")", ",")]
         if letter == "x":
-            first = next((k - 1 for k, w in enumerate(words) if w == "="), len(words))
-            return words[1 : first - 1]
+            return _call(card)[1]
         count = {"e": 4, "g": 4, "q": 3, "m": 3, "k": 0}.get(letter, 2)
         return words[1 : 1 + count]
 
@@ -185,6 +194,9 @@ class Writer:
         if begin > 0.0:
             self.report.note("N941", f"the trace begins at 0 s, not at {begin:g} s", self.source.place(0, 0))
         labels = self._names(top)[2]
+        labels |= {
+            coil: f"{labels[card]}.{branch}" for coil, (card, branch) in joined(top.elements, _coils(top)).items()
+        }
         traced = [t for text in self.netlist.shown if (t := _read(text, nodes, labels)) is not None]
         traced = traced or [f"{n}.e as v_{_plain(word)}" for word, n in list(nodes.items())[:SHOWN]]
         yield f"scene tran of {model} {{"
@@ -193,6 +205,18 @@ class Writer:
         if traced:
             yield f"  trace {', '.join(dict.fromkeys(traced))} every {every}"
         yield "}"
+
+
+def _coils(circuit: Circuit) -> dict[str, Card]:
+    """The coils of a circuit by name."""
+    return {c.head: c for c in circuit.elements if c.head.startswith("l")}
+
+
+def _call(card: Card) -> tuple[str, list[str], list[str]]:
+    """`X1 a b NAME p=1`: the subcircuit, the nodes, the words of what is given."""
+    words = [w for w in card.words if w not in ("params", "params:", ":")]
+    first = next((k - 1 for k, w in enumerate(words) if w == "="), len(words))
+    return words[first - 1], words[1 : first - 1], words[first:]
 
 
 def _node(name: str, nodes: dict[str, str]) -> str:

@@ -5,7 +5,8 @@
 (book, afterword; Kane, Levinson: Dynamics, 1985, 4.6).  Psi needs no multipliers: its reactions do no work along the
 columns of B.  B is found by elimination without division, so that it is regular wherever a pivot is; one that is a
 number comes first.  A flow constraint whose reaction something reads (that of an inequality its condition does) keeps
-its multiplier, with all that share flows with it: there is nothing left out, and the balances are Lagrange's own.
+its multiplier, as does one that joins flows of several elements of a family, with all that share flows with it: there
+is nothing left out, and the balances are Lagrange's own.
 """
 
 from __future__ import annotations
@@ -45,9 +46,9 @@ class Projection:
 
 
 def kane(model: EnergyModel) -> DescriptorForm:
-    """Unknowns q f kappa e s, and mu where a reaction is read.  ModelError E607 where Psi cannot be eliminated."""
-    rows, form = constraints(model), lagrangian(model)
-    read = _joined(rows, _reactions_read(form))
+    """Unknowns q f kappa e s, and mu where it is kept.  ModelError E607 where the rows of Psi depend on each other."""
+    (rows, joining), form = constraints(model), lagrangian(model)
+    read = _joined(rows, _reactions_read(form) | joining)
     found = projection(model, {label: entries for label, entries in rows.items() if label not in read})
     speeds = speeds_of(model, read)
     if speeds.speeds:
@@ -72,15 +73,18 @@ def repeats(form: DescriptorForm) -> bool:
     return not left_out and not any(form.is_speed(f) for f in form.families)
 
 
-def constraints(model: EnergyModel) -> dict[str, Entries]:
-    """Psi_f by label."""
+def constraints(model: EnergyModel) -> tuple[dict[str, Entries], frozenset[str]]:
+    """Psi_f by label, and the labels whose rows join flows of several elements or stand in several pieces."""
     rows: dict[str, Entries] = {}
+    joining: set[str] = set()
     families = {c.name: c for c in model.coordinates}
     for row in model.of_kind("psi"):
-        if row.name in rows:
-            raise _impossible(row, f"psi {row.name} is declared in several pieces")
-        rows[row.name] = _entries(row, families)
-    return rows
+        entries = _entries(row, families)
+        if entries is None or row.name in rows:
+            joining.add(row.name)
+            entries = rows.get(row.name, {}) | dict.fromkeys(_flows(row), const(1.0))
+        rows[row.name] = entries
+    return rows, frozenset(joining)
 
 
 def projection(model: EnergyModel, rows: Mapping[str, Entries]) -> Projection:
@@ -101,8 +105,13 @@ def _impossible(row: Row, why: str) -> ModelError:
     return ModelError((Diagnostic("E607", f"formulation kane: {why}", row.place, help_),))
 
 
-def _entries(row: Row, families: Mapping[str, Family]) -> Entries:
-    """Coefficients of the flows of a row, all of the row's own element."""
+def _flows(row: Row) -> list[str]:
+    """Coordinates whose flows a row reads."""
+    return [flow.data[0] for term in row.terms for flow in local_variables(term.expression, "f")]
+
+
+def _entries(row: Row, families: Mapping[str, Family]) -> Entries | None:
+    """Coefficients of the flows of a row, all of the row's own element; None where one is of another."""
     found: Entries = {}
     for term in row.terms:
         held, signals = signals_held(term.expression)
@@ -110,7 +119,7 @@ def _entries(row: Row, families: Mapping[str, Family]) -> Entries:
             name = flow.data[0]
             whole = loop_ranges(row.nest) == families[name].shape
             if flow.args != row.at or term.loops != row.nest or not whole:
-                raise _impossible(row, f"psi {row.name} joins flows of several elements ('{flow!r}')")
+                return None
             slope = substitute(derivative(held, flow), signals)
             found[name] = add(found[name], slope) if name in found else slope
     return {name: value for name, value in found.items() if not is_const(value, 0.0)}

@@ -13,6 +13,7 @@ section 11, 16).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -84,9 +85,10 @@ def _on_branches(network: Network, functions: frozenset[str]) -> Network:
         for e in network.energies
         if _over_fields(e, fields, said) and (e.function in functions or len(ex.variables(e.expression)) == 1)
     ]
-    chosen = _closed(chosen, fields, said)
+    chosen = _closed(network, chosen, fields, said)
     if not chosen:
         return network
+    rest, chosen = [e for e in network.energies if e not in chosen], _joined(chosen)
     laws: dict[str, Branch] = {}
     for name in dict.fromkeys(n for e in chosen for n in _owners(e)):
         laws[name] = _with_law(fields[name], [e for e in chosen if name in _owners(e)])
@@ -94,7 +96,7 @@ def _on_branches(network: Network, functions: frozenset[str]) -> Network:
     return replace(
         network,
         branches=tuple(laws.get(b.name, b) for b in network.branches),
-        energies=(*(e for e in network.energies if e not in chosen), *(_kept(e) for e in several if _is_store(e))),
+        energies=(*rest, *(_kept(e) for e in several if _is_store(e))),
     )
 
 
@@ -141,19 +143,28 @@ def _over_fields(energy: Energy, fields: dict[str, Branch], said: dict[str, set[
     return placed and all(said[b.name] == {function.name} for b in branches)
 
 
-def _closed(chosen: Iterable[Energy], fields: dict[str, Branch], said: dict[str, set[str]]) -> list[Energy]:
+def _closed(
+    network: Network, chosen: Iterable[Energy], fields: dict[str, Branch], said: dict[str, set[str]]
+) -> list[Energy]:
     """Statements all of whose branches stand in such statements only."""
-    kept = list(chosen)
+    kept, written = list(chosen), Counter(n for e in network.energies for n in _owners(e))
     while True:
-        count = dict.fromkeys(fields, 0)
-        for e in kept:
-            for name in _owners(e):
-                count[name] += 1
-        whole = {name for name in fields if len(said[name]) == 1 and count[name]}
+        count = Counter(n for e in kept for n in _owners(e))
+        whole = {name for name in fields if len(said[name]) == 1 and count[name] == written[name]}
         rest = [e for e in kept if set(_owners(e)) <= whole]
         if len(rest) == len(kept):
             return kept
         kept = rest
+
+
+def _joined(energies: Iterable[Energy]) -> list[Energy]:
+    """Those that share branches as one sum each: what these hold is its transform."""
+    found: list[Energy] = []
+    for e in energies:
+        shared = [other for other in found if set(_owners(other)) & set(_owners(e))]
+        whole = replace(e, expression=ex.add(*(other.expression for other in shared), e.expression))
+        found = [*(other for other in found if other not in shared), replace(whole, place=(*shared, e)[0].place)]
+    return found
 
 
 def _with_law(branch: Branch, energies: list[Energy]) -> Branch:

@@ -101,16 +101,16 @@ class Instances(Elements):
     def _announced(self, s: syntax.Instance, loops: tuple[syntax.For, ...]) -> Callable[[], None]:
         """What is to be done of an instance when it is read or its turn comes: a builtin, or a component."""
         name = s.component.names[0]
-        symbol = self.scope.find(name)
+        symbol = self.scope.component(name)
         label = s.decl.name
         if symbol is None and name in BUILTINS and len(s.component.names) == 1:
             return lambda: self.each([(s, loops)], self._builtin)
         if isinstance(symbol, Unsupported):
             raise Failed
-        if not isinstance(symbol, ComponentSymbol):
+        if symbol is None:
             if self.scope.is_broken(name):
                 raise Failed
-            components = [n for n in self.scope.names() if isinstance(self.scope.find(n), ComponentSymbol)]
+            components = [n for n in self.scope.names() if isinstance(self.scope.component(n), ComponentSymbol)]
             library = exported()
             near = name if name in library else nearest(name, (*components, *BUILTINS, *library))
             help_ = f"nearest name in scope: '{near}'" if near else "sysdyn std lists the library"

@@ -306,6 +306,16 @@ class Scope:
             scope = scope.outer
         return None
 
+    def component(self, name: str) -> ComponentSymbol | Unsupported | None:
+        """The component of that name: nodes, labels and values of the name do not hide it."""
+        scope: Scope | None = self
+        while scope is not None:
+            symbol = scope.symbols.get(name)
+            if isinstance(symbol, ComponentSymbol | Unsupported):
+                return symbol
+            scope = scope.outer
+        return None
+
     def unit(self, name: str) -> Unit | None:
         """A unit declared in a file."""
         scope: Scope | None = self

@@ -2,8 +2,8 @@
 
 The instants of both traces divide the common span into cells in which both curves are cubics.  In each cell the largest
 difference is compared with the limit in closed form; cells beyond it are judged by the tube in value and time
-(tube.py).  Where a whole cell of one is a whole cell of the other and only one has rates, both are lines there: the
-rows say all that both know.
+(tube.py).  Where a whole cell of one is a whole cell of the other, up to the tolerance in time, and only one has
+rates, both are lines there: the rows say all that both know.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ BLOCK = 1 << 16
 """Cells at a time: about 30 arrays of half a megabyte."""
 FIRST = 64
 """Cells beyond the limit that are judged by the tube at first: most often they decide."""
+SLIVER = 1e-3
+"""Part of a cell by which cells of both traces differ at most that are one cell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +167,7 @@ def _block(state: _State, curves: tuple[Curve, Curve], cells: tuple[Ints, Ints],
         whole_cells(curve, cell) if block.same else bernstein(curve, cell, block.left, block.right)
         for curve, cell in zip(curves, cells, strict=True)
     ]
-    _as_lines(pieces, curves, cells, block)
+    _as_lines(pieces, curves, cells, block, tau)
     with np.errstate(invalid="ignore", over="ignore"):
         difference = pieces[1] - pieces[0]
         size = np.abs(difference)
@@ -199,13 +201,19 @@ def _block(state: _State, curves: tuple[Curve, Curve], cells: tuple[Ints, Ints],
     _keep(state, float(deviation[k]), float(block.left[k] + x[k] * (block.right[k] - block.left[k])), k, pieces, block)
 
 
-def _as_lines(pieces: list[Floats], curves: tuple[Curve, Curve], cells: tuple[Ints, Ints], block: _Block) -> None:
-    """Cells of both traces at once of which only one has rates are compared as lines: the other says no more there."""
+def _as_lines(
+    pieces: list[Floats], curves: tuple[Curve, Curve], cells: tuple[Ints, Ints], block: _Block, tau: float
+) -> None:
+    """Cells of both traces at once (to tau: rows of events) of which only one has rates are compared as lines: the
+    other says no more there.
+    """
     lines = [_lines(curve, cell) for curve, cell in zip(curves, cells, strict=True)]
     mixed = lines[0] != lines[1]
     if mixed.any() and not block.same:
+        apart = np.minimum(tau, SLIVER * (block.right - block.left))
         for curve, cell in zip(curves, cells, strict=True):
-            mixed &= (curve.time[cell] == block.left) & (curve.time[cell + 1] == block.right)
+            mixed &= block.left - curve.time[cell] <= apart
+            mixed &= curve.time[cell + 1] - block.right <= apart
     if not mixed.any():
         return
     for piece in pieces:

@@ -64,7 +64,8 @@ def _worst(run: Integration) -> str | None:
     method, n = run.method.contents, run.stepped.unknowns
     if not method.ee:
         return None
-    change = np.abs(lib.reader(method.ee, n) * lib.reader(method.weight, n))
+    with np.errstate(over="ignore"):  # a correction that has no bounds
+        change = np.abs(lib.reader(method.ee, n) * lib.reader(method.weight, n))
     change = np.where(np.isfinite(change), change, np.inf)
     test = run.told.test
     if (test >= 0).any():

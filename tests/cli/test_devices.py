@@ -4,9 +4,10 @@ import re
 
 import pytest
 from sysdyn.cli.spice.circuit import Model, Reader
-from sysdyn.cli.spice.devices import DEVICES, THERMAL, Scope, coupled
+from sysdyn.cli.spice.devices import DEVICES, THERMAL, Scope
 from sysdyn.cli.spice.model_text import Writer
 from sysdyn.cli.spice.netlist import Unreadable, cards
+from sysdyn.cli.spice.windings import coupled
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 
@@ -157,11 +158,15 @@ def test_sources_have_a_direct_part_or_a_shape():
 
 def test_coupled_coils_are_one_element():
     coils = {c.head: c for c in map(card, ("l1 a 0 1m ic=2", "l2 b c 4m"))}
-    found = coupled(card("k1 l1 l2 0.5"), scope("k1"), coils)
+    one = card("k1 l1 l2 0.5")
+    found = coupled(one, scope("k1"), coils, [one])
     assert found.lines == ("k1: coupled_inductors(L1 = 1 mH, L2 = 4 mH, k = 0.5) one = a -> ground, two = b -> c",)
     assert found.initial == ("init k1.one.e = 0 V", "init k1.two.e = 0 V")
-    asked = coupled(card("k1 l1 l2 0.5"), scope("k1", uic=True), coils)
+    asked = coupled(one, scope("k1", uic=True), coils, [one])
     assert asked.initial == ("init k1.one.f = 2 A", "init k1.two.f = 0 A")
+    again = card("k2 l2 l1 0.4")
+    with pytest.raises(Unreadable, match="l1 and l2 are coupled already"):
+        coupled(again, scope("k1", "k2"), coils, [one, again])
 
 
 @pytest.mark.parametrize(

@@ -115,6 +115,46 @@ def test_subcircuits_become_components(tmp_path, capsys):
     assert "beta = 0.00022 A/V^2" in text
 
 
+@pytest.mark.parametrize("cards", ["K1 L1 L2 0.9\nK2 L3 L2 0.9\nK3 L1 L3 0.9\n", "K1 L1 L2 L3 0.9\n"])
+def test_three_coils_on_one_core(cards, tmp_path, capsys):
+    """A ramp of current through L1, the others open: i k sqrt(L1 L) over each; each coil is there once."""
+    coils = "L1 a 0 1m\nL2 b 0 4m\nL3 0 c 9m\n"
+    loads = "R1 a 0 1meg\nR2 b 0 1meg\nR3 c 0 1meg\n"
+    path = tmp_path / "n.cir"
+    path.write_text(f"t\nI1 0 a PWL(0 0 1m 1)\n{coils}{cards}{loads}.tran 10u 1m uic\n.print v(a) v(b) v(c) i(L1)\n")
+    code, _, out = imported(path, tmp_path, capsys)
+    assert code == 0
+    trace = simulate(str(out), accuracy=1e-6, output=str(tmp_path / "t.h5"))
+    for name, wanted in (("v_a", 1.0), ("v_b", 1.8), ("v_c", -2.7), ("i_l1", 1.0)):
+        assert trace[name].values[-1] == pytest.approx(wanted, rel=2e-5), name
+
+
+def test_perfect_coupling(tmp_path, capsys):
+    """V = 1 ohm i1 + v, v2 = v/10, i1 + i2/10 = im, v = 1 H im': im' = (V - im)/1.001 s."""
+    path = tmp_path / "n.cir"
+    path.write_text(
+        "t\nV1 a 0 10\nR1 a p 1\nL1 p 0 1\nL2 s 0 10m\nK1 L1 L2 1\nR2 s 0 10\n.tran 1m 1 uic\n.print v(s)\n"
+    )
+    code, _, out = imported(path, tmp_path, capsys)
+    assert code == 0
+    trace = simulate(str(out), accuracy=1e-6, output=str(tmp_path / "t.h5"))
+    assert trace["v_s"].values[-1] == pytest.approx(np.exp(-1.0 / 1.001) / 1.001, rel=1e-5)
+
+
+def test_subcircuits_and_files_called_as_parts_are(tmp_path, capsys):
+    """A call with PARAMS: makes no node of the subcircuit's name."""
+    path = tmp_path / "voltage.cir"
+    path.write_text(
+        "t\n.subckt resistor a b PARAMS: r=1k\nR1 a b {r}\n.ends\n"
+        "V1 in 0 4\nX1 in diode resistor PARAMS: r=3k\nR2 diode 0 1k\n.tran 1u 1m\n"
+    )
+    code, found, out = imported(path, tmp_path, capsys)
+    assert code == 0
+    assert "node in_, diode: electrical" in found["result"]["text"]
+    assert "model voltage_2 {" in found["result"]["text"]
+    assert run(["check", str(out)]) == 0
+
+
 FRONTS = {"inv": 1e-4, "latch": 1e-4}
 """Accuracy asked where gates switch: runs at 1e-5 and finer do not come closer to each other than 2e-6 to 2e-5."""
 RELTOL = {"colpitts": "1e-6"}

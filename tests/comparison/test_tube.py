@@ -180,3 +180,15 @@ def test_what_is_no_number_stands_beside_the_number_of_the_other():
     worst = compare(lost, whole, Tolerance()).quantities[0].worst
     assert worst.test == 3.0
     assert np.isnan(worst.reference)
+
+
+@pytest.mark.parametrize(("late", "equal"), [(0.0, True), (1e-10, True), (0.2, False)])
+def test_a_row_of_an_event_a_little_later_leaves_cells_lines_where_one_has_no_rates(late, equal):
+    """t^2 with rates and by its rows: in a cell of both the rows say all, in others the line is 1/16 off."""
+    time = np.array([0.0, 0.5, 0.5, 1.0])
+    other = time + np.array([0.0, late, late, 0.0])
+    known = Arrays(time, {"x": time**2}, {"x": 2.0 * time})
+    rows = Arrays(other, {"x": other**2}, {})
+    tolerance = Tolerance(rtol=1e-6, atol=0.0)
+    assert compare(known, rows, tolerance).equal == equal
+    assert compare(rows, known, tolerance).equal == equal

@@ -74,6 +74,23 @@ def test_elements_make_branches_between_the_ends_that_the_text_says():
     assert branches["K"].law is ex.mul(ex.param("K.k"), ex.var("K", "bq"))
 
 
+def test_what_has_the_name_of_a_component_does_not_hide_it():
+    """Nodes and labels as the parts are called: what stands behind a label is a component."""
+    elaborator, said = whole("""from std.electrical import resistor
+model m {
+  node flow, resistor: electrical
+  dissipator: resistor(R = 1 ohm) flow -> resistor
+  a: resistor(R = 2 ohm) resistor -> ground
+  b: dissipator(e = 3 ohm*f) resistor -> ground
+  c: flow(f = 1 A) ground -> flow
+}
+""")
+    assert said == []
+    assert {b.name: b.kind for b in elaborator.parts.branches} == {
+        "dissipator": "dissipator", "a": "dissipator", "b": "dissipator", "c": "flow",
+    }  # fmt: skip
+
+
 def test_statements_of_instances_are_in_their_own_names():
     elaborator, _ = whole(OSCILLATOR)
     (initial,) = elaborator.parts.initials

@@ -180,27 +180,59 @@ def test_displacement_constraints_keep_their_multipliers(tmp_path):
         assert np.max(np.abs(kane[name].values - wanted)) <= 1e-6 * np.max(np.abs(wanted)), name
 
 
-@pytest.mark.parametrize(
-    ("formulation", "coordinates", "energy"),
-    [("kane", "coord X: translation", "T* = 1/2*1 kg"), ("co_kane", "cocoord X: electrical", "V* = 1/2*1 F")],
-)
-def test_what_it_cannot_leave_out_is_refused_in_its_own_name(tmp_path, formulation, coordinates, energy):
+FAMILIES = [
+    ("kane", "coord X: translation", "T* = 1/2*1 kg", "m"),
+    ("co_kane", "cocoord X: electrical", "V* = 1/2*1 F", "Wb"),
+]
+
+
+@pytest.mark.parametrize(("formulation", "coordinates", "energy", "unit"), FAMILIES)
+def test_what_follows_from_others_is_refused_in_its_own_name(tmp_path, formulation, coordinates, energy, unit):
     path = tmp_path / "model.sd"
     path.write_text(f"""model m {{
-  {coordinates.replace("X", "x")}
-  {coordinates.replace("X", "v[1..3]")}
-  energy {energy}*(x'^2 + sum(i in 1..3: v[i]'^2))
-  psi one: x' = sum(i in 1..3: v[i]')
+  {coordinates.replace("X", "x, y, z")}
+  energy {energy}*(x'^2 + y'^2 + z'^2)
+  psi one: x' = (1 + z^2/(1 {unit}^2))*y'
+  psi two: 2*x' = (2 + 2*z^2/(1 {unit}^2))*y'
 }}
 """)
+    asked = {"formulation": formulation, "until": "1", "redundancy": "drop", "output": str(tmp_path / "t.h5")}
     report = Report()
-    assert run(Request(str(path), formulation=formulation, until="1", output=str(tmp_path / "t.h5")), report) is None
+    assert run(Request(str(path), **asked), report) is None
     (found,) = [d for d in report if d.severity == "error"]
     assert found.code == "E607"
-    assert "several elements" in found.message
+    assert "follows from the others" in found.message
     assert f"formulation {formulation}:" in found.message
     others = [formulation.replace("kane", name) for name in ("lagrangian", "hamiltonian")]
     assert found.help == f"formulation {', '.join(others)}"
+
+
+@pytest.mark.parametrize(("formulation", "coordinates", "energy", "unit"), FAMILIES)
+def test_a_constraint_that_joins_elements_of_a_family_keeps_its_multiplier(
+    tmp_path, formulation, coordinates, energy, unit
+):
+    """x' = v1' + v2' of three of mass 1, v1 on a spring of 6: v1'' = -4 v1, v2'' = -v1''/2."""
+    spring = "V = 3 N/m" if formulation == "kane" else "T = 3 H^-1"
+    path = tmp_path / "model.sd"
+    path.write_text(f"""model m {{
+  {coordinates.replace("X", "x")}
+  {coordinates.replace("X", "v[1..2]")} = [1 {unit}, 0 {unit}]
+  energy {energy}*(x'^2 + v[1]'^2 + v[2]'^2)
+  energy {spring}*v[1]^2
+  psi one: x' = sum(i in 1..2: v[i]')
+}}
+scene s of m {{
+  time 0 s to 2 s
+  trace v[1], v[2], x
+  solver auto(keep_flow = true)
+  accuracy 1e-7
+}}
+""")
+    ran, trace = simulated(tmp_path, path, formulation)
+    assert [f.kind for f in ran.prepared.compiled.form.families if f.kind == "mu"] == ["mu"]
+    first = np.cos(2.0 * trace.time)
+    for name, wanted in (("v[1]", first), ("v[2]", 0.5 * (1.0 - first)), ("x", 0.5 * (first - 1.0))):
+        assert np.max(np.abs(trace[name].values - wanted)) <= 1e-6, name
 
 
 @pytest.mark.parametrize("model", ["lead_filter", "two_tank", "electrical_transformer", "fluid_transformer"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.accuracy.options import Options
-from sysdyn.runtime.integrate.causes import _null_place
+from sysdyn.runtime.integrate.causes import _null_place, _worst
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.simulate import simulate
@@ -67,3 +67,13 @@ def test_slopes_that_no_factors_bring_together_are_no_place_of_singularity():
     system = SimpleNamespace(jacobian=lambda *_: (slopes, inertia), dense=lambda values: values)
     run = SimpleNamespace(system=system, method=SimpleNamespace(point=lambda: (0, 0), contents=SimpleNamespace(t=0.0)))
     assert _null_place(run) == ((), -1)
+
+
+def test_a_correction_without_bounds_is_named(monkeypatch):
+    """Weighted it is beyond what numbers hold: the unknown is told, without a warning of NumPy's."""
+    told = {"ee": np.array([1.0, 1e300]), "weight": np.array([1.0, 1e300])}
+    monkeypatch.setattr("sysdyn.runtime.integrate.causes.lib.reader", lambda name, n: told[name])
+    stepped = SimpleNamespace(unknowns=2, name=lambda k: "ab"[k])
+    method = SimpleNamespace(contents=SimpleNamespace(ee="ee", weight="weight"))
+    test = SimpleNamespace(test=np.array([-1.0, 0.0]))
+    assert _worst(SimpleNamespace(method=method, stepped=stepped, told=test)) == "b"

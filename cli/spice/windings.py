@@ -1,0 +1,122 @@
+"""K cards -> the coils of a core as one element: mutual inductances k sqrt(Li Lj) beside what each coil has alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+
+from sysdyn.cli.spice.circuit import pairs
+from sysdyn.cli.spice.devices import Element, Scope, enough, number_of
+from sysdyn.cli.spice.netlist import Card, Unreadable, value
+from sysdyn.cli.spice.writing import plain, quantity
+
+Factors = dict[tuple[str, str], str]
+"""Coupling factors by two coils."""
+
+
+def _said(card: Card, coils: Mapping[str, Card]) -> tuple[tuple[str, ...], str]:
+    """`K1 L1 L2 ... k`: coils and the factor of any two of them."""
+    words = enough(card, 4)
+    names, factor = words[1:-1], words[-1]
+    if any(w not in coils for w in names) or len(set(names)) < len(names):
+        raise Unreadable(f"'{card.text[:60]}': two coils of this circuit or more and a factor are wanted")
+    return names, factor
+
+
+def _cores(cards: Sequence[Card], coils: Mapping[str, Card]) -> Iterator[tuple[Card, list[str], Factors]]:
+    """The first card of each core, its coils, their factors: cards that share coils, directly or by others."""
+    left = [c for c in cards if c.head.startswith("k") and _is_said(c, coils)]
+    while left:
+        first, factors = left[0], Factors()
+        of = dict.fromkeys(_said(first, coils)[0])
+        while mine := [c for c in left if set(_said(c, coils)[0]) & set(of)]:
+            left = [c for c in left if c not in mine]
+            for c in mine:
+                joined, factor = _said(c, coils)
+                of |= dict.fromkeys(joined)
+                factors |= dict.fromkeys(_twos(joined), factor)
+        yield first, list(of), factors
+
+
+def _twos(coils: Sequence[str]) -> list[tuple[str, str]]:
+    """All that are two of them."""
+    return list(combinations(sorted(coils), 2))
+
+
+def _is_said(card: Card, coils: Mapping[str, Card]) -> bool:
+    try:
+        _said(card, coils)
+    except Unreadable:
+        return False
+    return True
+
+
+def joined(cards: Sequence[Card], coils: Mapping[str, Card]) -> dict[str, tuple[str, str]]:
+    """By coil on a core: the name of the card that writes it, and its branch there."""
+    return {
+        coil: (first.head, _branch(k, len(names)))
+        for first, names, _ in _cores(cards, coils)
+        for k, coil in enumerate(names)
+    }
+
+
+def _branch(k: int, coils: int) -> str:
+    return ("one", "two")[k] if coils == 2 else f"c{k + 1}"
+
+
+def coupled(card: Card, scope: Scope, coils: Mapping[str, Card], cards: Sequence[Card]) -> Element:
+    """The coils of a core as one element, at the first of its cards."""
+    mine = _said(card, coils)[0]
+    before = [_said(c, coils)[0] for c in cards[: cards.index(card)] if c.head.startswith("k") and _is_said(c, coils)]
+    if again := set(_twos(mine)) & {two for coils_ in before for two in _twos(coils_)}:
+        raise Unreadable(f"'{card.head}': {' and '.join(min(again))} are coupled already")
+    first, names, factors = next(c for c in _cores(cards, coils) if mine[0] in c[1])
+    if first is not card:
+        return Element(())
+    name, size = scope.name[card.head], len(names)
+    strength = {two: value(factor, scope.known) for two, factor in factors.items()}
+    if not all(abs(k) <= 1.0 for k in strength.values()):
+        raise Unreadable(f"'{card.head}': a factor beyond 1")
+    whole = any(abs(k) == 1.0 for k in strength.values())  # what two coils carry is one flux: no current is given
+    pair = size == 2 and not whole
+    cards_of = [enough(coils[w], 4) for w in names]
+    given = [f"L{k} = {number_of(scope, words[3], 'H')}" for k, words in enumerate(cards_of, 1)]
+    place = {coil: k for k, coil in enumerate(names, 1)}
+    for (i, j), k in sorted((sorted(place[coil] for coil in two), k) for two, k in strength.items()):
+        given.append(f"{'k' if pair else f'k{i}_{j}'} = {plain(k)}")
+    ends, initial, currents = [], [], []
+    for k, words in enumerate(cards_of):
+        branch = _branch(k, size)
+        ends.append(f"{branch} = {scope.node(words[1])} -> {scope.node(words[2])}")
+        at = dict(pairs(words[4:])) if "=" in words[4:] else {}
+        currents.append(value(at.get("ic", "0"), scope.known))
+        said = f"f {'~' if whole else '='} {quantity(currents[-1], 'A')}" if scope.uic else "e = 0 V"
+        initial.append(f"init {name}.{branch}.{said}")
+    if scope.uic and whole and size == 2:
+        sizes = [value(words[3], scope.known) for words in cards_of]
+        mutual = next(iter(strength.values())) * math.sqrt(math.prod(sizes))
+        flux = sizes[0] * currents[0] + mutual * currents[1]
+        initial = [f"init {name}.one.p = {quantity(flux, 'Wb')}"]
+    kind = "coupled_inductors" if pair else f"coils_{size}"
+    line = f"{name}: {kind}({', '.join(given)}) {', '.join(ends)}"
+    uses, local = ((kind,), ()) if pair else ((), (kind,))
+    return Element((line,), uses, local, tuple(initial))
+
+
+def component(size: int) -> str:
+    """Coils on one core, any two of them coupled by a factor of their own."""
+    numbers = range(1, size + 1)
+    of = {i: _branch(i - 1, size) for i in numbers}
+    two = [(i, j) for i in numbers for j in range(i + 1, size + 1)]
+    return "\n".join([
+        "## Coils on one core; k1_2 couples the first and the second.",
+        f"component coils_{size} {{",
+        *(f"  param L{i}: H" for i in numbers),
+        *(f"  param k{i}_{j} = 0" for i, j in two),
+        f"  branch {', '.join(of.values())}: electrical",
+        *(f"  energy T* = 1/2*L{i}*{of[i]}.f^2" for i in numbers),
+        *(f"  energy T* = k{i}_{j}*sqrt(L{i}*L{j})*{of[i]}.f*{of[j]}.f" for i, j in two),
+        "}",
+        "",
+    ])  # fmt: skip
