@@ -165,6 +165,7 @@ def test_there_are_twenty_netlists():
     assert len(list(NETLISTS.glob("*.cir"))) == 20
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.skipif(shutil.which("ngspice") is None, reason="ngspice is not installed")
 @pytest.mark.parametrize("name", sorted(p.stem for p in NETLISTS.glob("*.cir")))
 def test_ngspice_agrees(name, tmp_path, capsys):

@@ -613,6 +613,7 @@ scene gap_s of gap { time 0 s to 1 s
 """L i0 = 0.1 H x 2 A, q0 = 1 mF x 10 V: what moves the inductance or the gap of a loaded store moves it by its rate."""
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", ALL)
 @pytest.mark.parametrize("index", ["3", "1", "0"])
 @pytest.mark.parametrize("scene", ["coil_s", "gap_s"])
@@ -653,6 +654,7 @@ scene frame_s of frame { time 0 s to 1 s
 """
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("index", ["3", "2", "2v", "1", "0"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
 def test_matrices_of_every_index_hold_the_rates_of_inputs(formulation, index, tmp_path, capsys):

@@ -122,7 +122,7 @@ BOOK = ["dc_motor", "fluid_tank", *(["nonlinear_spring", "thermal_two_node", "lc
 
 
 @pytest.mark.parametrize("name", BOOK)
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_stated_errors_are_those_of_the_book(tmp_path, references, name):
     entry = references[name]
     file = at_the_instants_of_the_book(name, entry, tmp_path)

@@ -104,7 +104,7 @@ def alarms(reference, made):
 
 
 @pytest.mark.parametrize("name", [_marked(name) for name in (scenes() if LONG else SLICE)])
-@pytest.mark.one_in(400)
+@pytest.mark.long
 def test_the_same_physics_is_equal(name, tmp_path, monkeypatch):
     monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
     reference, *others = runs(name, tmp_path)

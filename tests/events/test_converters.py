@@ -10,7 +10,7 @@ NUMBERS = [k for k in range(60) if k != 34]  # of which the reference finds no s
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("number", NUMBERS)
-@pytest.mark.one_in(45)
+@pytest.mark.one_in(90)
 def test_converters_run_as_by_backward_euler(number, formulation, tmp_path):
     case = drawn(number)
     (tmp_path / "net.sd").write_text(case.text)

@@ -22,6 +22,7 @@ def _count(tmp_path, condition, tau, **options):
     return api.simulate(path, output=tmp_path / "m.h5", **options)["n"].values[-1]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
 @pytest.mark.parametrize(
@@ -42,6 +43,7 @@ def test_a_narrow_pulse_of_time_alone_is_seen(tmp_path, method):
     assert _count(tmp_path, condition, 50.0, method=method) == 1
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
 @pytest.mark.parametrize(

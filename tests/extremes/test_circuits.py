@@ -92,7 +92,7 @@ def test_rows_between_steps_are_as_accurate_as_steps(tmp_path, number, formulati
 @pytest.mark.parametrize(
     ("number", "formulation"), [(1, "hamiltonian"), (2, "co_lagrangian"), (4, "lagrangian"), (8, "lagrangian")]
 )
-@pytest.mark.one_in(40)
+@pytest.mark.long
 def test_bridges_whose_sources_float_while_all_diodes_block(tmp_path, number, formulation):
     """No current tells the voltage of such a source to earth: eight of them, of sparse kernels, were refused before."""
     time, accuracy = np.linspace(0.0, 0.02, 201), 1e-4
@@ -120,6 +120,7 @@ def test_random_rectifiers_start_where_their_diodes_leave_them(tmp_path, seed):
         assert error <= 1e-6 * np.abs(potentials).max()
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("seed", "formulation"),
     itertools.product(range(20, 40), FORMULATIONS[2:])

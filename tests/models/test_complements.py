@@ -75,6 +75,7 @@ def run(text, folder, formulation):
     return simulate(folder / "m.sd", formulation=formulation, output=folder / f"{formulation}.h5")
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("text", [PEAK, CHOPPER, SIDE_BY_SIDE, CLUTCH], ids=["peak", "chopper", "array", "freewheel"])
 def test_four_formulations_move_and_happen_alike(tmp_path, text):
     first, *others = (run(text, tmp_path, formulation) for formulation in FOUR)

@@ -186,7 +186,7 @@ def random_circuit(seed):
 
 
 @pytest.mark.parametrize("seed", range(60) if os.environ.get("SYSDYN_LONG") else [0, 5, 6, 9, 17, 56])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 def test_random_circuits_behind_a_step(tmp_path, seed):
     """Charges and voltages as coordinates agree."""
     found = []

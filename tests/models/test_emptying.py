@@ -55,6 +55,7 @@ def _sucked(t, start):
     return np.where(t < np.pi / 2, 0.0, 0.5 * (np.exp(np.pi / 2 - t) - np.cos(t) - np.sin(t)))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock"])
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-8])

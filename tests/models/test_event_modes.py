@@ -257,7 +257,7 @@ MOST_ASKED = 20
 
 @pytest.mark.parametrize("way", ["radau", "bdf", "rosenbrock", "dopri", "hamiltonian", "kane"])
 @pytest.mark.parametrize("name", list(MANY))
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_the_core_makes_what_the_handler_does(name, way, tmp_path, asked, monkeypatch):
     """Assignments, cascades, flows that are assigned, samples, impacts: instants, entries, values, steps."""
     if way == "dopri" and any(word in MANY[name] for word in ("phi ", "psi ", "abs(")):

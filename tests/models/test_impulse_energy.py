@@ -49,7 +49,7 @@ def _last(trace, *names):
 
 @pytest.mark.parametrize("way", STEPS)
 @pytest.mark.parametrize("formulation", [*FOUR, "kane"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_a_source_of_velocity_that_steps_does_the_work_of_its_impulse(tmp_path, formulation, way):
     jump, step = STEPS[way]
     text = VELOCITY.replace("JUMP", jump).replace("STEP", step)
@@ -65,6 +65,7 @@ def test_a_source_of_velocity_that_steps_does_the_work_of_its_impulse(tmp_path, 
         assert pushed == pytest.approx(-(3.0 * v + 2.0 * v * swing), abs=1e-5)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", FOUR)
 def test_a_source_of_voltage_that_steps_pays_for_the_charge_that_passes_at_once(tmp_path, formulation):
     primal = not formulation.startswith(

@@ -13,6 +13,7 @@ BASIS = 2
 """Of core/system/settle.c: whose factors stand."""
 
 
+@pytest.mark.long
 def test_steep_laws_that_jump_are_rosenbrocks_first():
     """The friction of a water tube jumps ten times, where its flow turns turbulent; the ends agree with radau's."""
     model = api.load(TUBE)

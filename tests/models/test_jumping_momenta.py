@@ -88,6 +88,7 @@ def behind(trace, at=0.2):
     return (time > at + 1e-12) | ((np.abs(time - at) < 1e-12) & second)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("method", ["dopri", "radau", "bdf", "rosenbrock"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
 @pytest.mark.parametrize("raised", ["road(t)", "(if t < 0.2 s then 0 m else 0.5 m/s*(t - 0.2 s))"])

@@ -100,6 +100,7 @@ def _held(times):
     return found
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("by_core", [True, False])
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize(("parts", "unit"), [(CAPACITOR, 1e-6), (INDUCTOR, 1e-3)], ids=["capacitor", "inductor"])

@@ -63,7 +63,7 @@ def scenes(name):
 @pytest.mark.parametrize(
     ("name", "scene"), [(name, scene) for name in FILES if not name.startswith("seed/") for scene in scenes(name)]
 )
-@pytest.mark.one_in(9)
+@pytest.mark.one_in(18)
 def test_scenes_run_and_hold_what_they_expect(name, scene, tmp_path, capsys):
     output = tmp_path / "trace.h5"
     options = ["--scene", scene, "--json", "-o", str(output), *settings(name), "--max-wall", "120"]

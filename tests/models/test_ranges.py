@@ -75,7 +75,7 @@ scene s of m {
         ("trace pull(x.q, t/(3 s)) as u", "pull", 3.0),
     ],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 def test_a_table_that_only_a_trace_reads_ends_the_run_there_too(tmp_path, capsys, formulation, said, table, end):
     """x = 1.5 m sin(2 t/s)."""
     path, out = tmp_path / "m.sd", tmp_path / "t.h5"

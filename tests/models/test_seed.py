@@ -118,7 +118,7 @@ def in_numpy(model, formulation):
     ("model", "formulation", "backend"),
     [(*case, backend) for case in CASES for backend in ("c", "numpy") if backend == "c" or in_numpy(*case)],
 )
-@pytest.mark.one_in(14)
+@pytest.mark.one_in(28)
 def test_reference_values(tmp_path, model, formulation, backend):
     reference = REFERENCES[model]
     found = simulated(tmp_path, model, formulation=formulation, backend=backend, times=reference["t"])

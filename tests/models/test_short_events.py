@@ -77,7 +77,7 @@ WINDOWS = {
 
 @pytest.mark.parametrize("method", ["bdf", "radau", "dopri"])
 @pytest.mark.parametrize("window", WINDOWS)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_a_window_as_narrow_as_the_accuracy_is_not_passed_over(window, method, tmp_path):
     """It is open for 0.2 us of steps of 30 ms: |x - c| falls below zero and comes back between two looks at a step."""
     condition, widths = WINDOWS[window]

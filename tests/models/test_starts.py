@@ -219,6 +219,7 @@ scene s of cut {{ time 0 s to 1 ms; trace L1.f as c1, L2.f as c2, L3.f as c3 eve
 """
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize(
     ("text", "law", "inverse", "total"),

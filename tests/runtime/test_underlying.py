@@ -168,7 +168,7 @@ def test_seed_models_meet_their_references(tmp_path):
     at_times = {"bouncing_ball", "coulomb_planar_stop", "coulomb_slide", "stick_slip_belt", "stiction_oscillator"}
     met, refused = [], []
     paths = [path for path in sorted((ROOT / "models" / "seed").glob("*.sd")) if path.stem in references]
-    paths = [path for k, path in enumerate(paths) if LONG or k % 4 == 0 or path.stem in (*explicit, *at_times)]
+    paths = [path for k, path in enumerate(paths) if LONG or k % 8 == 0 or path.stem in (*explicit, *at_times)]
     for number, path in enumerate(paths):
         for formulation in FORMULATIONS if LONG else FORMULATIONS[number % 2 :][:1]:
             wanted = references[path.stem]

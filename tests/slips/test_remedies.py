@@ -91,7 +91,7 @@ FOLLOWED = [c for c in CASES if c[5]]
 
 
 @pytest.mark.parametrize("case", FOLLOWED, ids=[f"{c[0]}: {c[5]!r}" for c in FOLLOWED])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 def test_a_model_that_follows_the_remedy_runs(case, tmp_path, capsys):
     base, old, *_, right = case
     (tmp_path / "m.sd").write_text(BASES[base].replace(old, right, 1))

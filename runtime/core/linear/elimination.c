@@ -100,6 +100,7 @@ sd_elimination *sd_elimination_new(int32_t n, const int32_t *column, const int32
     }
     e->pivot_column = e->pivot_row + n;
     e->growth = GROWTH;
+    e->orders = SD_ORDERS;
     sd_elimination_forget(e);
     return e;
 }
@@ -291,7 +292,7 @@ static sd_elimination *pupil(sd_elimination *first)
             return e;
         found = e->served < found->served ? e : found;
     }
-    if (orders < SD_ORDERS && (last->other = sd_elimination_new(first->n, first->column, first->row))) {
+    if (orders < first->orders && (last->other = sd_elimination_new(first->n, first->column, first->row))) {
         last->other->growth = first->growth;
         found = last->other;
     }

@@ -17,7 +17,7 @@
 #define SD_REPLAYED 100 /* largest matrix; above, loops over a pattern cost little more than the numbers themselves */
 
 #define SD_SAMPLES 6    /* matrices of which an order is found */
-#define SD_ORDERS 4     /* that are kept */
+#define SD_ORDERS 4     /* that are kept, where solutions are corrections that the next ones correct */
 
 /* how the target of a sum is made of S = source - sum over pairs of a b */
 enum sd_sum_kind { SD_SUM_PLAIN, SD_SUM_TIMES, SD_SUM_INVERSE, SD_SUM_LARGEST }; /* S; S times the cell `by`; 1 / S; largest |a b| */
@@ -54,6 +54,7 @@ struct sd_elimination {
     int64_t interpreted;         /* operations so far */
     sd_code *code;               /* NULL: interpreted */
     sd_elimination *other;       /* with another order; NULL: there is none */
+    int32_t orders;              /* of the first: that it keeps at most, SD_ORDERS or as its owner says */
     sd_elimination *serves;      /* of the first: the one whose factors were the last that served */
     int64_t tries, served;       /* of the first: matrices so far; the last of them that it served */
 };

@@ -118,6 +118,8 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
     rosenbrock->system = system;
     rosenbrock->linear = linear;
     sd_linear_replayed(linear);
+    if (linear->elimination)
+        linear->elimination->orders = 1; /* nothing corrects what its stages solve for */
     rosenbrock->n = system->unknowns;
     rosenbrock->stepper = (sd_stepper){
         .self = rosenbrock, .system = system, .n = rosenbrock->n, .t = &rosenbrock->t, .t_end = &rosenbrock->t_end,

@@ -33,8 +33,10 @@ sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
     u->system = system;
     u->linear = linear;
     sd_linear_replayed(linear);
-    if (linear->elimination)
+    if (linear->elimination) {
         linear->elimination->growth = BORNE;
+        linear->elimination->orders = 1;
+    }
     u->n = system->unknowns;
     u->first = system->kinematics;
     u->solved = linear->n;
