@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from sysdyn.cli.spice.circuit import Circuit, Netlist, pairs
 from sysdyn.cli.spice.devices import DEVICES, LOCAL, Element, Scope
 from sysdyn.cli.spice.netlist import Card, Unreadable, value
-from sysdyn.cli.spice.windings import component, coupled, joined
+from sysdyn.cli.spice.windings import Cores, component, coupled
 from sysdyn.cli.spice.writing import names, quantity
 from sysdyn.dsl.elaborate.files import exported
 from sysdyn.dsl.elaborate.instances import BUILTINS
@@ -93,26 +93,26 @@ class Writer:
             lines.append(f"  port {', '.join(nodes[p] for p in circuit.ports)}: electrical")
         if inside:
             lines.append(f"  node {', '.join(nodes[n] for n in inside)}: electrical")
-        coils, on_cores = _coils(circuit), joined(cards, _coils(circuit))
+        cores = Cores(cards, _coils(circuit))
         initial: list[str] = []
         for card in cards:
-            if card.head in on_cores:
+            if card.head in cores.branches:
                 continue
-            element = self._element(card, scope, coils, circuit)
+            element = self._element(card, scope, cores, circuit)
             lines += [f"  {line}" for line in element.lines]
             initial += [f"  {line}" for line in element.initial]
         if circuit is self.netlist.top and not self.netlist.uic:
             initial = self._asked(initial, cards, scope)
         return [*lines, *initial], nodes
 
-    def _element(self, card: Card, scope: Scope, coils: dict[str, Card], circuit: Circuit) -> Element:
+    def _element(self, card: Card, scope: Scope, cores: Cores, circuit: Circuit) -> Element:
         place = card.place
         letter = card.head[0]
         try:
             if letter == "x":
                 found = self._instance(card, scope, circuit)
             elif letter == "k":
-                found = coupled(card, scope, coils, circuit.elements)
+                found = coupled(card, scope, cores)
             elif letter in DEVICES:
                 found = DEVICES[letter](card, scope)
             else:
@@ -194,9 +194,8 @@ class Writer:
         if begin > 0.0:
             self.report.note("N941", f"the trace begins at 0 s, not at {begin:g} s", self.source.place(0, 0))
         labels = self._names(top)[2]
-        labels |= {
-            coil: f"{labels[card]}.{branch}" for coil, (card, branch) in joined(top.elements, _coils(top)).items()
-        }
+        branches = Cores(top.elements, _coils(top)).branches
+        labels |= {coil: f"{labels[card]}.{branch}" for coil, (card, branch) in branches.items()}
         traced = [t for text in self.netlist.shown if (t := _read(text, nodes, labels)) is not None]
         traced = traced or [f"{n}.e as v_{_plain(word)}" for word, n in list(nodes.items())[:SHOWN]]
         yield f"scene tran of {model} {{"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 from sysdyn.cli.spice.circuit import pairs
@@ -24,55 +24,71 @@ def _said(card: Card, coils: Mapping[str, Card]) -> tuple[tuple[str, ...], str]:
     return names, factor
 
 
-def _cores(cards: Sequence[Card], coils: Mapping[str, Card]) -> Iterator[tuple[Card, list[str], Factors]]:
-    """The first card of each core, its coils, their factors: cards that share coils, directly or by others."""
-    left = [c for c in cards if c.head.startswith("k") and _is_said(c, coils)]
-    while left:
-        first, factors = left[0], Factors()
-        of = dict.fromkeys(_said(first, coils)[0])
-        while mine := [c for c in left if set(_said(c, coils)[0]) & set(of)]:
-            left = [c for c in left if c not in mine]
-            for c in mine:
-                joined, factor = _said(c, coils)
-                of |= dict.fromkeys(joined)
-                factors |= dict.fromkeys(_twos(joined), factor)
-        yield first, list(of), factors
-
-
 def _twos(coils: Sequence[str]) -> list[tuple[str, str]]:
     """All that are two of them."""
     return list(combinations(sorted(coils), 2))
 
 
-def _is_said(card: Card, coils: Mapping[str, Card]) -> bool:
-    try:
-        _said(card, coils)
-    except Unreadable:
-        return False
-    return True
+class Cores:
+    """The cores of a circuit: cards that share coils, directly or by others, and what they couple.
 
+    branches: by coil on a core, the name of the first of its cards, which writes it, and the coil's branch there.
+    """
 
-def joined(cards: Sequence[Card], coils: Mapping[str, Card]) -> dict[str, tuple[str, str]]:
-    """By coil on a core: the name of the card that writes it, and its branch there."""
-    return {
-        coil: (first.head, _branch(k, len(names)))
-        for first, names, _ in _cores(cards, coils)
-        for k, coil in enumerate(names)
-    }
+    def __init__(self, cards: Sequence[Card], coils: Mapping[str, Card]) -> None:
+        self.coils, self._said = coils, dict[str, tuple[tuple[str, ...], str]]()
+        self._again: dict[str, tuple[str, str]] = {}
+        self._core: dict[str, tuple[str, list[str], Factors]] = {}
+        self.branches: dict[str, tuple[str, str]] = {}
+        before, on = set[tuple[str, str]](), dict[str, list[str]]()
+        for card in (c for c in cards if c.head.startswith("k")):
+            try:
+                self._said[card.head] = _said(card, coils)
+            except Unreadable:
+                continue  # told where the card is read
+            twos = _twos(self._said[card.head][0])
+            if again := before.intersection(twos):
+                self._again[card.head] = min(again)
+            before.update(twos)
+            for coil in self._said[card.head][0]:
+                on.setdefault(coil, []).append(card.head)
+        place = {head: k for k, head in enumerate(self._said)}
+        for first in self._said:
+            if first not in self._core:
+                self._gather(first, on, place)
+
+    def _gather(self, first: str, on: Mapping[str, list[str]], place: Mapping[str, int]) -> None:
+        """The core of this card, from it by what shares coils with what is there."""
+        factors, found, new = Factors(), dict[str, None](), list(self._said[first][0])
+        core = first, list[str](), factors
+        while new:
+            found |= dict.fromkeys(new)
+            heads = sorted({h for coil in new for h in on[coil] if h not in self._core}, key=place.__getitem__)
+            for head in heads:
+                joined, factor = self._said[head]
+                self._core[head] = core
+                factors |= dict.fromkeys(_twos(joined), factor)
+            new = [c for c in dict.fromkeys(c for h in heads for c in self._said[h][0]) if c not in found]
+        core[1].extend(found)
+        self.branches |= {coil: (first, _branch(k, len(found))) for k, coil in enumerate(found)}
+
+    def of(self, card: Card) -> tuple[str, list[str], Factors]:
+        """The first card of the core that a card tells of, its coils, their factors.  Unreadable."""
+        if card.head not in self._said:
+            _said(card, self.coils)
+        if again := self._again.get(card.head):
+            raise Unreadable(f"'{card.head}': {' and '.join(again)} are coupled already")
+        return self._core[card.head]
 
 
 def _branch(k: int, coils: int) -> str:
     return ("one", "two")[k] if coils == 2 else f"c{k + 1}"
 
 
-def coupled(card: Card, scope: Scope, coils: Mapping[str, Card], cards: Sequence[Card]) -> Element:
+def coupled(card: Card, scope: Scope, cores: Cores) -> Element:
     """The coils of a core as one element, at the first of its cards."""
-    mine = _said(card, coils)[0]
-    before = [_said(c, coils)[0] for c in cards[: cards.index(card)] if c.head.startswith("k") and _is_said(c, coils)]
-    if again := set(_twos(mine)) & {two for coils_ in before for two in _twos(coils_)}:
-        raise Unreadable(f"'{card.head}': {' and '.join(min(again))} are coupled already")
-    first, names, factors = next(c for c in _cores(cards, coils) if mine[0] in c[1])
-    if first is not card:
+    first, names, factors = cores.of(card)
+    if first != card.head:
         return Element(())
     name, size = scope.name[card.head], len(names)
     strength = {two: value(factor, scope.known) for two, factor in factors.items()}
@@ -80,7 +96,7 @@ def coupled(card: Card, scope: Scope, coils: Mapping[str, Card], cards: Sequence
         raise Unreadable(f"'{card.head}': a factor beyond 1")
     whole = any(abs(k) == 1.0 for k in strength.values())  # what two coils carry is one flux: no current is given
     pair = size == 2 and not whole
-    cards_of = [enough(coils[w], 4) for w in names]
+    cards_of = [enough(cores.coils[w], 4) for w in names]
     given = [f"L{k} = {number_of(scope, words[3], 'H')}" for k, words in enumerate(cards_of, 1)]
     place = {coil: k for k, coil in enumerate(names, 1)}
     for (i, j), k in sorted((sorted(place[coil] for coil in two), k) for two, k in strength.items()):
