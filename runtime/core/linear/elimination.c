@@ -68,8 +68,8 @@ void sd_elimination_forget(sd_elimination *elimination)
     sd_elimination *e = elimination;
     free_others(e);
     drop_order(e);
-    e->samples = e->seen = e->waited = e->missed = 0;
-    e->tries = e->served = 0;
+    e->samples = e->seen = e->missed = 0;
+    e->tries = e->since = e->served = 0;
     e->serves = e;
     e->wait = FIRST > e->n / SHARE ? FIRST : e->n / SHARE;
 }
@@ -294,6 +294,7 @@ static sd_elimination *pupil(sd_elimination *first)
     }
     if (orders < first->orders && (last->other = sd_elimination_new(first->n, first->column, first->row))) {
         last->other->growth = first->growth;
+        last->other->since = first->tries;
         found = last->other;
     }
     return found;
@@ -305,7 +306,7 @@ void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
     size_t size = (size_t)e->entries;
     e->seen++;
     e->missed += e->ready;
-    int due = e->waited >= e->wait && (!e->ready || e->missed >= MISSES);
+    int due = elimination->tries - e->since >= e->wait && (!e->ready || e->missed >= MISSES);
     if (due || !(e->seen & (e->seen - 1))) { /* of the first ones the 1st, 2nd, 4th, ... */
         if (e->samples == SD_SAMPLES)
             memmove(e->sample, e->sample + size, (size_t)--e->samples * size * sizeof(sd_number));
@@ -313,7 +314,8 @@ void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled)
     }
     if (!due)
         return;
-    e->waited = e->missed = 0;
+    e->since = elimination->tries;
+    e->missed = 0;
     e->wait += e->wait / 2; /* where no order lasts, looking for one stays cheap */
     prepare(e);
 }
@@ -398,8 +400,6 @@ int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, 
 {
     sd_elimination *const first = elimination, *const last = first->serves;
     first->tries++;
-    for (sd_elimination *e = first; e; e = e->other)
-        e->waited++;
     int found = factor(last, values, scale);
     for (sd_elimination *e = first; e && !found; e = e->other)
         if (e != last && (found = factor(e, values, scale)))

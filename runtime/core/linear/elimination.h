@@ -43,7 +43,7 @@ struct sd_elimination {
     int32_t ready, scaled;       /* an order was found; the magnitudes of its columns are not all one */
     int32_t factors, inside;     /* cells of factors; of all */
     int32_t samples, seen;
-    int32_t wait, waited, missed; /* matrices from one order to the next at least; since the last; that it did not serve */
+    int32_t wait, missed;        /* matrices from one order to the next at least; that it did not serve since the last */
     sd_number *sample;           /* [SD_SAMPLES][entries] scaled matrices, the newest last */
     sd_number *cell;             /* inverse pivots, other factors; then n each: right side, magnitudes, sizes of rows, their
                                     growth; constants */
@@ -56,7 +56,8 @@ struct sd_elimination {
     sd_elimination *other;       /* with another order; NULL: there is none */
     int32_t orders;              /* of the first: that it keeps at most, SD_ORDERS or as its owner says */
     sd_elimination *serves;      /* of the first: the one whose factors were the last that served */
-    int64_t tries, served;       /* of the first: matrices so far; the last of them that it served */
+    int64_t tries;               /* of the first: matrices so far */
+    int64_t since, served;       /* of them the one at the last order; the last that it served */
 };
 
 sd_elimination *sd_elimination_new(int32_t n, const int32_t *column, const int32_t *row);

@@ -108,7 +108,7 @@ int sd_run_integrate(sd_run *run, double to)
     const sd_stepper *stepper = run->stepper;
     double from = run->t_from, half = 0.5 * (to - from), middle = 0.5 * (to + from);
     memset(run->integral, 0, (size_t)run->audited * sizeof(double));
-    run->sampled = run->noded = 0;
+    run->sampled = 0;
     if (!run->audit || half == 0.0)
         return 0;
     if (stepper->nodes && (to == *stepper->t || stepper->collocated)) {

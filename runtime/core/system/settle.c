@@ -234,10 +234,10 @@ static int factorise(sd_settle *settle, double t, const double *y, const double 
     return 0;
 }
 
-/* the basis at (t, y, yd) */
-static int choose(sd_settle *settle, double t, const double *y, const double *yd, int met)
+/* the basis at (t, y, yd), an iterate */
+static int choose(sd_settle *settle, double t, const double *y, const double *yd)
 {
-    int failed = !slopes(settle, t, y, yd, met) || sd_settle_choose(settle);
+    int failed = !slopes(settle, t, y, yd, 0) || sd_settle_choose(settle);
     leave_slopes(settle);
     return failed;
 }
@@ -269,7 +269,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
             break;
         }
         if (!failed && now > CONTRACTS * before && now > fmax(FINE, limit)) {
-            failed = choose(settle, t, y, yd, 0);
+            failed = choose(settle, t, y, yd);
             fresh = 1;
         }
         before = now;
