@@ -2,6 +2,7 @@
 #include "linear/lanes.h"
 #include "steppers/radau.h"
 
+#include <math.h>
 #include <string.h>
 
 void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1])
@@ -172,6 +173,16 @@ void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
         between_points(radau, t, y, yd);
 }
 
+/* Whether a slope takes the unknown no further than the stages of the last step went: else it is not one that the step
+ * follows, but what a steep law makes of the point's own error. */
+static int followed(const sd_radau *radau, int32_t i, double change)
+{
+    double far = 0.0;
+    for (int s = 0; s < radau->used->stages; s++)
+        far = fmax(far, fabs(radau->kept[s][i]));
+    return radau->h_used * fabs(change) <= far;
+}
+
 /* the point that is settled may be room that was lent for it, of which nothing is read from where all unknowns follow from it */
 void sd_radau_refine(sd_radau *radau, sd_settle *settle)
 {
@@ -186,7 +197,7 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle)
         memcpy(radau->rate, radau->slope[k], size);
         if (sd_settle_point(settle, t[k], radau->y, radau->rate) == 0)
             for (int32_t i = 0; i < n; i++)
-                if (radau->smooth[i])
+                if (radau->smooth[i] && followed(radau, i, radau->rate[i] - radau->slope[k][i]))
                     radau->slope[k][i] = radau->rate[i];
         radau->refined[k] = 1;
     }
