@@ -15,7 +15,8 @@
  * values and derivatives at the last three points, whose error is that of the method; of more the polynomial of the
  * stages with the derivative at the step's start besides, an order more.  Where an unknown is pulled back faster than
  * the step follows, its derivative is its error times that rate, and the polynomial of the stages serves.  The stage's K
- * at the end of a step has the multipliers' order only: where rows are asked for, derivatives come from the settled point.
+ * at the end of a step has the multipliers' order only: where rows are asked for, derivatives come from the settled point,
+ * and lead the unknowns that they take no further off the polynomial of the stages than the error test allows.
  */
 #ifndef SYSDYN_RADAU_H
 #define SYSDYN_RADAU_H
@@ -128,7 +129,7 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
 int sd_radau_step(sd_radau *radau);
 /* radau_dense.c: y, yd [n] at any t within the last step */
 void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd);
-/* settled derivatives at the points that sd_radau_dense uses */
+/* settled derivatives at the points that sd_radau_dense uses, and which unknowns they lead */
 void sd_radau_refine(sd_radau *radau, sd_settle *settle);
 /* 1: between the nodes of the step at hand, whose stages are z, a steep law is beyond all magnitudes: the step passes
  * over something that happens.  Works in y, rate, d[0] and terms. */

@@ -140,14 +140,14 @@ static void between_stages(const sd_radau *radau, double t, double *y, double *y
         }
 }
 
-/* the polynomial of the stages for the unknowns that nothing else serves */
-static void of_stages(const sd_radau *radau, double t, double *y, double *yd)
+/* the polynomial of the stages for the unknowns that slopes lead, or for the others */
+static void of_stages(const sd_radau *radau, double t, char led, double *y, double *yd)
 {
     const sd_radau_method *method = radau->used;
     double h = radau->h_used, v[SD_STAGES + 1], d[SD_STAGES + 1];
     lagrange(radau, method, (t - (radau->t - h)) / h, v, d);
     for (int32_t i = 0; i < radau->n; i++)
-        if (!radau->led[i]) {
+        if (radau->led[i] == led) {
             double sum = sd_radau_last(radau, i), rate = 0.0;
             for (int s = 0; s < method->stages; s++) {
                 sum += v[s + 1] * radau->kept[s][i];
@@ -158,6 +158,15 @@ static void of_stages(const sd_radau *radau, double t, double *y, double *yd)
         }
 }
 
+/* the unknowns that slopes lead */
+static void of_slopes(const sd_radau *radau, double t, double *y, double *yd)
+{
+    if (radau->used->stages > 3)
+        between_stages(radau, t, y, yd);
+    else
+        between_points(radau, t, y, yd);
+}
+
 void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
 {
     int32_t n = radau->n;
@@ -166,21 +175,25 @@ void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
         memcpy(yd, radau->yd, (size_t)n * sizeof *yd);
         return;
     }
-    of_stages(radau, t, y, yd);
-    if (radau->used->stages > 3)
-        between_stages(radau, t, y, yd);
-    else
-        between_points(radau, t, y, yd);
+    of_stages(radau, t, 0, y, yd);
+    of_slopes(radau, t, y, yd);
 }
 
-/* Whether a slope takes the unknown no further than the stages of the last step went: else it is not one that the step
- * follows, but what a steep law makes of the point's own error. */
-static int followed(const sd_radau *radau, int32_t i, double change)
+/* Slopes lead no unknown that they would take further off the polynomial of the stages than the step's error may be: there
+ * they are of a motion before, or what a steep law makes of the point's own error. */
+static void mistrust(sd_radau *radau)
 {
-    double far = 0.0;
-    for (int s = 0; s < radau->used->stages; s++)
-        far = fmax(far, fabs(radau->kept[s][i]));
-    return radau->h_used * fabs(change) <= far;
+    const double third[2] = {1.0 / 3.0, 2.0 / 3.0}, early[1] = {0.5 * radau->used->c[0]};
+    const int quintic = radau->used->stages == 3;
+    for (int k = 0; k < 1 + quintic; k++) {
+        double t = radau->t - radau->h_used * (1.0 - (quintic ? third[k] : early[0]));
+        of_stages(radau, t, 1, radau->y, radau->rate);
+        memcpy(radau->ee, radau->y, (size_t)radau->n * sizeof(double));
+        of_slopes(radau, t, radau->y, radau->rate);
+        for (int32_t i = 0; i < radau->n; i++)
+            if (radau->led[i] && !(fabs(radau->y[i] - radau->ee[i]) * sd_radau_weight(radau, i) <= 1.0))
+                radau->led[i] = 0;
+    }
 }
 
 /* the point that is settled may be room that was lent for it, of which nothing is read from where all unknowns follow from it */
@@ -197,10 +210,12 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle)
         memcpy(radau->rate, radau->slope[k], size);
         if (sd_settle_point(settle, t[k], radau->y, radau->rate) == 0)
             for (int32_t i = 0; i < n; i++)
-                if (radau->smooth[i] && followed(radau, i, radau->rate[i] - radau->slope[k][i]))
+                if (radau->smooth[i])
                     radau->slope[k][i] = radau->rate[i];
         radau->refined[k] = 1;
     }
+    if (!(radau->fixed_h > 0.0)) /* whose error is nobody's wish */
+        mistrust(radau);
 }
 
 int sd_radau_astray(sd_radau *radau)
