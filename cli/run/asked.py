@@ -209,7 +209,7 @@ def _stops(prepared: Prepared, t0: float, t1: float) -> tuple[np.ndarray, str | 
     unseen = [o.expression for o in network.observations if not o.stored]
     crossed = [o.expression for o in network.observations if not o.stored and o.name in conditions]
     found = instants(*text, unseen, crossed)
-    answer = distinct(found.times, pulses(*text, crossed)), found.note
+    answer = distinct(found.times, pulses(*text, crossed, found.times)), found.note
     kept.clear()
     kept[t0, t1] = answer, {name: value_of(binding, name) for name in read.read}
     return answer

@@ -248,8 +248,9 @@ class _Search:
             brackets = self._affine(watched, labels, number) or self._sampled(watched, labels, number)
         except KeyError:  # a constant that is known at the start only
             return
-        found = labels.bisect(*brackets)
-        near = found <= self.t0 + ROUND_OFF * (self.t1 - self.t0)  # the start lies on its own right side
+        start = self.t0 + ROUND_OFF * (self.t1 - self.t0)
+        found = labels.bisect(*brackets, start)
+        near = found <= start  # the start lies on its own right side
         found = found[~near & (found <= self.t1)]
         if near.any() and labels.jumps(np.arange(number), self.t0, self.t0 + 1e-6 * (self.t1 - self.t0)):
             found = np.append(found, self.t0)
@@ -360,25 +361,27 @@ class _Labels:
                 return values[0].copy()
             return values[0] / values[1] if quotient else values[0] - values[1]
 
-    def bisect(self, index: Whole, low: Array, high: Array) -> Array:
-        """The first double of the new label in each bracket; where a zero lies between, the last of it too."""
+    def bisect(self, index: Whole, low: Array, high: Array, early: float) -> Array:
+        """The first double of the new label in each bracket; where a zero lies between, the last of it too.  Up to
+        `early` any will do.
+        """
         start, end = self.at(index, low), self.at(index, high)
         take = start != end
         index, low, high, start, end = index[take], low[take], high[take], start[take], end[take]
-        first = self._flip(index, low, high, start)
+        first = self._flip(index, low, high, start, early)
         middle = self.at(index, first)
         again = middle != end
-        last = self._flip(index[again], first[again], high[again], middle[again])
+        last = self._flip(index[again], first[again], high[again], middle[again], early)
         # a zero on a single double: the far side begins behind it, which the restart knows
         last = np.where(np.nextafter(first[again], np.inf) == last, first[again], np.nextafter(last, -np.inf))
         return np.concatenate([first, last])
 
-    def _flip(self, index: Whole, low: Array, high: Array, start: Array) -> Array:
+    def _flip(self, index: Whole, low: Array, high: Array, start: Array, early: float) -> Array:
         """The first double whose label is not `start` any more."""
         low, high = low.copy(), high.copy()
         for _ in range(_HALVINGS):
             middle = low + 0.5 * (high - low)
-            open_ = np.flatnonzero((middle > low) & (middle < high))
+            open_ = np.flatnonzero((middle > low) & (middle < high) & (high > early))
             if not open_.size:
                 break
             same = self.at(index[open_], middle[open_]) == start[open_]

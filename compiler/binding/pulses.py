@@ -4,7 +4,8 @@ Every largest expression of time, parameters and loop variables in the rows that
 over cells of the span; a cell is halved where its bounds exceed the values at its ends by more than HIDDEN of the
 signal's size, or differ by more than VARIES.  So nothing is missed however narrow it is, and a smooth signal costs few
 cells, all of the same size where it oscillates.  Where a run of small cells stands between large ones a pulse is there:
-steps end at its beginning, within it and at its end.
+steps end at its beginning, within it and at its end; not where it only rises or falls between instants at which they
+end anyhow.
 
 Received: a descriptor form and a binding; returned: instants [s].
 """
@@ -16,7 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.enclosures import Array, Bounds, Outline, Values, enclose
-from sysdyn.compiler.binding.instants import distinct, turns
+from sysdyn.compiler.binding.instants import ROUND_OFF, distinct, turns
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, DescriptorForm
 from sysdyn.compiler.model.interpret import Value, evaluate, grid
 from sysdyn.compiler.model.terms import Nest
@@ -24,6 +25,7 @@ from sysdyn.dsl.model.calculus import differential
 from sysdyn.dsl.model.expression import Node, const, topological_unbound, variables
 from sysdyn.dsl.model.network import Loop, Table
 
+NONE: Array = np.zeros(0)
 HIDDEN, VARIES = 3e-3, 0.1
 """Of the signal's size: what a cell may hide, and how far its bounds may differ.  Of a sine both ask the same."""
 CELLS = 37
@@ -40,6 +42,8 @@ MOST = 32768
 ELEMENTS = 32
 """Iterations of loops that are looked at one by one."""
 PULSES = 1000
+ASIDE = 1e-6
+"""Of a stretch between two instants: what stands aside of them."""
 TURNS = 1e-5
 """Of the span: between two extremes of a signal that may be followed."""
 
@@ -51,9 +55,10 @@ def pulses(
     t1: float,
     tables: Sequence[Table] = (),
     crossed: Sequence[Node] = (),
+    known: Array = NONE,
 ) -> Array:
     """Instants [s] in (t0, t1), ascending, at which steps should end so that no pulse is passed over; crossed: whose
-    zeros are events.
+    zeros are events; known: at which steps end anyhow [s].
     """
     outlines = {t.name: _outline(t) for t in tables if len(t.points) == 1}
     found: list[Array] = []
@@ -63,7 +68,7 @@ def pulses(
         for k in range(min(number, ELEMENTS)):
             held = {name: float(values[k]) for name, values in columns.items()}
             try:
-                found += _of(_bounded(root, _fixed(binding, held), outlines), t0, t1)
+                found += _of(_bounded(root, _fixed(binding, held), outlines), t0, t1, known)
             except KeyError:  # a constant that is known at the start only
                 break
     times = distinct(np.zeros(0), *found)
@@ -185,27 +190,50 @@ def _cells(signal: Outline, t0: float, t1: float) -> Array:
     return distinct(*done, low)
 
 
-def _of(signal: Outline, t0: float, t1: float) -> Iterator[Array]:
+def _of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
     """Instants of each pulse of one signal: the edges of its small cells, thinned to five.
 
     What is small is asked again and again, each time FINER, so that a pulse is found on a signal that varies by itself.
     """
-    edges = _cells(signal, t0, t1)
+    edges, stops = _cells(signal, t0, t1), distinct(known, np.array([t0, t1]))
     width = np.diff(edges)
     taken = np.zeros(width.size, dtype=bool)
     narrow, number = NARROW * (t1 - t0), 0
     while width.size and width.min() < FINE * narrow:
         change = np.diff(np.concatenate([[0], (width < narrow).astype(int), [0]]))
+        runs = []
         for first, last in zip(np.flatnonzero(change == 1), np.flatnonzero(change == -1), strict=True):
             fine = width[first:last].min() < FINE * narrow
             short = edges[last] - edges[first] <= ISOLATED * narrow
             if fine and short and not taken[first:last].any():
                 taken[first:last] = True
-                number += 1
-                yield _within(signal, edges[first : last + 1])
+                runs.append(edges[first : last + 1])
+        yield from (_within(signal, run) for run, told in zip(runs, _told(signal, runs, stops), strict=True) if not told)
+        number += len(runs)
         narrow *= FINER
         if number > PULSES:
             return
+
+
+def _told(signal: Outline, runs: Sequence[Array], stops: Array) -> Sequence[bool]:
+    """Of each run of cells whether the signal in it only rises or falls between stops, and rests before and behind them."""
+    if not runs:
+        return ()
+    ends = [distinct(run[[0, -1]], stops[(stops > run[0]) & (stops < run[-1])]) for run in runs]
+    low, high = (np.concatenate(side) for side in ([e[:-1] for e in ends], [e[1:] for e in ends]))
+    aside = ASIDE * (high - low)  # it may jump at either end
+    low, high = low + aside, high - aside
+    first, last = np.split(signal(*2 * (np.concatenate([low, high]),))[0], 2)
+    least, most = signal(low, high)
+    begins = np.cumsum([0, *(e.size - 1 for e in ends)])
+    with np.errstate(invalid="ignore"):
+        hidden = np.maximum(most - np.maximum(first, last), np.minimum(first, last) - least)
+        small = HIDDEN * np.maximum.reduceat(np.maximum(np.abs(first), np.abs(last)), begins[:-1])
+        worst, varies = np.maximum.reduceat(hidden, begins[:-1]), most - least
+    told, near = (small < np.inf) & (worst <= small), ROUND_OFF * (stops[-1] - stops[0])
+    for outer, end in ((begins[:-1], 0), (begins[1:] - 1, -1)):
+        told &= (varies[outer] <= small) | np.array([np.abs(stops - e[end]).min() <= near for e in ends])
+    return list(told)
 
 
 def _within(signal: Outline, edges: Array) -> Array:
