@@ -208,7 +208,9 @@ def _of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
             if fine and short and not taken[first:last].any():
                 taken[first:last] = True
                 runs.append(edges[first : last + 1])
-        yield from (_within(signal, run) for run, told in zip(runs, _told(signal, runs, stops), strict=True) if not told)
+        yield from (
+            _within(signal, run) for run, told in zip(runs, _told(signal, runs, stops), strict=True) if not told
+        )
         number += len(runs)
         narrow *= FINER
         if number > PULSES:
@@ -216,7 +218,7 @@ def _of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
 
 
 def _told(signal: Outline, runs: Sequence[Array], stops: Array) -> Sequence[bool]:
-    """Of each run of cells whether the signal in it only rises or falls between stops, and rests before and behind them."""
+    """Of each run of cells whether the signal only rises or falls between stops in it, and rests before and behind."""
     if not runs:
         return ()
     ends = [distinct(run[[0, -1]], stops[(stops > run[0]) & (stops < run[-1])]) for run in runs]
