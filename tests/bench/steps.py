@@ -2,10 +2,10 @@
 
 For each model of models/benchmark with `param n` and each size: unknowns as written and as stepped, CPU time of an
 accepted step of bdf and radau without rows (microseconds a section), over one integration at rtol 1e-6 or its first
-steps.  For rc_ladder beside IDA with KLU on a text of one unknown a node (peers/ladder.c), both over tolerances by half
-decades, and IDA over two policies of refactoring: the cheapest run whose error in the last voltage meets 1e-3, 1e-4,
-1e-5 of 0.2 V, its largest value; the reference is our radau at 1e-12.  Without SUNDIALS (Debian: libsundials-dev,
-libsuitesparse-dev) ours alone.
+steps; `grid`: one of n x n nodes.  For rc_ladder and grid beside IDA with KLU on a text of one unknown a node (peers),
+both over tolerances by half decades, and IDA over two policies of refactoring: the cheapest run whose error in the last
+voltage meets 1e-3, 1e-4, 1e-5 of its largest value; the reference is our radau at 1e-12.  Without SUNDIALS (Debian:
+libsundials-dev, libsuitesparse-dev) ours alone.
 """
 
 from __future__ import annotations
@@ -34,8 +34,31 @@ from sysdyn.runtime.simulate import simulate
 
 TOLERANCES = tuple(10.0 ** (-0.5 * k) for k in range(5, 13))
 TARGETS = (1e-3, 1e-4, 1e-5)
-SIZE = 0.2
-"""Largest voltage of the ladder's last node (V): what errors are relative to."""
+SIZES = {"rc_ladder": ("ladder", 0.2), "grid": ("grid", 0.05)}
+"""Of each model that has one its peer, and the largest voltage of the last node (V): what errors are relative to."""
+GRID = """from std.electrical import resistor, capacitor, voltage
+
+model grid {
+  param n = 100
+  node v[1..n, 1..n]: electrical
+  source: voltage(v = 1 V*sin(2*pi*2 Hz*t)) v[1, 1] -> ground
+  for i in 1..n {
+    for j in 1..n - 1 {
+      across[i, j]: resistor(R = 1 ohm) v[i, j] -> v[i, j + 1]
+      down[j, i]: resistor(R = 1 ohm) v[j, i] -> v[j + 1, i]
+    }
+    for j in 1..n {
+      C[i, j]: capacitor(C = 1 F / n^2) v[i, j] -> ground
+      init C[i, j].e = 0 V
+    }
+  }
+}
+
+scene reference of grid {
+  time 0 s to 1 s
+  trace v[n, n].e as y_end
+}
+"""
 REPEATED, FIRST = 3, 200
 """Runs of which the fastest counts; steps that are timed."""
 LONG = 100_000
@@ -105,12 +128,12 @@ def last_voltage(made: Integration) -> float:
 
 
 class Peer:
-    """peers/ladder.c; `program` None: SUNDIALS is not here."""
+    """One of peers; `program` None: SUNDIALS is not here."""
 
-    def __init__(self, folder: Path) -> None:
-        source = Path(__file__).parent / "peers" / "ladder.c"
+    def __init__(self, name: str, folder: Path) -> None:
+        source = Path(__file__).parent / "peers" / f"{name}.c"
         libraries = [*(f"-lsundials_{name}" for name in LIBRARIES), "-lklu", "-lm"]
-        self.program: Path | None = folder / "ladder"
+        self.program: Path | None = folder / name
         command = ["cc", "-O2", "-march=native", "-w", "-I/usr/include/suitesparse", str(source), "-o"]
         if subprocess.run([*command, str(self.program), *libraries], capture_output=True, check=False).returncode:
             self.program = None
@@ -126,20 +149,20 @@ class Peer:
         return least, steps, value
 
 
-def race(line: Line, n: int, peer: Peer) -> None:
-    """The ladder at equal errors."""
+def race(line: Line, n: int, peer: Peer, size: float) -> None:
+    """Both at equal errors."""
     repeated = 1 if n > LONG else REPEATED
     exact = last_voltage(line.run("radau", 1e-12, 1)[2])
     ours: dict[str, list[tuple[float, float]]] = {"bdf": [], "radau": []}
     for method, found in ours.items():
         for rtol in TOLERANCES:
             seconds, _, made = line.run(method, rtol, repeated)
-            found.append((abs(last_voltage(made) - exact) / SIZE, seconds))
+            found.append((abs(last_voltage(made) - exact) / size, seconds))
     theirs = []
     for rtol in TOLERANCES:
         for policy in ("0.25", "0.01"):
             seconds, steps, value = peer.run(n, rtol, policy, repeated)
-            theirs += [(abs(value - exact) / SIZE, seconds)] if steps > 0 else []
+            theirs += [(abs(value - exact) / size, seconds)] if steps > 0 else []
     for target in TARGETS:
         bdf, radau, ida = (
             1e3 * min((seconds for error, seconds in runs if error <= target), default=float("nan"))
@@ -157,17 +180,20 @@ def main() -> None:
     parser.add_argument("models", nargs="*", default=["rc_ladder", "lc_line", "nltl"])
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        peer = Peer(Path(folder))
         for name in asked.models:
+            made, size = SIZES.get(name, (None, 1.0))
+            peer = Peer(made, Path(folder)) if made is not None else None
+            if name == "grid":
+                (Path(folder) / "grid.sd").write_text(GRID)
             for n in map(int, asked.sizes.split(",")):
-                line = Line(name, n, Path(folder))
+                line = Line(Path(folder) / "grid.sd" if name == "grid" else name, n, Path(folder))
                 for method in ("bdf", "radau"):
-                    seconds, steps, made = line.run(method, 1e-6, 1 if n > LONG else REPEATED, FIRST)
-                    unknowns = f"{made.system.unknowns} unknowns, {made.stepped.unknowns} stepped"
+                    seconds, steps, run = line.run(method, 1e-6, 1 if n > LONG else REPEATED, FIRST)
+                    unknowns = f"{run.system.unknowns} unknowns, {run.stepped.unknowns} stepped"
                     each = f"{1e3 * seconds / steps:.4f} ms a step, {1e6 * seconds / steps / n:.3f} us a section"
                     print(f"{name} {n} {method}: {unknowns}; {steps} steps, {each}", flush=True)
-                if name == "rc_ladder" and peer.program is not None:
-                    race(line, n, peer)
+                if peer is not None and peer.program is not None:
+                    race(line, n, peer, size)
 
 
 if __name__ == "__main__":
