@@ -31,7 +31,7 @@ SMALL = 200
 
 
 SHORT = 8
-"""Entries of factors an unknown, from which on a net is worth rows of its own: on a grid of 30 x 30 a bdf then takes 5.0
+"""Entries of factors an unknown, from which on a net is worth rows of its own: on a grid of 30 x 30 a bdf takes 5.0
 ms for 7.7, a radau 7.7 for 12.9."""
 GAIN = 0.6
 """Part of what any pivots may fill that pairs promise to fill, for them to be tried: where a row does not pivot in its
