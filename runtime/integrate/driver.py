@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.integrate.bare import OBSERVED, by_sums, shows
 from sysdyn.runtime.integrate.impulses import Impulses, Side
 from sysdyn.runtime.integrate.least_norm import LeastNorm
 from sysdyn.runtime.integrate.ledgers import Ledgers
@@ -22,6 +23,8 @@ ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
 Sink = Callable[[Floats], None]
+CREDIT = 16
+"""Rows that are looked at before it shows that few of them meet their sums."""
 
 
 def _audited(system: System) -> Ints:
@@ -77,7 +80,8 @@ class Driver:
         self._observers(start_rate)
         self._asked(request)
         run.rough = request.settled_to
-        run.bare = int(self._bare(keeps) and not request.audited)
+        run.bare = int(not request.audited and shows(system, keeps))
+        run.told = CREDIT if not request.audited and self._follows_sums(settler, keeps) else 0
         unread = not request.audited and request.events is None and self._unread
         run.unsummed = 1 + request.draft if unread else 0
         run.projected = drift
@@ -108,11 +112,16 @@ class Driver:
         self.rows = np.empty((ROOM if width < ROOM else 64, width))
         run.row, run.room = lib.pointer(self.rows), self.rows.shape[0]
 
-    def _bare(self, keeps: NDArray[np.bool_]) -> bool:
-        """Whether all that is observed follows from the state: nothing that a row has to be settled for."""
-        follows = self.system.families_in(~keeps)
-        read = [(kernel.reads, kernel.rates) for kernel in self.system.description.blocks.get("observe", ())]
-        return all(reads is not None and not (reads & follows) and rates == frozenset() for reads, rates in read)
+    def _follows_sums(self, settler: Settler, keeps: NDArray[np.bool_]) -> bool:
+        """Tells the settler by which sums all that a row shows follows from the state, where it does and has no rates."""
+        settled = settler.system
+        if self.calls["observe_rate"] is not None or self._least_norm is not None or settler.condensed:
+            return False
+        known, self._sums = settled.once(("by sums", keeps.tobytes()), lambda: by_sums(settled, keeps))
+        if not shows(self.system, known, OBSERVED):
+            return False
+        settler.core.contents.told = lib.pointer(self._sums)
+        return True
 
     @property
     def _unread(self) -> bool:

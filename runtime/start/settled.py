@@ -253,6 +253,11 @@ class Settler:
         lib.core.sd_settle_rest(self.core)
 
     @property
+    def condensed(self) -> bool:
+        """Whether some of the unknowns follow from those that are moved."""
+        return self._left is not self.system
+
+    @property
     def address(self) -> int:
         """Of the core's structure."""
         return c.addressof(self.core.contents)

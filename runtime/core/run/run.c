@@ -12,6 +12,7 @@
 #include "system/condensed.h"
 
 #define POLL 4  /* steps between two looks at the clock */
+#define FAILS 4 /* rows that meet their sums for each that does not: fewer are not worth looking */
 #define GROWN 1.1 /* times the largest so far: beyond it the size of a step is not believed as the method left it */
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
@@ -113,10 +114,21 @@ static void emit_compared(sd_run *run, double *row)
     memcpy(row + SD_ROW_HEAD + run->observed, run->slope, (size_t)run->observed * sizeof *row);
 }
 
+/* whether a row shows what it shall as its point comes: for ever not once the first ones did not */
+static int meets(sd_run *run, double t)
+{
+    if (run->told && sd_settle_meets(run->settle, t, run->point, run->point_d)) {
+        run->told++;
+        return 1;
+    }
+    run->told = run->told > FAILS ? run->told - FAILS : 0;
+    return 0;
+}
+
 /* The point of a row moved there; where only runs are compared by it, roughly, or not where states alone are seen. */
 static void settle_row(sd_run *run, double t, int32_t kind)
 {
-    if (run->settle && !(kind == SD_COMPARED && run->bare)) {
+    if (run->settle && !(kind == SD_COMPARED && run->bare) && !meets(run, t)) {
         double enough = run->settle->enough;
         if (kind == SD_COMPARED)
             run->settle->enough = fmax(enough, run->rough);

@@ -16,6 +16,7 @@
 #define COARSE 1e-11    /* but no more than this */
 #define CLOSE 1e-9      /* scaled residual with which one may live */
 #define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
+#define TOLD 1e-10      /* scaled residual of a row that points between steps keep */
 #define HELD 1e8        /* weight of the state in a second attempt */
 #define STILL 1e-12     /* move of the state, in magnitudes, that is none */
 #define REFUSALS 3      /* of the basis in a row, behind which it is tried once in AGAIN points alone, and */
@@ -510,6 +511,18 @@ int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd)
     if (holds)
         finish(settle, t, y, yd, 1, 1);
     return holds;
+}
+
+int sd_settle_meets(sd_settle *settle, double t, const double *y, const double *yd)
+{
+    if (settle->calls == settle->failures || settle->seen || settle->system->left || !provide_work(settle))
+        return 0;
+    measure(settle, t, y, yd);
+    for (int32_t i = 0; i < settle->rows; i++)
+        if ((settle->told[i] || settle->sort[i] == SD_CONSTRAINT) && !(fabs(settle->r[i] * settle->row_scale[i]) <= TOLD))
+            return 0;
+    settle->drift = settle->constraints;
+    return 1;
 }
 
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)

@@ -64,6 +64,7 @@ typedef struct sd_settle {
     double drift;                    /* norm of the constraint rows before the last call moved the point */
     double contracted;               /* largest residual beside the one before it, of the steps of the last call */
     double floor;                    /* residual that fresh factors have left: what old ones leave need not be less */
+    const int8_t *told;              /* [rows] 1: constant sums, which points between steps keep (integrate/bare.py); NULL: none */
 } sd_settle;
 
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates);
@@ -81,5 +82,7 @@ void sd_settle_free(sd_settle *settle);
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd);
 /* 1: the point holds as far as round-off lets it, in the scales of the last one that was moved (none yet: 0) */
 int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd);
+/* 1: y, yd meet constraints and `told` rows as they come, in the scales of the last point that was moved (none yet: 0) */
+int sd_settle_meets(sd_settle *settle, double t, const double *y, const double *yd);
 
 #endif

@@ -162,6 +162,7 @@ class Run(c.Structure):
         ("sample_steps", I),
         ("sizes_at_steps", I),
         ("bare", I),
+        ("told", I),
         ("unsummed", I),
         ("rough", D),
         ("apart", D),

@@ -176,6 +176,7 @@ class Settle(c.Structure):
         ("drift", D),
         ("contracted", D),
         ("floor", D),
+        ("told", P),
     ]
 
 
