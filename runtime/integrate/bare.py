@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.condense.elimination import affine
+from sysdyn.runtime.condense.elimination import LONGEST, affine
 from sysdyn.runtime.model.system import System
 
 Mask = NDArray[np.bool_]
@@ -33,9 +33,10 @@ def by_sums(settled: System, state: Mask) -> tuple[Mask, Mask]:
     known = state.copy()
     there = in_y & sums[rows]
     rows, columns = rows[there], columns[there]
-    while True:
+    for _ in range(LONGEST):
         open_ = ~known[columns]
         last = open_ & (np.bincount(rows[open_], minlength=settled.rows) == 1)[rows]
         if not last.any():
-            return known, sums
+            break
         known[columns[last]] = True
+    return known, sums

@@ -115,11 +115,12 @@ class Driver:
     def _follows_sums(self, settler: Settler, keeps: NDArray[np.bool_]) -> bool:
         """Tells the settler by which sums all that a row shows follows from the state, where it does and has no rates."""
         settled = settler.system
-        if self.calls["observe_rate"] is not None or self._least_norm is not None or settler.condensed:
+        if self.calls["observe_rate"] is not None or self._least_norm is not None:
             return False
-        known, self._sums = settled.once(("by sums", keeps.tobytes()), lambda: by_sums(settled, keeps))
+        known, sums = settled.once(("by sums", keeps.tobytes()), lambda: by_sums(settled, keeps))
         if not shows(self.system, known, OBSERVED):
             return False
+        self._sums = settler.left_of(sums)
         settler.core.contents.told = lib.pointer(self._sums)
         return True
 

@@ -252,10 +252,9 @@ class Settler:
         """Of a large system: lets go of the room for a point."""
         lib.core.sd_settle_rest(self.core)
 
-    @property
-    def condensed(self) -> bool:
-        """Whether some of the unknowns follow from those that are moved."""
-        return self._left is not self.system
+    def left_of(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Of a mask of the settled rows those that are left where some unknowns follow from others."""
+        return mask if self._left is self.system else mask[self._left.kept_rows]
 
     @property
     def address(self) -> int:

@@ -483,6 +483,17 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     return !done;
 }
 
+/* y, yd := what the kept unknowns z, zd make of all */
+static void follow_kept(const sd_settle *settle, const double *z, const double *zd, double *y, double *yd)
+{
+    const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
+    sd_condensed_expand(condensed, z, y, 0);
+    sd_condensed_put(condensed, zd, yd);
+    for (int32_t i = 0; i < settle->kinematics; i++)
+        yd[settle->k_q[i]] = y[settle->k_f[i]];
+    sd_condensed_complete(condensed, yd, 1); /* what follows from displacements follows them in its rate */
+}
+
 /* the same for a point with all unknowns of the system that this one is condensed from */
 static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
 {
@@ -495,11 +506,7 @@ static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
     sd_condensed_gather(condensed, y, z);
     sd_condensed_gather(condensed, yd, zd);
     int failed = settle_unknowns(settle, t, z, zd);
-    sd_condensed_expand(condensed, z, y, 0);
-    sd_condensed_put(condensed, zd, yd);
-    for (int32_t i = 0; i < settle->kinematics; i++)
-        yd[settle->k_q[i]] = y[settle->k_f[i]];
-    sd_condensed_complete(condensed, yd, 1); /* what follows from displacements follows them in its rate */
+    follow_kept(settle, z, zd, y, yd);
     return failed;
 }
 
@@ -513,16 +520,24 @@ int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd)
     return holds;
 }
 
-int sd_settle_meets(sd_settle *settle, double t, const double *y, const double *yd)
+int sd_settle_meets(sd_settle *settle, double t, double *y, double *yd)
 {
-    if (settle->calls == settle->failures || settle->seen || settle->system->left || !provide_work(settle))
+    if (settle->calls == settle->failures || settle->seen || !provide_work(settle))
         return 0;
-    measure(settle, t, y, yd);
-    for (int32_t i = 0; i < settle->rows; i++)
-        if ((settle->told[i] || settle->sort[i] == SD_CONSTRAINT) && !(fabs(settle->r[i] * settle->row_scale[i]) <= TOLD))
-            return 0;
+    const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
+    double *z = condensed ? settle->room : y, *zd = condensed ? z + settle->unknowns + 8 : yd;
+    if (condensed) {
+        sd_condensed_gather(condensed, y, z);
+        sd_condensed_gather(condensed, yd, zd);
+    }
+    measure(settle, t, z, zd);
     settle->drift = settle->constraints;
-    return 1;
+    int meets = 1;
+    for (int32_t i = 0; i < settle->rows && meets; i++)
+        meets = !(settle->told[i] || settle->sort[i] == SD_CONSTRAINT) || fabs(settle->r[i] * settle->row_scale[i]) <= TOLD;
+    if (condensed)
+        follow_kept(settle, z, zd, y, yd);
+    return meets;
 }
 
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)

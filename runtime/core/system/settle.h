@@ -83,6 +83,6 @@ int sd_settle_point(sd_settle *settle, double t, double *y, double *yd);
 /* 1: the point holds as far as round-off lets it, in the scales of the last one that was moved (none yet: 0) */
 int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd);
 /* 1: y, yd meet constraints and `told` rows as they come, in the scales of the last point that was moved (none yet: 0) */
-int sd_settle_meets(sd_settle *settle, double t, const double *y, const double *yd);
+int sd_settle_meets(sd_settle *settle, double t, double *y, double *yd);
 
 #endif
