@@ -113,7 +113,7 @@ class Driver:
         run.row, run.room = lib.pointer(self.rows), self.rows.shape[0]
 
     def _follows_sums(self, settler: Settler, keeps: NDArray[np.bool_]) -> bool:
-        """Tells the settler by which sums all that a row shows follows from the state, where it does and has no rates."""
+        """Tells the settler by which sums all that a row shows follows from the state, where so and without rates."""
         settled = settler.system
         if self.calls["observe_rate"] is not None or self._least_norm is not None:
             return False
