@@ -254,7 +254,7 @@ class Settler:
 
     def left_of(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Of a mask of the settled rows those that are left where some unknowns follow from others."""
-        return mask if self._left is self.system else mask[self._left.kept_rows]
+        return mask[self._left.kept_rows] if isinstance(self._left, Condensed) else mask
 
     @property
     def address(self) -> int:
