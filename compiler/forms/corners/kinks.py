@@ -22,7 +22,19 @@ from contextlib import suppress
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.expression import Node, compare, const, linear, neg, rebuild, sub, topological, variables
+from sysdyn.dsl.model.expression import (
+    Node,
+    compare,
+    const,
+    linear,
+    neg,
+    param,
+    rebuild,
+    sub,
+    topological,
+    var,
+    variables,
+)
 from sysdyn.values import dataclass
 
 JUDGED = ("dynamics", "phi_reaction", "psi_reaction", "momentum", "phi", "psi", "gamma", "lambda")
@@ -93,19 +105,23 @@ def surfaces(form: DescriptorForm, directions: frozenset[str] = frozenset()) -> 
 
     directions: parameters of friction in the plane, which the contact itself keeps on one side.
     """
-    roots = list(_roots(form))
     first: dict[Node, int] = {}
-    for root, row in roots:
+    holding: dict[Node, dict[Node, None]] = {}
+    for root, row in _roots(form):
         for node in topological([root]):
             found = watched(node)
-            own = found is not None and any(n.op == "param" and n.data in directions for n in topological([found.u]))
-            if found is not None and not own and neg(found.u) not in first:
-                first.setdefault(found.u, row)
+            if found is None:
+                continue
+            own = any(n.op == "param" and n.data in directions for n in topological([found.u]))
+            u = found.u if neg(found.u) not in first else neg(found.u)
+            holding.setdefault(u, {})[root] = None
+            if not own:
+                first.setdefault(u, row)
     if not 0 < len(first) <= MOST:
         return ()
-    kept = []
+    kept, known = [], {}
     for u, row in first.items():
-        level = min((smoothness(root, u) for root, _ in roots), default=SMOOTH)
+        level = min(smoothness(root, u, known) for root in holding[u])
         if level < SMOOTH:
             kept.append(Surface(u, level == JUMPS, row))
     return tuple(kept)
@@ -142,11 +158,39 @@ def done_of(branch: Node, done: dict[Node, Node]) -> Node:
 # -- how smooth ----------------------------------------------------------------------------------------------
 
 
-def smoothness(root: Node, u: Node) -> int:
-    """JUMPS, KINK or SMOOTH: of an expression where u = 0."""
+def smoothness(root: Node, u: Node, known: dict[tuple[Node, ...], int | None] | None = None) -> int:
+    """JUMPS, KINK or SMOOTH: of an expression where u = 0; known: the answers so far, which serve the same text of
+    other names (one law of many devices).
+    """
     above, below = _unlike(side(root, u, above=True), side(root, u, above=False))
     if above is below:
         return SMOOTH
+    known = {} if known is None else known
+    key = _renamed((u, above, below))
+    if key not in known:
+        known[key] = _sampled(u, above, below)
+    found = known[key]
+    if found is None:
+        return KINK if _continuous(root, u) else JUMPS  # what the operation itself does
+    return found
+
+
+def _renamed(nodes: tuple[Node, ...]) -> tuple[Node, ...]:
+    """The same text with leaves numbered as they come."""
+    done: dict[Node, Node] = {}
+    for node in topological(nodes):
+        name = f"#{len(done)}"
+        if node.op == "var":
+            done[node] = var(name, node.data[1], order=node.data[2])
+        elif node.op == "param":
+            done[node] = param(name)
+        else:
+            done[node] = rebuild(node, tuple(done[a] for a in node.args))
+    return tuple(done[node] for node in nodes)
+
+
+def _sampled(u: Node, above: Node, below: Node) -> int | None:
+    """By values on u = 0 of the two branches there; None where none are known."""
     moved = next((n for n in topological([u]) if n.op == "var"), None)
     if moved is None:
         return SMOOTH
@@ -172,9 +216,7 @@ def smoothness(root: Node, u: Node) -> int:
             return JUMPS
         if _apart(here[2:], there[2:], asked=asked):
             found = KINK
-    if known:
-        return found
-    return KINK if _continuous(root, u) else JUMPS  # what the operation itself does
+    return found if known else None
 
 
 def _unlike(above: Node, below: Node) -> tuple[Node, Node]:
