@@ -214,7 +214,7 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle)
                     radau->slope[k][i] = radau->rate[i];
         radau->refined[k] = 1;
     }
-    if (!(radau->fixed_h > 0.0)) /* whose error is nobody's wish */
+    if (radau->system->scales > 0 && !(radau->fixed_h > 0.0)) /* whose error is nobody's wish */
         mistrust(radau);
 }
 
