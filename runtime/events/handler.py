@@ -22,6 +22,7 @@ from sysdyn.runtime.events.locate import Dense, crossing
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.pivoting import NoActiveSetError
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
+from sysdyn.runtime.events.returns import LEAST, flights
 from sysdyn.runtime.events.succession import Point, Succession
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
@@ -77,7 +78,7 @@ class Handler:
         self.happened: list[Happened] = []
         self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
         self.stalled, self.last = 0, -np.inf
-        self.simple, self.struck, self.rounds = False, -1, list[Round]()
+        self.simple, self.struck, self.rounds, self.soon = False, -1, list[Round](), 0.0
         self._plain = all(c.kind in ("phi", "friction") and c.guard < 0 for c in plan.contacts)
         self._exact: list[int] = []
         self._sinking: set[int] = set()
@@ -234,11 +235,11 @@ class Handler:
         """The point after everything that happens at t; None where nothing changes.  which: of the watched.
 
         rounds, simple: what is assigned, and whether that is all, and without an impact; struck: the gap that closed in
-        flight and opened again, where that is all, else -1.
+        flight and opened again, where that is all, else -1; soon (s): sooner than that the same shall be asked again.
         """
         self._count(t)
         free = self._free()
-        self.simple, self.struck, self.rounds = True, -1, []
+        self.simple, self.struck, self.rounds, self.soon = True, -1, [], 0.0
         said, stood = self._words(), self.kinks.state()
         self.kinks.anew()
         crossed = [w.relation for w in which if w.relation >= 0]
@@ -275,10 +276,22 @@ class Handler:
             return None
         self.struck = touched[0] if free and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
+        self._return(t, point, which)
         self.struck = self.struck if self._bounced(self.struck) else -1
         self.simple &= not self.bounces
         self.happened += self.kinks.happened(t, stood)
         return point
+
+    def _return(self, t: float, point: Point, which: Sequence[Watched]) -> None:
+        """SolverFailure where what was assigned sends a relation back for so little that it is not seen to return."""
+        moved = any(a.kind != "discrete" for r in self.rounds for group in r.groups for a in group)
+        falls = [(w.row, w.side) for w in which if w.relation >= 0 and self.side[w.relation] == -w.side]
+        if not (moved and falls and self.restart is not None):
+            return
+        for flight, least in flights(self.observer, self.restart, t, point, self.contacts.time, falls):
+            if flight.flight <= least:
+                raise SolverFailure("zeno", t, 0.0, self._names())
+            self.soon = max(self.soon, LEAST * least)
 
     def _bounced(self, k: int) -> bool:
         """Whether gap k has closed and opened again, and nothing holds that has impulses."""
@@ -316,7 +329,7 @@ class Handler:
 
     def anew(self, t: float, y: Floats, yd: Floats) -> Point:
         """The point behind an instant at which the text jumps, and behind the conditions that become true by it."""
-        self.simple, self.struck, self.rounds, stood = True, -1, [], self.kinks.state()
+        self.simple, self.struck, self.rounds, self.soon, stood = True, -1, [], 0.0, self.kinks.state()
         self.kinks.anew()
         point = self._followed(t, self.settled(t, y, yd, self._words()))
         self.simple &= not self.bounces
