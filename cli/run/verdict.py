@@ -72,8 +72,8 @@ _REMEDIES_OF_CAUSES = {
     "pulsed": "a ramp in place of the jump, or the store's own displacement or momentum in place of the integral",
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",
     "chatter": "a condition and an action that do not undo each other: hysteresis, or an 'every' in place of a 'when'",
-    "zeno": "a constraint in place of the event, which comes to rest: phi floor: h >= 0 m restitution 0.8; or an earlier"
-    " end: --until",
+    "zeno": "a constraint in place of the event, which comes to rest: phi floor: h >= 0 m restitution 0.8; or an"
+    " earlier end: --until",
     "complementarity": "constraints that do not ask for opposites: a resistance or a clearance between these elements",
 }
 
