@@ -41,6 +41,8 @@ STALLED = 200
 """Events in a row within NOTHING of the span: they chatter."""
 NOTHING = 1e-12
 """Of the span: no time."""
+HELD = 1e-9
+"""Of what counts as zero: what has stayed below it for a time is held there."""
 FALLEN = 1e-4
 """Of what else counts as zero, and of the height of its flight: a gap that an impact opened closes again below it."""
 
@@ -246,8 +248,9 @@ class Handler:
         said, stood = self._words(), self.kinks.state()
         self.kinks.anew()
         crossed = [w.relation for w in which if w.relation >= 0]
-        values = self.observer(t, y, yd) if crossed else ()
+        values = self.observer(t, y, yd) if self.plan.relations else np.zeros(0)
         self._exact = [k for k in crossed if values[self.plan.relations[k].row] == 0.0]
+        self._hold(values, crossed)
         for w in which:
             if w.relation >= 0:
                 self.side[w.relation] = -float(w.side)
@@ -284,6 +287,13 @@ class Handler:
         self.simple &= not self.bounces
         self.happened += self.kinks.happened(t, stood)
         return point
+
+    def _hold(self, values: Floats, crossed: Sequence[int]) -> None:
+        """What a constraint holds at zero since an event before (a speed that sticks) is on neither side."""
+        for k, relation in enumerate(self.plan.relations):
+            still = relation.moves and k not in crossed and self.stalled == 0
+            if still and abs(values[relation.row]) <= HELD * self.observer.zero(relation.row):
+                self.side[k] = 0.0
 
     def _return(self, t: float, point: Point, which: Sequence[Watched]) -> None:
         """SolverFailure where what was assigned sends a relation back for so little that it is not seen to return."""
