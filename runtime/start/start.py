@@ -14,6 +14,7 @@ import itertools
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints, Places
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
+from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.slopes import labels, rows_without_slope
 from sysdyn.runtime.model.system import LARGE, System
@@ -47,6 +48,8 @@ BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
 NOTHING = 1e-100
 """Of any unit: what an iteration down a steep law leaves of zero."""
+HELD = "#held "
+"""Before the name of a coordinate: what its flow makes with others that hold its inertia (compiler/forms/lowering.py)."""
 SHARPER = 60
 """Corrections in which what follows from the state is found, or left as it was."""
 EXPLAINED = 0.1
@@ -121,6 +124,26 @@ def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
         return x
     rows, may = starter.every & ~starter.groups("gamma", "gamma_rate"), free & ~held & starter.following(t, x)
     return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
+
+
+def _aimed(starter: Starter, t: float) -> Floats:
+    """The guess, with the momenta that flows of coupled masses make together there: of those that the text says, others
+    at rest.  Where nothing else asks for it none of these moves then, whatever unknowns hold their momenta.  Of a
+    network the contents of each store are guessed, and stay.
+    """
+    known, x = starter.equations, starter.guess.copy()
+    joined, families = known.joined, starter.system.description.families
+    stores = (f for f in families if f.kind in ("slack", "unsaid") and not f.owner.startswith(HELD))
+    if not x[: starter.n][joined].any() or any(True for _ in stores):
+        return x
+    rows, missed = known.guessed
+    x[missed] = starter.residual(t, x)[rows]
+    momentum, own = known.momentum[joined[known.flow]], own_unknown(starter.settled, "momentum", "f")
+    if not momentum.size or starter.written[momentum].any():
+        return x
+    free = np.zeros(x.size, dtype=bool)
+    free[momentum] = True
+    return _onto(starter, t, x, x, rows=(own >= 0) & joined[own], free=free)
 
 
 def _anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
@@ -320,7 +343,7 @@ def _consistent(
         integrated, places = _integrated(starter)
         starter.every[integrated] = False
     starter.work = Work(until=until)
-    guess = starter.guess
+    guess = _aimed(starter, t0)
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
         guess = starter.unknowns(t0, y, np.zeros(y.size))
