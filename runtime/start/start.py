@@ -49,7 +49,7 @@ BACK = 1e-10
 NOTHING = 1e-100
 """Of any unit: what an iteration down a steep law leaves of zero."""
 HELD = "#held "
-"""Before the name of a coordinate: what its flow makes with others that hold its inertia (compiler/forms/lowering.py)."""
+"""Before the name of a coordinate: what its flow and others hold together (compiler/forms/lowering.py)."""
 SHARPER = 60
 """Corrections in which what follows from the state is found, or left as it was."""
 EXPLAINED = 0.1
