@@ -304,3 +304,30 @@ scene s of shorted {
     (tmp_path / "model.sd").write_text(loaded)
     trace = api.simulate(tmp_path / "model.sd", output=tmp_path / "out.h5")
     assert trace["S.f"].values == pytest.approx(-2.5, rel=1e-9)
+
+
+BESIDE_A_TABLE = """\
+table pull(u: 1) -> 1 linear extend [ (-2, -3), (-1, -1), (-0.2, 0), (0.2, 0), (1, 1), (2, 3) ]
+model swing {{
+  coord x: translation = {x!r} m
+  coord y: translation ~ {y} m
+  energy T* = 1/2*(0.5 kg)*(x'^2 + y'^2)
+  energy V = (0.5 kg)*g0*y
+  phi rod: x^2 + y^2 = ({length!r} m)^2
+  work -2 N*pull(x/(1 m)) on x
+  init x' = -1.117 m/s
+}}
+scene s of swing {{ time 0 s to 1 us; trace y }}
+"""
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_guess_of_any_number_of_digits(tmp_path, seed):
+    """Beside laws with corners, where it was good to ten digits and more, one of eight was refused (E903)."""
+    dice = np.random.default_rng(seed)
+    angle, length = float(dice.uniform(-1.4, 1.4)), float(dice.uniform(0.1, 5.0))
+    x, y = length * float(np.sin(angle)), -length * float(np.cos(angle))
+    for digits in range(9, 17):
+        text = BESIDE_A_TABLE.format(x=x, y=f"{y:.{digits}g}", length=length)
+        trace = trace_of(tmp_path, text, scene="s", formulation=FOUR[seed % 2])
+        assert trace["y"].values[0] == pytest.approx(y, rel=1e-13)
