@@ -127,14 +127,21 @@ def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
 
 
 def _aimed(starter: Starter, t: float) -> Floats:
-    """The guess, with the momenta that flows of coupled masses make together there: of those that the text says, others
-    at rest.  Where nothing else asks for it none of these moves then, whatever unknowns hold their momenta.  Of a
+    """The guess, with the contents that coupled stores hold together there: of what the text says of each, the others
+    at rest.  Where nothing else asks for it none of these moves then, whatever unknowns hold their contents.  Of a
     network the contents of each store are guessed, and stay.
     """
+    families = starter.system.description.families
+    if any(f.kind in ("slack", "unsaid") and not f.owner.startswith(HELD) for f in families):
+        return starter.guess
+    return _with_contents(starter, t, _with_momenta(starter, t))
+
+
+def _with_momenta(starter: Starter, t: float) -> Floats:
+    """The guess with the momenta of flows that share inertia, and with what guesses of these miss."""
     known, x = starter.equations, starter.guess.copy()
-    joined, families = known.joined, starter.system.description.families
-    stores = (f for f in families if f.kind in ("slack", "unsaid") and not f.owner.startswith(HELD))
-    if not x[: starter.n][joined].any() or any(True for _ in stores):
+    joined = known.joined
+    if not x[: starter.n][joined].any():
         return x
     rows, missed = known.guessed
     x[missed] = starter.residual(t, x)[rows]
@@ -144,6 +151,17 @@ def _aimed(starter: Starter, t: float) -> Floats:
     free = np.zeros(x.size, dtype=bool)
     free[momentum] = True
     return _onto(starter, t, x, x, rows=(own >= 0) & joined[own], free=free)
+
+
+def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
+    """X with the displacements that implicit efforts which are said tell with others (coupled coils, mirrored)."""
+    said = starter.moves("e") & starter.written & (x != 0.0)
+    if not said.any():
+        return x
+    rows = starter.groups("gamma") & (np.bincount(starter.rows, said[starter.columns], starter.settled.rows) > 0.0)
+    free = np.zeros(x.size, dtype=bool)
+    free[starter.columns[rows[starter.rows]]] = True
+    return _onto(starter, t, x, x, rows=rows, free=free & starter.moves("q") & ~starter.written)
 
 
 def _anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:

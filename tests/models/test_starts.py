@@ -231,6 +231,30 @@ def test_a_flow_that_nothing_moves_begins_at_rest(tmp_path, bob, formulation):
     assert trace["x"].values[-1] == pytest.approx(found.y[0, -1], rel=1e-5)
 
 
+COUPLED = """from std.electrical import coupled_inductors, resistor
+
+model coupled {
+  node a, b: electrical
+  K: coupled_inductors(L1 = 1 H, L2 = 0.5 H, k = 0.8) one = a -> ground, two = b -> ground
+  R1: resistor(R = 1 ohm) a -> ground
+  R2: resistor(R = 1 ohm) b -> ground
+  init K.one.f = 1 A
+}
+scene go of coupled { time 0 s to 0.1 s; accuracy 1e-6; trace K.one.f as one, K.two.f as two }
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_the_other_coil_begins_without_a_current(tmp_path, formulation):
+    """It began with -1.49 A but in Lagrange's form, where the fluxes of both were least."""
+    trace = trace_of(tmp_path, COUPLED, formulation=formulation)
+    mutual = 0.8 * 0.5**0.5
+    rates = np.linalg.solve([[1.0, mutual], [mutual, 0.5]], -np.eye(2))
+    found = solve_ivp(lambda _t, i: rates @ i, (0.0, 0.1), [1.0, 0.0], rtol=1e-11, atol=1e-13)
+    assert trace["two"].values[0] == pytest.approx(0.0, abs=1e-9)
+    assert [trace["one"].values[-1], trace["two"].values[-1]] == pytest.approx(found.y[:, -1], abs=1e-5)
+
+
 LOOP = """model loop {{
   node a, b, c: electrical
   V0: effort(e = 1 V) a -> b
