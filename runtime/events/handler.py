@@ -43,6 +43,8 @@ NOTHING = 1e-12
 """Of the span: no time."""
 HELD = 1e-9
 """Of what counts as zero: what has stayed below it for a time is held there."""
+STOPPED = 1e-6
+"""Of what it was: a flow that an event leaves is no flow any more."""
 FALLEN = 1e-4
 """Of what else counts as zero, and of the height of its flight: a gap that an impact opened closes again below it."""
 
@@ -257,7 +259,7 @@ class Handler:
             if w.kink >= 0:
                 self.kinks.cross(w.kink, w.row, w.side)
         changed = bool(samples) or any(w.kink >= 0 for w in which)
-        y, yd = y.copy(), yd.copy()
+        begun, y, yd = y, y.copy(), yd.copy()
         assigned: list[tuple[str, tuple[Assignment, ...]]] = [
             (self.plan.sampled[k].name, self.plan.sampled[k].assignments) for k in samples
         ]
@@ -282,7 +284,7 @@ class Handler:
             return None
         self.struck = touched[0] if free and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
-        self._return(t, point, which)
+        self._return(t, begun, point, which)
         self.struck = self.struck if self._bounced(self.struck) else -1
         self.simple &= not self.bounces
         self.happened += self.kinks.happened(t, stood)
@@ -295,11 +297,14 @@ class Handler:
             if still and abs(values[relation.row]) <= HELD * self.observer.zero(relation.row):
                 self.side[k] = 0.0
 
-    def _return(self, t: float, point: Point, which: Sequence[Watched]) -> None:
-        """SolverFailure where what was assigned sends a relation back for so little that it is not seen to return."""
-        moved = any(a.kind != "discrete" for r in self.rounds for group in r.groups for a in group)
+    def _return(self, t: float, begun: Floats, point: Point, which: Sequence[Watched]) -> None:
+        """SolverFailure where what was assigned sends a relation back for so little that it is not seen to return;
+        begun: y before.  What others have stopped (a one-way clutch) is not sent.
+        """
+        moved = [a.place for r in self.rounds for group in r.groups for a in group if a.kind != "discrete"]
+        sent = any(abs(point[0][k]) > STOPPED * abs(begun[k]) for k in moved)
         falls = [(w.row, w.side) for w in which if w.relation >= 0 and self.side[w.relation] == -w.side]
-        if not (moved and falls and self.restart is not None):
+        if not (sent and falls and self.restart is not None):
             return
         for flight, least in flights(self.observer, self.restart, t, point, self.contacts.time, falls):
             if flight.flight <= least:

@@ -60,3 +60,27 @@ def test_holds_until_there(method, tmp_path):
     trace = api.simulate(tmp_path / "b.sd", method=method, output=tmp_path / "out.h5")
     assert np.abs(trace["y"].values - _heights(trace.time, 0.95)).max() < 1e-4
     assert len(trace.events) == 65
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.parametrize("method", ["auto", "bdf"])
+def test_what_an_event_stops_is_not_thrown(formulation, method, tmp_path):
+    """It begins back from the limit at rest but for round-off, however low a flight that would be."""
+    text = """\
+model stopped {
+  coord x: translation = 0 m
+  energy T* = 1/2*(2 kg)*x'^2
+  energy V = 1/2*(18 N/m)*x^2
+  when x > 0.5 m { x' := 0 m/s }
+  init x' = 3 m/s
+}
+scene s of stopped {
+  time 0 s to 3 s
+  trace x every 10 ms
+}
+"""
+    (tmp_path / "m.sd").write_text(text)
+    trace = api.simulate(tmp_path / "m.sd", method=method, formulation=formulation, output=tmp_path / "out.h5")
+    met = np.arcsin(0.5) / 3.0
+    exact = np.where(trace.time < met, np.sin(3.0 * trace.time), 0.5 * np.cos(3.0 * (trace.time - met)))
+    assert np.abs(trace["x"].values - exact).max() < 5e-5
