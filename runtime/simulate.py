@@ -198,9 +198,9 @@ def _short(runs: Runs, options: Options, achieved: Achieved) -> str | None:
 
 
 def _bounded(failure: SolverFailure, runs: Runs) -> bool:
-    """The caller's own bound ended it: another method would meet the same."""
+    """The caller's own bound ended it, or the text itself ends there: another method would meet the same."""
     limited = failure.cause == "max_steps" and runs.most_steps == runs.options.max_steps
-    return limited or failure.cause in ("max_wall", "memory")
+    return limited or failure.cause in ("max_wall", "memory", "zeno")
 
 
 def _told(before: SolverFailure | None, last: SolverFailure) -> SolverFailure:

@@ -38,6 +38,10 @@ _CAUSES = {
     "max_wall": ("E934", "the limit of wall time is reached"),
     "max_events": ("E934", "the limit of events is reached"),
     "chatter": ("E930", "events follow each other without end at one instant"),
+    "zeno": (
+        "E930",
+        "events follow each other ever sooner and never pass a later instant, of which the text is silent",
+    ),
     "complementarity": ("E930", "no set of constraints that hold fits: each one asks for another"),
     "slides": ("E930", "a law jumps there and both its branches drive it back: no motion follows either"),
     "drives": ("E933", "the bound c of dry friction, c*setsign(u) or c*abs(u), falls below zero: it would drive"),
@@ -49,7 +53,7 @@ _CAUSES = {
 }
 AT_REST = 1e-8
 """Of what there was of its kind at the start: an unknown that has come to rest."""
-_OF_EVENTS = ("max_events", "chatter", "complementarity", "conflict", "slides", "drives", "endless", "pulsed")
+_OF_EVENTS = ("max_events", "chatter", "zeno", "complementarity", "conflict", "slides", "drives", "endless", "pulsed")
 _REMEDIES = {
     "E704": "one event for both, or conditions that do not become true together",
     "E930": "another --method or --index, a looser --accuracy, or a smoother law there",
@@ -68,6 +72,8 @@ _REMEDIES_OF_CAUSES = {
     "pulsed": "a ramp in place of the jump, or the store's own displacement or momentum in place of the integral",
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",
     "chatter": "a condition and an action that do not undo each other: hysteresis, or an 'every' in place of a 'when'",
+    "zeno": "a constraint in place of the event, which comes to rest: phi floor: h >= 0 m restitution 0.8; or an"
+    " earlier end: --until",
     "complementarity": "constraints that do not ask for opposites: a resistance or a clearance between these elements",
 }
 

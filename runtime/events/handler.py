@@ -22,6 +22,7 @@ from sysdyn.runtime.events.locate import Dense, crossing
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.pivoting import NoActiveSetError
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
+from sysdyn.runtime.events.returns import LEAST, flights
 from sysdyn.runtime.events.succession import Point, Succession
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
@@ -40,6 +41,10 @@ STALLED = 200
 """Events in a row within NOTHING of the span: they chatter."""
 NOTHING = 1e-12
 """Of the span: no time."""
+HELD = 1e-9
+"""Of what counts as zero: what has stayed below it for a time is held there."""
+STOPPED = 1e-6
+"""Of what it was: a flow that an event leaves is no flow any more."""
 FALLEN = 1e-4
 """Of what else counts as zero, and of the height of its flight: a gap that an impact opened closes again below it."""
 
@@ -77,7 +82,7 @@ class Handler:
         self.happened: list[Happened] = []
         self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
         self.stalled, self.last = 0, -np.inf
-        self.simple, self.struck, self.rounds = False, -1, list[Round]()
+        self.simple, self.struck, self.rounds, self.soon = False, -1, list[Round](), 0.0
         self._plain = all(c.kind in ("phi", "friction") and c.guard < 0 for c in plan.contacts)
         self._exact: list[int] = []
         self._sinking: set[int] = set()
@@ -155,6 +160,9 @@ class Handler:
         for k, relation in enumerate(self.plan.relations):
             self.side[k] = self._side(k, values[relation.row], 1.0)
         self._bounded(t, values)
+        drives = self.succession.pushed(t, y, yd) if self.restart is not None else None
+        if drives is not None:
+            raise SolverFailure("drives", t, 0.0, drives)
         self.truth = self._true()
         due, anew = self.due(t), self.kinks.begin(values)
         if due:
@@ -234,23 +242,24 @@ class Handler:
         """The point after everything that happens at t; None where nothing changes.  which: of the watched.
 
         rounds, simple: what is assigned, and whether that is all, and without an impact; struck: the gap that closed in
-        flight and opened again, where that is all, else -1.
+        flight and opened again, where that is all, else -1; soon (s): sooner than that the same shall be asked again.
         """
         self._count(t)
         free = self._free()
-        self.simple, self.struck, self.rounds = True, -1, []
+        self.simple, self.struck, self.rounds, self.soon = True, -1, [], 0.0
         said, stood = self._words(), self.kinks.state()
         self.kinks.anew()
         crossed = [w.relation for w in which if w.relation >= 0]
-        values = self.observer(t, y, yd) if crossed else ()
+        values = self.observer(t, y, yd) if self.plan.relations else np.zeros(0)
         self._exact = [k for k in crossed if values[self.plan.relations[k].row] == 0.0]
+        self._hold(values, crossed)
         for w in which:
             if w.relation >= 0:
                 self.side[w.relation] = -float(w.side)
             if w.kink >= 0:
                 self.kinks.cross(w.kink, w.row, w.side)
         changed = bool(samples) or any(w.kink >= 0 for w in which)
-        y, yd = y.copy(), yd.copy()
+        begun, y, yd = y, y.copy(), yd.copy()
         assigned: list[tuple[str, tuple[Assignment, ...]]] = [
             (self.plan.sampled[k].name, self.plan.sampled[k].assignments) for k in samples
         ]
@@ -275,10 +284,32 @@ class Handler:
             return None
         self.struck = touched[0] if free and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
+        self._return(t, begun, point, which)
         self.struck = self.struck if self._bounced(self.struck) else -1
         self.simple &= not self.bounces
         self.happened += self.kinks.happened(t, stood)
         return point
+
+    def _hold(self, values: Floats, crossed: Sequence[int]) -> None:
+        """What a constraint holds at zero since an event before (a speed that sticks) is on neither side."""
+        for k, relation in enumerate(self.plan.relations):
+            still = relation.moves and k not in crossed and self.stalled == 0
+            if still and abs(values[relation.row]) <= HELD * self.observer.zero(relation.row):
+                self.side[k] = 0.0
+
+    def _return(self, t: float, begun: Floats, point: Point, which: Sequence[Watched]) -> None:
+        """SolverFailure where what was assigned sends a relation back for so little that it is not seen to return;
+        begun: y before.  What others have stopped (a one-way clutch) is not sent.
+        """
+        moved = [a.place for r in self.rounds for group in r.groups for a in group if a.kind != "discrete"]
+        sent = any(abs(point[0][k]) > STOPPED * abs(begun[k]) for k in moved)
+        falls = [(w.row, w.side) for w in which if w.relation >= 0 and self.side[w.relation] == -w.side]
+        if not (sent and falls and self.restart is not None):
+            return
+        for flight, least in flights(self.observer, self.restart, t, point, self.contacts.time, falls):
+            if flight.flight <= least:
+                raise SolverFailure("zeno", t, 0.0, self._names())
+            self.soon = max(self.soon, LEAST * least)
 
     def _bounced(self, k: int) -> bool:
         """Whether gap k has closed and opened again, and nothing holds that has impulses."""
@@ -316,7 +347,7 @@ class Handler:
 
     def anew(self, t: float, y: Floats, yd: Floats) -> Point:
         """The point behind an instant at which the text jumps, and behind the conditions that become true by it."""
-        self.simple, self.struck, self.rounds, stood = True, -1, [], self.kinks.state()
+        self.simple, self.struck, self.rounds, self.soon, stood = True, -1, [], 0.0, self.kinks.state()
         self.kinks.anew()
         point = self._followed(t, self.settled(t, y, yd, self._words()))
         self.simple &= not self.bounces

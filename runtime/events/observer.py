@@ -14,6 +14,8 @@ from sysdyn.runtime.model.system import System
 
 SMALL = 1e-9
 """Of the largest value and terms met of a row: what is less is zero."""
+LEAST = 1e-24
+"""In SI units: a value that has never been more has no size yet; round-off of what is held at zero is less still."""
 NOISE = 0.01
 """Of a run's tolerance: what it leaves of a zero."""
 
@@ -29,7 +31,7 @@ class Observer:
         self._out = np.zeros(max(self._number, 1))
         self._pointers = [lib.pointer(item) for item in (self._y, self._yd, self._out)]
         self._functions: dict[int, Any] = {}
-        self.largest, self.terms = np.zeros(self._number), np.zeros(self._number)
+        self.largest, self.terms = np.full(self._number, LEAST), np.zeros(self._number)
         families = [system.description.rows[k] for k in system.description.rows_of("observe")]
         self._units = [family.unit for family in families for _ in range(family.size)]
         self.groups: list[NDArray[np.int64]] = []

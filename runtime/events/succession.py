@@ -6,7 +6,7 @@ followed from an active set and what touched it is remembered, and tried first w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,10 +121,21 @@ class Succession:
         contacts.become(stood)
         return ends
 
-    def driving(self, t: float, y: Floats, yd: Floats) -> str | None:
-        """The name of a friction that would push what slips along: its bound is negative, or its sign is wrong."""
+    def pushed(self, t: float, y: Floats, yd: Floats) -> str | None:
+        """The same of frictions that slip, and whose bound a reaction tells: it has the sign that its text gives it."""
+        contacts, values = self.contacts, self.observer(t, y, yd)
+        slips = [k for k, c in enumerate(contacts.contacts) if c.hold >= 0 and not contacts.active[k]]
+        slips = [
+            k for k in slips if abs(values[contacts.contacts[k].value]) > self.observer.zero(contacts.contacts[k].value)
+        ]
+        return self.driving(t, y, yd, set(slips) - contacts.finite(t, y, yd)) if slips else None
+
+    def driving(self, t: float, y: Floats, yd: Floats, among: Set[int] | None = None) -> str | None:
+        """The name of a friction (among: of some) that would push what slips along: its bound is negative, or its sign
+        is wrong.
+        """
         for k, contact in enumerate(self.contacts.contacts):
-            if contact.kind == "friction":
+            if contact.kind == "friction" and (among is None or k in among):
                 ends = self._slipping(k, t, y, yd)
                 if len(ends) == 2 and ends[0][1] - ends[1][1] > self.observer.zero(contact.rate):
                     return contact.name

@@ -327,6 +327,7 @@ class Modes:
             end=self._array(ends, np.int32),
             sides=self._array(np.concatenate([flipped, *(r.sides for r in handler.rounds)])),
             entries=len(entries),
+            soon=handler.soon,
             strike=strike,
             momenta=momenta,
         )

@@ -181,10 +181,11 @@ class Initial:
 
 def stated(at: Ints, size: int, initial: tuple[Initial, ...]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
     """What a text says of unknowns at the start [size]: the values, 0 where it says nothing; which are fixed, and which
-    are written.  Of an unknown that is said twice a fixed value counts; at: places of families.
+    are written.  Of an unknown that is said twice a fixed value counts; at: places of families, negative where the form
+    has no such unknown (a displacement that is traced alone).
     """
     values, fixed, written = np.zeros(size), np.zeros(size, dtype=bool), np.zeros(size, dtype=bool)
-    for item in sorted(initial, key=lambda item: item.fixed):
+    for item in sorted((item for item in initial if at[item.family] >= 0), key=lambda item: item.fixed):
         own = at[item.family] + item.positions
         values[own], written[own] = item.values, True
         fixed[own] |= item.fixed

@@ -40,6 +40,8 @@ _HALVINGS = 12
 _LOST = 3
 """Directions one after the other along which no step makes the rows smaller: the next ones do not either."""
 _ROUND_OFF = 2e-15
+_ROUNDINGS = 8.0
+"""Times the unit round-off of its terms by their slopes: what evaluating a row of several operations may be off by."""
 _BESIDE = 1e-8
 """Scaled rows below which round-off alone can keep them from shrinking."""
 
@@ -239,9 +241,10 @@ class _Linear:
         problem, x, step, doubt = self.problem, self._x, np.zeros(self.shape[1]), np.zeros(self.shape[1])
         noise = np.zeros(problem.number)
         add_sizes(problem.rows, problem.columns, problem.jacobian(x), np.abs(x), noise)
-        noise *= np.finfo(float).eps
+        noise *= _ROUNDINGS * np.finfo(float).eps
         aim = -problem.residual(x)[problem.use]
         failed = _graded(self._full()[0], aim, step, noise[problem.use], doubt)
+        doubt /= _ROUNDINGS
         if failed == 1 or not np.isfinite(step).all():
             return None
         found, open_ = x.copy(), np.zeros(x.size)

@@ -14,6 +14,7 @@ import itertools
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints, Places
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
+from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.slopes import labels, rows_without_slope
 from sysdyn.runtime.model.system import LARGE, System
@@ -47,6 +48,8 @@ BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
 NOTHING = 1e-100
 """Of any unit: what an iteration down a steep law leaves of zero."""
+HELD = "#held "
+"""Before the name of a coordinate: what its flow and others hold together (compiler/forms/lowering.py)."""
 SHARPER = 60
 """Corrections in which what follows from the state is found, or left as it was."""
 EXPLAINED = 0.1
@@ -123,6 +126,44 @@ def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
 
 
+def _aimed(starter: Starter, t: float) -> Floats:
+    """The guess, with the contents that coupled stores hold together there: of what the text says of each, the others
+    at rest.  Where nothing else asks for it none of these moves then, whatever unknowns hold their contents.  Of a
+    network the contents of each store are guessed, and stay.
+    """
+    families = starter.system.description.families
+    if any(f.kind in ("slack", "unsaid") and not f.owner.startswith(HELD) for f in families):
+        return starter.guess
+    return _with_contents(starter, t, _with_momenta(starter, t))
+
+
+def _with_momenta(starter: Starter, t: float) -> Floats:
+    """The guess with the momenta of flows that share inertia, and with what guesses of these miss."""
+    known, x = starter.equations, starter.guess.copy()
+    joined = known.joined
+    if not x[: starter.n][joined].any():
+        return x
+    rows, missed = known.guessed
+    x[missed] = starter.residual(t, x)[rows]
+    momentum, own = known.momentum[joined[known.flow]], own_unknown(starter.settled, "momentum", "f")
+    if not momentum.size or starter.written[momentum].any():
+        return x
+    free = np.zeros(x.size, dtype=bool)
+    free[momentum] = True
+    return _onto(starter, t, x, x, rows=(own >= 0) & joined[own], free=free)
+
+
+def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
+    """X with the displacements that implicit efforts which are said tell with others (coupled coils, mirrored)."""
+    said = starter.moves("e") & starter.written & (x != 0.0)
+    if not said.any():
+        return x
+    rows = starter.groups("gamma") & (np.bincount(starter.rows, said[starter.columns], starter.settled.rows) > 0.0)
+    free = np.zeros(x.size, dtype=bool)
+    free[starter.columns[rows[starter.rows]]] = True
+    return _onto(starter, t, x, x, rows=rows, free=free & starter.moves("q") & ~starter.written)
+
+
 def _anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """The solution with its state to round-off, in its own magnitudes, and what follows found from x as where no state
     moves: neither depends on the way here; whether that holds.  What is too large for full matrices is left alone.
@@ -135,9 +176,12 @@ def _anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, 
     largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
     near = np.where(np.abs(near - there) <= NOISE * largest, there, near)
     back = np.where(np.abs(near - guess) <= BACK * largest, guess, near)
+    steep = bool(starter.system.form.scales)
     for moved in (back, near):
         found, holds = rescaled(starter, t, np.where(state, moved, x), guess, free & ~state, least=False)
-        if holds and found.residual <= max(CLOSED, best.residual):
+        held = holds and found.residual <= max(CLOSED, best.residual)
+        # what is left where a guess of twelve digits stays is no round-off: beside steep laws that is no start
+        if held and (moved is near or not steep or _sharp(starter, t, found, free) is not None):
             return found, True
     return best, False
 
@@ -320,7 +364,7 @@ def _consistent(
         integrated, places = _integrated(starter)
         starter.every[integrated] = False
     starter.work = Work(until=until)
-    guess = starter.guess
+    guess = _aimed(starter, t0)
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
         guess = starter.unknowns(t0, y, np.zeros(y.size))

@@ -97,3 +97,28 @@ scene s of m { time 0 s to 1 s; trace x }
     for reaction in ("floor.on(y)", "abs(floor.multiplier)"):
         (tmp_path / "m.sd").write_text(text.replace("REACTION", reaction))
         assert api.simulate(tmp_path / "m.sd", output=tmp_path / "m.h5", formulation=formulation).final == 1
+
+
+def test_friction_of_the_wrong_sign_is_told_of_what_moves_already(tmp_path):
+    """A bowling ball that its lane pushed on, told as met: no event happens that would ask."""
+    text = """model ball {
+  coord x, y: translation = 0 m
+  coord th: rotation = 0 rad
+  energy T* = 1/2*(6 kg)*(x'^2 + y'^2) + 1/5*(6 kg)*(11 cm)^2*th'^2
+  energy V = (6 kg)*g0*y
+  phi lane: y = 0 m
+  implicit R: N
+  work R on x - 11 cm*th
+  gamma fr: R + 0.2*REACTION*setsign(x' - 11 cm*th') = 0 N
+  init x' = 7 m/s
+  init th' = 0 rad/s
+}
+scene s of ball { time 0 s to 1.5 s; trace x, x' }
+"""
+    (tmp_path / "m.sd").write_text(text.replace("REACTION", "lane.multiplier"))
+    with pytest.raises(api.SolverFailure, match="drives at t = 0 s"):
+        api.simulate(tmp_path / "m.sd", output=tmp_path / "m.h5")
+    (tmp_path / "m.sd").write_text(text.replace("REACTION", "lane.on(y)"))
+    trace = api.simulate(tmp_path / "m.sd", output=tmp_path / "m.h5")
+    slides = np.minimum(trace.time, 2.0 * 7.0 / (7.0 * 0.2 * 9.80665))
+    assert np.abs(trace["x'"].values - (7.0 - 0.2 * 9.80665 * slides)).max() < 1e-3

@@ -203,7 +203,7 @@ static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_
             continue;
         if (due == SD_JUMP ? one->due != SD_JUMP : !same(one->due, one->sample, due, m->which))
             continue;
-        if (one->entries > m->left || (near && m->contacts && one->moves))
+        if (one->entries > m->left || (near && m->contacts && one->moves) || t - m->last < one->soon)
             return NULL;
         if (!one->moves)
             sd_landing_enter(run, one->to);

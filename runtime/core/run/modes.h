@@ -65,6 +65,7 @@ typedef struct sd_transition {
     const int32_t *kind, *place, *read; /* [end of the last] 0: a parameter, 1: an unknown; place; row that it becomes */
     const double *sides;              /* [1 + rounds][relations] once what crossed has changed, and behind each round */
     int64_t entries;                  /* events that it counts as */
+    double soon;                      /* s: sooner behind another event the handler looks whether it is seen to end */
     const sd_strike *strike, *momenta; /* an impact; momenta that follow from flows which are assigned; NULL: none */
 } sd_transition;
 

@@ -15,6 +15,7 @@
 #define GOLDEN 0.6180339887498949 /* of what the bottom lies within: what is kept */
 #define DEEP 70        /* of these: to the spacing of t */
 #define STEEPER 2.0    /* times the slopes met: as steep it may fall between two looks */
+#define AT_ONCE 1e-6   /* of the first part: what begins at zero and falls there may come back within it */
 #define FAINT 1e-9    /* of the largest value of what is watched: what it is off by unseen */
 
 /* The parabola through three points: its rise from the first to the second, and half of its second derivative. */
@@ -124,6 +125,25 @@ static int dips(sd_run *run, const sd_watch *watch, const double *t, int first)
     return 0;
 }
 
+/* Whether a watch that begins at zero falls and comes back between the points t[0..SD_PARTS] (a ball that is thrown). */
+static int returns(sd_run *run, const sd_watch *watch, const double *t)
+{
+    const double *values = run->looked + watch->row, f = watch->side * values[0];
+    double back = f, clear = t[0], seen = t[1];
+    int k = 0;
+    if (f > watch->tolerance)
+        return 0;
+    while (back <= f && k < SD_PARTS)
+        back = watch->side * values[(size_t)++k * (size_t)run->observed];
+    if (back <= f || (k == 1 && value_of(run, watch, t[0] + AT_ONCE * (t[1] - t[0])) >= f))
+        return 0;
+    if (!bottomed(run, watch, t[0], f, t[k], back, &clear, &seen))
+        return 0;
+    if (seen < run->t_seen)
+        run->t_clear = clear, run->t_seen = seen;
+    return 1;
+}
+
 static int fallen(const sd_run *run, const double *values)
 {
     for (int32_t i = 0; i < run->watches; i++)
@@ -157,6 +177,7 @@ static int scan(sd_run *run, double begin, double end, int parts, int seek, int 
             const int turns = unfollowed(run, &run->watch[i], part == SD_PARTS);
             more |= turns;
             dip |= turns && seek && dips(run, &run->watch[i], at, part == SD_PARTS);
+            dip |= seek && part == SD_PARTS && returns(run, &run->watch[i], at);
         }
         *fell |= dip;
         memcpy(run->looked, values, row * sizeof(double));

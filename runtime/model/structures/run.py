@@ -79,6 +79,7 @@ class Transition(c.Structure):
         *[(name, I) for name in ["to", "next", "crossed", "due", "rounds", "moves"]],
         *[(name, P) for name in ["which", "sample", "end", "kind", "place", "read", "sides"]],
         ("entries", L),
+        ("soon", D),
         *[(name, P) for name in ["strike", "momenta"]],
     ]
 
