@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.balance import LARGEST, Balance
+from sysdyn.runtime.model.balance import BALANCED, LARGEST, Balance
 from sysdyn.runtime.model.description import START, Floats, Initial, Ints, Places, stated
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import Inertia, own_inertia, own_unknown
@@ -378,7 +378,8 @@ class Starter:
         sized = values - told if missed.size or not values.flags.writeable else values
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
-        sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * self.generous, lib.pointer(found)
+        flags = LARGEST * self.generous + BALANCED * (not self.summed)
+        sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), flags, lib.pointer(found)
         if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *sizes):
             raise MemoryError
         if missed.size:  # what guesses of one unit miss is measured alike

@@ -23,6 +23,15 @@ CASES = {
         RV: dissipator(e = 1 ohm*f) src -> x[1]""",
         {"C.q": 0.0, "x[1].e": 1 / 1.8, "x[2].e": 1 / 1.8},
     ),
+    "a source at its peak and stores in parallel behind a gyrator": (  # its rate is what round-off leaves of cos(pi/2)
+        """node u, m, a: electrical
+        V: effort(e = 325 V*sin(314 rad/s*t + pi/2)) u -> ground
+        R: dissipator(e = 2 ohm*f) u -> m
+        G: gyrator(e1 = 200 ohm*f2) m -> ground, ground -> a
+        C1: potential(e = 1.2e5 V/C*q) a -> ground
+        C2: potential(e = 2.4e8 V/C*q) a -> ground""",
+        {"R.f": 0.0, "C1.q": 0.0, "C2.q": 0.0},
+    ),
     "capacitors around a loop": (
         """node a, b: electrical
         C1: potential(e = 4 V/C*q) a -> ground
