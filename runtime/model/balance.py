@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
-LARGEST, CAPPED, BALANCED = 1, 2, 4
-"""SD_LARGEST, SD_CAPPED, SD_BALANCED."""
+LARGEST, CAPPED = 1, 2
+"""SD_LARGEST, SD_CAPPED."""
 
 
 class Balance:

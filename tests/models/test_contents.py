@@ -32,6 +32,18 @@ CASES = {
         C2: potential(e = 2.4e8 V/C*q) a -> ground""",
         {"R.f": 0.0, "C1.q": 0.0, "C2.q": 0.0},
     ),
+    "a source at its peak before inductors in parallel": (
+        """node a[0..3]: electrical
+        R1: dissipator(e = 1.7 ohm*f) a[0] -> ground
+        C2: potential(q = 0.923 F*e) a[0] -> a[1]
+        V3: effort(e = 0.283 V*sin(2.77 rad/s*t - pi/2)) a[0] -> a[1]
+        R4: dissipator(e = 0.1 ohm*f) a[1] -> a[3]
+        R6: dissipator(e = 1.84 ohm*f) a[1] -> a[2]
+        L7: kinetic(p = 0.315 H*f) a[2] -> ground
+        L8: kinetic(p = 0.904 H*f) a[2] -> ground
+        R9: dissipator(e = 5 ohm*f) a[3] -> a[1]""",
+        {"L7.f": 0.0, "L8.f": 0.0, "a[1].e": 0.283},
+    ),
     "capacitors around a loop": (
         """node a, b: electrical
         C1: potential(e = 4 V/C*q) a -> ground

@@ -7,7 +7,6 @@
 #define SMALL 1e-3      /* of the largest coefficient of its row and kind: it proposes much, and is asked last */
 #define DUST 1e-11      /* the same: what is left of a zero, and is never asked */
 #define NOTHING 1e-280  /* less is no magnitude */
-#define BALANCED 1e-9   /* of the largest term of a row: where all others are less, nothing balances it but round-off */
 #define BORNE 1e3       /* times what balances a steep row, or what it is at the point: what a proposal may make of it */
 #define TENTH 0.1       /* of a proposal that a steep law does not bear: the next one */
 #define SHORTER 320     /* of them: from the largest double to one */
@@ -186,46 +185,10 @@ int sd_propagate_beside(const sd_balance *m, const double *size, const char *sma
     return 0;
 }
 
-/* Rates that proposals alone size, in rows whose largest term is another of them and balanced by nothing, are raised to
- * what balances it: a source at its peak moves by what round-off leaves of cos(pi/2), and proposes 1e-12 for what others
- * need 1e3 of.  room [3 rows] */
-static void raise_rates(const sd_balance *m, int32_t first, const double *size, const char *small, const double *x,
-                        const double *excited, double *room, double *scale)
-{
-    double *leading = room, *second = leading + m->rows, *from = second + m->rows;
-    int raised = 1;
-    for (int sweep = 0; sweep < SWEEPS && raised; sweep++) {
-        raised = 0;
-        memcpy(leading, excited, (size_t)m->rows * sizeof *leading);
-        for (int32_t r = 0; r < m->rows; r++)
-            second[r] = 0.0, from[r] = -1.0;
-        for (int32_t e = 0; e < m->entries; e++) {
-            int32_t r = m->row[e], k = m->column[e];
-            double term = size[e] * scale[k];
-            int leads = term > leading[r];
-            second[r] = leads ? leading[r] : sd_larger(second[r], term);
-            from[r] = !leads ? from[r] : k >= first && x[k] == 0.0 ? (double)k : -1.0;
-            leading[r] = leads ? term : leading[r];
-        }
-        for (int32_t e = 0; e < m->entries; e++) {
-            int32_t r = m->row[e], k = m->column[e];
-            if (k < first || x[k] != 0.0 || !(size[e] > 0.0) || small[e] || from[r] < 0.0 || from[r] == (double)k ||
-                second[r] >= BALANCED * leading[r])
-                continue;
-            double wanted = leading[r] / size[e];
-            if (isfinite(wanted) && scale[k] < wanted) {
-                scale[k] = wanted;
-                raised = 1;
-            }
-        }
-    }
-}
-
 int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const char *rated, const int32_t *member,
              int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale)
 {
-    size_t room = 3 * (size_t)m->rows;
-    double *most = calloc((room > (size_t)members ? room : (size_t)members) + 1, sizeof *most);
+    double *most = calloc((size_t)members + 1, sizeof *most);
     if (!most)
         return -1;
     for (int32_t k = 0; k < m->unknowns; k++)
@@ -244,8 +207,6 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const ch
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
     }
     failed |= small ? sd_propagate_beside(m, jacobian, small, residual, NULL, NULL, flags, scale) : -1;
-    if (small && flags & SD_BALANCED)
-        raise_rates(m, first, jacobian, small, x, residual, most, scale);
     free(small);
     for (int32_t k = 0; k < m->unknowns; k++)
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;

@@ -29,7 +29,7 @@ typedef struct sd_balance {
     const int32_t *kind;              /* [unknowns] number of the kind and unit, below `kinds` */
 } sd_balance;
 
-enum { SD_LARGEST = 1, SD_CAPPED = 2, SD_BALANCED = 4 };
+enum { SD_LARGEST = 1, SD_CAPPED = 2 };
 
 /* found [unknowns]: zeros become what balances the rows; size [entries]: |coefficient|, 0: no place; excited [rows]:
  * magnitude of the free terms; silent [rows]: rows that propose nothing (NULL: none); flags: SD_LARGEST of several proposals, SD_CAPPED by the largest known of the kind.
@@ -57,8 +57,7 @@ int sd_propagate_beside(const sd_balance *balance, const double *size, const cha
 
 /* scale [unknowns] := magnitudes of x, by the entries of a Jacobian and a residual at x, which are overwritten by their
  * magnitudes (what is no number counts as 0).  nominal [first]: 0 where there is none, NULL: nowhere; first: unknowns before the rates; rated [rows]: rows that say nothing of sizes
- * at first; member [first], members: number of the kind of an unknown; flags: SD_BALANCED where coefficients are those of
- * rows as they are (sums of rows leave dust).  Returns 0; -1: no memory. */
+ * at first; member [first], members: number of the kind of an unknown.  Returns 0; -1: no memory. */
 int sd_scale(const sd_balance *balance, const double *nominal, int32_t first, const char *rated, const int32_t *member,
              int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale);
 
