@@ -114,6 +114,7 @@ class Context:
         self.laws: dict[str, Any] = {}  # of branches, by family (laws.LawOf)
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
+        self.sized: Callable[[Node], Node] = lambda node: node  # an index with the sizes that are given
         self.taken: Callable[..., Node]  # what an instance takes in at an end (elaborate/port_efforts.py)
         self.constraints: dict[str, list[Constraint]] = {}
         self._quantities: dict[tuple[int, int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number, unit

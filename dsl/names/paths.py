@@ -69,18 +69,20 @@ class Paths(Names):
         if len(base.indices) != count:
             raise self.index_count(symbol.name, count, len(base.indices), span)
         at = tuple(self.index(i) for i in base.indices)
-        fitting = [s for s in symbol.spaces if _may_hold(s, at)]
+        fitting = [s for s in symbol.spaces if self._holds(s, at) is not False]
         if not fitting:
             raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
-        space = fitting[0] if len(fitting) == 1 else self._one_of(symbol, fitting, at)
+        space = fitting[0] if len(fitting) == 1 else self._one_of(symbol, fitting, at, span)
         self._remember(symbol, space, base, at, count)
         own = space.prefix[len(space.prefix) - count :]
         change = dict(base.change)
         change |= {o: a for o, a in zip(own, at, strict=True) if o.op == "index"}
         return space, change
 
-    def _one_of(self, symbol: InstanceSymbol, spaces: list[Space], at: tuple[Node, ...]) -> Space:
-        """The statement of a label that an element comes from; SeveralError where a loop runs over several."""
+    def _one_of(self, symbol: InstanceSymbol, spaces: list[Space], at: tuple[Node, ...], span: syntax.Span) -> Space:
+        """The statement of a label that an element comes from; SeveralError where a loop runs over several, E805 where
+        sizes without a value leave it open.
+        """
         chosen = self.chosen.get((id(symbol), at))
         if chosen is not None:
             return chosen
@@ -91,8 +93,23 @@ class Paths(Names):
                 offset = ex.sub(a, loop)
                 parts = (Part(s, *(ex.sub(b, offset) for b in r)) for s, r in zip(spaces, ranges, strict=True))
                 raise SeveralError(symbol.name, (id(symbol), at), loop.data, tuple(parts))
-        inside = [s for s in spaces if _holds(s, at)]
-        return (inside or spaces)[0]
+        inside = [s for s in spaces if self._holds(s, at)]
+        if not inside:
+            message = f"which statement of '{symbol.name}' has the element [{', '.join(map(str, at))}] is not known"
+            raise self.fail("E805", message, span, help="an index that the bounds of one of them hold")
+        return inside[0]
+
+    def _holds(self, space: Space, at: tuple[Node, ...]) -> bool | None:
+        """Whether fixed indices lie inside a statement's range, with the sizes given; None where these do not say."""
+        known = True
+        for a, (first, last) in zip(at, space.around[len(space.around) - len(at) :], strict=True):
+            if any(n.op == "index" for n in ex.topological([a])):
+                continue
+            for gap in (self.sized(ex.sub(a, first)), self.sized(ex.sub(last, a))):
+                if ex.is_const(gap) and gap.data < 0:
+                    return False
+                known &= ex.is_const(gap)
+        return True if known else None
 
     def _remember(self, symbol: InstanceSymbol, space: Space, base: Located, at: tuple[Node, ...], count: int) -> None:
         shape = space.around[len(space.around) - count :]
@@ -106,25 +123,3 @@ class Paths(Names):
         if isinstance(value, Vector):
             return Vector(tuple(Typed(ex.substitute(v.node, change), v.dimension) for v in value.items), value.first)
         return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
-
-
-def _gaps(space: Space, at: tuple[Node, ...]) -> list[Node]:
-    """How far fixed indices lie behind the first and before the last element of a statement."""
-    ranges = space.around[len(space.around) - len(at) :]
-    found = []
-    for a, (first, last) in zip(at, ranges, strict=True):
-        if all(n.op != "index" for n in ex.topological([a])):
-            found += [ex.sub(a, first), ex.sub(last, a)]
-    return found
-
-
-def _may_hold(space: Space, at: tuple[Node, ...]) -> bool:
-    """Whether no index lies outside a statement's range for certain."""
-    own = space.prefix[len(space.prefix) - len(at) :]
-    fits = all(o.op == "index" or o is a or a.op != "const" for o, a in zip(own, at, strict=True))
-    return fits and not any(ex.is_const(gap) and gap.data < 0 for gap in _gaps(space, at))
-
-
-def _holds(space: Space, at: tuple[Node, ...]) -> bool:
-    """Whether every index lies inside a statement's range for certain."""
-    return all(ex.is_const(gap) and gap.data >= 0 for gap in _gaps(space, at))
