@@ -297,6 +297,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         switches=tuple(parts.switches),
         levels=tuple(elaborator.choices.values()),
         read=nodes_read(parts),
+        literal=elaborator.resolver.sizes_read,
     )
 
 

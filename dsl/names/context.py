@@ -114,7 +114,8 @@ class Context:
         self.laws: dict[str, Any] = {}  # of branches, by family (laws.LawOf)
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
-        self.sized: Callable[[Node], Node] = lambda node: node  # an index with the sizes that are given
+        self.given: Callable[[Node], Node] = lambda node: node  # an index with the sizes that are given
+        self.sizes_read = False  # numbers of sizes say what something means
         self.taken: Callable[..., Node]  # what an instance takes in at an end (elaborate/port_efforts.py)
         self.constraints: dict[str, list[Constraint]] = {}
         self._quantities: dict[tuple[int, int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number, unit
@@ -128,6 +129,7 @@ class Context:
         self._bound: dict[str, Value] = {}  # loop variables, function arguments, an element's own variables
         self._names: dict[str, int] = {}
         self.chosen: dict[tuple[int, tuple[Node, ...]], Space] = {}  # the statement of a label that an index means
+        self.chosen_read = 0  # how often it was asked: what was resolved meanwhile holds in this part of a loop alone
         self.scope = Scope()
         self.source = SourceText("", "")
         self.file_scope = self.scope
@@ -218,6 +220,13 @@ class Context:
         finally:
             self._loops.pop()
             self._bound = before
+
+    def sized(self, node: Node) -> Node:
+        """An index or a bound with the sizes that are given, which what is resolved then depends on."""
+        if not ex.is_const(node):
+            self.sizes_read = True
+            node = self.given(node)
+        return node
 
     @contextmanager
     def narrowed(self, several: SeveralError, part: Part) -> Iterator[Loop]:

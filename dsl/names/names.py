@@ -255,7 +255,9 @@ class Names(Context):
         return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
 
     def _template(self, symbol: Definition) -> Value:
-        """The expression of a definition, resolved once where it was written; E105 where it needs itself."""
+        """The expression of a definition, resolved once where it was written (where a loop runs over several statements
+        of a label that it reads, in each of its parts); E105 where it needs itself.
+        """
         if symbol in self._active:
             chain = [s.name for s in self._active[self._active.index(symbol) :]] + [symbol.name]
             place = Place(symbol.space.source, symbol.span)
@@ -268,7 +270,7 @@ class Names(Context):
             if value is None:
                 raise Failed
             return value
-        self._values[key] = None
+        self._values[key], before = None, self.chosen_read
         self._active.append(symbol)
         placeholders = {n: Typed(ex.index(f"{symbol.name}.{n}"), NONE) for n in symbol.at}
         try:
@@ -292,6 +294,8 @@ class Names(Context):
         finally:
             self._active.pop()
         self._values[key] = value
+        if self.chosen_read != before:
+            del self._values[key]
         return value
 
     def _declared(self, symbol: Definition, value: Value) -> Value:

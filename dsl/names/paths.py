@@ -85,6 +85,7 @@ class Paths(Names):
         """
         chosen = self.chosen.get((id(symbol), at))
         if chosen is not None:
+            self.chosen_read += 1
             return chosen
         for k, a in enumerate(at):
             loop = next((n for n in ex.topological([a]) if n.op == "index"), None)

@@ -1,6 +1,9 @@
 """Families of components that several statements declare: each index means one of them, whatever the sizes are."""
 
+import math
+
 import pytest
+from model_runs import FOUR
 from sysdyn.api import ModelError, check, load
 
 CHAIN = """
@@ -72,3 +75,63 @@ def test_an_element_that_two_statements_make_is_named(whole, label):
     text = CHAIN.replace("A: chain()", whole).replace("node v[1..n-1]", "node v[0..n]")
     twice = [d.message for d in check(text) if d.code == "E106"]
     assert twice == [f"'{label}' is declared twice"] * bool(label)
+
+
+LAGS = """
+component lag {
+  input u: V
+  state z: V = 0 V
+  dynamic z' = (u - z)/(1 s)
+  output y = z
+}
+model m {
+  param n = 4
+  s[1]: lag(u = 1 V)
+  for i in 2..n-1 { s[i]: lag(u = s[i-1].y) }
+  s[n]: lag(u = s[n-1].y)
+}
+scene s of m {
+  time 0 s to 2 s
+  accuracy 1e-8
+  trace s[1..n].z as z
+}
+"""
+
+
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_what_an_input_reads_is_read_anew_in_each_part_of_a_loop(tmp_path, n):
+    """A cascade of first-order lags behind a step: 1 - exp(-t) sum of t^j/j! below k (Erlang)."""
+    (tmp_path / "m.sd").write_text(LAGS)
+    trace = load(tmp_path / "m.sd").run(set={"n": n})
+    for k in range(1, n + 1):
+        erlang = 1.0 - math.exp(-2.0) * sum(2.0**j / math.factorial(j) for j in range(k))
+        assert trace[f"z[{k}]"].values[-1] == pytest.approx(erlang, rel=1e-6)
+
+
+FILTER = """
+component cell {
+  port a, b: electrical
+  r: dissipator(e = 1 ohm*f) a -> b
+  c: potential(q = 1 mF*e) b -> ground
+}
+model m {
+  param n = 4
+  node v[0..n]: electrical
+  V: effort(e = 10 V) v[0] -> ground
+  s[1]: cell() a = v[0], b = v[1]
+  for i in 2..n { s[i]: cell() a = v[i-1], b = v[i] }
+  for i in 1..n { init s[i].c.e = 1 V*i }
+}
+scene s of m {
+  time 0 s to 1 ms
+  trace s[1..n].c.e as e
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.parametrize("n", [1, 4])
+def test_a_start_that_a_loop_says_of_several_statements(tmp_path, formulation, n):
+    (tmp_path / "m.sd").write_text(FILTER)
+    trace = load(tmp_path / "m.sd", formulation=formulation).run(set={"n": n})
+    assert [trace[f"e[{k}]"].values[0] for k in range(1, n + 1)] == pytest.approx(list(range(1, n + 1)), rel=1e-12)
