@@ -19,7 +19,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import ElementSetting, Observation, Scene
 from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
-from sysdyn.dsl.names.failures import Failed
+from sysdyn.dsl.names.failures import Failed, SeveralError
 from sysdyn.dsl.names.habits import blamed
 from sysdyn.dsl.names.symbols import Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
@@ -91,10 +91,12 @@ class SceneReader:
         with self.model.entering(self.model.space), self.resolver.within(self.model.space.scope, source):
             self.guarded(lambda statement: do(self, statement), s)
 
-    def guarded(self, do: Callable[..., None], statement: object) -> None:
+    def guarded(self, do: Callable[..., None], statement: syntax.SceneStatement | syntax.TraceItem) -> None:
         """Carry out one statement; what fails has been reported."""
         try:
             do(statement)
+        except SeveralError as several:
+            self.resolver.spread(several, statement.span)
         except Failed:
             return
 

@@ -6,6 +6,8 @@ given.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.names.context import Use, Value
@@ -106,17 +108,48 @@ class Paths(Names):
         for a, (first, last) in zip(at, space.around[len(space.around) - len(at) :], strict=True):
             if any(n.op == "index" for n in ex.topological([a])):
                 continue
-            for gap in (self.sized(ex.sub(a, first)), self.sized(ex.sub(last, a))):
-                if ex.is_const(gap) and gap.data < 0:
-                    return False
-                known &= ex.is_const(gap)
+            held = self._between(a, first, last)
+            if held is False:
+                return False
+            known &= held is True
         return True if known else None
+
+    def _between(self, index: Node, first: Node, last: Node) -> bool | None:
+        """Whether an index lies between bounds, with the sizes given; None where these do not say."""
+        gaps = [self.sized(ex.sub(index, first)), self.sized(ex.sub(last, index))]
+        if any(ex.is_const(gap) and gap.data < 0 for gap in gaps):
+            return False
+        return True if all(map(ex.is_const, gaps)) else None
 
     def _remember(self, symbol: InstanceSymbol, space: Space, base: Located, at: tuple[Node, ...], count: int) -> None:
         shape = space.around[len(space.around) - count :]
         if len(symbol.spaces) == 1:
             for node, bounds, index in zip(at, shape, base.indices, strict=True):
                 self.uses.append(Use(bounds, node, self.loops, symbol.name, self.place(index.span)))
+
+    def outside(self, read: Callable[[], Value], change: dict[Node, Node], span: syntax.Span) -> Value:
+        """A value from inside instances at the indices given; what it reads of several statements of a label by the
+        loop of its own is told by these: by a number, of one of them, by a loop around, in each part of that.
+        """
+        try:
+            return self._changed(read(), change)
+        except SeveralError as several:
+            given = change.get(ex.index(several.loop))
+            if given is None:
+                raise
+            loop = next((n for n in ex.topological([given]) if n.op == "index"), None)
+            if loop is not None:
+                offset = ex.sub(given, loop)
+                parts = (Part(p.space, ex.sub(p.first, offset), ex.sub(p.last, offset)) for p in several.parts)
+                raise SeveralError(several.label, several.key, loop.data, tuple(parts)) from None
+            held = [p for p in several.parts if self._between(given, p.first, p.last)]
+            if not held:
+                raise self.spread(several, span) from None
+            key, self.chosen[several.key] = several.key, held[0].space
+        try:
+            return self.outside(read, change, span)
+        finally:
+            del self.chosen[key]
 
     def _changed(self, value: Value, change: dict[Node, Node]) -> Value:
         if not change:

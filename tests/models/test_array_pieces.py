@@ -135,3 +135,34 @@ def test_a_start_that_a_loop_says_of_several_statements(tmp_path, formulation, n
     (tmp_path / "m.sd").write_text(FILTER)
     trace = load(tmp_path / "m.sd", formulation=formulation).run(set={"n": n})
     assert [trace[f"e[{k}]"].values[0] for k in range(1, n + 1)] == pytest.approx(list(range(1, n + 1)), rel=1e-12)
+
+
+FORWARD = LAGS.replace("output y = z", "output y = z\n  output w = u + z").replace(
+    "accuracy 1e-8\n  trace s[1..n].z as z",
+    """accuracy 1e-8
+  trace whole, most, s[1..n].z as z, s[1..n].w as w, before, pulled""",
+)
+FORWARD = FORWARD.replace(
+    "  s[n]: lag(u = s[n-1].y)\n",
+    """  s[n]: lag(u = s[n-1].y)
+  let whole = sum(i in 2..n: s[i].w*s[i-1].y)
+  let most = max(i in 1..n: s[i].u - s[i].w)
+  let before = s[n-1].w
+  coord x[1..n]: translation = 0 m
+  for i in 1..n-1 { work s[i+1].w*1 N/V on x[i] }
+  energy T* = sum(i in 1..n: 1/2*1 kg*x[i]'^2)
+  let pulled = sum(i in 1..n: i*x[i]'')
+""",
+)
+
+
+@pytest.mark.parametrize("n", [3, 4, 6])
+def test_a_loop_over_what_reads_several_statements_itself_is_cut(tmp_path, n):
+    (tmp_path / "m.sd").write_text(FORWARD)
+    trace = load(tmp_path / "m.sd").run(set={"n": n})
+    z, w = ([trace[f"{name}[{k}]"].values[-1] for k in range(1, n + 1)] for name in "zw")
+    assert w == pytest.approx([1.0 + z[0], *(z[k] + z[k - 1] for k in range(1, n))], rel=1e-9)
+    assert trace["whole"].values[-1] == pytest.approx(sum(w[k] * z[k - 1] for k in range(1, n)), rel=1e-9)
+    assert trace["most"].values[-1] == pytest.approx(-min(z), rel=1e-9)
+    assert trace["before"].values[-1] == pytest.approx(w[n - 2], rel=1e-9)
+    assert trace["pulled"].values[-1] == pytest.approx(sum(k * w[k] for k in range(1, n)), rel=1e-9)
