@@ -203,6 +203,7 @@ def _elaborated(
         reader.settings(scene)
     for source, statement in given:
         reader.command(source, statement, SceneReader.set_parameter)
+    elaborator.settle()
     elaborator.statements()
     return elaborator, reader
 

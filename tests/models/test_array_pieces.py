@@ -166,3 +166,37 @@ def test_a_loop_over_what_reads_several_statements_itself_is_cut(tmp_path, n):
     assert trace["most"].values[-1] == pytest.approx(-min(z), rel=1e-9)
     assert trace["before"].values[-1] == pytest.approx(w[n - 2], rel=1e-9)
     assert trace["pulled"].values[-1] == pytest.approx(sum(k * w[k] for k in range(1, n)), rel=1e-9)
+
+
+CELLS = """
+component cell {
+  input left: K
+  input right: K
+  node c: heat = 300 K
+  C: potential(q = 1 J/K*e) c -> ground
+  m: flow(f = 1 W/K*(left + right - 2*c.e)) ground -> c
+  output T = c.e
+}
+model m {
+  param n = 4
+  s[1]: cell() left = 300 K, right = s[2].T
+  for i in 2..n-1 { s[i]: cell() left = s[i-1].T, right = s[i+1].T }
+  s[n]: cell() left = s[n-1].T, right = 400 K
+}
+scene s of m {
+  time 0 s to 200 s
+  accuracy 1e-6
+  trace s[1..n].T as T
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "co_hamiltonian"])
+def test_laws_that_read_both_neighbours_stand_in_parts(tmp_path, formulation):
+    """At rest each cell is the mean of its neighbours."""
+    (tmp_path / "m.sd").write_text(CELLS)
+    model = load(tmp_path / "m.sd", formulation=formulation)
+    for n in (2, 3, 5):
+        trace = model.run(set={"n": n})
+        found = [trace[f"T[{k}]"].values[-1] for k in range(1, n + 1)]
+        assert found == pytest.approx([300.0 + 100.0 * k / (n + 1) for k in range(1, n + 1)], abs=1e-3)
