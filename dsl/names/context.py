@@ -128,7 +128,7 @@ class Context:
         self._loops: list[Loop] = []
         self._bound: dict[str, Value] = {}  # loop variables, function arguments, an element's own variables
         self._names: dict[str, int] = {}
-        self.chosen: dict[tuple[int, tuple[Node, ...]], Space] = {}  # the statement of a label that an index means
+        self.chosen: dict[tuple[int, int, Node], tuple[Space, ...]] = {}  # statements of a label, by its k-th index
         self.chosen_read = 0  # how often it was asked: what was resolved meanwhile holds in this part of a loop alone
         self.scope = Scope()
         self.source = SourceText("", "")
@@ -234,12 +234,25 @@ class Context:
         k = next(k for k, loop in enumerate(self._loops) if loop.index == several.loop)
         loop = self._loops[k]
         inner = Loop(loop.index, later(loop.first, part.first), earlier(loop.last, part.last))
-        self._loops[k], self.chosen[several.key] = inner, part.space
+        self._loops[k] = inner
         try:
-            yield inner
+            with self.choosing(several, part):
+                yield inner
         finally:
             self._loops[k] = loop
-            del self.chosen[several.key]
+
+    @contextmanager
+    def choosing(self, several: SeveralError, part: Part) -> Iterator[None]:
+        """Where an index of a label means statements of this part."""
+        before = self.chosen.get(several.key)
+        self.chosen[several.key] = part.spaces
+        try:
+            yield
+        finally:
+            if before is None:
+                del self.chosen[several.key]
+            else:
+                self.chosen[several.key] = before
 
     def spread(self, several: SeveralError, span: syntax.Span) -> Failed:
         """Report that nobody can cut the loop."""

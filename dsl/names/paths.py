@@ -6,6 +6,7 @@ given.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 from sysdyn.dsl.model import expression as ex
@@ -85,22 +86,42 @@ class Paths(Names):
         """The statement of a label that an element comes from; SeveralError where a loop runs over several, E805 where
         sizes without a value leave it open.
         """
-        chosen = self.chosen.get((id(symbol), at))
-        if chosen is not None:
-            self.chosen_read += 1
-            return chosen
         for k, a in enumerate(at):
+            chosen = self.chosen.get((id(symbol), k, a))
+            if chosen is not None:
+                self.chosen_read += 1
+                spaces = [s for s in spaces if any(s is c for c in chosen)]
+        for k, a in enumerate(at) if len(spaces) > 1 else ():
             loop = next((n for n in ex.topological([a]) if n.op == "index"), None)
-            ranges = [s.around[len(s.around) - len(at) + k] for s in spaces]
-            if loop is not None and len(set(ranges)) > 1:
+            ranges = tuple(dict.fromkeys(_range(s, k, len(at)) for s in spaces))
+            if loop is not None and len(ranges) > 1 and (len(at) == 1 or self._apart(ranges)):
                 offset = ex.sub(a, loop)
-                parts = (Part(s, *(ex.sub(b, offset) for b in r)) for s, r in zip(spaces, ranges, strict=True))
-                raise SeveralError(symbol.name, (id(symbol), at), loop.data, tuple(parts))
+                alike = [tuple(s for s in symbol.spaces if _range(s, k, len(at)) == bounds) for bounds in ranges]
+                cut = [Part(s, *(ex.sub(b, offset) for b in bounds)) for s, bounds in zip(alike, ranges, strict=True)]
+                met = cut if len(at) == 1 else [part for part in cut if self._meets(loop, part)]
+                raise SeveralError(symbol.name, (id(symbol), k, a), loop.data, tuple(met or cut[:1]))
         inside = [s for s in spaces if self._holds(s, at)]
         if not inside:
             message = f"which statement of '{symbol.name}' has the element [{', '.join(map(str, at))}] is not known"
             raise self.fail("E805", message, span, help="an index that the bounds of one of them hold")
         return inside[0]
+
+    def _apart(self, ranges: tuple[tuple[Node, Node], ...]) -> bool:
+        """Whether no two ranges share a number, with the sizes given."""
+        pairs = itertools.combinations(ranges, 2)
+        return not any(self._before(a[1], b[0]) is False and self._before(b[1], a[0]) is False for a, b in pairs)
+
+    def _meets(self, loop: Node, part: Part) -> bool:
+        """Whether a loop may run over a part, with the sizes given."""
+        own = next((o for o in self.loops if o.index == loop.data), None)
+        if own is None:
+            return True
+        return self._before(own.last, part.first) is not True and self._before(part.last, own.first) is not True
+
+    def _before(self, a: Node, b: Node) -> bool | None:
+        """Whether a < b; None where the sizes given do not say."""
+        gap = self.sized(ex.sub(b, a))
+        return bool(gap.data > 0) if ex.is_const(gap) else None
 
     def _holds(self, space: Space, at: tuple[Node, ...]) -> bool | None:
         """Whether fixed indices lie inside a statement's range, with the sizes given; None where these do not say."""
@@ -140,16 +161,13 @@ class Paths(Names):
             loop = next((n for n in ex.topological([given]) if n.op == "index"), None)
             if loop is not None:
                 offset = ex.sub(given, loop)
-                parts = (Part(p.space, ex.sub(p.first, offset), ex.sub(p.last, offset)) for p in several.parts)
+                parts = (Part(p.spaces, ex.sub(p.first, offset), ex.sub(p.last, offset)) for p in several.parts)
                 raise SeveralError(several.label, several.key, loop.data, tuple(parts)) from None
             held = [p for p in several.parts if self._between(given, p.first, p.last)]
             if not held:
                 raise self.spread(several, span) from None
-            key, self.chosen[several.key] = several.key, held[0].space
-        try:
-            return self.outside(read, change, span)
-        finally:
-            del self.chosen[key]
+            with self.choosing(several, held[0]):
+                return self.outside(read, change, span)
 
     def _changed(self, value: Value, change: dict[Node, Node]) -> Value:
         if not change:
@@ -157,3 +175,8 @@ class Paths(Names):
         if isinstance(value, Vector):
             return Vector(tuple(Typed(ex.substitute(v.node, change), v.dimension) for v in value.items), value.first)
         return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
+
+
+def _range(space: Space, k: int, count: int) -> tuple[Node, Node]:
+    """The bounds of the k-th of `count` indices of a statement."""
+    return space.around[len(space.around) - count + k]

@@ -200,3 +200,47 @@ def test_laws_that_read_both_neighbours_stand_in_parts(tmp_path, formulation):
         trace = model.run(set={"n": n})
         found = [trace[f"T[{k}]"].values[-1] for k in range(1, n + 1)]
         assert found == pytest.approx([300.0 + 100.0 * k / (n + 1) for k in range(1, n + 1)], abs=1e-3)
+
+
+PLATE = """
+component cell {
+  input near: K
+  node c: heat = 300 K
+  C: potential(q = 1 J/K*e) c -> ground
+  m: flow(f = 1 W/K*(near - 4*c.e)) ground -> c
+  output T = c.e
+}
+model m {
+  param n = 4
+  param k = 3
+  for i in 2..n-1 { for j in 2..k-1 { s[i, j]: cell() near = s[i-1, j].T + s[i+1, j].T + s[i, j-1].T + s[i, j+1].T } }
+  for j in 2..k-1 {
+    s[1, j]: cell() near = 300 K + 20 K*j + s[2, j].T + s[1, j-1].T + s[1, j+1].T
+    s[n, j]: cell() near = s[n-1, j].T + 310 K + 10 K*n + 20 K*j + s[n, j-1].T + s[n, j+1].T
+  }
+  for i in 2..n-1 {
+    s[i, 1]: cell() near = s[i-1, 1].T + s[i+1, 1].T + 300 K + 10 K*i + s[i, 2].T
+    s[i, k]: cell() near = s[i-1, k].T + s[i+1, k].T + s[i, k-1].T + 320 K + 10 K*i + 20 K*k
+  }
+  s[1, 1]: cell() near = 320 K + s[2, 1].T + 310 K + s[1, 2].T
+  s[1, k]: cell() near = 300 K + 20 K*k + s[2, k].T + s[1, k-1].T + 330 K + 20 K*k
+  s[n, 1]: cell() near = s[n-1, 1].T + 330 K + 10 K*n + 300 K + 10 K*n + s[n, 2].T
+  s[n, k]: cell() near = s[n-1, k].T + 310 K + 10 K*n + 20 K*k + s[n, k-1].T + 320 K + 10 K*n + 20 K*k
+  let whole = sum(i in 1..n: sum(j in 1..k: s[i, j].T))
+}
+scene warm of m {
+  time 0 s to 100 s
+  accuracy 1e-6
+  trace s[1..n, 1..k].T as T, whole
+}
+"""
+
+
+@pytest.mark.parametrize(("n", "k"), [(2, 2), (2, 4), (3, 3), (5, 4)])
+def test_a_grid_with_edges_and_corners_of_their_own(tmp_path, n, k):
+    """What rises evenly along both indices is the mean of its neighbours everywhere."""
+    (tmp_path / "m.sd").write_text(PLATE)
+    trace = load(tmp_path / "m.sd").run(set={"n": n, "k": k})
+    wanted = {(i, j): 300.0 + 10.0 * i + 20.0 * j for i in range(1, n + 1) for j in range(1, k + 1)}
+    assert [trace[f"T[{i}, {j}]"].values[-1] for i, j in wanted] == pytest.approx(list(wanted.values()), abs=1e-3)
+    assert trace["whole"].values[-1] == pytest.approx(sum(wanted.values()), abs=1e-2)
