@@ -426,14 +426,14 @@ scene s of servo { time 0 s to 1 s; trace k.q }
 
 
 def test_rest_is_not_sought_where_what_is_left_open_hides_the_rows(tmp_path):
-    """With heat and angles left open 40 states of rest were told, 39 of them at 1e16 rad: rows held beside that alone."""
+    """With heat and angles left open 40 states were told, 39 of them at 1e16 rad: rows held beside that alone."""
     path = tmp_path / "servo.sd"
     path.write_text(SHORTED)
     found = api.equilibria(path)
     assert 1 <= len(found) <= 4
-    for rest in found:
-        hot = rest.efforts["hot"][0]
+    for state in found:
+        hot = state.efforts["hot"][0]
         joule = 36.0 / (1.2 * (1.0 + 0.0039 * (hot - 293.15)))
         lost = 0.2 * (hot - 293.15) + 1e-9 * (hot**4 - 293.15**4)
         assert joule == pytest.approx(lost, rel=1e-6)
-        assert abs(rest.values["w"]) < 1.0
+        assert abs(state.values["w"]) < 1.0
