@@ -244,3 +244,20 @@ def test_a_grid_with_edges_and_corners_of_their_own(tmp_path, n, k):
     wanted = {(i, j): 300.0 + 10.0 * i + 20.0 * j for i in range(1, n + 1) for j in range(1, k + 1)}
     assert [trace[f"T[{i}, {j}]"].values[-1] for i, j in wanted] == pytest.approx(list(wanted.values()), abs=1e-3)
     assert trace["whole"].values[-1] == pytest.approx(sum(wanted.values()), abs=1e-2)
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_a_range_that_the_sizes_leave_empty(tmp_path, formulation):
+    """Its inner nodes were undetermined coordinates in the complementary formulations (E516)."""
+    changes = {
+        "r: dissipator(e = 1 ohm*f) a -> b": "node m: electrical; r: dissipator(e = 1 ohm*f) a -> m",
+        "  c: potential": "  l: kinetic(p = 1 mH*f) m -> b\n  c: potential",
+        "  for i in 2..n {": "  s[n]: cell() a = v[n-1], b = v[n]\n  for i in 2..n-1 {",
+        "to 1 ms": "to 50 ms",
+    }
+    text = FILTER
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    (tmp_path / "m.sd").write_text(text)
+    trace = load(tmp_path / "m.sd", formulation=formulation).run(set={"n": 2})
+    assert [trace[f"e[{k}]"].values[-1] for k in (1, 2)] == pytest.approx([10.0, 10.0], abs=0.05)
