@@ -50,7 +50,7 @@ class SceneReader:
         self._targets: set[tuple[str, str]] = set()
 
     def levels(self, scene: syntax.Scene) -> None:
-        """The `level` statements and those that set inputs: before the model's instances are elaborated."""
+        """The `level` statements and those that set inputs and sizes: before the model's instances are elaborated."""
         self._each(scene, {syntax.SceneLevel: SceneReader.level, syntax.Set: SceneReader.set_input})
 
     def settings(self, scene: syntax.Scene) -> None:
@@ -58,8 +58,9 @@ class SceneReader:
         self._each(scene, {syntax.Set: SceneReader.set_parameter})
 
     def set_input(self, s: syntax.Set) -> None:
-        """A `set` of an input of the model; others wait."""
+        """A `set` of an input of the model, or of what may be a size; others wait."""
         self.given.input(s)
+        self.given.size(s)
 
     def set_parameter(self, s: syntax.Set) -> None:
         """A `set` of a parameter or elements of one."""

@@ -213,10 +213,13 @@ class Names(Context):
         return tuple(v.node for name in symbol.at if isinstance(v := self._bound[name], Typed))
 
     def _expanded(self, symbol: ParameterSymbol | UnknownSymbol, span: syntax.Span) -> Vector:
-        """A whole array as a value: only where its bounds are written as numbers."""
-        if len(symbol.shape) != 1 or not all(ex.is_const(b) for b in symbol.shape[0]):
+        """A whole array as a value: where its bounds are written as numbers; of parameters with the sizes given."""
+        bounds = symbol.shape[0] if len(symbol.shape) == 1 else ()
+        if isinstance(symbol, ParameterSymbol):
+            bounds = tuple(self.sized(b) for b in bounds)
+        if not bounds or not all(ex.is_const(b) for b in bounds):
             raise self._unnamed(symbol.name, span)
-        return self._elements(symbol, symbol.shape[0])
+        return self._elements(symbol, bounds)
 
     def _elements(self, symbol: ParameterSymbol | UnknownSymbol, bounds: Sequence[Node]) -> Vector:
         """The elements between two constants."""
@@ -370,6 +373,8 @@ class Names(Context):
     def _part(self, symbol: ParameterSymbol | UnknownSymbol, index: syntax.Range, span: syntax.Span) -> Vector:
         """`x[1..3]`: the elements between two numbers, whatever size the array has."""
         bounds = [self.index(b) for b in (index.lower, index.upper)]
+        if isinstance(symbol, ParameterSymbol):
+            bounds = [self.sized(b) for b in bounds]
         if not all(ex.is_const(b) for b in bounds):
             return self.slice(self._expanded(symbol, span), index)
         for bound in bounds:

@@ -261,3 +261,35 @@ def test_a_range_that_the_sizes_leave_empty(tmp_path, formulation):
     (tmp_path / "m.sd").write_text(text)
     trace = load(tmp_path / "m.sd", formulation=formulation).run(set={"n": 2})
     assert [trace[f"e[{k}]"].values[-1] for k in (1, 2)] == pytest.approx([10.0, 10.0], abs=0.05)
+
+
+TANKS = """
+component row {
+  param n = 2
+  param A[1..n]: m^2
+  port ps[1..n]: hydraulic
+  for i in 1..n { T[i]: potential(e = 1000 kg/m^3*g0/A[i]*q) ps[i] -> ground; init T[i].e = 1 kPa*i }
+  output whole = sum(i in 1..n: T[i].q)
+}
+model m {
+  param n = 3
+  param A[1..n]: m^2 = [1 m^2, 2 m^2, 3 m^2]
+  node mid[1..n]: hydraulic
+  for i in 1..n { R[i]: dissipator(e = 1e9 Pa.s/m^3*f) mid[i] -> ground }
+  K: row(n = n, A = GIVEN) ps = mid
+}
+scene s of m {
+  time 0 s to 1 s
+  trace K.whole
+}
+"""
+
+
+@pytest.mark.parametrize("given", ["A", "A[1..n]"])
+def test_an_array_of_parameters_is_handed_on_whole(tmp_path, given):
+    (tmp_path / "m.sd").write_text(TANKS.replace("GIVEN", given))
+    model = load(tmp_path / "m.sd")
+    for settings, areas in (({}, [1, 2, 3]), ({"A[2]": 5.0}, [1, 5, 3]), ({"n": 2, "A": [4.0, 7.0]}, [4, 7])):
+        held = model.run(set=settings)["K.whole"].values[0]
+        wanted = sum(1e3 * (i + 1) * area / (1e3 * 9.80665) for i, area in enumerate(areas))
+        assert held == pytest.approx(wanted, rel=1e-9), settings
