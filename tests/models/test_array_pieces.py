@@ -293,3 +293,39 @@ def test_an_array_of_parameters_is_handed_on_whole(tmp_path, given):
         held = model.run(set=settings)["K.whole"].values[0]
         wanted = sum(1e3 * (i + 1) * area / (1e3 * 9.80665) for i, area in enumerate(areas))
         assert held == pytest.approx(wanted, rel=1e-9), settings
+
+
+FALLING = """
+component cell {
+  port a: electrical
+  C: potential(q = 1 mF*e) a -> ground
+  R: dissipator(e = 100 ohm*f) a -> ground
+  discrete n = 0
+  when C.e < 1 V { n := n + 1 }
+  output k = n
+  output v = C.e
+}
+model m {
+  param n = 4
+  node v[1..n]: electrical
+  s[1]: cell() a = v[1]
+  for i in 2..n-1 { s[i]: cell() a = v[i] }
+  s[n]: cell() a = v[n]
+  for i in 1..n { init s[i].C.e = 1.5 V + 0.1 V*i }
+  discrete total = 0
+  for i in 1..n { when s[i].v < 0.9 V { total := total + i } }
+}
+scene go of m {
+  time 0 s to 1 s
+  trace total, s[1..n].k as k
+}
+"""
+
+
+@pytest.mark.parametrize("n", [2, 4])
+def test_events_of_an_element_that_is_declared_by_itself(tmp_path, n):
+    """Their targets have sizes for indices, `s[n].n[n]`: a fault before."""
+    (tmp_path / "m.sd").write_text(FALLING)
+    trace = load(tmp_path / "m.sd").run(set={"n": n})
+    assert [trace[f"k[{i}]"].values[-1] for i in range(1, n + 1)] == [1.0] * n
+    assert trace["total"].values[-1] == n * (n + 1) / 2
