@@ -214,7 +214,7 @@ class Names(Context):
 
     def _expanded(self, symbol: ParameterSymbol | UnknownSymbol, span: syntax.Span) -> Vector:
         """A whole array as a value: where its bounds are written as numbers; of parameters with the sizes given."""
-        bounds = symbol.shape[0] if len(symbol.shape) == 1 else ()
+        bounds: tuple[Node, ...] = symbol.shape[0] if len(symbol.shape) == 1 else ()
         if isinstance(symbol, ParameterSymbol):
             bounds = tuple(self.sized(b) for b in bounds)
         if not bounds or not all(ex.is_const(b) for b in bounds):
