@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -203,6 +204,7 @@ def _elaborated(
         reader.settings(scene)
     for source, statement in given:
         reader.command(source, statement, SceneReader.set_parameter)
+    elaborator.settle()
     elaborator.statements()
     return elaborator, reader
 
@@ -259,8 +261,10 @@ def _unused_levels(elaborator: Elaborator, report: Report) -> None:
     known = {space.path for space, _ in elaborator.bodies} if elaborator.levels else set[str]()
     for path, (name, place) in elaborator.levels.items():
         if path not in known and not report.failed:
-            near = nearest(path, known)
+            near, whole = nearest(path, known), re.sub(r"\[[^]]*\]", "", path)
             help_ = f"nearest: '{near}'" if near else None
+            if whole in known:
+                help_ = f"a level is that of all elements of a statement: level {whole} = {name}"
             report.error("E802", f"level {path} = {name}: there is no component '{path}'", place, help=help_)
 
 
@@ -297,6 +301,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         switches=tuple(parts.switches),
         levels=tuple(elaborator.choices.values()),
         read=nodes_read(parts),
+        literal=elaborator.resolver.sizes_read,
     )
 
 

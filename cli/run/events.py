@@ -103,15 +103,18 @@ class _Planner:
     def _assignment(self, action: Action) -> Assignment:
         row, target = self.row[action.value], action.target
         if target.op == "param":
-            return Assignment(_shown(target.data, target), "discrete", self.prepared.place(target), row)
+            return Assignment(self._shown(target.data, target), "discrete", self.prepared.place(target), row)
         name, kind, _ = target.data
         if (name, kind) not in self.unknown:
             text = f"an event assigns the flow of {name}, which is no unknown of this formulation"
             raise ModelError([Diagnostic("E702", text, action.place)])
         first, shape = self.unknown[name, kind]
-        shown = _shown(name, target) + "'" * (kind == "f")
-        place = first + position_of(shape, (n.data for n in target.args))
+        shown = self._shown(name, target) + "'" * (kind == "f")
+        place = first + position_of(shape, self.prepared.indices(target))
         return Assignment(shown, "state" if kind == "s" else "flow", place, row)
+
+    def _shown(self, name: str, node: Node) -> str:
+        return f"{name}[{', '.join(map(str, self.prepared.indices(node)))}]" if node.args else name
 
     def _contact(self, number: int, s: Switch) -> Contact:
         def row(name: str | None) -> int:
@@ -129,10 +132,6 @@ class _Planner:
             tuple(self.row[name] for name in s.aim), tuple(self.prepared.place(n) for n in s.direction),
             -1 if s.holds is None else self.prepared.place(s.holds), s.moves, s.dual,
         )  # fmt: skip
-
-
-def _shown(name: str, node: Node) -> str:
-    return f"{name}[{', '.join(str(round(a.data)) for a in node.args)}]" if node.args else name
 
 
 def _plain(form: DescriptorForm) -> frozenset[int]:

@@ -65,7 +65,7 @@ def watch(prepared: Prepared) -> Watch:
 
 
 def _near(time: Floats, at: float) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(time - at) <= 1e-12 * max(abs(at), 1.0))
+    return np.asarray(np.abs(time - at) <= 1e-12 * abs(at))
 
 
 def judge(prepared: Prepared, outcome: Outcome, report: Report, *, finished: bool) -> tuple[Claim, ...]:

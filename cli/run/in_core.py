@@ -65,7 +65,7 @@ class InCore:
         network = self.prepared.network
         if self.prepared.compiled.form.kinks:
             raise NotApplicableError("the model has kinks")
-        read = ex.topological([side for claim in network.statics for side in (claim.left, claim.right)])
+        read = ex.topological([x for c in network.statics for x in (c.left, c.right, c.within) if x is not None])
         if any(node.op == "param" and not str(node.data).startswith("static ") for node in read):
             raise NotApplicableError("a claim about counts reads parameters")
 

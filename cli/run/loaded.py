@@ -116,6 +116,8 @@ class Compiled:
 
 def _text_of(value: Any) -> str:
     """A value as --set takes it."""
+    if np.ndim(value):
+        return f"[{', '.join(repr(float(v)) for v in value)}]"
     return value if isinstance(value, str) else repr(float(value))
 
 
@@ -230,6 +232,9 @@ class Loaded:
             else:
                 key = (plain, *map(int, element[2].split(","))) if element else name
                 numbers[key] = np.asarray(number, dtype=float)
+        if texts:  # a list fits the sizes that are set with it, not those of the text
+            whole = [name for name in numbers if np.ndim(numbers[name])]
+            texts += [(name, _text_of(numbers.pop(name).tolist())) for name in whole]
         return numbers, tuple(texts)
 
     def bound(self, settings: Settings) -> tuple[Prepared, Compiled]:

@@ -70,7 +70,11 @@ class Prepared:
             return compiled.program.scalars.index(node.data)
         boxes = binding.parameters.boxes[node.data]
         where = places_of(compiled.network, compiled.form, compiled.program, binding)[1][node.data]
-        return where + position_of(boxes, (n.data for n in node.args))
+        return where + position_of(boxes, self.indices(node))
+
+    def indices(self, node: Node) -> tuple[int, ...]:
+        """The indices of an element: numbers, or sizes (the last one of an array that is declared by itself)."""
+        return tuple(round(self.binding.evaluate(n)) for n in node.args)
 
     @staticmethod
     def arrays_of(b: Binding) -> dict[str, Any]:

@@ -258,14 +258,14 @@ def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None]
             return float("nan") if value is None else float(value)
         return prepared.binding.evaluate(node)
 
-    left, right = evaluate([claim.left, claim.right], lookup)
+    left, right, within = evaluate([claim.left, claim.right, claim.within or ex.const(0.0)], lookup)
     if missing:
         message = f"static quantity '{missing[0]}' is not known for this model (too large, or undetermined)"
         report.note("N608", message, claim.place)
-    elif not holds(claim.operator, left, right, 0.0):
-        report.error(
-            "E909", f"expect failed: {claim.text.removeprefix('expect ')}, found {left:g} and {right:g}", claim.place
-        )
+    elif not holds(claim.operator, left, right, within):
+        unit = "" if claim.unit.text == "1" else f" {claim.unit.text}"
+        found = f"found {left:.9g}{unit} and {right:.9g}{unit}"
+        report.error("E909", f"expect failed: {claim.text.removeprefix('expect ')}, {found}", claim.place)
 
 
 def holds(operator: str, left: float, right: float, within: float) -> bool:

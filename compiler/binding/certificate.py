@@ -311,9 +311,9 @@ class _Judge:
         return self._value(root, {})
 
     def _leaf(self, node: Node, args: list[Value]) -> Value:
-        """What no unknown changes; of arrays the first element stands for all."""
+        """What no unknown changes; of arrays the first element stands for all, and one for none (an empty range)."""
         if node.op == "param" and node.args:
-            return float(np.ravel(self.binding.parameters.values[node.data])[0])
+            return float(next(iter(np.ravel(self.binding.parameters.values[node.data])), 1.0))
         if node.op == "index":
             return 1.0
         return self.binding.parameters.lookup(node, args)

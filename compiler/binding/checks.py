@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from sysdyn.compiler.forms.momenta import given, inertial, undefined
 from sysdyn.compiler.model.energies import EnergyModel, tangible
 from sysdyn.compiler.model.integers import Integers
+from sysdyn.compiler.network.primal.bounds import Sizes
 from sysdyn.dsl.model.affine import AFFINE
 from sysdyn.dsl.model.expression import Node, topological, variables
 from sysdyn.dsl.model.network import Network
@@ -22,7 +23,7 @@ def check_energies(model: EnergyModel, network: Network) -> tuple[Diagnostic, ..
     return (
         *_idle_efforts(model),
         *_assertions(model, network),
-        *_undetermined(model),
+        *_undetermined(model, Sizes(network)),
         *_missing_momenta(model),
         *_indices(model),
     )
@@ -51,8 +52,8 @@ def _assertions(model: EnergyModel, network: Network) -> Iterator[Diagnostic]:
             yield Diagnostic("E513", message, c.place, "delete 'tangible'")
 
 
-def _undetermined(model: EnergyModel) -> Iterator[Diagnostic]:
-    """E516: no store, dissipator, constraint or law contains the coordinate."""
+def _undetermined(model: EnergyModel, sizes: Sizes) -> Iterator[Diagnostic]:
+    """E516: no store, dissipator, constraint or law contains the coordinate, and there is one (no empty range)."""
     roots = [t.expression for name in model.functions for t in model.function(name)]
     roots += _of_rows(model, ("phi", "psi", "gamma")) + [w.effort for w in model.works]
     m = model.mirror
@@ -62,7 +63,7 @@ def _undetermined(model: EnergyModel) -> Iterator[Diagnostic]:
         if _owners([work.effort], "e"):
             present |= _owners([work.on], m.coordinate)
     for c in model.coordinates:
-        if c.name not in present:
+        if c.name not in present and all(sizes.value(a) <= sizes.value(b) for a, b in c.shape):
             message = f"coordinate {c.name} has no inertia, stiffness, dissipation or constraint: it is undetermined"
             yield Diagnostic("E516", message, c.place, "give it an energy, a content or a constraint")
 

@@ -80,10 +80,13 @@ class Elaborator(Instances):
                 self.declare(statement)
 
     def elements(self) -> None:
-        """Elaborate the model's instances, those inside them, and the laws of all."""
+        """Elaborate the model's instances and those inside them; their laws follow once sizes are set (`settle`)."""
         with self.entering(self.space):
             self.announce(self._body)
         self._said(syntax.Law, self.law)
+
+    def settle(self) -> None:
+        """The laws of all branches."""
         for _, group in groupby(self.pending, key=lambda pending: id(pending.space)):
             own = list(group)
             with nullcontext() if isinstance(own[0].space, Likeness) else self.entering(own[0].space):

@@ -122,18 +122,22 @@ class Elements(Connections):
         loops, bound = self.resolver.loops, self.resolver.sight()
         whole = (*symbol.family.prefix, *at)
 
-        def resolve() -> None:
-            own = self.current.bound if not kind and symbol.family.name == self.current.path else None
-            own = own_variables(symbol, whole) if own is None else own
-            self._hidden(value, own, symbol.name)
-            with self.resolver.inside(loops, {**bound, **own}):
-                law = law_of(self.resolver, symbol, whole, side, value, kind, span)
+        def part() -> None:
+            """Of the loops in sight: of all, or where the law reads several statements of a label, of a part."""
+            law, loops = law_of(self.resolver, symbol, whole, side, value, kind, span), self.resolver.loops
             node = events.of_law(self, law, symbol.family.name, whole, loops, self.place(s.span))
             law = replace(law, law=node)
             self.resolver.laws[symbol.family.name] = law
             said = law.kind, law.side, law.law
             branch = self.branch(symbol.family.name, symbol.domain, whole, loops, said, ends, self.place(s.span))
             self.parts.branches.append(branch)
+
+        def resolve() -> None:
+            own = self.current.bound if not kind and symbol.family.name == self.current.path else None
+            own = own_variables(symbol, whole) if own is None else own
+            self._hidden(value, own, symbol.name)
+            with self.resolver.inside(loops, {**bound, **own}):
+                self.in_parts(part, span)
 
         self.pending.append(Pending(self.current, span, resolve))
 
@@ -169,11 +173,8 @@ class Elements(Connections):
         whole = (*branches[0].family.prefix, *at)
         kind, side, value, span = law
 
-        def resolve() -> None:
-            own = {**own_variables(branches[0], whole, "1"), **own_variables(branches[1], whole, "2")}
-            self._hidden(value, own, s.decl.name)
-            with self.resolver.inside(loops, bound), self.resolver.bound(own):
-                ratio = ratio_of(self.resolver, branches, whole, kind, side, value, span)
+        def part() -> None:
+            ratio, loops = ratio_of(self.resolver, branches, whole, kind, side, value, span), self.resolver.loops
             place = self.place(s.span)
             for symbol, end in zip(branches, ends, strict=True):
                 name, domain, port = symbol.family.name, symbol.domain, ("port", None, None)
@@ -182,6 +183,12 @@ class Elements(Connections):
             self.parts.couplings.append(
                 Coupling(ratio.kind, first, second, whole, loops, ratio.side, ratio.ratio, place)
             )
+
+        def resolve() -> None:
+            own = {**own_variables(branches[0], whole, "1"), **own_variables(branches[1], whole, "2")}
+            self._hidden(value, own, s.decl.name)
+            with self.resolver.inside(loops, bound), self.resolver.bound(own):
+                self.in_parts(part, span)
 
         self.pending.append(Pending(self.current, span, resolve))
 

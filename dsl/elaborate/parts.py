@@ -141,7 +141,7 @@ class ElaborationContext:
         self.report = report
         self.resolver = Resolver(report)
         self.parts = NetworkBuilder()
-        self.resolver.branches = self.parts.branches
+        self.resolver.branches, self.resolver.given = self.parts.branches, self.given
         self.scope = Scope()
         self.current = Space("", self.scope, self.scope, self.resolver.source)
         self._postponed: list[tuple[Space, NotYetError, Callable[[], None]]] = []

@@ -19,7 +19,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import ElementSetting, Observation, Scene
 from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
-from sysdyn.dsl.names.failures import Failed
+from sysdyn.dsl.names.failures import Failed, SeveralError
 from sysdyn.dsl.names.habits import blamed
 from sysdyn.dsl.names.symbols import Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
@@ -50,7 +50,7 @@ class SceneReader:
         self._targets: set[tuple[str, str]] = set()
 
     def levels(self, scene: syntax.Scene) -> None:
-        """The `level` statements and those that set inputs: before the model's instances are elaborated."""
+        """The `level` statements and those that set inputs and sizes: before the model's instances are elaborated."""
         self._each(scene, {syntax.SceneLevel: SceneReader.level, syntax.Set: SceneReader.set_input})
 
     def settings(self, scene: syntax.Scene) -> None:
@@ -58,8 +58,9 @@ class SceneReader:
         self._each(scene, {syntax.Set: SceneReader.set_parameter})
 
     def set_input(self, s: syntax.Set) -> None:
-        """A `set` of an input of the model; others wait."""
+        """A `set` of an input of the model, or of what may be a size; others wait."""
         self.given.input(s)
+        self.given.size(s)
 
     def set_parameter(self, s: syntax.Set) -> None:
         """A `set` of a parameter or elements of one."""
@@ -91,10 +92,12 @@ class SceneReader:
         with self.model.entering(self.model.space), self.resolver.within(self.model.space.scope, source):
             self.guarded(lambda statement: do(self, statement), s)
 
-    def guarded(self, do: Callable[..., None], statement: object) -> None:
+    def guarded(self, do: Callable[..., None], statement: syntax.SceneStatement | syntax.TraceItem) -> None:
         """Carry out one statement; what fails has been reported."""
         try:
             do(statement)
+        except SeveralError as several:
+            self.resolver.spread(several, statement.span)
         except Failed:
             return
 

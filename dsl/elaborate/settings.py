@@ -36,6 +36,12 @@ class Settings:
         if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
             self._input(s.target.name, *self.model.parts.inputs[s.target.name], s)
 
+    def size(self, s: syntax.Set) -> None:
+        """A `set` of a parameter of the model to a number, which may be a size that instances ask for."""
+        symbol = self.model.scope.symbols.get(s.target.name) if isinstance(s.target, syntax.Name) else None
+        if isinstance(symbol, ParameterSymbol) and not symbol.shape and isinstance(s.value, syntax.Number):
+            self.parameter(s)
+
     def parameter(self, s: syntax.Set) -> None:
         """`set ref = value` of a parameter or an element of one, no input; paths lead into instances."""
         if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:

@@ -464,7 +464,7 @@ class Network:
     authors: Mapping[str, tuple[tuple[str, Place], ...]] = field(default_factory=dict)  # elements of gathered families
     read: frozenset[str] = frozenset()  # common-effort nodes whose effort a law or statement reads (not a trace)
     positions: tuple[State, ...] = ()  # of points, at the start alone
-    literal: bool = False  # numbers of sizes are part of it: reductions are written out
+    literal: bool = False  # numbers of sizes are part of it: reductions written out, elements that indices mean
 
     @property
     def traced(self) -> tuple[str, ...]:

@@ -114,6 +114,8 @@ class Context:
         self.laws: dict[str, Any] = {}  # of branches, by family (laws.LawOf)
         self.quadratures: dict[str, Quadrature] = {}  # integrals that are read: a state each
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
+        self.given: Callable[[Node], Node] = lambda node: node  # an index with the sizes that are given
+        self.sizes_read = False  # numbers of sizes say what something means
         self.taken: Callable[..., Node]  # what an instance takes in at an end (elaborate/port_efforts.py)
         self.constraints: dict[str, list[Constraint]] = {}
         self._quantities: dict[tuple[int, int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number, unit
@@ -126,7 +128,8 @@ class Context:
         self._loops: list[Loop] = []
         self._bound: dict[str, Value] = {}  # loop variables, function arguments, an element's own variables
         self._names: dict[str, int] = {}
-        self.chosen: dict[tuple[int, tuple[Node, ...]], Space] = {}  # the statement of a label that an index means
+        self.chosen: dict[tuple[int, int, Node], tuple[Space, ...]] = {}  # statements of a label, by its k-th index
+        self.chosen_read = 0  # how often it was asked: what was resolved meanwhile holds in this part of a loop alone
         self.scope = Scope()
         self.source = SourceText("", "")
         self.file_scope = self.scope
@@ -218,18 +221,38 @@ class Context:
             self._loops.pop()
             self._bound = before
 
+    def sized(self, node: Node) -> Node:
+        """An index or a bound with the sizes that are given, which what is resolved then depends on."""
+        if not ex.is_const(node):
+            self.sizes_read = True
+            node = self.given(node)
+        return node
+
     @contextmanager
     def narrowed(self, several: SeveralError, part: Part) -> Iterator[Loop]:
         """Inside one part of a loop that runs over several statements of a label."""
         k = next(k for k, loop in enumerate(self._loops) if loop.index == several.loop)
         loop = self._loops[k]
         inner = Loop(loop.index, later(loop.first, part.first), earlier(loop.last, part.last))
-        self._loops[k], self.chosen[several.key] = inner, part.space
+        self._loops[k] = inner
         try:
-            yield inner
+            with self.choosing(several, part):
+                yield inner
         finally:
             self._loops[k] = loop
-            del self.chosen[several.key]
+
+    @contextmanager
+    def choosing(self, several: SeveralError, part: Part) -> Iterator[None]:
+        """Where an index of a label means statements of this part."""
+        before = self.chosen.get(several.key)
+        self.chosen[several.key] = part.spaces
+        try:
+            yield
+        finally:
+            if before is None:
+                del self.chosen[several.key]
+            else:
+                self.chosen[several.key] = before
 
     def spread(self, several: SeveralError, span: syntax.Span) -> Failed:
         """Report that nobody can cut the loop."""

@@ -14,9 +14,9 @@ class Failed(Exception):  # noqa: N818
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A range of a loop variable in which a label has one statement: that statement's space."""
+    """A range of a loop variable in which a label has these statements: one, or several that another index tells."""
 
-    space: Space
+    spaces: tuple[Space, ...]
     first: Node
     last: Node
 
@@ -32,6 +32,6 @@ class NotYetError(Failed):
 class SeveralError(Failed):
     """A loop runs over several statements of one label: whoever owns the loop cuts it into these parts."""
 
-    def __init__(self, label: str, key: tuple[int, tuple[Node, ...]], loop: str, parts: tuple[Part, ...]) -> None:
+    def __init__(self, label: str, key: tuple[int, int, Node], loop: str, parts: tuple[Part, ...]) -> None:
         super().__init__(label)
         self.label, self.key, self.loop, self.parts = label, key, loop, parts

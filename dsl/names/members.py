@@ -59,7 +59,7 @@ class Members(Ports):
                 if len(found.indices) != len(symbol.at):
                     raise self.index_count(symbol.name, len(symbol.at), len(found.indices), e.span)
                 at = tuple(self.index(i) for i in found.indices)
-                return self._changed(self.definition(symbol, at), found.change)
+                return self.outside(lambda: self.definition(symbol, at), found.change, e.span)
             if not isinstance(symbol, Definition):
                 return self.value(symbol, e.span)
         value = self.resolve(e.base)
@@ -80,7 +80,7 @@ class Members(Ports):
             return self._audit(e)
         whole = self.located(e)
         if whole is not None:
-            return self._changed(self.value(whole.symbol, e.span), whole.change)
+            return self.outside(lambda: self.value(whole.symbol, e.span), whole.change, e.span)
         base = self.located(e.base)
         if base is None:
             inner = e.base.base if isinstance(e.base, syntax.Item) else e.base

@@ -213,10 +213,13 @@ class Names(Context):
         return tuple(v.node for name in symbol.at if isinstance(v := self._bound[name], Typed))
 
     def _expanded(self, symbol: ParameterSymbol | UnknownSymbol, span: syntax.Span) -> Vector:
-        """A whole array as a value: only where its bounds are written as numbers."""
-        if len(symbol.shape) != 1 or not all(ex.is_const(b) for b in symbol.shape[0]):
+        """A whole array as a value: where its bounds are written as numbers; of parameters with the sizes given."""
+        bounds: tuple[Node, ...] = symbol.shape[0] if len(symbol.shape) == 1 else ()
+        if isinstance(symbol, ParameterSymbol):
+            bounds = tuple(self.sized(b) for b in bounds)
+        if not bounds or not all(ex.is_const(b) for b in bounds):
             raise self._unnamed(symbol.name, span)
-        return self._elements(symbol, symbol.shape[0])
+        return self._elements(symbol, bounds)
 
     def _elements(self, symbol: ParameterSymbol | UnknownSymbol, bounds: Sequence[Node]) -> Vector:
         """The elements between two constants."""
@@ -255,7 +258,9 @@ class Names(Context):
         return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
 
     def _template(self, symbol: Definition) -> Value:
-        """The expression of a definition, resolved once where it was written; E105 where it needs itself."""
+        """The expression of a definition, resolved once where it was written (where a loop runs over several statements
+        of a label that it reads, in each of its parts); E105 where it needs itself.
+        """
         if symbol in self._active:
             chain = [s.name for s in self._active[self._active.index(symbol) :]] + [symbol.name]
             place = Place(symbol.space.source, symbol.span)
@@ -268,7 +273,7 @@ class Names(Context):
             if value is None:
                 raise Failed
             return value
-        self._values[key] = None
+        self._values[key], before = None, self.chosen_read
         self._active.append(symbol)
         placeholders = {n: Typed(ex.index(f"{symbol.name}.{n}"), NONE) for n in symbol.at}
         try:
@@ -292,6 +297,8 @@ class Names(Context):
         finally:
             self._active.pop()
         self._values[key] = value
+        if self.chosen_read != before:
+            del self._values[key]
         return value
 
     def _declared(self, symbol: Definition, value: Value) -> Value:
@@ -366,6 +373,8 @@ class Names(Context):
     def _part(self, symbol: ParameterSymbol | UnknownSymbol, index: syntax.Range, span: syntax.Span) -> Vector:
         """`x[1..3]`: the elements between two numbers, whatever size the array has."""
         bounds = [self.index(b) for b in (index.lower, index.upper)]
+        if isinstance(symbol, ParameterSymbol):
+            bounds = [self.sized(b) for b in bounds]
         if not all(ex.is_const(b) for b in bounds):
             return self.slice(self._expanded(symbol, span), index)
         for bound in bounds:

@@ -6,6 +6,9 @@ given.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
+
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.names.context import Use, Value
@@ -69,36 +72,102 @@ class Paths(Names):
         if len(base.indices) != count:
             raise self.index_count(symbol.name, count, len(base.indices), span)
         at = tuple(self.index(i) for i in base.indices)
-        fitting = [s for s in symbol.spaces if _may_hold(s, at)]
+        fitting = [s for s in symbol.spaces if self._holds(s, at) is not False]
         if not fitting:
             raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
-        space = fitting[0] if len(fitting) == 1 else self._one_of(symbol, fitting, at)
+        space = fitting[0] if len(fitting) == 1 else self._one_of(symbol, fitting, at, span)
         self._remember(symbol, space, base, at, count)
         own = space.prefix[len(space.prefix) - count :]
         change = dict(base.change)
         change |= {o: a for o, a in zip(own, at, strict=True) if o.op == "index"}
         return space, change
 
-    def _one_of(self, symbol: InstanceSymbol, spaces: list[Space], at: tuple[Node, ...]) -> Space:
-        """The statement of a label that an element comes from; SeveralError where a loop runs over several."""
-        chosen = self.chosen.get((id(symbol), at))
-        if chosen is not None:
-            return chosen
+    def _one_of(self, symbol: InstanceSymbol, spaces: list[Space], at: tuple[Node, ...], span: syntax.Span) -> Space:
+        """The statement of a label that an element comes from; SeveralError where a loop runs over several, E805 where
+        sizes without a value leave it open.
+        """
         for k, a in enumerate(at):
+            chosen = self.chosen.get((id(symbol), k, a))
+            if chosen is not None:
+                self.chosen_read += 1
+                spaces = [s for s in spaces if any(s is c for c in chosen)]
+        for k, a in enumerate(at) if len(spaces) > 1 else ():
             loop = next((n for n in ex.topological([a]) if n.op == "index"), None)
-            ranges = [s.around[len(s.around) - len(at) + k] for s in spaces]
-            if loop is not None and len(set(ranges)) > 1:
+            ranges = tuple(dict.fromkeys(_range(s, k, len(at)) for s in spaces))
+            if loop is not None and len(ranges) > 1 and (len(at) == 1 or self._apart(ranges)):
                 offset = ex.sub(a, loop)
-                parts = (Part(s, *(ex.sub(b, offset) for b in r)) for s, r in zip(spaces, ranges, strict=True))
-                raise SeveralError(symbol.name, (id(symbol), at), loop.data, tuple(parts))
-        inside = [s for s in spaces if _holds(s, at)]
-        return (inside or spaces)[0]
+                alike = [tuple(s for s in symbol.spaces if _range(s, k, len(at)) == bounds) for bounds in ranges]
+                cut = [Part(s, *(ex.sub(b, offset) for b in bounds)) for s, bounds in zip(alike, ranges, strict=True)]
+                met = cut if len(at) == 1 else [part for part in cut if self._meets(loop, part)]
+                raise SeveralError(symbol.name, (id(symbol), k, a), loop.data, tuple(met or cut[:1]))
+        inside = [s for s in spaces if self._holds(s, at)]
+        if not inside:
+            message = f"which statement of '{symbol.name}' has the element [{', '.join(map(str, at))}] is not known"
+            raise self.fail("E805", message, span, help="an index that the bounds of one of them hold")
+        return inside[0]
+
+    def _apart(self, ranges: tuple[tuple[Node, Node], ...]) -> bool:
+        """Whether no two ranges share a number, with the sizes given."""
+        pairs = itertools.combinations(ranges, 2)
+        return not any(self._before(a[1], b[0]) is False and self._before(b[1], a[0]) is False for a, b in pairs)
+
+    def _meets(self, loop: Node, part: Part) -> bool:
+        """Whether a loop may run over a part, with the sizes given."""
+        own = next((o for o in self.loops if o.index == loop.data), None)
+        if own is None:
+            return True
+        return self._before(own.last, part.first) is not True and self._before(part.last, own.first) is not True
+
+    def _before(self, a: Node, b: Node) -> bool | None:
+        """Whether a < b; None where the sizes given do not say."""
+        gap = self.sized(ex.sub(b, a))
+        return bool(gap.data > 0) if ex.is_const(gap) else None
+
+    def _holds(self, space: Space, at: tuple[Node, ...]) -> bool | None:
+        """Whether fixed indices lie inside a statement's range, with the sizes given; None where these do not say."""
+        known = True
+        for a, (first, last) in zip(at, space.around[len(space.around) - len(at) :], strict=True):
+            if any(n.op == "index" for n in ex.topological([a])):
+                continue
+            held = self._between(a, first, last)
+            if held is False:
+                return False
+            known &= held is True
+        return True if known else None
+
+    def _between(self, index: Node, first: Node, last: Node) -> bool | None:
+        """Whether an index lies between bounds, with the sizes given; None where these do not say."""
+        gaps = [self.sized(ex.sub(index, first)), self.sized(ex.sub(last, index))]
+        if any(ex.is_const(gap) and gap.data < 0 for gap in gaps):
+            return False
+        return True if all(map(ex.is_const, gaps)) else None
 
     def _remember(self, symbol: InstanceSymbol, space: Space, base: Located, at: tuple[Node, ...], count: int) -> None:
         shape = space.around[len(space.around) - count :]
         if len(symbol.spaces) == 1:
             for node, bounds, index in zip(at, shape, base.indices, strict=True):
                 self.uses.append(Use(bounds, node, self.loops, symbol.name, self.place(index.span)))
+
+    def outside(self, read: Callable[[], Value], change: dict[Node, Node], span: syntax.Span) -> Value:
+        """A value from inside instances at the indices given; what it reads of several statements of a label by the
+        loop of its own is told by these: by a number, of one of them, by a loop around, in each part of that.
+        """
+        try:
+            return self._changed(read(), change)
+        except SeveralError as several:
+            given = change.get(ex.index(several.loop))
+            if given is None:
+                raise
+            loop = next((n for n in ex.topological([given]) if n.op == "index"), None)
+            if loop is not None:
+                offset = ex.sub(given, loop)
+                parts = (Part(p.spaces, ex.sub(p.first, offset), ex.sub(p.last, offset)) for p in several.parts)
+                raise SeveralError(several.label, several.key, loop.data, tuple(parts)) from None
+            held = [p for p in several.parts if self._between(given, p.first, p.last)]
+            if not held:
+                raise self.spread(several, span) from None
+            with self.choosing(several, held[0]):
+                return self.outside(read, change, span)
 
     def _changed(self, value: Value, change: dict[Node, Node]) -> Value:
         if not change:
@@ -108,23 +177,6 @@ class Paths(Names):
         return Typed(ex.substitute(value.node, change), value.dimension, value.truth)
 
 
-def _gaps(space: Space, at: tuple[Node, ...]) -> list[Node]:
-    """How far fixed indices lie behind the first and before the last element of a statement."""
-    ranges = space.around[len(space.around) - len(at) :]
-    found = []
-    for a, (first, last) in zip(at, ranges, strict=True):
-        if all(n.op != "index" for n in ex.topological([a])):
-            found += [ex.sub(a, first), ex.sub(last, a)]
-    return found
-
-
-def _may_hold(space: Space, at: tuple[Node, ...]) -> bool:
-    """Whether no index lies outside a statement's range for certain."""
-    own = space.prefix[len(space.prefix) - len(at) :]
-    fits = all(o.op == "index" or o is a or a.op != "const" for o, a in zip(own, at, strict=True))
-    return fits and not any(ex.is_const(gap) and gap.data < 0 for gap in _gaps(space, at))
-
-
-def _holds(space: Space, at: tuple[Node, ...]) -> bool:
-    """Whether every index lies inside a statement's range for certain."""
-    return all(ex.is_const(gap) and gap.data >= 0 for gap in _gaps(space, at))
+def _range(space: Space, k: int, count: int) -> tuple[Node, Node]:
+    """The bounds of the k-th of `count` indices of a statement."""
+    return space.around[len(space.around) - count + k]

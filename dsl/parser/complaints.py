@@ -316,6 +316,10 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
     if text == "(" and "*" in accepted and unit is not None:
         meant = f"factors are joined by '*': {unit[1]}*{unit[2]}(...)"
         return "E113", f"'{unit[2]}' stands where a unit is read", meant
+    last = re.search(r"([\d.]+\s+[^\s()]*?)\s*([./]?)([^\W\d]\w*)$", line)
+    if text == "[" and word != "param" and "*" in accepted and last is not None:
+        meant = f"the variable stands apart: {last[1].strip()} {'/' if last[2] == '/' else '*'} {last[3]}[...]"
+        return "E113", f"'{last[3]}' stands where a unit is read", meant
     if word == "work" and line.split()[-1:] == ["on"]:
         shape = SHAPES["work"]
     if word in ("param", "const", "coord", "state") and re.search(r":\s*[-+]?[\d.]+$", line):

@@ -214,6 +214,9 @@ def _dynamics(model: Elaborator, known: Values, report: Report) -> None:
             report.error("E507", f"state {name} {what}", said[-1].place, help="each element once")
 
 
+OVERLAP = "bounds that do not overlap with these sizes"
+
+
 def _branches(model: Elaborator, known: Values, report: Report) -> None:
     """E106: an element of an array that several statements make."""
     pieces: dict[str, list[Branch]] = {}
@@ -222,13 +225,14 @@ def _branches(model: Elaborator, known: Values, report: Report) -> None:
             pieces.setdefault(re.sub(r"\[[^]]*\]", "", branch.name), []).append(branch)  # `X[2].R` is a piece of X.R
     told: set[str] = set()
     for name, made in pieces.items():
-        label = name.partition(".")[0].partition("#")[0]
+        inside = [branch.name.rpartition("[")[0] for branch in made if "[" in branch.name]
+        label = (inside or [name])[0].partition("#")[0]  # what bears the index: a component, or the element itself
         if len(made) < 2 or label in told:
             continue
         counts = _counted([(branch.at, branch.loops) for branch in made], known)
         for element in (element for element, number in counts.items() if number > 1):
             told.add(label)
-            report.error("E106", f"'{_indexed(label, element)}' is declared twice", made[-1].place)
+            report.error("E106", f"'{_indexed(label, element)}' is declared twice", made[-1].place, help=OVERLAP)
             break
 
 

@@ -58,6 +58,13 @@ def active(branch: Branch, known: Values) -> bool:
     return report.failed
 
 
+MEANT = {
+    letter: f"where it is meant to deliver power: its content, in a component with a branch: content {word} = ... {of}"
+    for letter, word, of in (("f", "D", "(int e df)"), ("e", "G", "(int f de)"))
+}
+"""By its own variable: how an active element is written, of which nothing is asked."""
+
+
 def _judge(branch: Branch, law: Node, known: Values, laws: _Laws, report: Report) -> None:
     if law.op == "sum" and law.data[0] == 0.0 and len(law.args) == 1 and law.args[0].op == "var":
         return  # 5 ohm*f
@@ -79,7 +86,7 @@ def _judge(branch: Branch, law: Node, known: Values, laws: _Laws, report: Report
         unit = domain.flow if letter == "f" else domain.effort
         name = branch.name.partition("#")[0]
         message = f"dissipator '{name}': e*f = {x * value:.3g} W < 0 at {letter} = {x:g} {unit.text}"
-        report.error("E313", f"{message} (active element)", branch.place, help="an effort or flow source with that law")
+        report.error("E313", f"{message} (active element)", branch.place, help=MEANT[letter])
         return
 
 

@@ -141,8 +141,8 @@ class Report:
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """Everything found: by file (in the order of their first finding), errors before warnings before notes, by
-        class (1 names and text, 2 units, ...: what others follow from comes first), then place.
+        """Everything found: by file (in the order of their first finding), errors (and CAUSE) before warnings before
+        notes, by class (1 names and text, 2 units, ...: what others follow from comes first), then place.
         """
         if self._sorted[0] != len(self._found):
             files: dict[str, int] = {}
@@ -163,6 +163,8 @@ class Report:
             raise ModelError(self.diagnostics)
 
 
+CAUSE = "W101"
+"""A warning that is told before errors, for units and members that do not fit follow from it."""
 HERE_TOO = "here too"
 """Beside the other places of one slip."""
 
@@ -208,7 +210,7 @@ def shortened(found: Iterable[Diagnostic]) -> list[Diagnostic]:
 
 def _order(item: Diagnostic, files: dict[str, int]) -> tuple[int, int, str, int, int, str, str]:
     """Sort key: file, severity, class, span, code, message."""
-    rank = tuple(_SEVERITIES).index(item.code[0]), item.code[1]
+    rank = 0 if item.code == CAUSE else tuple(_SEVERITIES).index(item.code[0]), item.code[1]
     if item.place is None:
         return files[""], *rank, -1, -1, item.code, item.message
     span = item.place.span

@@ -39,7 +39,7 @@ REMEDIES = {
     "E310": "coefficients that are equal both ways round",
     "E311": "leave one of them out",
     "E312": "one of the two",
-    "E313": "a positive resistance; a source where power is delivered",
+    "E313": "a positive resistance; its content where power is delivered",
     "E314": "leave 'lossless' out, or the element that is named",
     "E315": "a dissipator or a store, whose law may read its own variable",
     "E316": "a transformer relates e1 and e2 or f1 and f2, a gyrator e1 and f2",

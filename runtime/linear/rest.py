@@ -37,6 +37,8 @@ SAME = 1e-6
 """Distance of two states of rest, in magnitudes, below which they are one."""
 NEAR = 1e-9
 """Part of a magnitude that is tried as zero."""
+FAR = 1e9
+"""Times its magnitude: a displacement that is left open and has wandered off."""
 SHARE = 0.05
 """Of the work that a search for a start may take: that of one search for rest."""
 MANY = 20_000
@@ -47,14 +49,16 @@ NEAREST, FARTHEST = -1.0, 1.5
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """A state of rest; residual: largest row relative to its terms; free: unknowns that it leaves open, by name;
-    together: directions in which displacements may move together without changing anything; standing: the parameters
-    and the active set of constraints that hold at times, holding: how each of these stands.
+    """A state of rest; residual: largest row relative to its terms; free: unknowns that it leaves open, by name, and
+    open_: which these are [unknowns]; together: directions in which displacements may move together without changing
+    anything; standing: the parameters and the active set of constraints that hold at times, holding: how each of these
+    stands.
     """
 
     state: ConsistentState
     residual: float
     free: tuple[str, ...]
+    open_: Mask
     together: int = 0
     standing: tuple[Floats, Mask] | None = None
     holding: dict[str, str] = field(default_factory=dict)
@@ -196,11 +200,14 @@ class Resting:
         y = self._clean(own.x, problem)
         null = self._null(y, again) / again.scale[:, None] if self.n <= DENSE else np.zeros((self.n, 0))
         y = self._back(y, again, null, near)
+        if (np.abs(y) > FAR * problem.scale).any():  # rows hold beside terms that large alone
+            return None
         state = ConsistentState(self.t, y, self.rates(y), (), own.residual)
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
         largest = np.abs(null).max(axis=1, initial=0.0)
-        free = tuple(self.system.name(int(k)) for k in np.flatnonzero(told & (largest > SAME)))
-        return Rest(state, own.residual, free, self.along.shape[1])
+        open_ = told & (largest > SAME)
+        free = tuple(self.system.name(int(k)) for k in np.flatnonzero(open_))
+        return Rest(state, own.residual, free, open_, self.along.shape[1])
 
     def _met(self, y: Floats) -> bool:
         return solve(self.problem(y), y, 1).residual < MET
@@ -219,7 +226,10 @@ class Resting:
             return y
         away = (y - near) / problem.scale
         back = y - problem.scale * (null @ least_squares(null, away))
-        return back if self._met(back) else y
+        if self._met(back):
+            return back
+        found = solve(self.problem(back), back)  # along what bends, or from where its rows hold by round-off alone
+        return found.x if found.residual < MET else y
 
     def _turned(self, y: Floats) -> Floats:
         """Angles in -pi..pi where the rows cannot tell whole turns; -pi but for round-off is pi."""
@@ -296,5 +306,6 @@ def rests(
         if found is not None and all(resting.apart(other, found) for other in kept):
             kept.append(found)
             mirrored.append(-found.state.y)
-            scale = np.maximum(scale, np.abs(found.state.y - guess))
+            # what is left open says nothing of how far others lie, and would wander off
+            scale = np.maximum(scale, np.where(found.open_, 0.0, np.abs(found.state.y - guess)))
     return tuple(kept)

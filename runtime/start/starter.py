@@ -31,6 +31,7 @@ from sysdyn.runtime.numerics.gauss_newton import Problem, Work
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.numerics.products import add_sizes
 from sysdyn.runtime.start.equations import Equations
+from sysdyn.runtime.start.residue import Residue
 from sysdyn.runtime.start.sums import Sums, Weights, of_few, of_many, weights
 from sysdyn.values import dataclass
 
@@ -106,7 +107,7 @@ class Starter:
     def __init__(self, system: System) -> None:
         self.system = system
         self.here, self.known = (0.0, False, b""), dict[str, NDArray[Any]]()
-        self.work = Work()  # of one search for a start
+        self.work, self._residue = Work(), Residue(self)  # of one search for a start
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
         if system.unknowns > LARGE:  # found again where it is asked
@@ -372,7 +373,7 @@ class Starter:
         """
         known, found, nominal = self.equations, np.zeros(x.size), self.settled.named
         x = np.ascontiguousarray(x, dtype=np.float64)
-        values, free = self.jacobian(t, x), self.residual(t, x)
+        values, free = self.jacobian(t, x), self._residue.cleared(t, self.residual(t, x))
         rows, missed = known.guessed
         told = np.where(np.isin(self.rows, rows) & np.isfinite(values), values, 0.0) if missed.size else 0.0
         sized = values - told if missed.size or not values.flags.writeable else values

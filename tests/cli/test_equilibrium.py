@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from sysdyn import api
 from sysdyn.cli.analysis import resting
 from sysdyn.cli.main import run
 from sysdyn.cli.progress import SEARCH, ProgressLine
@@ -399,3 +400,40 @@ scene fill of pipes {
     out = capsys.readouterr().out
     assert "nodes a = 3 bar, b = 200000 Pa" in out
     assert "C = 2e-07 m^3" in out
+
+
+SHORTED = """
+model servo {
+  node a, b: electrical
+  node w, w2: rotation
+  node hot: heat
+  U: effort(e = 6 V) a -> ground
+  Rw: dissipator(e = 1.2 ohm*(1 + 0.0039 K^-1*(hot.e - 293.15 K))*f) a -> b
+  L: kinetic(p = 2 mH*f) b -> ground
+  K: gyrator(e1 = 0.05 V.s*f2) b -> ground, w -> ground
+  J: kinetic(p = 2e-5 kg.m^2*f) w
+  k: potential(e = 0.8 N.m*q + 3 N.m*q^3) w -> w2
+  d: dissipator(e = 1e-3 N.m.s*f) w -> w2
+  J2: kinetic(p = 5e-5 kg.m^2*f) w2
+  T: effort(e = 0.02 N.m) w2 -> ground
+  C: potential(q = 15 J/K*e) hot -> ground
+  G: flow(f = 0.2 W/K*(hot.e - 293.15 K) + 1e-9 W/K^4*(hot.e^4 - (293.15 K)^4)) hot -> ground
+  joule: flow(f = Rw.e*Rw.f) ground -> hot
+  init C.e = 300 K
+}
+scene s of servo { time 0 s to 1 s; trace k.q }
+"""
+
+
+def test_rest_is_not_sought_where_what_is_left_open_hides_the_rows(tmp_path):
+    """With heat and angles left open 40 states were told, 39 of them at 1e16 rad: rows held beside that alone."""
+    path = tmp_path / "servo.sd"
+    path.write_text(SHORTED)
+    found = api.equilibria(path)
+    assert 1 <= len(found) <= 4
+    for state in found:
+        hot = state.efforts["hot"][0]
+        joule = 36.0 / (1.2 * (1.0 + 0.0039 * (hot - 293.15)))
+        lost = 0.2 * (hot - 293.15) + 1e-9 * (hot**4 - 293.15**4)
+        assert joule == pytest.approx(lost, rel=1e-6)
+        assert abs(state.values["w"]) < 1.0

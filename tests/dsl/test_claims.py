@@ -1,7 +1,8 @@
 """Claims that compare numbers of a run exactly (W909)."""
 
+import numpy as np
 import pytest
-from sysdyn.api import check
+from sysdyn.api import check, load
 
 MODEL = """
 model m {
@@ -40,3 +41,58 @@ scene s of m {
 def test_what_varies_is_compared_within(claim, warned):
     found = [d.code for d in check(MODEL.replace("CLAIM", claim))]
     assert (found == ["W909"]) is warned, found
+
+
+STATIC = """
+model m {
+  param p0 = 30 bar
+  param slack = 1 Pa
+  node n: hydraulic
+  S: effort(e = p0) n -> ground
+  R: dissipator(e = 1 Pa.s/m^3*f) n -> ground
+  expect static: p0 OP 3000.5 kPa WITHIN
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("op", "within", "failed"),
+    [
+        ("==", "within 501 Pa", False),
+        ("==", "within 499 Pa", True),
+        ("==", "within 501*slack", False),
+        ("!=", "within 501 Pa", True),
+        (">=", "within 501 Pa", False),
+        (">=", "", True),
+    ],
+)
+def test_a_static_claim_grants_what_it_says(op, within, failed):
+    found = check(STATIC.replace("OP", op).replace("WITHIN", within))
+    assert [d.code for d in found] == ["E909"] * failed
+    assert all(d.message.endswith("found 3000000 Pa and 3000500 Pa") for d in found)
+
+
+
+BRIEF = """
+model rc {
+  param R = 1 kohm
+  node a: electrical
+  C: potential(q = 1 fF*e) a -> ground
+  D: dissipator(e = R*f) a -> ground
+  init C.e = 1 V
+}
+scene s of rc {
+  time 0 s to 10 ps
+  trace a.e every 0.5 ps
+  expect at 5 ps: a.e == 1 V*exp(-5) within 10 uV
+  expect at 1.25 ps: a.e == 1 V*exp(-1.25) within 100 uV
+}
+"""
+
+
+def test_an_instant_is_told_from_one_a_picosecond_away(tmp_path):
+    (tmp_path / "rc.sd").write_text(BRIEF)
+    model = load(tmp_path / "rc.sd")
+    assert abs(model.run()["a.e"][-1] - np.exp(-10.0)) < 1e-4
+    swept = model.sweep({"R": [1e3, 2e3]}, keep="end")
+    assert [number for number, *_ in swept.failed] == [1]

@@ -35,6 +35,7 @@ def made(text):
     elaborator = Elaborator(FileScope(document.file, report), model, report)
     elaborator.names()
     elaborator.elements()
+    elaborator.settle()
     elaborator.statements()
     return elaborator, [(d.code, d.message, source.text[d.place.span.start : d.place.span.end]) for d in report]
 

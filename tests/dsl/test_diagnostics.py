@@ -6,6 +6,7 @@ import pickle
 import re
 
 import pytest
+from sysdyn.api import check
 from sysdyn.dsl.text.codes import codes, explain
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Related, Report
 from sysdyn.dsl.text.source import SourceText
@@ -58,6 +59,11 @@ def test_a_report_is_sorted_and_holds_each_finding_once():
         report.raise_if_failed()
     assert caught.value.diagnostics == report.diagnostics
     assert "E203: late" in str(caught.value)
+
+
+def test_a_hidden_name_is_told_before_the_errors_that_follow_from_it():
+    text = "model m { param p = 2 bar; node n: hydraulic; S: effort(e = p) n -> ground; param k = 1 m + 1 s }\n"
+    assert [d.code for d in check(text)] == ["W101", "E208", "E203"]
 
 
 def test_warnings_and_notes_do_not_fail():

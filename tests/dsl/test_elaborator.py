@@ -47,6 +47,7 @@ def whole(text):
     elaborator, report = begun(text)
     elaborator.names()
     elaborator.elements()
+    elaborator.settle()
     elaborator.statements()
     return elaborator, [d.code for d in report]
 
@@ -187,6 +188,7 @@ def test_of_two_connections_of_one_port_or_input_none_is_taken(connection, said)
     elaborator, report = begun(f"{link}\nmodel m {{ node p, q: electrical; L: link() {connection} }}")
     elaborator.names()
     elaborator.elements()
+    elaborator.settle()
     assert [(d.code, d.message) for d in report] == ([("E402", said)] if said else [])
 
 
@@ -207,4 +209,5 @@ def test_nodes_in_a_row_are_named_in_the_remedy(ends, named):
     elaborator, report = begun(f"component k {{ {ends} }}\nmodel m {{ node p, q: electrical; K: k() {row} }}")
     elaborator.names()
     elaborator.elements()
+    elaborator.settle()
     assert [(d.code, d.help) for d in report] == [("E402", named)]

@@ -55,3 +55,18 @@ model m {
 scene s of m { time 0 s to 1 s; trace V.f }
 """)
     assert [(d.code, d.help) for d in found] == [("E102", "V.a.f or V.b.f; of an element inside, V.seat.f")]
+
+
+@pytest.mark.parametrize(
+    ("law", "content", "line"),
+    [
+        ("law e = 2 ohm*f - 5 V", "content D = 1 ohm*f^2 - 5 V*f", "content D = ... (int e df)"),
+        ("law f = 2 S*e - 5 A", "content G = 1 S*e^2 - 5 A*e", "content G = ... (int f de)"),
+    ],
+)
+def test_an_element_that_delivers_power_is_led_to_its_content(law, content, line):
+    text = f"component cell {{ branch: electrical; {law} }}\nmodel m {{ node a: electrical; B: cell() a -> ground\n"
+    text += "  R: dissipator(e = 10 ohm*f) a -> ground }\n"
+    (active,) = check(text)
+    assert (active.code, active.help[-len(line) :]) == ("E313", line)
+    assert [d for d in check(text.replace(law, content)) if d.severity != "note"] == []

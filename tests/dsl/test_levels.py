@@ -1,6 +1,7 @@
 """What a level lacks and another has (language, decision 5): a note in traces and initial values, else an error."""
 
 import pytest
+from sysdyn.api import check
 from sysdyn.dsl import load
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 
@@ -67,3 +68,22 @@ def test_a_part_without_levels_has_none_to_choose(tmp_path):
     document = load.document(SourceText(str(tmp_path / "drive.sd"), text), report)
     load.network(document, document.models["drive"], document.scenes["run"], report)
     assert [(d.code, d.help) for d in report if d.code == "E802"] == [("E802", "leave the level out")]
+
+
+def test_a_level_of_one_element_of_an_array_is_answered_with_that_of_all():
+    text = """
+component seg {
+  port a, b: electrical
+  level cold default { r: dissipator(e = 1 ohm*f) a -> b }
+  level hot extends cold { r: dissipator(e = 2 ohm*f) a -> b }
+}
+model m {
+  node v[0..2]: electrical
+  V: effort(e = 1 V) v[0] -> ground
+  for i in 1..2 { s[i]: seg() a = v[i-1], b = v[i] }
+  R: dissipator(e = 1 ohm*f) v[2] -> ground
+}
+scene go of m { time 0 s to 1 s; level s[2] = hot; trace R.f }
+"""
+    (found,) = [d for d in check(text) if d.code == "E802"]
+    assert found.help == "a level is that of all elements of a statement: level s = hot"

@@ -304,3 +304,17 @@ def test_what_other_languages_write_is_shown_as_it_is_written_here(line, help_):
 def test_a_brace_belongs_on_the_line_above():
     found = parse(SourceText("t.sd", "model m\n{\n  param k = 3\n}\n"))[1]
     assert [(d.code, d.help) for d in found] == [("E109", "the '{' at the end of the line above")]
+
+
+@pytest.mark.parametrize(
+    ("written", "unit", "meant"),
+    [
+        ("9810 Pa/m/A[i]*q", "A", "9810 Pa/m / A[...]"),
+        ("3 A[1]", "A", "3 * A[...]"),
+        ("2.5 N.m[1]", "m", "2.5 N * m[...]"),
+    ],
+)
+def test_an_array_that_is_read_as_a_unit_is_told(written, unit, meant):
+    found = in_model(f"let x = {written}")
+    assert (found.code, found.message) == ("E113", f"'{unit}' stands where a unit is read")
+    assert found.help == f"the variable stands apart: {meant}"

@@ -23,6 +23,27 @@ CASES = {
         RV: dissipator(e = 1 ohm*f) src -> x[1]""",
         {"C.q": 0.0, "x[1].e": 1 / 1.8, "x[2].e": 1 / 1.8},
     ),
+    "a source at its peak and stores in parallel behind a gyrator": (  # its rate is what round-off leaves of cos(pi/2)
+        """node u, m, a: electrical
+        V: effort(e = 325 V*sin(314 rad/s*t + pi/2)) u -> ground
+        R: dissipator(e = 2 ohm*f) u -> m
+        G: gyrator(e1 = 200 ohm*f2) m -> ground, ground -> a
+        C1: potential(e = 1.2e5 V/C*q) a -> ground
+        C2: potential(e = 2.4e8 V/C*q) a -> ground""",
+        {"R.f": 0.0, "C1.q": 0.0, "C2.q": 0.0},
+    ),
+    "a source at its peak before inductors in parallel": (
+        """node a[0..3]: electrical
+        R1: dissipator(e = 1.7 ohm*f) a[0] -> ground
+        C2: potential(q = 0.923 F*e) a[0] -> a[1]
+        V3: effort(e = 0.283 V*sin(2.77 rad/s*t - pi/2)) a[0] -> a[1]
+        R4: dissipator(e = 0.1 ohm*f) a[1] -> a[3]
+        R6: dissipator(e = 1.84 ohm*f) a[1] -> a[2]
+        L7: kinetic(p = 0.315 H*f) a[2] -> ground
+        L8: kinetic(p = 0.904 H*f) a[2] -> ground
+        R9: dissipator(e = 5 ohm*f) a[3] -> a[1]""",
+        {"L7.f": 0.0, "L8.f": 0.0, "a[1].e": 0.283},
+    ),
     "capacitors around a loop": (
         """node a, b: electrical
         C1: potential(e = 4 V/C*q) a -> ground

@@ -52,6 +52,10 @@ def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) 
             found[b.loop] = shared
     except ModelError:
         return None
+    for name, values in own.items():  # of a loop over one element alone, which the statement names by its number
+        if values.size != 1 and index(name) not in change:
+            return None
+        change.setdefault(index(name), values.first.node)
     return found, substitute(initial.value, change)
 
 

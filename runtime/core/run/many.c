@@ -142,7 +142,7 @@ static void claim(sd_many *many, const double *row, int last)
 {
     for (int32_t k = 0; k < many->claims; k++) {
         const sd_claim *c = &many->claim[k];
-        int here = c->moment == 2 && fabs(row[0] - c->at) <= SAME * fmax(fabs(c->at), 1.0);
+        int here = c->moment == 2 && fabs(row[0] - c->at) <= SAME * fabs(c->at);
         if (last ? c->moment != 1 : c->moment == 1 || (c->moment == 2 && !here))
             continue;
         const double *value = row + SD_ROW_HEAD;
