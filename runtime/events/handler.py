@@ -413,13 +413,13 @@ class Handler:
     def _assign(self, t: float, y: Floats, yd: Floats, events: list[tuple[str, tuple[Assignment, ...]]]) -> Floats:
         """All values are read, then all assigned; a law driven back to where it came from is no longer so for that."""
         values = self.observer(t, y, yd)
-        y, set_by = y.copy(), dict[tuple[str, int], str]()
-        for name, assignments in events:
+        y, set_by = y.copy(), dict[tuple[str, int], int]()
+        for k, (name, assignments) in enumerate(events):
             said, now = [], []
             for a in assignments:
-                other = set_by.setdefault((a.kind, a.place), name)
-                if other != name:
-                    raise SolverFailure("conflict", t, 0.0, f"{a.name} (by '{other}' and by '{name}')")
+                other = set_by.setdefault((a.kind, a.place), k)
+                if other != k:  # elements of one family have a name in common
+                    raise SolverFailure("conflict", t, 0.0, f"{a.name} (by '{events[other][0]}' and by '{name}')")
                 target = self.p if a.kind == "discrete" else y
                 said.append(f"{a.name} = {target[a.place]:.9g}")
                 target[a.place] = values[a.row]

@@ -148,6 +148,27 @@ def test_what_is_wrong_with_an_array_of_discretes_is_said(tmp_path):
     assert codes(COUNTED.replace("k[i] := k[i] + 1;", "k[i] := k[i] + 1; k[i] := 0;")) == ["E704"]
 
 
+TOGETHER = """model fall {
+  param n = 3
+  coord x[1..n]: translation = 1 m
+  discrete total = 0
+  for i in 1..n {
+    energy T* = 1/2*(1 kg)*x[i]'^2
+    when x[i] < 0.9 m { total := total + i }
+  }
+  for i in 1..n { work FORCE on x[i] }
+}
+scene s of fall { time 0 s to 1 s; trace total }
+"""
+
+
+def test_elements_of_one_array_that_assign_one_variable_at_once_are_told(tmp_path):
+    """The last one counted alone."""
+    trace = trace_of(tmp_path, TOGETHER.replace("FORCE", "-1 N*i"))
+    assert trace["total"].values[-1] == 6.0
+    assert "E704" in [d.code for d in attempt(tmp_path, TOGETHER.replace("FORCE", "-1 N"))[1]]
+
+
 COUNTERS = """
 component counter {
   param n = 2
