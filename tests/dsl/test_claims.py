@@ -72,7 +72,6 @@ def test_a_static_claim_grants_what_it_says(op, within, failed):
     assert all(d.message.endswith("found 3000000 Pa and 3000500 Pa") for d in found)
 
 
-
 BRIEF = """
 model rc {
   param R = 1 kohm
