@@ -3,23 +3,9 @@
  *     grid N RTOL DELTACJ
  *
  * One line: steps, CPU seconds of the integration from 0 to 1 s, voltage of the last node; as ladder.c. */
-#include <ida/ida.h>
-#include <math.h>
-#include <nvector/nvector_serial.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <sunlinsol/sunlinsol_klu.h>
-#include <sunmatrix/sunmatrix_sparse.h>
-#include <time.h>
-
-#define V(v) N_VGetArrayPointer(v)
+#include "run_ida.h"
 
 static int n, side;
-
-static double source(double t)
-{
-    return sin(4.0 * acos(0.0) * 2.0 * t);
-}
 
 /* The neighbours of node k, number of them: nodes count from the one behind the source, -1 is the source. */
 static int neighbours(int k, int *found)
@@ -87,28 +73,5 @@ int main(int number, char **argument)
         return 2;
     side = atoi(argument[1]);
     n = side * side - 1;
-    double rtol = atof(argument[2]), t = 0.0;
-    SUNContext context;
-    SUNContext_Create(NULL, &context);
-    N_Vector y = N_VNew_Serial(n, context), yd = N_VClone(y);
-    N_VConst(0.0, y);
-    N_VConst(0.0, yd);
-    void *ida = IDACreate(context);
-    IDAInit(ida, residual, 0.0, y, yd);
-    IDASStolerances(ida, rtol, rtol);
-    SUNMatrix J = SUNSparseMatrix(n, n, 5 * n, CSC_MAT, context);
-    SUNLinearSolver linear = SUNLinSol_KLU(y, J, context);
-    IDASetLinearSolver(ida, linear, J);
-    IDASetJacFn(ida, jacobian);
-    IDASetDeltaCjLSetup(ida, atof(argument[3]));
-    IDASetMaxNumSteps(ida, 1000000);
-    IDASetMaxStep(ida, 0.05);
-    IDASetStopTime(ida, 1.0);
-    clock_t began = clock();
-    int flag = IDASolve(ida, 1.0, &t, y, yd, IDA_NORMAL);
-    double seconds = (double)(clock() - began) / CLOCKS_PER_SEC;
-    long steps = 0;
-    IDAGetNumSteps(ida, &steps);
-    printf("%ld %.9g %.17g\n", flag < 0 ? -1L : steps, seconds, V(y)[n - 1]);
-    return 0;
+    return run(n, 5, atof(argument[2]), atof(argument[3]), residual, jacobian);
 }

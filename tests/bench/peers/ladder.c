@@ -4,23 +4,9 @@
  *
  * One line: steps, CPU seconds of the integration from 0 to 1 s, voltage of the last node.  Residual and Jacobian cost next
  * to nothing here: what is left is IDA.  DELTACJ: change of cj that it refactors for (0.25 by default). */
-#include <ida/ida.h>
-#include <math.h>
-#include <nvector/nvector_serial.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <sunlinsol/sunlinsol_klu.h>
-#include <sunmatrix/sunmatrix_sparse.h>
-#include <time.h>
-
-#define V(v) N_VGetArrayPointer(v)
+#include "run_ida.h"
 
 static int n;
-
-static double source(double t)
-{
-    return sin(4.0 * acos(0.0) * 2.0 * t);
-}
 
 /* C v' = (v[i-1] - v[i])/R - (v[i] - v[i+1])/R with R = C = 1/n */
 static int residual(realtype t, N_Vector y, N_Vector yd, N_Vector r, void *none)
@@ -57,28 +43,5 @@ int main(int number, char **argument)
     if (number < 4)
         return 2;
     n = atoi(argument[1]);
-    double rtol = atof(argument[2]), t = 0.0;
-    SUNContext context;
-    SUNContext_Create(NULL, &context);
-    N_Vector y = N_VNew_Serial(n, context), yd = N_VClone(y);
-    N_VConst(0.0, y);
-    N_VConst(0.0, yd);
-    void *ida = IDACreate(context);
-    IDAInit(ida, residual, 0.0, y, yd);
-    IDASStolerances(ida, rtol, rtol);
-    SUNMatrix J = SUNSparseMatrix(n, n, 3 * n, CSC_MAT, context);
-    SUNLinearSolver linear = SUNLinSol_KLU(y, J, context);
-    IDASetLinearSolver(ida, linear, J);
-    IDASetJacFn(ida, jacobian);
-    IDASetDeltaCjLSetup(ida, atof(argument[3]));
-    IDASetMaxNumSteps(ida, 1000000);
-    IDASetMaxStep(ida, 0.05);
-    IDASetStopTime(ida, 1.0);
-    clock_t began = clock();
-    int flag = IDASolve(ida, 1.0, &t, y, yd, IDA_NORMAL);
-    double seconds = (double)(clock() - began) / CLOCKS_PER_SEC;
-    long steps = 0;
-    IDAGetNumSteps(ida, &steps);
-    printf("%ld %.9g %.17g\n", flag < 0 ? -1L : steps, seconds, V(y)[n - 1]);
-    return 0;
+    return run(n, 3, atof(argument[2]), atof(argument[3]), residual, jacobian);
 }
