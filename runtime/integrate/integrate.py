@@ -93,6 +93,8 @@ class Integration:
         self.driver = Driver(system, request, self.method, self.settler, keeps, self.start_rate, self._drift())
         if self.forms is not None:
             self.driver.unread = np.asarray(self.forms.settled.unread, dtype=np.int32)
+        if self.method.name == "rosenbrock" and system.form.scales and self.forms is None:
+            self.method.contents.settle = self.settler.address
         if self.underlying is None and system.form.scales:
             self.driver.run.magnitude = lib.pointer(self.sizes.magnitude)
         self.pieces = Pieces(self, request.events) if request.events else None

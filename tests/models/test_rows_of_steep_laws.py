@@ -22,3 +22,15 @@ def test_rows_of_radau_stay_with_the_motion(tmp_path, rtol, volts, amperes):
     rows = simulate(model, rtol=rtol, method="radau", output=tmp_path / "t.h5")
     assert np.max(np.abs(np.asarray(rows["v_out"]) - np.asarray(fine["v_out"]))) < volts
     assert np.max(np.abs(np.asarray(rows["i"]) - np.asarray(fine["i"]))) < amperes
+
+
+@pytest.mark.parametrize(("name", "part"), [("buck", 2e-3), ("osc", 0.05)])
+def test_rosenbrock_goes_on_from_what_its_steps_leave_of_a_diode(tmp_path, name, part):
+    """Linear steps do not meet an exponential: no length of the next one bore what they left."""
+    model = tmp_path / "model.sd"
+    assert run(["import", str(NETLIST.with_stem(name)), "-o", str(model), "--quiet"]) == 0
+    fine = simulate(model, accuracy=1e-6, output=tmp_path / "fine.h5")
+    rows = simulate(model, rtol=1e-2, method="rosenbrock", output=tmp_path / "t.h5")
+    (shown,) = fine.names
+    wanted = np.asarray(fine[shown])
+    assert np.max(np.abs(np.asarray(rows[shown]) - wanted)) < part * np.max(np.abs(wanted))

@@ -22,6 +22,8 @@
 #define FALLS 0.5          /* of an error: that of a shorter step where none does */
 #define FAR_LONGER 1e3     /* a step over another whose error is to say the same of a jump */
 #define LEAST 1e-10        /* error of a step, for the next one's size */
+#define SHRUNK 1e-3        /* of the step that was tried first, below which the point that it begins at is settled */
+#define AFRESH 0.1         /* of it: what is tried from there */
 #define FAILS 12           /* matrices and stages of a step that may fail */
 
 static int step(void *rosenbrock)
@@ -355,16 +357,17 @@ static void accept(sd_rosenbrock *rosenbrock, double error)
     rosenbrock->h = rosenbrock->fixed_h > 0.0 ? rosenbrock->fixed_h : fmin(next, rosenbrock->h_max);
 }
 
-/* the new point moved onto every constraint */
-static void project(sd_rosenbrock *rosenbrock)
+/* the last point moved onto constraints, or all rows; 1: it could not be */
+static int project(sd_rosenbrock *rosenbrock, sd_settle *onto)
 {
     size_t size = (size_t)rosenbrock->n * sizeof(double);
     memcpy(rosenbrock->y, rosenbrock->phi, size);
     memcpy(rosenbrock->rate, rosenbrock->yd, size);
-    if (sd_settle_point(rosenbrock->project, rosenbrock->t, rosenbrock->y, rosenbrock->rate))
-        return;
+    if (sd_settle_point(onto, rosenbrock->t, rosenbrock->y, rosenbrock->rate))
+        return 1;
     memcpy(rosenbrock->phi, rosenbrock->y, size);
     memcpy(rosenbrock->yd, rosenbrock->rate, size);
+    return 0;
 }
 
 /* what values within the step are off, where what is pulled back at once hides it from the error of the end: a Newton
@@ -420,8 +423,8 @@ static int stays(sd_rosenbrock *rosenbrock, double error)
 
 int sd_rosenbrock_step(sd_rosenbrock *rosenbrock)
 {
-    int failures = 0, known = 0;
-    double error = 0.0, state = 0.0;
+    int failures = 0, known = 0, settled = !rosenbrock->settle;
+    double error = 0.0, state = 0.0, tried = rosenbrock->h;
     set_weights(rosenbrock);
     rosenbrock->cause = SD_FINE;
     for (;;) {
@@ -443,6 +446,15 @@ int sd_rosenbrock_step(sd_rosenbrock *rosenbrock)
             break;
         rosenbrock->cause = cause;
         rosenbrock->rejected = 1;
+        if (!settled && rosenbrock->h < SHRUNK * tried) { /* what steps leave of an exponential no length of the next one bears */
+            settled = 1;
+            if (!project(rosenbrock, rosenbrock->settle)) {
+                known = failures = 0;
+                rosenbrock->h = AFRESH * tried;
+                rosenbrock->h_refused = 0.0;
+                continue;
+            }
+        }
         if (cause == SD_STOPPED || cause == SD_MEMORY || rosenbrock->fixed_h > 0.0)
             return cause;
         if (cause == SD_ERROR_TEST) {
@@ -459,6 +471,6 @@ int sd_rosenbrock_step(sd_rosenbrock *rosenbrock)
     rosenbrock->cause = SD_FINE;
     accept(rosenbrock, error);
     if (rosenbrock->project)
-        project(rosenbrock);
+        project(rosenbrock, rosenbrock->project);
     return SD_FINE;
 }

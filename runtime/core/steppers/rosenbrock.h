@@ -55,6 +55,7 @@ typedef struct sd_rosenbrock {
     int64_t steps, rejected_steps, newton_failures, taken;
     int32_t cause, bad_row, bad_column;
     sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */
+    sd_settle *settle;        /* of steep laws: moves a point that no step goes on from onto all rows; or NULL */
     sd_stepper stepper;
 } sd_rosenbrock;
 

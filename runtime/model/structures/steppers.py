@@ -253,6 +253,7 @@ class Rosenbrock(c.Structure):
         *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
         *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
         ("project", P),
+        ("settle", P),
         ("stepper", Stepper),
     ]
 
