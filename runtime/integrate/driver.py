@@ -16,7 +16,7 @@ from sysdyn.runtime.integrate.methods import Method
 from sysdyn.runtime.integrate.request import TRACE, Request
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.settled import Settler
 
 ROOM = 4096
@@ -115,8 +115,8 @@ class Driver:
     def _follows_sums(self, settler: Settler, keeps: NDArray[np.bool_]) -> bool:
         """Tells the settler by which sums all that a row shows follows from the state, where so and without rates."""
         settled = settler.system
-        if self.calls["observe_rate"] is not None or self._least_norm is not None:
-            return False
+        if self.calls["observe_rate"] is not None or self._least_norm is not None or settled.unknowns > LARGE:
+            return False  # of a large one the room counts
         known, sums = settled.once(("by sums", keeps.tobytes()), lambda: by_sums(settled, keeps))
         if not shows(self.system, known, OBSERVED):
             return False

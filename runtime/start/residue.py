@@ -18,6 +18,17 @@ RESIDUE = 1e-9
 """Of what a row's free term is at other times: round-off of a zero."""
 LATER = (0.6180339887, 6.180339887e6)
 """s: such times, in no simple ratio to a period; for what turns in years too."""
+PART = 1 << 16
+"""Rows that are looked at together: of a large model the room counts."""
+
+
+def _largest(values: Floats) -> float:
+    size = np.abs(values)
+    return float(np.max(size, where=np.isfinite(size), initial=0.0))
+
+
+def _between(size: Floats, most: float) -> NDArray[np.bool_]:
+    return (size > 0.0) & (size < most)
 
 
 class Rows(Protocol):
@@ -35,22 +46,25 @@ class Rows(Protocol):
 class Residue:
     """Of one search: free terms at other times are asked for once, where there is something to tell."""
 
-    def __init__(self, rows: Rows) -> None:
-        self._rows = rows
+    def __init__(self) -> None:
         self._later: tuple[float, Floats] | None = None
 
-    def cleared(self, t: float, free: Floats) -> Floats:
+    def cleared(self, rows: Rows, t: float, free: Floats) -> Floats:
         """Free terms [rows] at t, without what is left of a zero in rows of rates."""
-        size = np.abs(free)
-        tiny = (size > 0.0) & (size < RESIDUE * np.max(size, where=np.isfinite(size), initial=0.0))
-        tiny &= self._rows.groups(*HIDDEN)
-        if not tiny.any():
+        parts = [slice(k, k + PART) for k in range(0, free.size, PART)]
+        largest = max((_largest(free[part]) for part in parts), default=0.0)
+        tiny = [k.start + np.flatnonzero(_between(np.abs(free[k]), RESIDUE * largest)) for k in parts]
+        places = np.concatenate([np.zeros(0, dtype=np.int64), *tiny])
+        places = places[rows.groups(*HIDDEN)[places]] if places.size else places
+        if not places.size:
             return free
-        return np.where(tiny & (size < RESIDUE * self._at_other_times(t)), 0.0, free)
+        left = free.copy()
+        left[places[np.abs(free[places]) < RESIDUE * self._at_other_times(rows, t)[places]]] = 0.0
+        return left
 
-    def _at_other_times(self, t: float) -> Floats:
+    def _at_other_times(self, rows: Rows, t: float) -> Floats:
         """The largest of each free term beside the guess [rows]."""
         if self._later is None or self._later[0] != t:
-            found = [np.abs(self._rows.residual(t + beyond, self._rows.guess)) for beyond in LATER]
+            found = [np.abs(rows.residual(t + beyond, rows.guess)) for beyond in LATER]
             self._later = t, np.max([np.where(np.isfinite(size), size, 0.0) for size in found], axis=0)
         return self._later[1]

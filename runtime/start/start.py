@@ -139,10 +139,11 @@ def _aimed(starter: Starter, t: float) -> Floats:
 
 def _with_momenta(starter: Starter, t: float) -> Floats:
     """The guess with the momenta of flows that share inertia, and with what guesses of these miss."""
-    known, x = starter.equations, starter.guess.copy()
+    known, guess = starter.equations, starter.guess
     joined = known.joined
-    if not x[: starter.n][joined].any():
-        return x
+    if not (joined.any() and guess[: starter.n][joined].any()):
+        return guess  # of a large model the room counts
+    x = guess.copy()
     rows, missed = known.guessed
     x[missed] = starter.residual(t, x)[rows]
     momentum, own = known.momentum[joined[known.flow]], own_unknown(starter.settled, "momentum", "f")
@@ -155,10 +156,13 @@ def _with_momenta(starter: Starter, t: float) -> Floats:
 
 def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
     """X with the displacements that implicit efforts which are said tell with others (coupled coils, mirrored)."""
-    said = starter.moves("e") & starter.written & (x != 0.0)
-    if not said.any():
+    said = np.flatnonzero(starter.written)
+    said = said[starter.moves("e")[said] & (x[said] != 0.0)]
+    if not said.size:
         return x
-    rows = starter.groups("gamma") & (np.bincount(starter.rows, said[starter.columns], starter.settled.rows) > 0.0)
+    told = np.zeros(x.size, dtype=bool)
+    told[said] = True
+    rows = starter.groups("gamma") & (np.bincount(starter.rows, told[starter.columns], starter.settled.rows) > 0.0)
     free = np.zeros(x.size, dtype=bool)
     free[starter.columns[rows[starter.rows]]] = True
     return _onto(starter, t, x, x, rows=rows, free=free & starter.moves("q") & ~starter.written)

@@ -107,7 +107,7 @@ class Starter:
     def __init__(self, system: System) -> None:
         self.system = system
         self.here, self.known = (0.0, False, b""), dict[str, NDArray[Any]]()
-        self.work, self._residue = Work(), Residue(self)  # of one search for a start
+        self.work, self._residue = Work(), Residue()  # of one search for a start
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
         if system.unknowns > LARGE:  # found again where it is asked
@@ -373,7 +373,7 @@ class Starter:
         """
         known, found, nominal = self.equations, np.zeros(x.size), self.settled.named
         x = np.ascontiguousarray(x, dtype=np.float64)
-        values, free = self.jacobian(t, x), self._residue.cleared(t, self.residual(t, x))
+        values, free = self.jacobian(t, x), self._residue.cleared(self, t, self.residual(t, x))
         rows, missed = known.guessed
         told = np.where(np.isin(self.rows, rows) & np.isfinite(values), values, 0.0) if missed.size else 0.0
         sized = values - told if missed.size or not values.flags.writeable else values
