@@ -119,7 +119,8 @@ def surfaces(form: DescriptorForm, directions: frozenset[str] = frozenset()) -> 
                 first.setdefault(u, row)
     if not 0 < len(first) <= MOST:
         return ()
-    kept, known = [], {}
+    kept: list[Surface] = []
+    known: dict[tuple[Node, ...], int | None] = {}
     for u, row in first.items():
         level = min(smoothness(root, u, known) for root in holding[u])
         if level < SMOOTH:
