@@ -16,8 +16,7 @@
  * stages with the derivative at the step's start besides, an order more.  Where an unknown is pulled back faster than
  * the step follows, its derivative is its error times that rate, and the polynomial of the stages serves.  The stage's K
  * at the end of a step has the multipliers' order only: where rows are asked for, derivatives come from the settled point,
- * and where laws are steep lead the unknowns that they take no further off the polynomial of the stages than the error test
- * allows.
+ * and lead the unknowns that they take no further off the polynomial of the stages than the error test allows.
  */
 #ifndef SYSDYN_RADAU_H
 #define SYSDYN_RADAU_H

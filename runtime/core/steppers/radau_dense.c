@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#define MANY 100.0 /* unknowns up to which each is asked for what the error test asks of all */
+
 void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1])
 {
     for (int k = 0; k < SD_METHODS; k++) {
@@ -180,18 +182,20 @@ void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
 }
 
 /* Slopes lead no unknown that they would take further off the polynomial of the stages than the step's error may be: there
- * they are of a motion before, or what a steep law makes of the point's own error. */
+ * they are of a motion before, or what a stiff law makes of the point's own error.  (The error test is of the mean: of many
+ * unknowns one may be off by more.) */
 static void mistrust(sd_radau *radau)
 {
     const double third[2] = {1.0 / 3.0, 2.0 / 3.0}, early[1] = {0.5 * radau->used->c[0]};
     const int quintic = radau->used->stages == 3;
+    const double most = radau->system->scales > 0 ? 1.0 : fmax(1.0, sqrt((double)radau->n / MANY));
     for (int k = 0; k < 1 + quintic; k++) {
         double t = radau->t - radau->h_used * (1.0 - (quintic ? third[k] : early[0]));
         of_stages(radau, t, 1, radau->y, radau->rate);
         memcpy(radau->ee, radau->y, (size_t)radau->n * sizeof(double));
         of_slopes(radau, t, radau->y, radau->rate);
         for (int32_t i = 0; i < radau->n; i++)
-            if (radau->led[i] && !(fabs(radau->y[i] - radau->ee[i]) * sd_radau_weight(radau, i) <= 1.0))
+            if (radau->led[i] && !(fabs(radau->y[i] - radau->ee[i]) * sd_radau_weight(radau, i) <= most))
                 radau->led[i] = 0;
     }
 }
@@ -214,7 +218,7 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle)
                     radau->slope[k][i] = radau->rate[i];
         radau->refined[k] = 1;
     }
-    if (radau->system->scales > 0 && !(radau->fixed_h > 0.0)) /* whose error is nobody's wish */
+    if (!(radau->fixed_h > 0.0)) /* whose error is nobody's wish */
         mistrust(radau);
 }
 
