@@ -160,7 +160,7 @@ class Handler:
         for k, relation in enumerate(self.plan.relations):
             self.side[k] = self._side(k, values[relation.row], 1.0)
         self._bounded(t, values)
-        drives = self.succession.pushed(t, y, yd) if self.restart is not None else None
+        drives = self.succession.pushed(t, y, yd, values) if self.restart is not None else None
         if drives is not None:
             raise SolverFailure("drives", t, 0.0, drives)
         self.truth = self._true()

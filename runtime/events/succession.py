@@ -121,14 +121,12 @@ class Succession:
         contacts.become(stood)
         return ends
 
-    def pushed(self, t: float, y: Floats, yd: Floats) -> str | None:
+    def pushed(self, t: float, y: Floats, yd: Floats, values: Floats) -> str | None:
         """The same of frictions that slip, and whose bound a reaction tells: it has the sign that its text gives it."""
-        contacts, values = self.contacts, self.observer(t, y, yd)
-        slips = [k for k, c in enumerate(contacts.contacts) if c.hold >= 0 and not contacts.active[k]]
-        slips = [
-            k for k in slips if abs(values[contacts.contacts[k].value]) > self.observer.zero(contacts.contacts[k].value)
-        ]
-        return self.driving(t, y, yd, set(slips) - contacts.finite(t, y, yd)) if slips else None
+        contacts, zero = self.contacts, self.observer.zero
+        free = {k for k, c in enumerate(contacts.contacts) if c.hold >= 0 and not contacts.active[k]}
+        slips = {k for k in free if abs(values[(row := contacts.contacts[k].value)]) > zero(row)}
+        return self.driving(t, y, yd, slips - contacts.finite(t, y, yd)) if slips else None
 
     def driving(self, t: float, y: Floats, yd: Floats, among: Set[int] | None = None) -> str | None:
         """The name of a friction (among: of some) that would push what slips along: its bound is negative, or its sign

@@ -11,9 +11,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.start.equations import HIDDEN
 
-HIDDEN = ("dynamics_rate", "momentum_rate", "phi_rate", "phi_acceleration", "psi_rate", "gamma_rate")
-"""Groups of rows that are derivatives of others."""
 RESIDUE = 1e-9
 """Of what a row's free term is at other times: round-off of a zero."""
 LATER = (0.6180339887, 6.180339887e6)

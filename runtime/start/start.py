@@ -29,8 +29,8 @@ from sysdyn.runtime.numerics.gauss_newton import (
 )
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
+from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.moved import moved_guesses
-from sysdyn.runtime.start.residue import HIDDEN
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 from sysdyn.runtime.start.strategies import (
     CLOSED,

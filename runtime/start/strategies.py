@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve
-from sysdyn.runtime.start.residue import HIDDEN
+from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter, problem_of
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)

@@ -45,7 +45,8 @@ typedef struct sd_run {
     int32_t instants, every_step, sample_steps;
     int32_t sizes_at_steps;           /* largest is over the ends of all steps, not of those with a row alone */
     int32_t bare;                     /* what is observed follows from the state: rows for comparison alone are not settled */
-    int32_t told;                     /* it does by the settler's `told` rows: one that meets these is not settled; falls to 0 where few do */
+    int32_t told;                     /* it does by the settler's `told` rows: one that meets these is not settled; falls to
+                                       * 0 where few do */
     int32_t unsummed;                 /* nothing observed reads the audit: rows for comparison alone are without it (1), a draft
                                        * without integrals of powers (2); they are no numbers */
     double rough;                     /* scaled residual that will do for rows by which runs are compared and nothing else */

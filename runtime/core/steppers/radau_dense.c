@@ -186,11 +186,10 @@ void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
  * unknowns one may be off by more.) */
 static void mistrust(sd_radau *radau)
 {
-    const double third[2] = {1.0 / 3.0, 2.0 / 3.0}, early[1] = {0.5 * radau->used->c[0]};
-    const int quintic = radau->used->stages == 3;
+    const int looks = radau->used->stages > 3 ? 1 : 2; /* of more stages the first gap is the one that slopes bend */
     const double most = radau->system->scales > 0 ? 1.0 : fmax(1.0, sqrt((double)radau->n / MANY));
-    for (int k = 0; k < 1 + quintic; k++) {
-        double t = radau->t - radau->h_used * (1.0 - (quintic ? third[k] : early[0]));
+    for (int k = 1; k <= looks; k++) {
+        double t = radau->t - radau->h_used * (1.0 - (looks > 1 ? k / 3.0 : 0.5 * radau->used->c[0]));
         of_stages(radau, t, 1, radau->y, radau->rate);
         memcpy(radau->ee, radau->y, (size_t)radau->n * sizeof(double));
         of_slopes(radau, t, radau->y, radau->rate);

@@ -446,7 +446,9 @@ int sd_rosenbrock_step(sd_rosenbrock *rosenbrock)
             break;
         rosenbrock->cause = cause;
         rosenbrock->rejected = 1;
-        if (!settled && rosenbrock->h < SHRUNK * tried) { /* what steps leave of an exponential no length of the next one bears */
+        if (cause == SD_STOPPED || cause == SD_MEMORY || rosenbrock->fixed_h > 0.0)
+            return cause;
+        if (!settled && rosenbrock->h < SHRUNK * tried) { /* no length bears what steps leave of an exponential */
             settled = 1;
             if (!project(rosenbrock, rosenbrock->settle)) {
                 known = failures = 0;
@@ -455,8 +457,6 @@ int sd_rosenbrock_step(sd_rosenbrock *rosenbrock)
                 continue;
             }
         }
-        if (cause == SD_STOPPED || cause == SD_MEMORY || rosenbrock->fixed_h > 0.0)
-            return cause;
         if (cause == SD_ERROR_TEST) {
             rosenbrock->rejected_steps++;
             double ratio = pow(error, POWER) / SAFE;

@@ -483,6 +483,16 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     return !done;
 }
 
+/* the kept unknowns of y and, in zd, of yd */
+static double *gather_kept(const sd_settle *settle, const double *y, const double *yd, double **zd)
+{
+    const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
+    *zd = settle->room + settle->unknowns + 8;
+    sd_condensed_gather(condensed, y, settle->room);
+    sd_condensed_gather(condensed, yd, *zd);
+    return settle->room;
+}
+
 /* y, yd := what the kept unknowns z, zd make of all */
 static void follow_kept(const sd_settle *settle, const double *z, const double *zd, double *y, double *yd)
 {
@@ -497,14 +507,11 @@ static void follow_kept(const sd_settle *settle, const double *z, const double *
 /* the same for a point with all unknowns of the system that this one is condensed from */
 static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
 {
-    const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
     if (!provide_work(settle))
         return 1;
-    if (!condensed)
+    if (!settle->system->left)
         return settle_unknowns(settle, t, y, yd);
-    double *z = settle->room, *zd = z + settle->unknowns + 8;
-    sd_condensed_gather(condensed, y, z);
-    sd_condensed_gather(condensed, yd, zd);
+    double *zd, *z = gather_kept(settle, y, yd, &zd);
     int failed = settle_unknowns(settle, t, z, zd);
     follow_kept(settle, z, zd, y, yd);
     return failed;
@@ -524,12 +531,8 @@ int sd_settle_meets(sd_settle *settle, double t, double *y, double *yd)
 {
     if (settle->calls == settle->failures || settle->seen || !provide_work(settle))
         return 0;
-    const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
-    double *z = condensed ? settle->room : y, *zd = condensed ? z + settle->unknowns + 8 : yd;
-    if (condensed) {
-        sd_condensed_gather(condensed, y, z);
-        sd_condensed_gather(condensed, yd, zd);
-    }
+    const int condensed = settle->system->left != NULL;
+    double *zd = yd, *z = condensed ? gather_kept(settle, y, yd, &zd) : y;
     measure(settle, t, z, zd);
     settle->drift = settle->constraints;
     int meets = 1;
