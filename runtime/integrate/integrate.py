@@ -16,6 +16,7 @@ import numpy as np
 from sysdyn.runtime.condense.condensed import Condensed, Forms, condensed
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.causes import NEWTON, failure, placed
+from sysdyn.runtime.integrate.corners import Corners, serves
 from sysdyn.runtime.integrate.creeping import Creeping
 from sysdyn.runtime.integrate.crossing import cross
 from sysdyn.runtime.integrate.driver import Driver, Sink
@@ -98,6 +99,7 @@ class Integration:
         if self.underlying is None and system.form.scales:
             self.driver.run.magnitude = lib.pointer(self.sizes.magnitude)
         self.pieces = Pieces(self, request.events) if request.events else None
+        self.corners = Corners(self) if serves(self) else None
         self._spare()
         self._put_away()
         if system.unknowns > LARGE:
@@ -329,7 +331,7 @@ class Integration:
                     continue
                 self.driver.drain(sink)
             if state == 1:
-                return at if self.pieces is None else self.pieces.at
+                return next((taken.at for taken in (self.pieces, self.corners) if taken is not None), at)
             if not creeping.goes_on(method.t, self.statistics()):
                 raise failure(self, "crawl")
 
@@ -364,6 +366,8 @@ class Integration:
                 break
             before = time.process_time()
             cross(self, self.segments[at])
+            if self.corners is not None:
+                self.corners.at = at
             self._put_away()
             self._spare()
             self.system.trim(LARGE)

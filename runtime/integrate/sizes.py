@@ -101,6 +101,11 @@ class Sizes:
         """Of what follows from that: made again if asked."""
         self.__dict__.pop("least", None)
 
+    @property
+    def own(self) -> tuple[Ints, Floats, Floats] | None:
+        """Of a method of fewer unknowns: their places, magnitudes and |y| met; None where it steps all."""
+        return None if self._own is None else (whole_of(self._own[0]), *self._own[1:])
+
     def stepped(self, kept: Ints | None) -> tuple[Floats, Floats]:
         """Magnitude and |y| met of the unknowns that the method steps; kept: their places, None: all."""
         if kept is None:
@@ -175,8 +180,12 @@ class Sizes:
         """The same of all that the rows determine, by the inverse of their Jacobian: where steps fail by it."""
         self._at_least(np.where(carries, 0.0, open_unknowns(self.system, t, y, yd, self.time)))
 
+    @property
+    def resolves(self) -> float:
+        """What a tolerance needs of a magnitude beside what round-off leaves open."""
+        return UNRESOLVED / max(self._request.rtol, 1e-15)
+
     def _at_least(self, open_: Floats) -> None:
         """No magnitude is less than a tolerance needs of what is open [unknowns], which is written to."""
-        open_ *= UNRESOLVED
-        open_ /= max(self._request.rtol, 1e-15)
+        open_ *= self.resolves
         np.maximum(self.magnitude, open_, out=self.magnitude)

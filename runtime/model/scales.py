@@ -42,7 +42,7 @@ RUNGS = 1e-3 ** np.arange(4)
 Far = tuple[Floats, Floats, Floats, int]
 _HOLDS = ("phi", "psi")
 """Beginnings of the names of groups of constraints."""
-_SWEEPS = 8
+SWEEPS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,11 +200,15 @@ def noise(system: System, y: Floats, jy: Floats, time: float) -> Floats:
     displacements over it, and multipliers balance what flows make of that.
     """
     found = np.zeros(system.unknowns)
-    kinds = _holding(system), system.of_groups("dynamics"), system.are("kappa", "mu", "e"), system.are("f")
-    arrays = map(lib.pointer, (*kinds, np.ascontiguousarray(y), jy))
-    if lib.core.sd_noise(c.byref(system.core), *arrays, time, _SWEEPS, GROUP, lib.pointer(found)):
+    arrays = map(lib.pointer, (*noisy(system), np.ascontiguousarray(y), jy))
+    if lib.core.sd_noise(c.byref(system.core), *arrays, time, SWEEPS, GROUP, lib.pointer(found)):
         raise MemoryError
     return found
+
+
+def noisy(system: System) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Rows of constraints, of balances [rows], multipliers and flows [unknowns], as `noise` goes by them."""
+    return _holding(system), system.of_groups("dynamics"), system.are("kappa", "mu", "e"), system.are("f")
 
 
 def _with_momentum(system: System) -> NDArray[np.bool_]:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.accuracy.options import Options
-from sysdyn.runtime.integrate import methods
+from sysdyn.runtime.integrate import corners, methods
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.carrier import load
@@ -140,6 +140,7 @@ def test_a_method_that_rests_between_pieces_steps_on_alike(monkeypatch):
 
     kept, rested, rest = rows(), [], methods.lib.core.sd_radau_rest
     monkeypatch.setattr(methods, "LARGE", 0)
+    monkeypatch.setattr(corners, "LARGE", 0)
     monkeypatch.setattr(methods.lib.core, "sd_radau_rest", lambda radau: (rested.append(radau), rest(radau)))
     found = rows()
     assert len(rested) >= 2

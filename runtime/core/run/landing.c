@@ -7,7 +7,8 @@
 #include "run/fits.h"
 #include "run/strike.h"
 
-#define HELD 1e8 /* weight of the state across an event */
+#define HELD 1e8 /* weight of the state across an instant */
+#define ROWS_OF_EVENT 8 /* at most, beside those asked for */
 
 void sd_landing_look(sd_run *run, double t, const double *y, const double *yd, double *values)
 {
@@ -79,38 +80,49 @@ static int assign(sd_run *run, const sd_transition *one, double t)
     return 1;
 }
 
-/* m->y, m->yd settled at t: 1, where no state moves for it */
-static int stays(sd_run *run, double t)
+/* y, yd settled at t: 1, where no state moves for it */
+static int stays(sd_settle *settle, double t, double *y, double *yd, const sd_keeping *keeping)
 {
-    sd_modes *m = run->modes;
-    int failed = sd_settle_point(run->settle, t, m->y, m->yd);
-    for (int32_t i = 0; i < run->written && !failed; i++)
-        failed = m->state[i] && !(fabs(m->y[i] - m->restart[i]) <= m->still * m->magnitude[i]);
+    int failed = sd_settle_point(settle, t, y, yd);
+    for (int32_t i = 0; i < keeping->written && !failed; i++)
+        failed = keeping->state[i] && !(fabs(y[i] - keeping->before[i]) <= keeping->still * keeping->magnitude[i]);
     return !failed;
 }
 
-/* The same with the state held: 1; 0: that fails, or moves the state.  Where constraints stay as they are a basis that moves
- * no state is enough. */
-static int keeps_state(sd_run *run, double t)
+int sd_landing_keeps(sd_settle *settle, double t, double *y, double *yd, const sd_keeping *keeping)
 {
-    sd_modes *m = run->modes;
-    sd_settle *settle = run->settle;
-    size_t written = (size_t)run->written * sizeof(double);
+    size_t written = (size_t)keeping->written * sizeof(double);
     double slack = settle->slack;
-    memcpy(m->restart, m->y, written);
-    memcpy(m->restart_d, m->yd, written);
+    memcpy(keeping->before, y, written);
+    memcpy(keeping->before_d, yd, written);
     settle->slack = 0.0;
-    int done = settle->basis && !settle->determined && stays(run, t);
+    int done = settle->basis && !settle->determined && stays(settle, t, y, yd, keeping);
     settle->slack = slack;
     if (done)
         return 1;
-    memcpy(m->y, m->restart, written);
-    memcpy(m->yd, m->restart_d, written);
+    memcpy(y, keeping->before, written);
+    memcpy(yd, keeping->before_d, written);
     settle->hold = HELD;
-    done = stays(run, t);
+    done = stays(settle, t, y, yd, keeping);
     settle->hold = 1.0;
     settle->ready = 0;
     return done;
+}
+
+int sd_landing_jumps(int32_t number, const double *before, const double *behind, const double *largest, double part)
+{
+    for (int32_t i = 0; i < number; i++)
+        if (fabs(behind[i] - before[i]) > part * fmax(largest[i], fmax(fabs(behind[i]), fabs(before[i]))))
+            return 1;
+    return 0;
+}
+
+int sd_landing_room(const sd_run *run, double t)
+{
+    int32_t rows = ROWS_OF_EVENT;
+    for (int32_t k = run->next; k < run->instants && run->instant[k] <= t && rows <= run->room; k++)
+        rows += 2;
+    return rows > run->room ? -1 : run->rows + rows <= run->room;
 }
 
 void sd_landing_leave(sd_run *run)
@@ -126,7 +138,8 @@ int sd_landing_arrives(sd_run *run, const double *sides, double t)
 {
     sd_modes *m = run->modes;
     size_t written = (size_t)run->written * sizeof(double);
-    if (!keeps_state(run, t))
+    const sd_keeping keeping = {run->written, m->state, m->magnitude, m->still, m->restart, m->restart_d};
+    if (!sd_landing_keeps(run->settle, t, m->y, m->yd, &keeping))
         return 0;
     memset(m->restart, 0, (size_t)m->unknowns * sizeof(double));
     memset(m->rate, 0, (size_t)m->unknowns * sizeof(double));

@@ -4,6 +4,26 @@
 
 #include "run/run.h"
 
+/* What keeps its value across an instant: of the unknowns as written those with state 1, in magnitudes; before, before_d
+ * [written] := the point there. */
+typedef struct sd_keeping {
+    int32_t written;
+    const int32_t *state;
+    const double *magnitude;
+    double still;                     /* what a state moves by and has not jumped */
+    double *before, *before_d;
+} sd_keeping;
+
+/* y, yd := settled at t with the state where it is: 1; 0: that fails, or moves it.  Where constraints stay as they are a basis
+ * that moves no state is enough. */
+int sd_landing_keeps(sd_settle *settle, double t, double *y, double *yd, const sd_keeping *keeping);
+
+/* Whether values [number] behind an instant differ from those before by more than that part of the largest so far. */
+int sd_landing_jumps(int32_t number, const double *before, const double *behind, const double *largest, double part);
+
+/* Room for the rows of the last step up to t and of what happens there: 1; 0: not now; -1: never. */
+int sd_landing_room(const sd_run *run, double t);
+
 /* values [observed] at a point, whose sizes are kept */
 void sd_landing_look(sd_run *run, double t, const double *y, const double *yd, double *values);
 

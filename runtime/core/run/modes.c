@@ -8,7 +8,6 @@
 #include "run/fits.h"
 #include "run/landing.h"
 
-#define ROWS_OF_EVENT 8  /* at most, beside those asked for */
 #define AT_ONCE 1e-2     /* of the first step behind an event: before that its dense output knows nothing */
 #define SHORTER 8.0      /* steps in the place of one that misled */
 
@@ -213,15 +212,6 @@ static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_
     return NULL;
 }
 
-/* Room for the rows of the last step up to t: 1; 0: not now; -1: never. */
-static int roomy(const sd_run *run, double t)
-{
-    int32_t rows = ROWS_OF_EVENT;
-    for (int32_t k = run->next; k < run->instants && run->instant[k] <= t && rows <= run->room; k++)
-        rows += 2;
-    return rows > run->room ? -1 : run->rows + rows <= run->room;
-}
-
 static int settled(sd_run *run, double t)
 {
     sd_modes *m = run->modes;
@@ -240,7 +230,7 @@ static int event(sd_run *run, double enough)
         stepper->refine(stepper->self, run->settle);
     for (;;) {
         int32_t crossed = sd_run_crossing(run, end, &t);
-        int room = roomy(run, crossed ? t : end);
+        int room = sd_landing_room(run, crossed ? t : end);
         if (*stepper->system->stop || room < 0)
             return SD_EVENT;
         m->waits = !room;
@@ -323,15 +313,6 @@ static int32_t turned(sd_run *run, const double *values)
     return found;
 }
 
-/* Whether what is observed, m->values, differs from what it was before a jump of the text, m->low. */
-static int jumped(const sd_modes *m)
-{
-    for (int32_t i = 0; i < m->observed; i++)
-        if (fabs(m->values[i] - m->low[i]) > m->differs * fmax(m->largest[i], fmax(fabs(m->values[i]), fabs(m->low[i]))))
-            return 1;
-    return 0;
-}
-
 /* The samples due at t, into m->which. */
 static int32_t due_at(const sd_modes *m, double t)
 {
@@ -373,10 +354,10 @@ static int sample(sd_run *run, int32_t due)
 /* Whether a jump of the text to `label`, with so many events, asks for a row before it that is not there yet. */
 static int lacks_row(const sd_run *run, double label, int64_t entries)
 {
+    const sd_modes *m = run->modes;
     if (run->every_step || run->end_kind & SD_TRACE)
         return 0;
-    int asked = run->next < run->instants && run->instant[run->next] <= label && run->instant_kind[run->next] & SD_TRACE;
-    return entries || (asked && jumped(run->modes));
+    return entries || (sd_run_asks(run, label) && sd_landing_jumps(m->observed, m->low, m->values, m->largest, m->differs));
 }
 
 /* The text jumps where the step has met the end of its piece. */
@@ -418,7 +399,7 @@ int sd_modes_end(sd_run *run)
     int32_t jumps = t >= m->segment, due = jumps ? 0 : due_at(m, t);
     if (m->now < 0 || (jumps ? m->at + 1 >= m->pieces : !due))
         return SD_FINISHED;
-    if (roomy(run, t) == 0)
+    if (sd_landing_room(run, t) == 0)
         return SD_FULL;
     return jumps ? jump(run) : sample(run, due);
 }

@@ -7,6 +7,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "run/corners.h"
 #include "run/quadratures.h"
 #include "run/watched.h"
 #include "system/condensed.h"
@@ -449,12 +450,26 @@ void sd_run_row(sd_run *run, int32_t kind)
     emit(run, run->t_to, run->t_to, (double)kind, 1);
 }
 
+int sd_run_asks(const sd_run *run, double t)
+{
+    return !run->every_step && run->next < run->instants && run->instant[run->next] <= t &&
+           run->instant_kind[run->next] & SD_TRACE;
+}
+
+/* what happens where a step has met the end of its piece of the text */
+static int end(sd_run *run)
+{
+    if (run->modes)
+        return sd_modes_end(run);
+    return run->corners ? sd_corners_end(run) : SD_FINISHED;
+}
+
 /* one step, or what happens where one ends */
 static int advance(sd_run *run)
 {
     double from = *run->stepper->t;
     if (from >= *run->stepper->t_end)
-        return run->modes ? sd_modes_end(run) : SD_FINISHED;
+        return end(run);
     memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
     if (run->stepper->step(run->stepper->self))
         return SD_FAILED;

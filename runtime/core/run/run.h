@@ -76,6 +76,7 @@ typedef struct sd_run {
     double beyond;                    /* largest |unknown| of a row within a step, in these magnitudes */
     const double *projected;          /* drift of the last step before the method itself projected it; NULL: it does not */
     sd_modes *modes;                  /* NULL: every event goes to its handler */
+    struct sd_corners *corners;       /* NULL: every jump of a text without events goes to Python */
     double t_clear, t_seen;           /* within the last step, between which something watched has been seen to change */
     double turns;                     /* s: in which something that is read turns; 0: nothing does */
     double *looked;                   /* [SD_PARTS + 2][observed] values at the ends of parts, and within one */
@@ -86,6 +87,8 @@ typedef struct sd_run {
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
                    int32_t audited);
 void sd_run_free(sd_run *run);
+/* whether a row of the trace is asked for at t or before, and not at every step */
+int sd_run_asks(const sd_run *run, double t);
 /* values [observed] := what is observed at run->point, point_d */
 void sd_run_quantities(sd_run *run, double t, double *values);
 /* notes the powers at y, yd [written], the point at the end of the last step, which a restart leaves */

@@ -133,6 +133,24 @@ class Modes(c.Structure):
     ]
 
 
+class Corners(c.Structure):
+    """sd_corners."""
+
+    _fields_ = [
+        ("piece", P),
+        *[(name, I) for name in ["pieces", "at", "unknowns", "keeps", "groups"]],
+        *[
+            (name, P)
+            for name in ["t_end", "expanded", "kept", "own_magnitude", "own_met", "magnitude", "met", "resolved"]
+        ],
+        *[(name, P) for name in ["state", "differential", "unnamed", "group", "largest", "system"]],
+        *[(name, P) for name in ["constraint", "balance", "multiplier", "flow", "jy", "jyd", "open"]],
+        *[(name, P) for name in ["y", "yd", "before", "before_d", "rate", "seen"]],
+        *[(name, D) for name in ["still", "differs", "unknown_size", "round_off", "part", "time", "resolves"]],
+        ("sweeps", I),
+    ]
+
+
 class Run(c.Structure):
     """sd_run."""
 
@@ -192,6 +210,7 @@ class Run(c.Structure):
         ("beyond", D),
         ("projected", P),
         ("modes", P),
+        ("corners", P),
         ("t_clear", D),
         ("t_seen", D),
         ("turns", D),
