@@ -12,7 +12,7 @@ from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.dsl.model.expression import Node, topological_unbound, variables
+from sysdyn.dsl.model.expression import Node, order_of, variables
 
 Array = NDArray[np.float64]
 Bounds = tuple[Array, Array]
@@ -32,10 +32,11 @@ _RISING: Mapping[str, Callable[[Array], Array]] = {
 
 def _ordered(*ends: Array) -> Bounds:
     """The least and the largest of some values; no numbers are no bounds."""
-    every = np.stack(np.broadcast_arrays(*ends))
-    wrong = np.isnan(every).any(axis=0)
-    low, high = every.min(axis=0), every.max(axis=0)
-    return np.where(wrong, -np.inf, low), np.where(wrong, np.inf, high)
+    low = high = ends[0]
+    for end in ends[1:]:
+        low, high = np.minimum(low, end), np.maximum(high, end)
+    wrong = np.isnan(low)  # either carries what is no number
+    return (np.where(wrong, -np.inf, low), np.where(wrong, np.inf, high)) if wrong.any() else (low, high)
 
 
 def _product(a: Bounds, b: Bounds) -> Bounds:
@@ -164,7 +165,7 @@ def _combined(node: Node, args: list[Bounds], outlines: Mapping[str, Outline]) -
 
 def enclose(root: Node, low: Array, high: Array, fixed: Values, outlines: Mapping[str, Outline]) -> Bounds:
     """Bounds of `root`, which depends on time alone, over the intervals low..high [s] [k]."""
-    order = topological_unbound([root])
+    order = order_of((root,))
     if not variables(root):
         value = np.broadcast_to(np.asarray(fixed([root])[0], dtype=float), low.shape)
         return value, value
@@ -192,7 +193,7 @@ def enclose_over(
     fixed: values of expressions without unknowns.
     """
     found: dict[Node, Range] = {}
-    for node in topological_unbound([root]):
+    for node in order_of((root,)):
         if node in known or node.op in ("var", "time"):
             found[node] = known.get(node, (-np.inf, np.inf))
         elif not variables(node):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.model.terms import Nest
-from sysdyn.dsl.model.expression import Node, topological_unbound
+from sysdyn.dsl.model.expression import Node, order_of
 
 Value = Any  # float or array
 Lookup = Callable[[Node, list[Value]], Value]  # (leaf, values of its indices or arguments) -> value
@@ -44,7 +44,7 @@ def last_of(nodes: Sequence[Node], lookup: Lookup) -> Value:
 
 
 def _evaluate(roots: Sequence[Node], lookup: Lookup) -> list[Value]:
-    values = _values(topological_unbound(roots), lookup)
+    values = _values(order_of(tuple(roots)), lookup)
     return [values[r] for r in roots]
 
 

@@ -6,14 +6,14 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from sysdyn.dsl.model.expression import Node, index, topological_unbound, variables
+from sysdyn.dsl.model.expression import Node, index, order_of, topological_unbound, variables
 from sysdyn.dsl.model.functions import FUNCTIONS, real_power
 
 
 def evaluate(roots: Sequence[Node], lookup: Callable[[Node], float]) -> list[float]:
     """Values of scalar nodes; lookup gives those of param, time, index, var and table nodes."""
     values: dict[Node, Any] = {}
-    for node in topological_unbound(roots):
+    for node in order_of(tuple(roots)):
         values[node] = _value(node, values, lookup)
     return [values[r] for r in roots]
 

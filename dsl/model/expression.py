@@ -22,6 +22,7 @@ import math
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
 from typing import Any
 
 from sysdyn.dsl.model import budget
@@ -335,6 +336,12 @@ def calls(root: Node, function: str) -> list[Node]:
 def topological_unbound(roots: Iterable[Node]) -> list[Node]:
     """Like `topological`, but does not enter the bodies of reductions (their loop variable is not bound there)."""
     return _ordered(roots, bodies=False)
+
+
+@lru_cache(maxsize=128)
+def order_of(roots: tuple[Node, ...]) -> tuple[Node, ...]:
+    """The same, kept for a while: of what is evaluated again and again (samples of a law, bisections of an instant)."""
+    return tuple(_ordered(roots, bodies=False))
 
 
 def _ordered(roots: Iterable[Node], *, bodies: bool) -> list[Node]:

@@ -99,19 +99,20 @@ int sd_settle_choose(sd_settle *settle)
 double sd_settle_move_basic(sd_settle *settle, double *y, double *yd, double *state)
 {
     int32_t n = settle->unknowns, moves = n + settle->rates;
-    double largest = 0.0, *b = settle->r; /* which is measured anew behind it */
+    const double states = settle->determined ? 0.0 : 1.0, others = 1.0 / settle->follows;
+    double most[2] = {0.0, 0.0}, *b = settle->r; /* of what follows, of states; which is measured anew behind it */
     for (int32_t i = 0; i < settle->rows; i++)
         b[i] = -settle->r[i] * settle->row_scale[i];
     sd_sparse_basic(settle->basis, b, settle->step, settle->step + moves);
     for (int32_t j = 0; j < moves; j++) {
-        double move = settle->step[j] *= lift(settle, j);
-        largest = fmax(largest, fabs(move));
-        if (settle->state[j])
-            *state = fmax(*state, fabs(move));
+        const int carries = settle->state[j] != 0;
+        const double move = settle->step[j] *= carries ? states : others, size = fabs(move);
+        most[carries] = size > most[carries] ? size : most[carries];
     }
     for (int32_t j = 0; j < n; j++)
         y[j] += settle->step[j] * settle->scale[j];
     for (int32_t k = 0; k < settle->rates; k++)
         yd[settle->rate[k]] += settle->step[n + k] * settle->scale[n + k];
-    return largest;
+    *state = fmax(*state, most[1]);
+    return fmax(most[0], most[1]);
 }
