@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.api import simulate
+from sysdyn.runtime.start.restart import Restart
 
 HEAD = """from std.electrical import resistor, capacitor, voltage
 component ideal_diode {
@@ -80,3 +81,24 @@ def test_bridge_before_a_coil_commutates_at_once(method, rtol, tmp_path):
     w = 314.159265
     times = sorted({round(e.time * w / np.pi, 6) for e in found.events if e.time > 0.0})
     assert times == [1.0, 2.0, 3.0]
+
+
+SIX = Path(__file__).parents[2] / "models" / "gallery" / "six_pulse_rectifier.sd"
+
+
+def test_sets_that_short_a_source_are_not_searched_for(tmp_path, monkeypatch):
+    """Where the current goes from one phase to the next both diodes conduct in the first set that is tried: its equations
+    depend on each other, which says at once that there is no such point.  Voltage and current against closed forms.
+    """
+    searched, search = [], Restart._search
+    monkeypatch.setattr(Restart, "_search", lambda self, *given: searched.append(0) or search(self, *given))
+    trace = simulate(SIX, output=tmp_path / "t.h5", accuracy=1e-6)
+    assert not searched
+    assert len(trace.events) >= 24  # twelve commutations of two diodes
+    angle = 2.0 * np.pi * 50.0 * trace.time
+    phases = np.array([325.0 * np.sin(angle - k * 2.0 * np.pi / 3.0) for k in range(3)])
+    wanted = phases.max(axis=0) - phases.min(axis=0)
+    assert np.abs(trace["rectified"].values - wanted).max() < 1e-3
+    pulses = 3.0 * np.sqrt(3.0) / np.pi * 325.0 / 10.0  # the mean current, once the coil is charged
+    late = trace.time > 0.02
+    assert abs(trace["current"].values[late].mean() / pulses - 1.0) < 1e-3
