@@ -87,18 +87,12 @@ class Succession:
             if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
                 self.contacts.turn(k, values)
         self.contacts.apply()
-        found = self.determined.fit(t, y, yd, self._settled, touched)
+        found = self.determined.fit(t, y, yd, restart.struck, touched)
         if self._tied(t, found, touched if self.contacts.state() == stood else ()):
             found = self._ahead(t, found, self.contacts.state()) or found
         if not self._impacts:
             self._follows[stood, tuple(touched)] = self.contacts.state()
         return self._closed(t, found), True
-
-    def _settled(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
-        """The point of a set; where its equations depend on each other (diodes that short a source) without a search,
-        which finds none where there is none.
-        """
-        return self._restart.struck(t, y, yd, quickly=self.determined.leaves(t, y, yd) > 0)
 
     def _quickly(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         """The point of a set that has one without a search."""

@@ -12,6 +12,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.start.instant import Instant, UnbalancedError
+from sysdyn.runtime.start.linearly import unmet
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.runtime.start.strategies import behind
@@ -86,7 +87,8 @@ class Restart:
         self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, quickly: bool = False
     ) -> tuple[Floats, Floats, Floats] | None:
         """The same; magnitude [unknowns as written] before it."""
-        before = y
+        before, yd = y, yd.copy()
+        yd[self.settler.system.idle_multipliers()] = 0.0  # what does not hold any more pushes no more
         same, moved = _held(self.settler, t, (y, yd), magnitude)
         moved &= self.state
         if same is not None and not moved.any():  # no state need jump: there is no impulse
@@ -103,7 +105,7 @@ class Restart:
         found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
         if done and self._stays(found, y, magnitude):
             return found, rate, impulse
-        if quickly:
+        if quickly or unmet(self.settler, t, y, yd, self.state):
             return None
         # what follows is sought from where it was: impulses move it along slopes that steep laws had before the jump
         searched = self._search(t, np.where(self.state, y, before), yd)

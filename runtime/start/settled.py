@@ -31,6 +31,8 @@ LARGE = 100_000
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
 RATES = ("momentum_rate", "gamma_rate", "dynamics_rate")
+LEFT_OUT = 3
+"""SD_LEFT_OUT (core/system/settle.h): a row that no point is asked to meet."""
 HELD = 1e8
 """Weight (of squares) of a state that moves only where the rows leave nothing else."""
 
@@ -169,6 +171,12 @@ class Settler:
             slots[k] = full
         return found, slots
 
+    @property
+    def holding(self) -> NDArray[np.bool_]:
+        """Rows [rows] that a settled point meets."""
+        found: NDArray[np.bool_] = self._sort[: self._left.rows] != LEFT_OUT
+        return found
+
     def _sorts(self) -> Ints:
         """Of the rows, as core/system/settle.h names them: constraints, rates of other rows, others, left out."""
         found = np.zeros(max(self.system.rows, 1), dtype=np.int32)
@@ -176,7 +184,7 @@ class Settler:
             sort = 1 if group in ("phi", "phi_rate", "psi") else 2 if group in RATES else 0
             found[first : first + self.system.description.rows[family].size] = sort
         if self.system.form.name == "rated":
-            found[: self.system.rows][inertial_rates(self.system)] = 3
+            found[: self.system.rows][inertial_rates(self.system)] = LEFT_OUT
         return found if isinstance(self._left, System) else found[self._left.kept_rows]
 
     def _provide(self) -> None:

@@ -87,8 +87,8 @@ SIX = Path(__file__).parents[2] / "models" / "gallery" / "six_pulse_rectifier.sd
 
 
 def test_sets_that_short_a_source_are_not_searched_for(tmp_path, monkeypatch):
-    """Where the current goes from one phase to the next both diodes conduct in the first set that is tried: its equations
-    depend on each other, which says at once that there is no such point.  Voltage and current against closed forms.
+    """Where the current goes from one phase to the next both diodes conduct in the first set that is tried: linear
+    algebra says at once that there is no such point.  Voltage and current against closed forms.
     """
     searched, search = [], Restart._search
     monkeypatch.setattr(Restart, "_search", lambda self, *given: searched.append(0) or search(self, *given))

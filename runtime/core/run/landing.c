@@ -139,6 +139,9 @@ int sd_landing_arrives(sd_run *run, const double *sides, double t)
     sd_modes *m = run->modes;
     size_t written = (size_t)run->written * sizeof(double);
     const sd_keeping keeping = {run->written, m->state, m->magnitude, m->still, m->restart, m->restart_d};
+    const sd_system *system = run->settle->system;
+    for (int32_t i = 0; i < system->held; i++)
+        m->yd[system->held_unknown[i]] = 0.0; /* what does not hold any more pushes no more */
     if (!sd_landing_keeps(run->settle, t, m->y, m->yd, &keeping))
         return 0;
     memset(m->restart, 0, (size_t)m->unknowns * sizeof(double));
