@@ -11,20 +11,22 @@
 static void last_point(const sd_run *run, const sd_corners *c)
 {
     const sd_stepper *stepper = c->expanded ? c->expanded->inner : run->stepper;
-    size_t size = (size_t)c->unknowns * sizeof(double);
+    const size_t written = (size_t)run->written, rest = (size_t)c->unknowns - written;
     if (c->expanded) {
         sd_condensed_expand(c->expanded->condensed, stepper->y, c->y, 0);
         sd_condensed_expand(c->expanded->condensed, stepper->yd, c->yd, 1);
     } else {
-        memcpy(c->y, stepper->y, size);
-        memcpy(c->yd, stepper->yd, size);
+        memcpy(c->y, stepper->y, written * sizeof(double));
+        memcpy(c->yd, stepper->yd, written * sizeof(double));
     }
+    memset(c->y + written, 0, rest * sizeof(double));
+    memset(c->yd + written, 0, rest * sizeof(double));
 }
 
 /* what a method of fewer unknowns knows of their sizes becomes known of all */
 static void share(const sd_corners *c)
 {
-    for (int32_t i = 0; i < c->unknowns && c->keeps; i++) {
+    for (int32_t i = 0; i < c->unknowns; i++) {
         c->met[i] = fmax(c->met[i], fabs(c->y[i]));
         c->magnitude[i] = fmax(c->magnitude[i], fabs(c->y[i]));
     }
@@ -99,11 +101,8 @@ static int across(sd_run *run, const sd_corners *c, double t)
 /* the method starts from c->y, yd at the begin of `next` */
 static void go_on(sd_run *run, const sd_corners *c, const sd_piece *next)
 {
-    const size_t written = (size_t)run->written;
     const double *start_rate = run->start_rate;
-    memcpy(c->rate, c->yd, written * sizeof(double));
-    for (int32_t i = run->written; i < c->unknowns; i++)
-        c->y[i] = c->rate[i] = 0.0;
+    memcpy(c->rate, c->yd, (size_t)c->unknowns * sizeof(double));
     for (int32_t i = 0; i < c->unknowns; i++)
         c->yd[i] = c->differential[i] ? c->rate[i] : 0.0;
     begin_to_move(c);
@@ -126,7 +125,8 @@ int sd_corners_end(sd_run *run)
     if (room <= 0)
         return room ? SD_FINISHED : SD_FULL;
     last_point(run, c);
-    share(c);
+    if (c->keeps)
+        share(c);
     if (!across(run, c, next->begin) || shows_first(c, run->written))
         return SD_FINISHED;
     int starts = next->label == c->piece[0].label;
