@@ -2,9 +2,9 @@
 
 Four blocked diodes of a bridge say three things; four that conduct leave the current that circles in them open.  Among
 the active sets that fit, one is taken whose equations determine everything: of dependent constraints one lets go (its
-multiplier is zero, that of dry friction at its bound, the others hold its value), of undetermined flows that are zero
-one is held.  Which sets are regular
-is a matter of structure: it is asked once for each.
+multiplier is zero, that of dry friction at its bound, the others hold its value), of undetermined flows one is held at
+zero, those that are zero first: what the equations tell stays as it is.  Which sets are regular is a matter of
+structure: it is asked once for each.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting, Settle
 from sysdyn.runtime.model.description import Floats
@@ -25,6 +26,8 @@ DENSE = 300
 """Unknowns up to which matrices are full; larger models are taken as they come."""
 NOTHING = 1e-9
 """Of a unit vector: a contact's share of what is open."""
+SAME = 1e-6
+"""Of the largest flow, or rate of one: what a point found with another set may differ by, and is the same."""
 ALIKE = 9
 """Digits to which shares are compared."""
 GENERIC = 0.7310585786300049
@@ -39,7 +42,7 @@ class Determined:
     def __init__(self, contacts: Contacts) -> None:
         self.contacts = contacts
         self._pivoting = Pivoting(contacts, self._singular)
-        self._regular: dict[tuple[bool, ...], tuple[int, Floats]] = {}
+        self._regular: dict[tuple[bool, ...], tuple[int, Floats, NDArray[np.bool_]]] = {}
 
     @cached_property
     def _system(self) -> System:
@@ -56,18 +59,20 @@ class Determined:
         """How many directions the equations with the present active set leave open."""
         return self._open(t, y, yd)[0]
 
-    def _open(self, t: float, y: Floats, yd: Floats) -> tuple[int, Floats]:
-        """The same; how much the row of each contact has to do with it [contacts]: what has nothing cannot close it."""
+    def _open(self, t: float, y: Floats, yd: Floats) -> tuple[int, Floats, NDArray[np.bool_]]:
+        """The same; how much the row of each contact has to do with it [contacts]: what has nothing cannot close it; the
+        unknowns [unknowns as written] that are determined all the same.
+        """
         key = tuple(self.contacts.active.tolist())
         if key not in self._regular:
             system, n = self._system, self._system.form.written
             jy, jyd = system.jacobian(t, y[:n], yd[:n])
             if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
-                return 0, np.zeros(len(key))
+                return 0, np.zeros(len(key)), np.ones(n, dtype=bool)
             e, b = equilibrated(system.dense(jyd), system.dense(jy))
-            left, sigma, _ = decomposed(b + GENERIC * e)
+            left, sigma, right = decomposed(b + GENERIC * e)
             some = count(sigma, CERTAIN)
-            part = np.zeros(len(key))
+            part, told = np.zeros(len(key)), np.linalg.norm(right[some:, :n], axis=0) <= NOTHING
             if some < sigma.size:
                 rows, _, number, _ = switch_rows(system.description, system.form)
                 share = np.linalg.norm(left[rows, some:], axis=1)
@@ -76,7 +81,7 @@ class Determined:
                 total[-1] = 1.0  # of relations, which have no switch
                 np.maximum.at(total, number, share)
                 part = total[at]
-            self._regular[key] = sigma.size - some, part
+            self._regular[key] = sigma.size - some, part, told
         return self._regular[key]
 
     def fit(self, t: float, y: Floats, yd: Floats, settle: Settle, turned: Sequence[int] = ()) -> Point:
@@ -100,19 +105,21 @@ class Determined:
         """Points of neighbouring active sets that fit too and leave less open."""
         contacts, (open_, turned) = self.contacts, what
         values, before = contacts.observer(t, *point), contacts.state()
-        part = self._open(t, *point)[1]
+        _, part, told = self._open(t, *point)
         # of equal shares the first counts, not what round-off makes the larger
         order = [k for k in np.argsort(-np.round(part, ALIKE), kind="stable") if part[k] > NOTHING]
-        for pivots in (False, True):
+        zero = {k: abs(values[(row := contacts.contacts[k].value)]) <= contacts.observer.zero(row) for k in order}
+        for pivots, small in ((False, True), (True, True), (False, False)):
             for k in sorted(order, key=lambda k: k in turned):
-                small = abs(values[contacts.contacts[k].value]) <= contacts.observer.zero(contacts.contacts[k].value)
-                if not small or k in contacts.frozen:
+                if zero[k] != small or k in contacts.frozen or not (small or contacts.contacts[k].kind == "psi"):
                     continue
                 for turn in self._turns(k, values):
                     turn()
                     contacts.apply()
                     found = self._near(t, point, settle, pivots=pivots)
-                    if found is not None and self._goes_on(k, point, found):
+                    if found is not None and (
+                        self._goes_on(k, point, found) if small else self._alike(point, found, told)
+                    ):
                         less = self.nullity(t, *found)
                         if less < open_:
                             yield found, less
@@ -120,11 +127,16 @@ class Determined:
 
     def _goes_on(self, k: int, point: Point, other: Point) -> bool:
         """Whether the motion is the same; what a relation leaves open moves something where its sense decides."""
-        if self.contacts.contacts[k].hold < 0:
-            return True
-        moves = np.isin(self._system.kinds, ("f", "s"))[: point[1].size]
-        rates = np.stack([one[1][: moves.size][moves] for one in (point, other)])
-        return bool((np.abs(rates[0] - rates[1]) <= NOTHING * np.abs(rates).max(initial=0.0)).all())
+        return self.contacts.contacts[k].hold < 0 or _same(point[1], other[1], self._moves, NOTHING)
+
+    def _alike(self, point: Point, other: Point, told: NDArray[np.bool_]) -> bool:
+        """Whether what moves and is told [unknowns as written] is the same, and moves alike."""
+        return all(_same(a, b, self._moves & told, SAME) for a, b in zip(point, other, strict=True))
+
+    @cached_property
+    def _moves(self) -> NDArray[np.bool_]:
+        found: NDArray[np.bool_] = np.isin(self._system.kinds, ("f", "s"))[: self._system.form.written]
+        return found
 
     def _turns(self, k: int, values: Floats) -> Iterator[Callable[[], None]]:
         """What else contact k may be: friction that sticks may be at its bound in either sense, first that in which it
@@ -149,3 +161,9 @@ class Determined:
         if found is None or not self.contacts.fits(t, point[0], found):
             return None
         return found[:2]
+
+
+def _same(a: Floats, b: Floats, which: NDArray[np.bool_], part: float) -> bool:
+    """Whether two vectors differ in these entries by no more than that part of the largest of them."""
+    pair = np.stack([one[: which.size][which] for one in (a, b)])
+    return bool((np.abs(pair[0] - pair[1]) <= part * np.abs(pair).max(initial=0.0)).all())
