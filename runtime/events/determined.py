@@ -60,7 +60,7 @@ class Determined:
         return self._open(t, y, yd)[0]
 
     def _open(self, t: float, y: Floats, yd: Floats) -> tuple[int, Floats, NDArray[np.bool_]]:
-        """The same; how much the row of each contact has to do with it [contacts]: what has nothing cannot close it; the
+        """The same; how much the row of each contact has to do with it [contacts]: what has nothing closes nothing; the
         unknowns [unknowns as written] that are determined all the same.
         """
         key = tuple(self.contacts.active.tolist())

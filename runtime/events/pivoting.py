@@ -8,6 +8,7 @@ cycles).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, combinations, islice
 
@@ -22,6 +23,8 @@ MANY = 2
 """Diodes that change at once, at least: fewer are turned one by one."""
 TRIALS = 20
 """Trials a contact, beside TRIALS for all."""
+VISITS = 3
+"""Of one set from one point: it is the third time that what was tried in between leads back."""
 
 Settle = Callable[[float, Floats, Floats], tuple[Floats, Floats, Floats] | None]
 """t, y, yd -> y, yd consistent with the active set and the impulses [unknowns] that took the flows there; None: no
@@ -63,7 +66,7 @@ class Pivoting:
         self, t: float, y: Floats, yd: Floats, settle: Settle, turned: dict[int, set[bool]]
     ) -> tuple[Floats, Floats]:
         """The same; turned: those that were turned, and whether they held."""
-        seen: set[tuple[float, ...]] = set()
+        seen = Counter[tuple[float, ...]]()
         changed: list[int] = []
         fewest = len(self.contacts.contacts)
         block: tuple[NDArray[np.bool_], int, Floats] | None = None
@@ -73,7 +76,9 @@ class Pivoting:
             self.contacts.apply()
             state = self.contacts.state()
             again = state in seen
-            seen.add(state)
+            seen[state] += 1
+            if seen[state] > VISITS:
+                break
             found = self._settled_by(t, y, yd, settle)
             if found is None and block is not None:  # sources that they short: one of them alone
                 self.contacts.active[:], (_, first, values), block, fewest = block[0], block, None, 0
@@ -119,7 +124,7 @@ class Pivoting:
         return all(passed[k] > 0.0 for k in wrong if not self.contacts.active[k])
 
     def _beside(
-        self, t: float, y: Floats, yd: Floats, settle: Settle, seen: set[tuple[float, ...]]
+        self, t: float, y: Floats, yd: Floats, settle: Settle, seen: Counter[tuple[float, ...]]
     ) -> tuple[Floats, Floats, Floats] | None:
         """Where the active set contradicts itself (a source that two diodes short): the point of a near one, not seen
         yet, that does not: the first that fits, else the first; the active set then is that.
@@ -143,7 +148,7 @@ class Pivoting:
         if first is None:
             return None
         self.contacts.become(first[1])
-        seen.add(self.contacts.state())
+        seen[self.contacts.state()] += 1
         return first[0]
 
     def _near(self, before: NDArray[np.bool_]) -> Iterator[Sequence[int]]:
