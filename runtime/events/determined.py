@@ -130,13 +130,23 @@ class Determined:
         return self.contacts.contacts[k].hold < 0 or _same(point[1], other[1], self._moves, NOTHING)
 
     def _alike(self, point: Point, other: Point, told: NDArray[np.bool_]) -> bool:
-        """Whether what moves and is told [unknowns as written] is the same, and moves alike."""
-        return all(_same(a, b, self._moves & told, SAME) for a, b in zip(point, other, strict=True))
+        """Whether the flows that are told [unknowns as written] are the same, and those with a rate of their own go on alike:
+        what has none is not followed by a point.
+        """
+        asked = self._moves & told, self._moves & told & self._rated
+        return all(_same(a, b, which, SAME) for a, b, which in zip(point, other, asked, strict=True))
 
     @cached_property
     def _moves(self) -> NDArray[np.bool_]:
         found: NDArray[np.bool_] = np.isin(self._system.kinds, ("f", "s"))[: self._system.form.written]
         return found
+
+    @cached_property
+    def _rated(self) -> NDArray[np.bool_]:
+        """Unknowns [unknowns as written] whose rates the equations as written hold."""
+        found = np.zeros(self._system.unknowns, dtype=bool)
+        found[self._system.pattern.columns_of()[self._system.structural()[1]]] = True
+        return found[: self._system.form.written]
 
     def _turns(self, k: int, values: Floats) -> Iterator[Callable[[], None]]:
         """What else contact k may be: friction that sticks may be at its bound in either sense, first that in which it
