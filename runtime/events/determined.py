@@ -117,24 +117,22 @@ class Determined:
                     turn()
                     contacts.apply()
                     found = self._near(t, point, settle, pivots=pivots)
-                    if found is not None and (
-                        self._goes_on(k, point, found) if small else self._alike(point, found, told)
-                    ):
+                    if found is not None and self._goes_on(k, (point, found), None if small else told):
                         less = self.nullity(t, *found)
                         if less < open_:
                             yield found, less
                     contacts.become(before)
 
-    def _goes_on(self, k: int, point: Point, other: Point) -> bool:
-        """Whether the motion is the same; what a relation leaves open moves something where its sense decides."""
-        return self.contacts.contacts[k].hold < 0 or _same(point[1], other[1], self._moves, NOTHING)
-
-    def _alike(self, point: Point, other: Point, told: NDArray[np.bool_]) -> bool:
-        """Whether the flows that are told [unknowns as written] are the same, and those with a rate of their own go on alike:
-        what has none is not followed by a point.
+    def _goes_on(self, k: int, points: tuple[Point, Point], told: NDArray[np.bool_] | None) -> bool:
+        """Whether the motion is the same: what a relation leaves open moves something where its sense decides.  told
+        [unknowns as written]: of a flow that need not be zero, flows that are told are the same, and those that have a
+        rate of their own go on alike.
         """
-        asked = self._moves & told, self._moves & told & self._rated
-        return all(_same(a, b, which, SAME) for a, b, which in zip(point, other, asked, strict=True))
+        (y, yd), (other, other_d) = points
+        if told is None:
+            return self.contacts.contacts[k].hold < 0 or _same(yd, other_d, self._moves, NOTHING)
+        flows = self._moves & told
+        return _same(y, other, flows, SAME) and _same(yd, other_d, flows & self._rated, SAME)
 
     @cached_property
     def _moves(self) -> NDArray[np.bool_]:

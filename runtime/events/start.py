@@ -20,6 +20,8 @@ AHEAD = (1e-8, 1e-5)
 """Of the time in which the unknowns change: how far ahead a tie between active sets is looked at, where sources alone
 have moved.
 """
+BETWEEN = 3
+"""Points of sets that ask for each other, near which one is sought."""
 SPAN = 1.0
 """s: in which what starts at rest may come to its magnitude."""
 
@@ -57,20 +59,20 @@ def _fitting(system: System, t0: float, plan: Plan, until: float | None, *, cons
 def _pivoted(
     system: System, t0: float, plan: Plan, until: float | None, *, constants: bool, quickly: bool
 ) -> ConsistentState:
-    """The same; quickly: each set by the first strategy of a start alone."""
+    """The same; quickly: each set by the first strategy of a start alone.
+
+    Where the least change of one set asks for another, and that for the first again, both hold at the point between
+    them: a capacitor that a diode charges up to its source, which falls.  It is sought near what such a set asked for.
+    """
     contacts = Contacts(plan, system, Observer(system), system.description.p, starting=True)
-    contacts.begin()
     zeros = np.zeros(system.form.written)
-    values = contacts.observer(t0, zeros, zeros)
-    for k, contact in enumerate(plan.contacts):
-        if contact.kind == "guarded":
-            contacts.active[k] = bool(values[contact.guard])
     found: list[ConsistentState] = []
     errors: list[InconsistentStart] = []
+    near: ConsistentState | None = None
 
     def settle(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         try:
-            found.append(consistent_start(system, t, until=until, constants=constants, quickly=quickly))
+            found.append(consistent_start(system, t, near, until, constants=constants, quickly=quickly))
         except InconsistentStart as error:
             errors.append(error)
             return None
@@ -78,14 +80,27 @@ def _pivoted(
         contacts.size(*magnitudes(system, t, t + SPAN, y, yd))
         return y, yd, np.zeros_like(zeros)
 
-    determined = Determined(contacts)
-    try:
+    def fitted() -> ConsistentState:
+        contacts.begin()
+        values = contacts.observer(t0, zeros, zeros)
+        for k, contact in enumerate(plan.contacts):
+            if contact.kind == "guarded":
+                contacts.active[k] = bool(values[contact.guard])
+        determined = Determined(contacts)
         y, yd = determined.fit(t0, zeros, zeros, settle)
+        if _tied(contacts, contacts.observer(t0, y, yd)):
+            y = _ahead(contacts, determined, t0, settle, y)
+        return next(state for state in reversed(found) if state.y is y)
+
+    try:
+        return fitted()
     except NoActiveSetError as error:
-        raise errors[-1] if errors else InconsistentStart("stuck", float("inf"), names=error.names) from error
-    if _tied(contacts, contacts.observer(t0, y, yd)):
-        y = _ahead(contacts, determined, t0, settle, y)
-    return next(state for state in reversed(found) if state.y is y)
+        failed = errors[-1] if errors else InconsistentStart("stuck", float("inf"), names=error.names)
+    for asked in found[: -1 - BETWEEN : -1] if quickly else ():
+        near = asked
+        with suppress(NoActiveSetError):
+            return fitted()
+    raise failed
 
 
 def _tied(contacts: Contacts, values: Floats) -> bool:

@@ -30,6 +30,7 @@ from sysdyn.runtime.numerics.gauss_newton import (
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.start.equations import HIDDEN
+from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
 from sysdyn.runtime.start.strategies import (
@@ -372,6 +373,8 @@ def _consistent(
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
         guess = starter.unknowns(t0, y, np.zeros(y.size))
+    if quickly and no_start(starter, t0, guess):
+        raise InconsistentStart("stuck", float("inf"))
     best, strategy = _attempt(starter, t0, guess, starter.free, 1 if quickly else None)
     if quickly and not strategy:
         raise InconsistentStart("stuck", best.residual)

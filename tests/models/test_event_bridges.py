@@ -138,3 +138,31 @@ def test_a_current_that_circles_in_conducting_diodes_is_held_though_none_is_zero
     assert min(flow.min() for flow in flows) > -1e-12
     assert np.abs(flows[0] + flows[1] - trace["Ld.f"].values).max() < 1e-9
     assert np.abs(flows[0] - flows[2] - trace["Ls.f"].values).max() < 1e-9
+
+
+CHARGED = """from std.electrical import resistor, capacitor, voltage, diode
+model m {
+  node s, r, p, n: electrical
+  V: voltage(v = 268 V*sin(2*pi*60 Hz*t - 0.718)) s -> r
+  A: diode.complementary() s -> p
+  B: diode.complementary() n -> s
+  C: diode.complementary() r -> p
+  D: diode.complementary() n -> r
+  Cd: capacitor(C = 39 uF) p -> n
+  R: resistor(R = 1 kohm) p -> n
+  G: resistor(R = 0.1 ohm) n -> ground
+}
+scene s of m { time 0 s to 1 ms; trace Cd.e as v every 0.1 ms; accuracy 1e-6 }
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_a_capacitor_at_a_source_that_falls_begins_at_it(tmp_path, formulation):
+    """Nothing is said of it.  Conducting diodes take it to the source, whose fall they then would have to follow; blocked
+    ones leave it at zero, where they conduct (E903): it begins at the source, and decays from there.
+    """
+    trace = run(CHARGED, tmp_path, formulation=formulation)
+    exact = 268.0 * np.sin(0.718) * np.exp(-trace.time / 39e-3)
+    source = np.abs(268.0 * np.sin(2.0 * np.pi * 60.0 * trace.time - 0.718))
+    assert (source[1:] < exact[1:]).all()
+    assert np.abs(trace["v"].values - exact).max() < 2e-4

@@ -18,7 +18,7 @@ def asked(f, *parts, **more):
     state[[names.index("q_x"), names.index("f_x")]] = True
     y[names.index("f_x")] = f
     kinematics = system.form.k_q, system.form.k_f
-    settler = Settler(system, kinematics, np.ones(system.unknowns), 1.0, state)
+    settler = Settler(system, kinematics, np.full(system.unknowns, f), 1.0, state)
     return unmet(settler, 0.0, y, np.ones_like(y), state)
 
 
