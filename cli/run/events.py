@@ -127,7 +127,7 @@ class _Planner:
         sense = -1 if s.sense is None else self.prepared.place(s.sense)
         related, aim = s.kind == "relation", tuple(self.row[name] for name in s.aim)
         if related and aim:
-            self.relations.append(Relation(*aim, True))
+            self.relations.append(Relation(aim[0], True))
         kind = "friction" if related else s.kind
         return Contact(
             s.name, kind, number, row(s.value), row(s.rate), row(s.multiplier), row(s.acceleration), row(s.bound),
