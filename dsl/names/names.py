@@ -15,7 +15,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.units import NONE, known
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Context, Use, Value
-from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
+from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError, circular
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
     BundleNode,
@@ -262,10 +262,9 @@ class Names(Context):
         of a label that it reads, in each of its parts); E105 where it needs itself.
         """
         if symbol in self._active:
-            chain = [s.name for s in self._active[self._active.index(symbol) :]] + [symbol.name]
             place = Place(symbol.space.source, symbol.span)
-            help_ = "break it with a state or an implicit closed by a gamma"
-            self.report.error("E105", f"circular definition: {' -> '.join(chain)}", place, help=help_)
+            message, help_ = circular(self._active[self._active.index(symbol) :])
+            self.report.error("E105", message, place, help=help_)
             raise Failed
         key = symbol, self.virtual
         if key in self._values:
