@@ -156,8 +156,8 @@ class Elaborator(Instances):
             self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
 
     def _by_nodes(self, power: ex.Node) -> ex.Node:
-        """A power with the efforts of branches without a law (coils on one core) by their nodes: what makes them, a rate
-        of several momenta, stands in no dynamic.
+        """A power with the efforts of branches without a law (coils on one core) by their nodes: what makes them, the
+        rate of several momenta, stands in no dynamic.
         """
         efforts = [n for n in ex.variables(power) if n.op == "var" and n.data[1:] == ("be", 0)]
         if not efforts:
