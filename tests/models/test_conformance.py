@@ -442,6 +442,15 @@ REFUSED = {
         "model z { param n = 0 kg\n param p = 2 N.s\n let x = p/n }\nscene s of z { time 0 s to 1 s; trace x }\n",
         ("E324", 4, "p/n, n = 0 kg", ""),
     ),
+    "a bound is a whole number": (
+        "model a {\n coord y[1..2.5]: translation = 0 m\n}\n",
+        ("E805", 2, "a bound is 2.5", "an index within the bounds"),
+    ),
+    "a file of rows that is not there": (
+        'table f(x: m) -> N linear file "nope.csv"\nmodel a { let y = f(1 m) }\n',
+        ("E206", 1, "'nope.csv' cannot be read", "rows of numbers"),
+    ),
+    "a text is no value": ('model a {\n let y = "abc"\n}\n', ("E203", 2, "a text stands", "a number")),
     "ground is declared once": ("model z {\n node ground: electrical\n}\n", ("E108", 2, "'ground'", "")),
 }
 
