@@ -110,7 +110,7 @@ class Names(Context):
         return Typed(ex.compare("==", ex.const(float(e.value)), ex.const(1.0)), NONE, truth=True)
 
     def _text(self, e: syntax.Text) -> Value:
-        raise self.fail("E203", "a text stands where a value is wanted", e.span, help="a number: there are no texts here")
+        raise self.fail("E203", "a text stands where a value is wanted", e.span, help="a number: texts are no values")
 
     def _group(self, e: syntax.Group) -> Value:
         return self.resolve(e.expr)
