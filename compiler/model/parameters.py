@@ -208,7 +208,7 @@ class Parameters:
         """ModelError E324 where a value came out infinite or undefined."""
         if not np.all(np.isfinite(values)):
             text = f"division by zero, or a number too large, in {what} with the values bound"
-            raise ModelError([Diagnostic("E324", text, place)])
+            raise ModelError([Diagnostic("E324", text, place, "a finite number, and no zero below a division")])
 
 
 def _number(parameter: Parameter) -> float | None:

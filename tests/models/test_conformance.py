@@ -451,6 +451,31 @@ REFUSED = {
         ("E206", 1, "'nope.csv' cannot be read", "rows of numbers"),
     ),
     "a text is no value": ('model a {\n let y = "abc"\n}\n', ("E203", 2, "a text stands", "a number")),
+    "what is fixed is named as it is written": (
+        "model z {\n node a: electrical\n I: flow(f = 1 A) ground -> a\n L: kinetic(p = 1 H*f) a\n init L.f = 0 A\n}\n",
+        ("E903", 3, "fixed initial values of 'L.f'", "free 'L.f'"),
+    ),
+    "an impact at the start": (
+        "model z {\n coord h: translation = 0 m\n energy T* = 1/2*(1 kg)*h'^2\n phi floor: h >= 0 m\n"
+        " init h' = -2 m/s\n}\n",
+        ("E903", 4, "contradict floor", "the rate behind the impact"),
+    ),
+    "an input that is a condition": (
+        "component s { port a: electrical\n input g: 1\n R: dissipator(e = (if g > 0.5 then 1 ohm else 2 ohm)*f) a }\n"
+        "model z {\n node a: electrical\n S: s(g = t > 1 s) a = a\n C: potential(e = 1 V/C*q) a\n}\n",
+        ("E203", 3, "'g' is a condition", "(if t > 1 s then 1 else 0)"),
+    ),
+    "a source whose ends are one": (
+        "from std.electrical import voltage\nmodel z {\n node a: electrical\n V: voltage(v = 1 V) ground -> ground\n"
+        " R: dissipator(e = 1 ohm*f) a\n C: potential(e = 1 V/C*q) a\n}\n",
+        ("E411", 4, "both ends of the effort source V are one node", ""),
+    ),
+    "a value for an element": (
+        "component c { port a: electrical\n param k: V/C\n C: potential(e = k*q) a }\nmodel z {\n node a: electrical\n"
+        " K: c(k = 1 V/C) a = a\n R: dissipator(e = 1 ohm*f) a\n}\n"
+        "scene s of z { time 0 s to 1 s; set K = 3 V/C; trace a.e }\n",
+        ("E910", 9, "'K' is not a parameter", "set K.k = ..."),
+    ),
     "ground is declared once": ("model z {\n node ground: electrical\n}\n", ("E108", 2, "'ground'", "")),
 }
 
