@@ -92,6 +92,10 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             report.error(
                 "E510", f"the constraints contradict each other at the start: residual {left} in {names}", where
             )
+        case _ if not np.isfinite(error.residual):
+            message = f"no start fits: what holds at it would let go at once, and hold at once where it does not: {names}"
+            there = next((s.place for s in prepared.network.switches if s.name in error.names), where)
+            report.error("E903", message, there, help="initial values of all that it ties: init ... = ...")
         case _:
             message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
             sides = {switch.name for switch in prepared.network.switches}  # no guess mends a short circuit

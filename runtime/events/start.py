@@ -82,7 +82,8 @@ def _pivoted(
     try:
         y, yd = determined.fit(t0, zeros, zeros, settle)
     except NoActiveSetError as error:
-        raise errors[-1] if errors else InconsistentStart("stuck", float("inf"), names=error.names) from error
+        # that of the set that follows from what is wrong: those behind it are tried beside it
+        raise errors[0] if errors else InconsistentStart("stuck", float("inf"), names=error.names) from error
     if _tied(contacts, contacts.observer(t0, y, yd)):
         y = _ahead(contacts, determined, t0, settle, y)
     return next(state for state in reversed(found) if state.y is y)

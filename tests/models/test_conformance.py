@@ -406,6 +406,17 @@ def test_a_bound_ends_with_the_reaction_that_tells_it(tmp_path, formulation):
 
 # -- refused ----------------------------------------------------------------------------------------------------
 
+RATCHET = """model z {{
+  node a, b: rotation
+  A: kinetic(p = 1 kg.m^2*f) a
+  B: kinetic(p = 2 kg.m^2*f) b
+  C: dissipator(e = 1 N.m*setsign(f)) a
+  R: ratchet() a -> b
+  init A.f = -1 rad/s
+  {0}
+}}
+component ratchet {{ branch: rotation; psi one_way: f >= 0 rad/s }}
+"""
 REFUSED = {
     "a product in parentheses is no unit": (
         "model a {\n let x = 30 N/(m.s^2)*3\n}\n",
@@ -475,6 +486,14 @@ REFUSED = {
         " K: c(k = 1 V/C) a = a\n R: dissipator(e = 1 ohm*f) a\n}\n"
         "scene s of z { time 0 s to 1 s; set K = 3 V/C; trace a.e }\n",
         ("E910", 9, "'K' is not a parameter", "set K.k = ..."),
+    ),
+    "a ratchet that begins backwards, beside friction": (
+        RATCHET.format("init b.f = 0 rad/s"),
+        ("E903", 10, "fixed initial values of 'A.f', 'b.f' contradict R", "free one of"),
+    ),
+    "a ratchet that would let go at once": (
+        RATCHET.format(""),
+        ("E903", 10, "would let go at once, and hold at once", "initial values of all that it ties"),
     ),
     "ground is declared once": ("model z {\n node ground: electrical\n}\n", ("E108", 2, "'ground'", "")),
 }
