@@ -93,7 +93,7 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
                 "E510", f"the constraints contradict each other at the start: residual {left} in {names}", where
             )
         case _ if not np.isfinite(error.residual):
-            message = f"no start fits: what holds at it would let go at once, and hold at once where it does not: {names}"
+            message = f"no start fits: what holds would let go at once, and hold at once where it does not: {names}"
             there = next((s.place for s in prepared.network.switches if s.name in error.names), where)
             report.error("E903", message, there, help="initial values of all that it ties: init ... = ...")
         case _:

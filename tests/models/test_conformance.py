@@ -493,7 +493,7 @@ REFUSED = {
     ),
     "a ratchet that would let go at once": (
         RATCHET.format(""),
-        ("E903", 10, "would let go at once, and hold at once", "initial values of all that it ties"),
+        ("E903", 10, "would let go at once, and hold", "initial values of all that it ties"),
     ),
     "ground is declared once": ("model z {\n node ground: electrical\n}\n", ("E108", 2, "'ground'", "")),
 }
