@@ -57,7 +57,8 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     # faster than that it was in shorter steps, which are over
     met[k_f] = np.minimum(met[k_f], np.maximum(2.0 * met[k_q] / step, np.abs(y[k_f])))
     # what jumps where the run ended (a floor of what is whole there) is open there, and not beside it
-    beside = tuple((place, system.observe(t, place, yd), system.ledgers(t, place, yd)) for place in (y, y + BESIDE * met))
+    places = y, y + BESIDE * met
+    beside = tuple((place, system.observe(t, place, yd), system.ledgers(t, place, yd)) for place in places)
     found = LeftOpen(*map(np.zeros_like, beside[0][1:]))
     given = _given(system)
     said = given > 0.0
