@@ -22,7 +22,7 @@
 #define FALLS 0.5          /* of an error: that of a shorter step where none does */
 #define FAR_LONGER 1e3     /* a step over another whose error is to say the same of a jump */
 #define DOUBTED 0.1        /* of a steep row's terms: what it may be off before slopes tell whether tolerances let it be */
-#define LOOSE 1e-3         /* tolerance beyond which that is asked: of five circuits none was refused by it to there */
+#define LOOSE 5e-3         /* tolerance beyond which that is asked: to 1e-3 it refused none of the steps of five circuits */
 #define LEAST 1e-10        /* error of a step, for the next one's size */
 #define SHRUNK 1e-3        /* of the step that was tried first, below which the point that it begins at is settled */
 #define AFRESH 0.1         /* of it: what is tried from there */
