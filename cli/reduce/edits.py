@@ -21,6 +21,8 @@ from sysdyn.values import dataclass
 
 Cut = tuple[int, int, str]
 """Code points first..last-1 of a text, and what stands there instead."""
+NO_MEMBER = r"(?<!\w)(?<!(?<!\.)\.)"
+"""What stands before a name that is none of a member: no letter, no dot but those of a range."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +56,10 @@ def candidates(target: Target, network: Network, found: Sequence[Activity]) -> t
         if all(a.role in ("in", "through") for a in group):
             continue
         name = statement.decl.name if isinstance(statement, syntax.Instance) else ""
+        several = sum(isinstance(s, syntax.Instance) and s.decl.name == name for s in target.model.body) > 1
         value, share = sum(a.activity for a in group), sum(a.share for a in group)
-        label = name or group[0].label
-        made.append(Candidate(label, value, share, key, name, _joined(source, statement, network)))
+        label = group[0].label if several else name or group[0].label
+        made.append(Candidate(label, value, share, key, "" if several else name, _joined(source, statement, network)))
     return tuple(sorted(made, key=lambda c: (c.activity, c.span)))
 
 
@@ -64,10 +67,13 @@ def _statement(target: Target, activity: Activity) -> syntax.Statement | None:
     """The statement of the model that makes an element, or that is one; None inside components and loops."""
     if activity.name:
         first = re.split(r"[.\[#]", activity.name, maxsplit=1)[0]
-        for s in target.model.body:
-            if isinstance(s, syntax.Instance) and s.decl.name == first:
-                return s
-        return None
+        text, own = target.document.file.source.text, "".join(activity.name.split())
+        named = [s for s in target.model.body if isinstance(s, syntax.Instance) and s.decl.name == first]
+        said = {"".join(text[s.decl.span.start : s.decl.span.end].split()): s for s in named}
+        several = next(
+            (s for label, s in said.items() if own == label or own.startswith((f"{label}.", f"{label}#"))), None
+        )
+        return several or (named[0] if named and not own.startswith(f"{first}[") else None)
     place = activity.place
     if place.file != target.document.file.source.name:
         return None
@@ -158,7 +164,7 @@ def _spoken(target: Target, text: str, name: str) -> int:
 
 def _renamed(target: Target, text: str, goes: str, stays: str) -> Iterator[Cut]:
     """Cuts that put one node for another at the ends of elements, and take away what then has both ends there."""
-    word = re.compile(rf"(?<![\w.]){re.escape(goes)}(?!\w)")
+    word = re.compile(rf"{NO_MEMBER}{re.escape(goes)}(?!\w)")
     for statement in dict.fromkeys(s for s, _ in _connections(target)):
         within = [(c, word.sub(stays, text[c.span.start : c.span.end])) for c in statement.connections]
         sides = [[word.sub(stays, end) for end in _ends(text, c)] for c, _ in within]
@@ -218,6 +224,8 @@ def unread(target: Target, text: str, before: str) -> str:
 
 
 def _read(text: str, name: str, *, of: bool = False) -> int:
-    """How often a name stands in a text, comments apart; of: as what is said of something too (`x.name`)."""
-    plain = re.sub(r"#[^\n]*", "", text)
-    return len(re.findall(rf"(?<![\w{'' if of else '.'}]){re.escape(name)}(?!\w)", plain))
+    """How often a name stands in a text, comments apart; of: as what is said of something too (`x.name`).  A range
+    ends at a name: `1..name`.
+    """
+    plain, before = re.sub(r"#[^\n]*", "", text), r"(?<!\w)" if of else NO_MEMBER
+    return len(re.findall(rf"{before}{re.escape(name)}(?!\w)", plain))

@@ -7,6 +7,7 @@ are integrated by the solver in a run of their own.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -123,7 +124,7 @@ def _of_branches(branches: Sequence[Branch]) -> Iterator[list[Part]]:
         power = [
             summed(mul(var(b.name, "be", *b.at), var(b.name, "bf", *b.at)), b.loops) for b in pieces if b.kind in ROLES
         ]
-        label = shown(name) + (f"[{_ranges(pieces)}]" if first.at else "")
+        label = f"{shown(name)}{_ranges(pieces)}"
         yield [Part(f"power of {name}", label, ROLES[first.kind], True, add(*power), first.place, first.domain.name)]
 
 
@@ -134,9 +135,12 @@ def shown(name: str) -> str:
 
 
 def _ranges(pieces: Sequence[Branch]) -> str:
-    if len(pieces) > 1:
-        return "…"
-    return ", ".join([f"{loop.first}..{loop.last}" for loop in pieces[0].loops] or list(map(str, pieces[0].at)))
+    """The indices of a family in brackets, but for those that its name holds (of one of several statements)."""
+    first = pieces[0]
+    named = sum(part.count(",") + 1 for part in re.findall(r"\[([^\]]*)\]", first.name))
+    loops = {loop.index: f"{loop.first}..{loop.last}" for loop in first.loops}
+    own = [loops.get(at.data, str(at)) if at.op == "index" else str(at) for at in first.at[named:]]
+    return f"[{'…' if len(pieces) > 1 else ', '.join(own)}]" if own else ""
 
 
 def _of_statements(network: Network) -> Iterator[list[Part]]:

@@ -128,7 +128,7 @@ def options_of(
 
     t0 = value(scene.start) if scene.start is not None else 0.0
     t1 = value(scene.end) if scene.end is not None else None
-    if request.until is None and t1 is None:
+    if request.until is None and t1 is None and not report.failed:
         raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
     until, at, wall = instants_of(request, target.document, report)
     t1 = until if request.until is not None else t1

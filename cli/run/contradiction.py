@@ -80,6 +80,9 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             free = f"free {among}{fixed}: '~' for '='"
             still = [r.label for r in error.rows if r.kind == "dynamics" and _without_inertia(prepared, r.label)]
             free += f"; or {still[0]} lacks an inertia: energy T* = 1/2*m*{still[0]}'^2" if still else ""
+            gaps = {switch.name for switch in prepared.network.switches if switch.kind == "phi"}
+            struck = not itself and any(r.label in gaps for r in error.rows)
+            free += "; or the rate behind the impact: a run begins when it is over" if struck else ""
             report.error("E903", message, where, help=free, related=related)
         case "fixed" if any(row.kind == "initial" for row in error.rows):
             message = f"an initial value contradicts the constraints: residual {_residual(prepared, error)}"
@@ -89,6 +92,10 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             report.error(
                 "E510", f"the constraints contradict each other at the start: residual {left} in {names}", where
             )
+        case _ if not np.isfinite(error.residual):
+            message = f"no start fits: what holds would let go at once, and hold at once where it does not: {names}"
+            there = next((s.place for s in prepared.network.switches if s.name in error.names), where)
+            report.error("E903", message, there, help="initial values of all that it ties: init ... = ...")
         case _:
             message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
             sides = {switch.name for switch in prepared.network.switches}  # no guess mends a short circuit
@@ -110,9 +117,14 @@ def _without_inertia(prepared: Prepared, name: str) -> bool:
 def _listed(prepared: Prepared, error: InconsistentStart) -> str:
     """The fixed values to free, as the author writes them: `x'`, and `shaft.f` of a node or an element."""
     elements = {n.name for n in prepared.network.nodes} | {b.name for b in prepared.network.branches}
+    places = [place_of(prepared, c) for c in error.candidates]
     shown = []
-    for c in error.candidates:
+    for c, place in zip(error.candidates, places, strict=True):
         name = c.label.removesuffix("'")
+        written = re.match(r"init\s+([^=~:]+?)\s*[=~]", place.source.text[place.span.start : place.span.end])
+        if written and ".." not in written[1] and places.count(place) == 1:
+            shown.append(written[1])
+            continue
         shown.append(f"{name}.f" if name != c.label and re.sub(r"\[.*", "", name) in elements else c.label)
     return ", ".join(f"'{name}'" for name in dict.fromkeys(shown))
 

@@ -125,12 +125,16 @@ class _Planner:
             text = f"phi {s.name}: restitution {restitution:g} is not between 0 and 1"
             raise ModelError([Diagnostic("E514", text, s.place)])
         sense = -1 if s.sense is None else self.prepared.place(s.sense)
-        kind = "friction" if s.kind == "relation" else s.kind
+        related, aim = s.kind == "relation", tuple(self.row[name] for name in s.aim)
+        if related and aim:
+            self.relations.append(Relation(aim[0], True))
+        kind = "friction" if related else s.kind
         return Contact(
             s.name, kind, number, row(s.value), row(s.rate), row(s.multiplier), row(s.acceleration), row(s.bound),
             row(s.upper), row(s.lower), sense, row(s.guard), restitution,
-            tuple(self.row[name] for name in s.aim), tuple(self.prepared.place(n) for n in s.direction),
+            aim, tuple(self.prepared.place(n) for n in s.direction),
             -1 if s.holds is None else self.prepared.place(s.holds), s.moves, s.dual,
+            len(self.relations) - 1 if related and aim else -1,
         )  # fmt: skip
 
 

@@ -150,7 +150,7 @@ class Parameters:
             raise ModelError([Diagnostic("E805", f"'{name}' has {len(box)} indices, not {len(at)}", place)])
         for k, (first, last) in zip(at, box, strict=True):
             if not first <= k <= last:
-                raise ModelError([Diagnostic("E805", f"'{name}': index {k} outside {first}..{last}", place)])
+                raise ModelError([Diagnostic("E805", f"'{name}': index {k:g} outside {first}..{last}", place)])
         return tuple(int(k) - first for k, (first, _) in zip(at, box, strict=True))
 
     def extents(self, shape: Shape, place: Place | None = None) -> Extents:
@@ -208,7 +208,7 @@ class Parameters:
         """ModelError E324 where a value came out infinite or undefined."""
         if not np.all(np.isfinite(values)):
             text = f"division by zero, or a number too large, in {what} with the values bound"
-            raise ModelError([Diagnostic("E324", text, place)])
+            raise ModelError([Diagnostic("E324", text, place, "a finite number, and no zero below a division")])
 
 
 def _number(parameter: Parameter) -> float | None:

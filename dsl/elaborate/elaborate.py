@@ -22,7 +22,7 @@ from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.port_efforts import NotSaidError, conjugate_of
 from sysdyn.dsl.elaborate.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Derived, Dynamic, Initial, Loop, Observation, State, loop_indices
+from sysdyn.dsl.model.network import Branch, Derived, Dynamic, Initial, Loop, Observation, State, loop_indices
 from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.model.units import Dimension, si
 from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
@@ -150,10 +150,23 @@ class Elaborator(Instances):
             except Failed:
                 continue
             self.parts.states.append(State(name, found.shape, si(found.dimension), found.place))
-            self.parts.dynamics.append(Dynamic(state, power, loops, found.place))
+            self.parts.dynamics.append(Dynamic(state, self._by_nodes(power), loops, found.place))
             self.parts.given.add(name)
             target = state if found.first is None else ex.sub(state, found.first)
             self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
+
+    def _by_nodes(self, power: ex.Node) -> ex.Node:
+        """A power with the efforts of branches without a law (coils on one core) by their nodes: what makes them, the
+        rate of several momenta, stands in no dynamic.
+        """
+        efforts = [n for n in ex.variables(power) if n.op == "var" and n.data[1:] == ("be", 0)]
+        if not efforts:
+            return power
+        read = (n for e in self.parts.energies if e.function == "T*" for n in ex.variables(e.expression))
+        kinetic = {n.data[0] for n in read if n.op == "var" and n.data[1] == "bf"}
+        fields = {b.name: b for b in self.parts.branches if b.kind == "field" and b.domain.common == "effort"}
+        change = {n: _between(fields[n.data[0]], n) for n in efforts if n.data[0] in kinetic & fields.keys()}
+        return ex.substitute(power, change)
 
     def derived(self) -> None:
         """What branches along expressions differentiate by time, and integrals of these read."""
@@ -191,3 +204,12 @@ class Elaborator(Instances):
                             self._speed(symbol, value.node, symbol.dimension)
                 except Failed:
                     continue
+
+
+def _between(branch: Branch, effort: ex.Node) -> ex.Node:
+    """The effort of a branch by its nodes; where an expression is in their place, as it is."""
+    ends, here = (branch.plus, branch.minus), dict(zip(branch.at, effort.args, strict=True))
+    if None in ends:
+        return effort
+    found = [ex.var(end.node, "ne", *end.at) if end and end.node else ex.const(0.0) for end in ends]
+    return ex.substitute(ex.sub(*found), here)

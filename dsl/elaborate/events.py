@@ -357,7 +357,8 @@ def relation(
     """The text of a relation given = text with each term c*setsign(u) as c*s: s closes  u = 0  where that holds, else
     s = sense, the sign of u.  It holds as long as c*s, what the others leave, is within abs(c): a relation may be
     written with either sign of c.  Where u is what a dissipator `absorbs` by, c itself is the bound, which is not
-    negative.  Where u moves at finite rates alone it is a sign, which may slide (forms/corners).
+    negative.  A c that a reaction tells is watched (aim).  Where u moves at finite rates alone it is a sign, which may
+    slide (forms/corners).
     """
     at, shape = loop_indices(loops), loop_ranges(loops)
     change: dict[Node, Node] = {}
@@ -387,7 +388,9 @@ def relation(
         rest = ex.substitute(root, {s: ex.const(0.0)})
         left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
         bound = ex.neg(factor) if u is absorbs else ex.call("abs", factor)
-        draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, holds=holds)
+        told = u is not absorbs and any(n.data[1] in ("kappa", "mu") for n in ex.variables(factor) if n.op == "var")
+        aim = (factor,) if told else ()
+        draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, aim=aim, holds=holds)
         frame.parts.drafts.append(draft)
     return text
 

@@ -240,8 +240,15 @@ class Instances(Elements):
         for arg in s.args or ():
             if arg.name is None:
                 text = self.source_text(arg.span)
-                names = [n for n, p in head.parameters.items() if p.value is None] or [*head.parameters]
-                help_ = f"{names[0]} = {text}" if len(names) == 1 else f"name it: {', '.join(head.parameters)}"
+                taken: dict[str, syntax.Param | syntax.Input] = {**head.parameters, **head.inputs}
+                names = [n for n, p in taken.items() if p.value is None] or [*taken]
+                help_ = (
+                    f"{names[0]} = {text}"
+                    if len(names) == 1
+                    else f"name it: {', '.join(taken)}"
+                    if taken
+                    else "leave it out"
+                )
                 message = f"'{text}' is a positional argument: those of '{component.name}' are named"
                 raise self.resolver.fail("E404", message, arg.span, help=help_)
             if arg.name in found or arg.name in inputs:

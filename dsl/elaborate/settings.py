@@ -72,6 +72,9 @@ class Settings:
         inside = [p for p in (*self.model.parts.parameters, *self.model.parts.inputs) if p.endswith(f".{last}")]
         near = near or (inside[0] if inside and (symbol is None or "." in shown) else None)
         started = f"init {shown} = ... sets an initial value" if symbol is not None else None
+        own = [p for p in (*self.model.parts.parameters, *self.model.parts.inputs) if p.startswith(f"{shown}.")]
+        if own and symbol is not None:
+            near, started = None, " or ".join(f"set {p} = ..." for p in own[:3])
         help_ = f"nearest: '{near}'" if near else started
         if name in self.model.parts.inputs:
             help_ = f"the whole: set {name} = [a, b, ...]"

@@ -93,7 +93,8 @@ def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is no text"
-        report.error("E206", f"table {item.name.name}: '{item.file}' cannot be read: {reason}", place)
+        help_ = "a text of rows of numbers, separated by commas, beside the model"
+        report.error("E206", f"table {item.name.name}: '{item.file}' cannot be read: {reason}", place, help=help_)
         raise Failed from None
     rows: list[Row] = []
     for number, line in enumerate(lines, 1):

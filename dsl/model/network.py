@@ -322,7 +322,7 @@ class Switch:
     kind: phi or psi (with a multiplier >= 0 where it holds, and value >= 0 elsewhere), guarded (while), friction (the
     multiplier bounded by `bound` on both sides where it holds; elsewhere the param `sense` is the sign of the value),
     relation (friction whose multiplier is what the rest of a relation leaves: the relation reads value = 0 where the
-    param `holds` is 1, and has no row beside it),
+    param `holds` is 1, and has no row beside it; aim: c of its c*setsign(u), where a reaction tells it),
     planar (friction in the plane: value is the speed along the params `direction`, less half the speed, rate that
     of the former; aim: names of both flows, both multipliers and the speed),
     follows (holds where the one before it does).

@@ -10,7 +10,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.units import NONE, Dimension, multiply, raised
 from sysdyn.dsl.names.context import Context, Value
-from sysdyn.dsl.names.symbols import Typed, Vector
+from sysdyn.dsl.names.symbols import Definition, Typed, Vector
 from sysdyn.dsl.text.diagnostics import Related
 from sysdyn.dsl.tree import syntax
 
@@ -108,13 +108,25 @@ class Arithmetic(Context):
         dimension = tuple((k, int(v) if v == int(v) else v) for k, v in raised(base.dimension, power))
         return Typed(ex.power(base.node, exponent.node), dimension)
 
+    def _signal_of(self, e: syntax.Expr) -> tuple[str, str] | None:
+        """The input that an expression names, and what it is bound to as it is written."""
+        symbol = self.scope.find(e.name) if isinstance(e, syntax.Name) else None
+        if not isinstance(symbol, Definition) or symbol.kind != "input":
+            return None
+        span = symbol.expression.span
+        return symbol.name, " ".join(symbol.space.source.text[span.start : span.end].split())
+
     def _compare(self, e: syntax.Compare) -> Value:
         """Two numbers of one dimension compared; conditions and arrays are not (E203)."""
         left, right = self.resolve(e.left), self.resolve(e.right)
         if isinstance(left, Vector) or isinstance(right, Vector):
             raise self.fail("E203", "arrays are not compared", e.span, help="an element of one: a[1] < b[1]")
         if left.truth or right.truth:
-            raise self.fail("E203", "a condition is not compared", e.span, help="and, or, not")
+            bound = self._signal_of(e.left if left.truth else e.right)
+            said, number = "a condition is not compared", "and, or, not"
+            if bound:
+                said, number = f"'{bound[0]}' is a condition: it is not compared", f"(if {bound[1]} then 1 else 0)"
+            raise self.fail("E203", said, e.span, help=number)
         if None not in (left.dimension, right.dimension) and left.dimension != right.dimension:
             message = f"the two operands differ: {dim.show(left.dimension)} {e.op} {dim.show(right.dimension)}"
             help_ = self.missing(right.dimension, left.dimension, e.right, e.left)

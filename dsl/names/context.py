@@ -377,6 +377,8 @@ class Context:
                 self.whole.add(node.data)
             if node.op == "const" and node.data != node.data:
                 raise Failed
+        if value.node.op == "const" and not float(value.node.data).is_integer():
+            raise self.fail("E805", f"{what} is {value.node.data:g}, no whole number", expression.span)
         return value.node
 
     def missing(self, have: Dimension | None, want: Dimension | None, *within: syntax.Expr) -> str | None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.names.symbols import Space
+from sysdyn.dsl.names.symbols import Definition, Space
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
@@ -35,3 +37,16 @@ class SeveralError(Failed):
     def __init__(self, label: str, key: tuple[int, int, Node], loop: str, parts: tuple[Part, ...]) -> None:
         super().__init__(label)
         self.label, self.key, self.loop, self.parts = label, key, loop, parts
+
+
+def circular(chain: Sequence[Definition]) -> tuple[str, str]:
+    """What is said of definitions that need each other, and what to write instead."""
+    names = [s.name for s in chain]
+    if all(s.at for s in chain):
+        said = f"elements of '{names[0]}' are defined by elements of '{names[0]}'"
+        through = f", through '{', '.join(names[1:])}'" if names[1:] else ""
+        one = f"{names[0]}[{', '.join(chain[0].at)}]"
+        help_ = f"sum(j in ...) or prod(j in ...) over what is added up; or 'implicit' and a gamma for each {one}"
+        return f"{said}{through}: a let knows no order of its elements", help_
+    said = " -> ".join([*names, names[0]])
+    return f"circular definition: {said}", "break it with a state or an implicit closed by a gamma"

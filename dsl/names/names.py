@@ -15,7 +15,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.units import NONE, known
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Context, Use, Value
-from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
+from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError, circular
 from sysdyn.dsl.names.symbols import (
     BranchSymbol,
     BundleNode,
@@ -110,7 +110,7 @@ class Names(Context):
         return Typed(ex.compare("==", ex.const(float(e.value)), ex.const(1.0)), NONE, truth=True)
 
     def _text(self, e: syntax.Text) -> Value:
-        raise self.fail("E203", "a text stands where a value is wanted", e.span)
+        raise self.fail("E203", "a text stands where a value is wanted", e.span, help="a number: texts are no values")
 
     def _group(self, e: syntax.Group) -> Value:
         return self.resolve(e.expr)
@@ -262,10 +262,9 @@ class Names(Context):
         of a label that it reads, in each of its parts); E105 where it needs itself.
         """
         if symbol in self._active:
-            chain = [s.name for s in self._active[self._active.index(symbol) :]] + [symbol.name]
             place = Place(symbol.space.source, symbol.span)
-            help_ = "break it with a state or an implicit closed by a gamma"
-            self.report.error("E105", f"circular definition: {' -> '.join(chain)}", place, help=help_)
+            message, help_ = circular(self._active[self._active.index(symbol) :])
+            self.report.error("E105", message, place, help=help_)
             raise Failed
         key = symbol, self.virtual
         if key in self._values:

@@ -122,6 +122,10 @@ def _loops_of_sources(model: Elaborator, report: Report) -> None:
             continue
         names = ", ".join((*_between(found, plus, minus), branch.name))
         message = f"loop of {branch.kind} sources: {names} fix the {branch.kind} between two nodes twice"
+        if plus == minus:
+            message = (
+                f"both ends of the {branch.kind} source {branch.name} are one node: its {branch.kind} is zero there"
+            )
         report.error("E411", message, replace(branch.place, element=branch.name))
     _cutsets(model, report)
 

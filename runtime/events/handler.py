@@ -24,6 +24,7 @@ from sysdyn.runtime.events.pivoting import NoActiveSetError
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.events.returns import LEAST, flights
 from sysdyn.runtime.events.succession import Point, Succession
+from sysdyn.runtime.events.turns import Turns
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -75,7 +76,7 @@ class Handler:
         self.contacts = Contacts(plan, system, self.observer, self.p)
         self.determined = Determined(self.contacts)
         self.succession = Succession(plan, self.contacts, self.determined)
-        self.kinks = Kinks(plan.kinks, self.observer, self.p)
+        self.kinks, self.turns = Kinks(plan.kinks, self.observer, self.p), Turns(plan, self.observer, self.succession)
         self.side = np.ones(len(plan.relations))
         self.truth = [False] * len(plan.whens)
         self.bounces: dict[int, Bounce] = {}
@@ -163,6 +164,7 @@ class Handler:
         drives = self.succession.pushed(t, y, yd, values) if self.restart is not None else None
         if drives is not None:
             raise SolverFailure("drives", t, 0.0, drives)
+        self.turns.seen(t, (y, yd))
         self.truth = self._true()
         due, anew = self.due(t), self.kinks.begin(values)
         if due:
@@ -253,6 +255,7 @@ class Handler:
         values = self.observer(t, y, yd) if self.plan.relations else np.zeros(0)
         self._exact = [k for k in crossed if values[self.plan.relations[k].row] == 0.0]
         self._hold(values, crossed)
+        which = self.turns.passed(t, which)
         for w in which:
             if w.relation >= 0:
                 self.side[w.relation] = -float(w.side)
@@ -284,6 +287,7 @@ class Handler:
             return None
         self.struck = touched[0] if free and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
+        self.turns.seen(t, point)
         self._return(t, begun, point, which)
         self.struck = self.struck if self._bounced(self.struck) else -1
         self.simple &= not self.bounces

@@ -62,7 +62,8 @@ class Contact:
     before it does.
     value, rate, acceleration (of phi), multiplier, bound, bound - multiplier (upper),
     bound + multiplier (lower), guard: rows; number: of its switch; restitution: of phi; moves: whether the bound
-    changes between events (a negative one ends the run); dual: what holds here is free in the text.
+    changes between events (a negative one ends the run); dual: what holds here is free in the text; turn: the
+    relation c against zero of a c*setsign(u) that a reaction tells (aim: its row), -1: none.
     """
 
     name: str
@@ -83,6 +84,7 @@ class Contact:
     hold: int = -1
     moves: bool = False
     dual: bool = False
+    turn: int = -1
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,7 +95,8 @@ def _pivoted(
     try:
         return fitted()
     except NoActiveSetError as error:
-        failed = errors[-1] if errors else InconsistentStart("stuck", float("inf"), names=error.names)
+        # that of the set that follows from what is wrong: those behind it are tried beside it
+        failed = errors[0] if errors else InconsistentStart("stuck", float("inf"), names=error.names)
     for asked in found[: -1 - BETWEEN : -1] if quickly else ():
         near = asked
         with suppress(NoActiveSetError):

@@ -128,6 +128,11 @@ class Succession:
         slips = {k for k in free if abs(values[(row := contacts.contacts[k].value)]) > zero(row)}
         return self.driving(t, y, yd, slips - contacts.finite(t, y, yd)) if slips else None
 
+    def acts(self, k: int, t: float, y: Floats, yd: Floats) -> bool:
+        """Whether the rate of what a friction slips by is another one in the other sense."""
+        ends, least = self._slipping(k, t, y, yd), self.observer.zero(self.contacts.contacts[k].rate)
+        return len(ends) == 2 and bool(abs(ends[0][1] - ends[1][1]) > least)
+
     def driving(self, t: float, y: Floats, yd: Floats, among: Set[int] | None = None) -> str | None:
         """The name of a friction (among: of some) that would push what slips along: its bound is negative, or its sign
         is wrong.

@@ -24,6 +24,8 @@ PROBES = 4
 """Errors of the rows that are tried."""
 MARGIN = 64.0
 """Times what they make of a quantity."""
+BESIDE = 1e-6
+"""Of the largest of each unknown: how far beside the end they are asked too."""
 PIVOT = 0.1
 """Of the largest of its column: what an elimination takes as a pivot."""
 HOPS = 3
@@ -54,17 +56,24 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     k_q, k_f = system.form.k_q, system.form.k_f
     # faster than that it was in shorter steps, which are over
     met[k_f] = np.minimum(met[k_f], np.maximum(2.0 * met[k_q] / step, np.abs(y[k_f])))
-    before = system.observe(t, y, yd), system.ledgers(t, y, yd)
-    found = LeftOpen(*map(np.zeros_like, before))
+    # what jumps where the run ended (a floor of what is whole there) is open there, and not beside it
+    places = y, y + BESIDE * met
+    beside = tuple((place, system.observe(t, place, yd), system.ledgers(t, place, yd)) for place in places)
+    found = LeftOpen(*map(np.zeros_like, beside[0][1:]))
     given = _given(system)
     said = given > 0.0
     for change in _changes(system, (t, y, yd), met, step):
         if (np.abs(change)[said] > given[said]).any():
-            return LeftOpen(*map(np.zeros_like, before))
-        moved = t, y + change, yd + change / step
-        for largest, now, was in zip(found, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
-            np.fmax(largest, MARGIN * np.abs(now - was), out=largest)
-        del change, moved  # of a large system the room counts
+            return LeftOpen(*map(np.zeros_like, found))
+        opened = [np.full_like(largest, np.inf) for largest in found]
+        for place, *before in beside:
+            moved = t, place + change, yd + change / step
+            for least, now, was in zip(opened, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
+                np.fmin(least, MARGIN * np.abs(now - was), out=least)
+            del moved  # of a large system the room counts
+        for largest, least in zip(found, opened, strict=True):
+            np.fmax(largest, np.where(np.isfinite(least), least, 0.0), out=largest)
+        del change, opened
     return found
 
 

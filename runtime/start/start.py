@@ -392,7 +392,9 @@ def _consistent(
     zeros = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: system.form.written]
     del largest
     moved = tuple(moved_guesses(starter, t0, best.x, starter.scale(t0, best.x)))
-    y, yd = (np.where(np.abs(values) < NOTHING, 0.0, values) for values in starter.expand(best.x))
+    fixed = np.abs(best.x[starter.pinned])
+    nothing = NOTHING * min(1.0, float(fixed[fixed > 0.0].min(initial=1.0)))
+    y, yd = (np.where(np.abs(values) < nothing, 0.0, values) for values in starter.expand(best.x))
     if best.x.size > LARGE:
         starter.forget()
         del starter, guess

@@ -366,3 +366,31 @@ def test_work_along_a_function_of_a_sum_and_a_traced_balance(tmp_path, capsys):
     assert np.abs(got["audit.energy"].values).max() < 1e-5
     supplied = trace["audit.supplied"].values
     assert found["work"] == pytest.approx(np.abs(np.diff(supplied)).sum(), rel=0.02)
+
+
+SPLIT = """\
+from std.electrical import resistor, capacitor, voltage
+model ladder {
+  param n = 4
+  node v[0..n]: electrical
+  V: voltage(v = 1 V*sin(2*pi*50 Hz*t)) v[0] -> ground
+  R[1]: resistor(R = 1 ohm) v[0] -> v[1]
+  for i in 2..n-1 { R[i]: resistor(R = 1 ohm) v[i-1] -> v[i] }
+  R[n]: resistor(R = 1 kohm) v[n-1] -> v[n]
+  for i in 1..n { C[i]: capacitor(C = 1 mF) v[i] -> ground }
+}
+scene hum of ladder { time 0 s to 0.1 s; trace v[1].e }
+"""
+
+
+def test_elements_of_several_statements_go_one_by_one(tmp_path, capsys):
+    """`R[n][n]` stood for R[1], and n of `1..n` was taken for read nowhere: nothing could go."""
+    code, told = run_json(capsys, "reduce", write(tmp_path, SPLIT), "--accuracy", "1e-2")
+    assert code == 0
+    named = {item["element"] for item in told["result"]["activity"]}
+    assert named == {"V", "R[1]", "R[2..n - 1]", "R[n]", "C[1..n]"}
+    assert [(t["element"], t["kept"]) for t in told["result"]["trials"]] == [("R[n]", True)]
+    text = Path(told["result"]["file"]).read_text(encoding="utf-8")
+    assert "R[n]:" not in text
+    assert "R[1]:" in text
+    assert "param n" in text

@@ -110,3 +110,22 @@ def test_explain_takes_small_letters_and_refuses_what_is_none():
     assert "Right:" in explain("E503")
     with pytest.raises(KeyError):
         explain("E999")
+
+
+RECURSION = """model chain {
+  param n = 4
+  param a[1..n] = [1, 2, 3, 4]
+  for i in 1..n { let s[i] = SUM }
+  state z: 1 = 0
+  dynamic z' = s[n]*(1 Hz)
+}
+"""
+
+
+def test_a_recursion_along_an_array_is_told_with_the_sum_to_write():
+    """It was circular, which it is not, and a state was to break it."""
+    (found,) = [d for d in check(RECURSION.replace("SUM", "s[i-1] + a[i]")) if d.severity == "error"]
+    assert (found.code, found.place.start[0]) == ("E105", 4)
+    assert "elements of 's' are defined by elements of 's'" in found.message
+    assert "sum(j in" in found.help
+    assert not [d for d in check(RECURSION.replace("SUM", "sum(j in 1..i: a[j])")) if d.severity == "error"]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from running import ran
 from scipy.integrate import solve_ivp
+from sysdyn.api import simulate
 
 BELT = """
 from std.mechanical import coulomb, damper, mass, spring, velocity
@@ -216,3 +217,15 @@ def test_a_current_that_is_the_difference_of_equal_voltages(tmp_path, formulatio
     v = np.where(time <= 0.02, rise.sol(time)[0], after.sol(time)[0])
     for name, exact in (("v", v), ("i", power(time) / v)):
         assert np.abs(np.asarray(run.trace[name]) - exact).max() <= 1e-7 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("size", [1e-120, 1e-250])
+def test_a_start_is_what_it_says_however_small(tmp_path, size):
+    """Below 1e-100 m it was zero, told as met."""
+    path = tmp_path / "m.sd"
+    path.write_text(
+        f"model m {{\n coord x: translation = {size} m\n energy T* = 1/2*(1 kg)*x'^2\n"
+        " energy V = 1/2*(1 N/m)*x^2\n init x' = 0 m/s\n}\nscene s of m { time 0 s to 10 s; trace x every 0.5 s }\n"
+    )
+    trace = simulate(path, output=tmp_path / "t.h5")
+    assert np.abs(trace["x"].values / size - np.cos(trace.time)).max() < 1e-3

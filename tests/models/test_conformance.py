@@ -406,6 +406,17 @@ def test_a_bound_ends_with_the_reaction_that_tells_it(tmp_path, formulation):
 
 # -- refused ----------------------------------------------------------------------------------------------------
 
+RATCHET = """model z {{
+  node a, b: rotation
+  A: kinetic(p = 1 kg.m^2*f) a
+  B: kinetic(p = 2 kg.m^2*f) b
+  C: dissipator(e = 1 N.m*setsign(f)) a
+  R: ratchet() a -> b
+  init A.f = -1 rad/s
+  {0}
+}}
+component ratchet {{ branch: rotation; psi one_way: f >= 0 rad/s }}
+"""
 REFUSED = {
     "a product in parentheses is no unit": (
         "model a {\n let x = 30 N/(m.s^2)*3\n}\n",
@@ -441,6 +452,48 @@ REFUSED = {
     "a traced quotient by zero": (
         "model z { param n = 0 kg\n param p = 2 N.s\n let x = p/n }\nscene s of z { time 0 s to 1 s; trace x }\n",
         ("E324", 4, "p/n, n = 0 kg", ""),
+    ),
+    "a bound is a whole number": (
+        "model a {\n coord y[1..2.5]: translation = 0 m\n}\n",
+        ("E805", 2, "a bound is 2.5", "an index within the bounds"),
+    ),
+    "a file of rows that is not there": (
+        'table f(x: m) -> N linear file "nope.csv"\nmodel a { let y = f(1 m) }\n',
+        ("E206", 1, "'nope.csv' cannot be read", "rows of numbers"),
+    ),
+    "a text is no value": ('model a {\n let y = "abc"\n}\n', ("E203", 2, "a text stands", "a number")),
+    "what is fixed is named as it is written": (
+        "model z {\n node a: electrical\n I: flow(f = 1 A) ground -> a\n L: kinetic(p = 1 H*f) a\n init L.f = 0 A\n}\n",
+        ("E903", 3, "fixed initial values of 'L.f'", "free 'L.f'"),
+    ),
+    "an impact at the start": (
+        "model z {\n coord h: translation = 0 m\n energy T* = 1/2*(1 kg)*h'^2\n phi floor: h >= 0 m\n"
+        " init h' = -2 m/s\n}\n",
+        ("E903", 4, "contradict floor", "the rate behind the impact"),
+    ),
+    "an input that is a condition": (
+        "component s { port a: electrical\n input g: 1\n R: dissipator(e = (if g > 0.5 then 1 ohm else 2 ohm)*f) a }\n"
+        "model z {\n node a: electrical\n S: s(g = t > 1 s) a = a\n C: potential(e = 1 V/C*q) a\n}\n",
+        ("E203", 3, "'g' is a condition", "(if t > 1 s then 1 else 0)"),
+    ),
+    "a source whose ends are one": (
+        "from std.electrical import voltage\nmodel z {\n node a: electrical\n V: voltage(v = 1 V) ground -> ground\n"
+        " R: dissipator(e = 1 ohm*f) a\n C: potential(e = 1 V/C*q) a\n}\n",
+        ("E411", 4, "both ends of the effort source V are one node", ""),
+    ),
+    "a value for an element": (
+        "component c { port a: electrical\n param k: V/C\n C: potential(e = k*q) a }\nmodel z {\n node a: electrical\n"
+        " K: c(k = 1 V/C) a = a\n R: dissipator(e = 1 ohm*f) a\n}\n"
+        "scene s of z { time 0 s to 1 s; set K = 3 V/C; trace a.e }\n",
+        ("E910", 9, "'K' is not a parameter", "set K.k = ..."),
+    ),
+    "a ratchet that begins backwards, beside friction": (
+        RATCHET.format("init b.f = 0 rad/s"),
+        ("E903", 10, "fixed initial values of 'A.f', 'b.f' contradict R", "free one of"),
+    ),
+    "a ratchet that would let go at once": (
+        RATCHET.format(""),
+        ("E903", 10, "would let go at once, and hold", "initial values of all that it ties"),
     ),
     "ground is declared once": ("model z {\n node ground: electrical\n}\n", ("E108", 2, "'ground'", "")),
 }

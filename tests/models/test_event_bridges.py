@@ -158,8 +158,8 @@ scene s of m { time 0 s to 1 ms; trace Cd.e as v every 0.1 ms; accuracy 1e-6 }
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 def test_a_capacitor_at_a_source_that_falls_begins_at_it(tmp_path, formulation):
-    """Nothing is said of it.  Conducting diodes take it to the source, whose fall they then would have to follow; blocked
-    ones leave it at zero, where they conduct (E903): it begins at the source, and decays from there.
+    """Nothing is said of it.  Conducting diodes take it to the source, whose fall they then would have to follow;
+    blocked ones leave it at zero, where they conduct (E903): it begins at the source, and decays from there.
     """
     trace = run(CHARGED, tmp_path, formulation=formulation)
     exact = 268.0 * np.sin(0.718) * np.exp(-trace.time / 39e-3)

@@ -122,3 +122,42 @@ scene s of ball { time 0 s to 1.5 s; trace x, x' }
     trace = api.simulate(tmp_path / "m.sd", output=tmp_path / "m.h5")
     slides = np.minimum(trace.time, 2.0 * 7.0 / (7.0 * 0.2 * 9.80665))
     assert np.abs(trace["x'"].values - (7.0 - 0.2 * 9.80665 * slides)).max() < 1e-3
+
+
+TURNING = """model lifted {
+  coord x, y: translation = 0 m
+  energy T* = 1/2*(1 kg)*(x'^2 + y'^2)
+  work (1 kg)*g0*cos(t/(1 s)) on y
+  phi lane: y = 0 m
+  implicit R: N
+  work R on x
+  gamma fr: R + 0.3*REACTION*setsign(x') = 0 N
+  init x' = 50 m/s
+}
+scene s of lifted { time 0 s to 3 s; trace x' }
+"""
+
+
+@pytest.mark.parametrize(
+    ("reaction", "formulation"),
+    [("lane.multiplier", "lagrangian"), ("lane.multiplier", "hamiltonian"), ("(-lane.on(y))", "kane")],
+)
+def test_friction_on_a_reaction_that_turns_is_told_where_it_begins_to_drive(tmp_path, reaction, formulation):
+    """cos t passes zero: from there on it drove, told as met.  What its text keeps above zero (abs) brakes on."""
+    file = tmp_path / "m.sd"
+    file.write_text(TURNING.replace("REACTION", reaction))
+    with pytest.raises(api.SolverFailure, match="drives") as failed:
+        api.simulate(file, output=tmp_path / "m.h5", formulation=formulation)
+    assert failed.value.time == pytest.approx(np.pi / 2, abs=1e-6)
+    file.write_text(TURNING.replace("REACTION", f"abs({reaction})"))
+    trace = api.simulate(file, output=tmp_path / "m.h5", formulation=formulation)
+    braked = np.where(trace.time < np.pi / 2, np.sin(trace.time), 2.0 - np.sin(trace.time))
+    assert np.abs(trace["x'"].values - (50.0 - 0.3 * 9.80665 * braked)).max() < 5e-3
+
+
+def test_a_sign_on_a_reaction_that_turns_drives_nobody(tmp_path):
+    """A relay of a position has either sense: x'' = -30 x - 0.5 cos t sign x."""
+    text = TURNING.replace("setsign(x')", "setsign(x)").replace("init x' = 50 m/s", "init x' = 5 m/s")
+    text = text.replace("0.3*REACTION", "0.05*lane.multiplier").replace("  phi", "  energy V = 1/2*(30 N/m)*x^2\n  phi")
+    (tmp_path / "m.sd").write_text(text)
+    assert api.simulate(tmp_path / "m.sd", output=tmp_path / "m.h5").attributes["met"] == 1

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from model_runs import FOUR, attempt, trace_of
 from reduced import ROOT
+from sysdyn.api import NotMet, simulate
 from sysdyn.compiler import pipeline
 from sysdyn.dsl.model.expression import const, substitute, variables
 
@@ -82,3 +83,14 @@ def test_no_ledger(tmp_path, text, said):
     ran, report = attempt(tmp_path, text)
     assert ran is None
     assert any(d.code == "E102" and said in d.message for d in report)
+
+
+def test_a_staircase_of_energy_is_not_met_where_the_run_ends_on_a_step(tmp_path):
+    """8 of 12.5 J came from nowhere, told as met: at 9 m round-off leaves open on which step it stands."""
+    path = tmp_path / "m.sd"
+    path.write_text(
+        "model m {\n coord x: translation = 0 m\n energy T* = 1/2*(1 kg)*x'^2\n energy V = (1 J)*floor(x/(1 m))\n"
+        " init x' = 3 m/s\n}\nscene s of m { time 0 s to 3 s; trace x }\n"
+    )
+    with pytest.raises(NotMet, match="ledger is off"):
+        simulate(path, output=tmp_path / "t.h5")

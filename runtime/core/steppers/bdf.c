@@ -21,6 +21,7 @@
 #define STEEP_SLUGGISH 0.05 /* the same with steep laws, whose slopes change by themselves: 6 to 20 % fewer residuals */
 #define LAX 10.0            /* a steep row may be off by as many tolerances of its terms; beside 3: error over steps times tolerance
                              * at most 0.88 instead of 0.52 (an amplifier), 0.42 instead of 0.23 (a diode), in the mean the same */
+#define LOOSEST_ROW 0.3     /* and be off by no more of them: of an exponential that is no law any more any value is within 1 */
 #define FINEST_ROW 1e-9     /* part of a steep row's terms that round-off of its unknowns leaves */
 
 static int step(void *bdf)
@@ -166,7 +167,7 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
 /* what a row may be off, of its terms */
 static double row_limit(const sd_bdf *bdf)
 {
-    return fmin(1.0, fmax(FINEST_ROW, LAX * bdf->rtol));
+    return fmin(LOOSEST_ROW, fmax(FINEST_ROW, LAX * bdf->rtol));
 }
 
 /* The residual in delta, behind the last correction, is small in every steep row beside the row's own terms: on an

@@ -1,0 +1,64 @@
+"""Loose tolerances beside exponential laws: rows are off by some tolerances, not by what no law bears (by SciPy)."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from sysdyn.api import simulate
+
+RECTIFIER = """from std.electrical import voltage, resistor, capacitor
+model rectifier {
+  node a, b: electrical
+  Vs: voltage(v = 10 V*sin(2*pi*50 Hz*t)) a -> ground
+  D: dissipator(f = 1e-14 A*(exp(D.e/(25.852 mV)) - 1)) a -> b
+  C: capacitor(C = 100 uF) b -> ground
+  R: resistor(R = 1 kohm) b -> ground
+  init C.e = 0 V
+}
+scene mains of rectifier {
+  time 0 s to 50 ms
+  trace b.e as v
+}
+"""
+CLIPPER = """from std.electrical import voltage, resistor, capacitor
+model clipper {
+  node a, b: electrical
+  Vs: voltage(v = 5 V*sin(2*pi*1 kHz*t)) a -> ground
+  R: resistor(R = 2.2 kohm) a -> b
+  C: capacitor(C = 10 nF) b -> ground
+  D1: dissipator(f = 2.52 nA*(exp(D1.e/(45.3 mV)) - 1)) b -> ground
+  D2: dissipator(f = 2.52 nA*(exp(D2.e/(45.3 mV)) - 1)) ground -> b
+  init C.e = 0 V
+}
+scene tone of clipper {
+  time 0 s to 5 ms
+  trace b.e as v
+}
+"""
+
+
+def rectified(t, v):
+    forward = (10 * np.sin(100 * np.pi * t) - v) / 0.025852
+    return (1e-14 * np.expm1(np.minimum(forward, 300)) - v / 1e3) / 100e-6
+
+
+def clipped(t, v):
+    return ((5 * np.sin(2e3 * np.pi * t) - v) / 2200 - 2 * 2.52e-9 * np.sinh(v / 0.0453)) / 10e-9
+
+
+@pytest.mark.parametrize(
+    ("text", "rate", "method", "rtol", "within"),
+    [
+        (RECTIFIER, rectified, "bdf", 0.1, 0.1),  # 3.9 times off: the diode stood 18 V forward
+        (CLIPPER, clipped, "bdf", 0.1, 0.3),  # a fault 48 times off
+        (CLIPPER, clipped, "rosenbrock", 0.02, 0.1),  # a step over a half period: 1.7 times off
+    ],
+)
+def test_rows_beside_diodes_are_some_tolerances_off(tmp_path, text, rate, method, rtol, within):
+    path = tmp_path / "m.sd"
+    path.write_text(text)
+    trace = simulate(path, method=method, rtol=rtol, output=tmp_path / "t.h5")
+    found = solve_ivp(
+        rate, (0.0, trace.time[-1]), [0.0], "Radau", trace.time, rtol=1e-8, atol=1e-10, max_step=trace.time[-1] / 500
+    )
+    off = np.abs(trace["v"].values - found.y[0]).max() / np.abs(found.y[0]).max()
+    assert off < within
