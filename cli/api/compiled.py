@@ -14,6 +14,7 @@ from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tabl
 from sysdyn.cli.export.naming import elements
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.flat_laws import impossible
+from sysdyn.cli.run.loaded import KEPT, place_of
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.starting import start
 from sysdyn.dsl import load as load_
@@ -44,32 +45,44 @@ class Module:
         self.parameters = shown(formed.prepared.binding.values)
         pattern = self._numbers.state or self._numbers.system
         self.indptr, self.indices = pattern.column, pattern.row
-        self._systems: dict[tuple[tuple[str, float], ...], System] = {(): formed.system}
+        self._systems: dict[tuple[tuple[str, bytes], ...], System] = {(): formed.system}
 
-    def _system(self, parameters: Mapping[str, float] | None) -> System:
+    def _system(self, parameters: Mapping[str, Any] | None) -> System:
         """The system with other values of parameters."""
-        key = tuple(sorted((parameters or {}).items()))
+        said = sorted((parameters or {}).items())
+        key = tuple((name, np.asarray(value, dtype=float).tobytes()) for name, value in said)
         if key not in self._systems:
             prepared, system = self._formed.prepared, self._formed.system
             sizes = {p.name for p in prepared.network.parameters if p.whole} if prepared.network.branches else set()
-            for name in sizes & {name for name, _ in key}:  # which elements are alike depends on where ranges meet
+            given = {place_of(name): np.asarray(value, dtype=float) for name, value in said}
+            for name in sizes & given.keys():  # which elements are alike depends on where ranges meet
                 message = f"the size '{name}' is part of the text where elements sit between nodes"
                 help_ = f"a text with another {name}, compiled for itself"
                 raise ModelError([Diagnostic("E805", message, None, help_)])
-            arrays = prepared.arrays_of(prepared.compiled.bind(dict(key)))
+            arrays = prepared.arrays_of(prepared.compiled.bind(given))
             made = System(prepared.structure, arrays, prepared.carrier, system.form.name)
+            if len(self._systems) > KEPT:
+                self._systems.pop(next(each for each in self._systems if each))
             self._systems[key] = made.without(system.left_out) if system.left_out else made
         return self._systems[key]
+
+    def _point(self, *given: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Vectors of unknowns as the module takes them.  ValueError where one has another shape."""
+        found = [np.ascontiguousarray(vector, dtype=float) for vector in given]
+        for vector in found:
+            if vector.shape != self.y0.shape:
+                raise ValueError(f"y and ydot have {self.y0.size} unknowns: an array of shape {vector.shape} was given")
+        return found
 
     def residual(
         self,
         t: float,
         y: NDArray[np.float64],
         ydot: NDArray[np.float64],
-        parameters: Mapping[str, float] | None = None,
+        parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """F(t, y, ydot) [rows]; parameters: values that replace the model's."""
-        system, y, ydot = self._system(parameters), np.asarray(y, dtype=float), np.asarray(ydot, dtype=float)
+        system, (y, ydot) = self._system(parameters), self._point(y, ydot)
         if self._numbers.state is None:
             return system.residual(t, y, ydot)
         return np.asarray(ydot - self._slopes(system, t, y)[1][self._numbers.state.places])
@@ -80,14 +93,14 @@ class Module:
         y: NDArray[np.float64],
         ydot: NDArray[np.float64],
         cj: float,
-        parameters: Mapping[str, float] | None = None,
+        parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """Entries of dF/dy + cj dF/dydot on the pattern: scipy.sparse.csc_array((values, indices, indptr))."""
-        system, y = self._system(parameters), np.asarray(y, dtype=float)
+        system, (y, ydot) = self._system(parameters), self._point(y, ydot)
         if self._numbers.state is not None:
             inside, rates = self._slopes(system, t, y)
             return state_jacobian(self._numbers, system, t, inside, rates, cj)
-        jy, jyd = system.jacobian(t, y, np.asarray(ydot, dtype=float))
+        jy, jyd = system.jacobian(t, y, ydot)
         return jy + cj * jyd
 
     def mass(
@@ -95,23 +108,24 @@ class Module:
         t: float,
         y: NDArray[np.float64],
         ydot: NDArray[np.float64],
-        parameters: Mapping[str, float] | None = None,
+        parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """Entries of dF/dydot on the pattern."""
+        y, ydot = self._point(y, ydot)
         if self._numbers.state is not None:
             columns = np.repeat(np.arange(self.y0.size), np.diff(self.indptr))
             return np.asarray(self.indices == columns, dtype=float)
-        return self._system(parameters).jacobian(t, np.asarray(y, dtype=float), np.asarray(ydot, dtype=float))[1]
+        return self._system(parameters).jacobian(t, y, ydot)[1]
 
     def outputs(
         self,
         t: float,
         y: NDArray[np.float64],
         ydot: NDArray[np.float64],
-        parameters: Mapping[str, float] | None = None,
+        parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """What the scene traces at a point; not a number where it reads a ledger of a whole run."""
-        system, y, ydot = self._system(parameters), np.asarray(y, dtype=float), np.asarray(ydot, dtype=float)
+        system, (y, ydot) = self._system(parameters), self._point(y, ydot)
         if self._numbers.state is not None:
             y, ydot = self._slopes(system, t, y)
         kinetic, potential = system.audit(t, y, ydot)[:2]
@@ -119,7 +133,7 @@ class Module:
         places = [output.place for output in self._numbers.outputs]
         return np.asarray(system.observe(t, y, ydot, known)[places])
 
-    def start(self, parameters: Mapping[str, float] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def start(self, parameters: Mapping[str, Any] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Consistent (y, ydot) at t0 for other parameters.  Raises InconsistentStart."""
         system = self._system(parameters)
         y, yd = consistent_start(system, self.t0).for_form(system)
