@@ -18,17 +18,10 @@ from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.slopes import labels, rows_without_slope
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.gauss_newton import (
-    OutOfTimeError,
-    Solution,
-    Work,
-    corrected,
-    least_residual,
-    solve,
-    stepped,
-)
+from sysdyn.runtime.numerics.gauss_newton import Solution, corrected, least_residual, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
+from sysdyn.runtime.numerics.work import OutOfTimeError, Work
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
@@ -227,7 +220,7 @@ def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) ->
     """X after corrections that vanish, and whether the rows hold to their round-off then and leave no state or effort
     open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little.
     """
-    told, begun, agrees = starter.moves(*STATE, "e"), x, True
+    told, begun, agrees, last = starter.moves(*STATE, "e"), x, True, np.inf
     for _ in range(SHARPER):
         problem = problem_of(starter, t, x, x, rows=rows, free=free)
         near = corrected(problem, x)
@@ -235,11 +228,12 @@ def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) ->
             return begun, agrees
         agrees = near.agrees
         step, size = np.abs(near.x - x), np.maximum(problem.scale, np.abs(x))
-        if (step <= EXACT * size).all():
+        most = float(np.max(step / size, initial=0.0))
+        if most <= EXACT and (agrees or most > 0.5 * last):  # a steep law tells 1e-13 of a volt from its round-off
             return x, agrees and not (near.open_ > starter.largest_alike(size))[told].any()
         if starter.work.done:
             return begun, False
-        x = near.x
+        x, last = near.x, most
     return begun, True
 
 
