@@ -103,6 +103,25 @@ CASES = {
         L: kinetic(p = 0.4 H*f) a[n] -> ground""",
         {"a[0].e": 0.76, "a[n].e": 0.16, "L.f": 0.5, "C[2].q": 0.12},
     ),
+    "an effort that is said of a store whose law tells no content": (  # q/2 + 1.5 q^3 = 0.3
+        """node a, b, c: electrical
+        S: effort(e = 1 V) a -> ground
+        R: dissipator(e = 3 ohm*f) a -> b
+        C1: potential(q = 1 F*e) b -> c
+        C2: potential(e = q/(2 F) + 1.5 V/C^3*q^3) c -> ground
+        init C2.e = 0.3 V""",
+        {"C1.q": 0.0, "C2.q": 0.4032629374759649, "c.e": 0.3},
+    ),
+    "efforts of such stores in series": (
+        """node a, b, c: electrical
+        S: effort(e = 1 V) a -> ground
+        R: dissipator(e = 3 ohm*f) a -> b
+        C1: potential(e = q/(1 F) + 1 V/C^3*q^3) b -> c
+        C2: potential(e = q/(2 F) + 1.5 V/C^3*q^3) c -> ground
+        init C1.e = 0.5 V
+        init C2.e = 0.3 V""",
+        {"C1.q": 0.42385379906978327, "C2.q": 0.4032629374759649, "b.e": 0.8},
+    ),
     "strings of inductors that end in capacitors": (
         """param n = 2
         param m = 3
