@@ -112,6 +112,15 @@ CASES = {
         init C2.e = 0.3 V""",
         {"C1.q": 0.0, "C2.q": 0.4032629374759649, "c.e": 0.3},
     ),
+    "coupled coils in parallel": (
+        """node a, b: electrical
+        S: effort(e = 1 V) a -> ground
+        R: dissipator(e = 3 ohm*f) a -> b
+        K: coupled_inductors(L1 = 2 H, L2 = 1 H, k = 0.5) one = b -> ground, two = b -> ground
+        init K.one.f = 1 A
+        init K.two.f = 0.3 A""",
+        {"K.one.f": 1.0, "K.two.f": 0.3, "b.e": -2.9},
+    ),
     "efforts of such stores in series": (
         """node a, b, c: electrical
         S: effort(e = 1 V) a -> ground
@@ -146,7 +155,7 @@ CASES = {
 @pytest.mark.one_in(20)
 def test_contents(tmp_path, case, formulation):
     body, start = CASES[case]
-    text = ("model net {{\n" + body + SCENE).format(traced=", ".join(start))
+    text = ("from std.electrical import coupled_inductors\nmodel net {{\n" + body + SCENE).format(traced=", ".join(start))
     trace = trace_of(tmp_path, text, formulation=formulation)
     reference = trace_of(tmp_path, text, formulation="lagrangian")
     for name, value in start.items():

@@ -6,10 +6,10 @@ the coordinates, which are one choice of tree; k one constant for each beside it
 
 In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + k, with k its own
 initial content less +- that of the first; it is chosen where not all of these are fixed and a loop of stores and
-efforts may ask for others, and where an effort is said of one that tells no content (e = q + q^3).  What is no store begins at what the text says of it, else at zero, whatever the first
-store holds.  A store between two nodes of the reflection (an inductor) holds their difference: where
-such stores close loops in which contents are said, each has its own initial content as k; it is chosen where
-nothing is said of it.
+efforts may ask for others, and where an effort is said of one that tells no content (e = q + q^3).  What is no store
+begins at what the text says of it, else at zero, whatever the first store holds.  A store between two nodes of the
+reflection (an inductor) holds their difference: where such stores close loops in which contents are said, each has its
+own initial content as k; it is chosen where nothing is said of it.
 """
 
 from __future__ import annotations
