@@ -155,7 +155,8 @@ CASES = {
 @pytest.mark.one_in(20)
 def test_contents(tmp_path, case, formulation):
     body, start = CASES[case]
-    text = ("from std.electrical import coupled_inductors\nmodel net {{\n" + body + SCENE).format(traced=", ".join(start))
+    text = "from std.electrical import coupled_inductors\nmodel net {{\n" + body + SCENE
+    text = text.format(traced=", ".join(start))
     trace = trace_of(tmp_path, text, formulation=formulation)
     reference = trace_of(tmp_path, text, formulation="lagrangian")
     for name, value in start.items():
