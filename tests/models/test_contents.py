@@ -112,6 +112,17 @@ CASES = {
         init C2.e = 0.3 V""",
         {"C1.q": 0.0, "C2.q": 0.4032629374759649, "c.e": 0.3},
     ),
+    "a coil of which nothing is said beside one whose current tells no flux": (
+        """node a, b, c: electrical
+        C1: potential(q = 2.4 F*e) a -> ground
+        R1: dissipator(e = 1 ohm*f) a -> ground
+        L1: kinetic(p = 1.2 H*f) a -> b
+        L2: kinetic(f = p/(0.94 H) + 0.845 A/Wb^3*p^3) b -> c
+        R2: dissipator(e = 2 ohm*f) b -> ground
+        R3: dissipator(e = 3 ohm*f) c -> ground
+        init L2.f = 0.8 A""",
+        {"L1.f": 0.0, "L2.f": 0.8, "b.e": -1.6, "c.e": 2.4},
+    ),
     "coupled coils in parallel": (
         """node a, b: electrical
         S: effort(e = 1 V) a -> ground
