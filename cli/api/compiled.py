@@ -53,10 +53,12 @@ class Module:
         key = tuple((name, np.asarray(value, dtype=float).tobytes()) for name, value in said)
         if key not in self._systems:
             prepared, system = self._formed.prepared, self._formed.system
-            sizes = {p.name for p in prepared.network.parameters if p.whole} if prepared.network.branches else set()
+            fixed = prepared.network.branches or self._numbers.state is not None  # y0 says which unknowns are the state
+            sizes = {p.name for p in prepared.network.parameters if p.whole} if fixed else set()
             given = {place_of(name): np.asarray(value, dtype=float) for name, value in said}
             for name in sizes & given.keys():  # which elements are alike depends on where ranges meet
-                message = f"the size '{name}' is part of the text where elements sit between nodes"
+                where = "where elements sit between nodes" if prepared.network.branches else "in index form 0"
+                message = f"the size '{name}' is part of the text {where}"
                 help_ = f"a text with another {name}, compiled for itself"
                 raise ModelError([Diagnostic("E805", message, None, help_)])
             arrays = prepared.arrays_of(prepared.compiled.bind(given))
@@ -66,13 +68,15 @@ class Module:
             self._systems[key] = made.without(system.left_out) if system.left_out else made
         return self._systems[key]
 
-    def _point(self, *given: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """Vectors of unknowns as the module takes them.  ValueError where one has another shape."""
-        found = [np.ascontiguousarray(vector, dtype=float) for vector in given]
-        for vector in found:
-            if vector.shape != self.y0.shape:
-                raise ValueError(f"y and ydot have {self.y0.size} unknowns: an array of shape {vector.shape} was given")
-        return found
+    def _at(self, parameters: Mapping[str, Any] | None, *given: NDArray[np.float64]) -> tuple[System, Any, Any]:
+        """The system with these parameters, and y, ydot as it takes them.  ValueError where one has another shape."""
+        system = self._system(parameters)
+        number = system.unknowns if self._numbers.state is None else self.y0.size
+        y, ydot = (np.ascontiguousarray(vector, dtype=float) for vector in given)
+        for vector in (y, ydot):
+            if vector.shape != (number,):
+                raise ValueError(f"y and ydot have {number} unknowns: an array of shape {vector.shape} was given")
+        return system, y, ydot
 
     def residual(
         self,
@@ -82,7 +86,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """F(t, y, ydot) [rows]; parameters: values that replace the model's."""
-        system, (y, ydot) = self._system(parameters), self._point(y, ydot)
+        system, y, ydot = self._at(parameters, y, ydot)
         if self._numbers.state is None:
             return system.residual(t, y, ydot)
         return np.asarray(ydot - self._slopes(system, t, y)[1][self._numbers.state.places])
@@ -96,7 +100,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """Entries of dF/dy + cj dF/dydot on the pattern: scipy.sparse.csc_array((values, indices, indptr))."""
-        system, (y, ydot) = self._system(parameters), self._point(y, ydot)
+        system, y, ydot = self._at(parameters, y, ydot)
         if self._numbers.state is not None:
             inside, rates = self._slopes(system, t, y)
             return state_jacobian(self._numbers, system, t, inside, rates, cj)
@@ -111,11 +115,11 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """Entries of dF/dydot on the pattern."""
-        y, ydot = self._point(y, ydot)
+        system, y, ydot = self._at(parameters, y, ydot)
         if self._numbers.state is not None:
             columns = np.repeat(np.arange(self.y0.size), np.diff(self.indptr))
             return np.asarray(self.indices == columns, dtype=float)
-        return self._system(parameters).jacobian(t, y, ydot)[1]
+        return system.jacobian(t, y, ydot)[1]
 
     def outputs(
         self,
@@ -125,7 +129,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """What the scene traces at a point; not a number where it reads a ledger of a whole run."""
-        system, (y, ydot) = self._system(parameters), self._point(y, ydot)
+        system, y, ydot = self._at(parameters, y, ydot)
         if self._numbers.state is not None:
             y, ydot = self._slopes(system, t, y)
         kinetic, potential = system.audit(t, y, ydot)[:2]

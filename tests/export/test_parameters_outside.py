@@ -103,3 +103,16 @@ def test_an_error_is_told_before_notes(tmp_path):
     assert len(caught.value.diagnostics) > 1
     with pytest.raises(api.UsageError, match="max-steps"):
         api.load(tmp_path / "model.sd").run(max_steps=-1)
+
+
+def test_sizes_of_a_module(tmp_path):
+    """Of coordinates alone another size has other vectors; in index form 0 the state is that of the text."""
+    path = written(tmp_path, ROW)
+    found = api.compile_model(path, scene="s", index="2")
+    y = np.append(np.ones(5), np.zeros(5))
+    assert np.abs(found.residual(0.0, y, np.zeros(10), {"n": 5})).max() == 2.0
+    with pytest.raises(ValueError, match="10 unknowns"):
+        found.residual(0.0, found.y0, found.yd0, {"n": 5})
+    found = api.compile_model(path, scene="s", index="0")
+    with pytest.raises(api.ModelError, match="index form 0"):
+        found.residual(0.0, found.y0, found.yd0, {"n": 5})
