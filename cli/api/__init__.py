@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.api.compiled import Module, compile_model, shown
+from sysdyn.api.compiled import Module, compile_model, known, shown
 from sysdyn.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.analysis.resting import Equilibrium
 from sysdyn.cli.failures import UsageError
@@ -233,9 +233,11 @@ def _request(path: str, options: dict[str, Any]) -> Request:
 
 def _made(make: Any, *arguments: Any, **options: Any) -> Request:
     try:
-        return make(*arguments, **options)  # type: ignore[no-any-return]
+        request: Request = make(*arguments, **options)
     except TypeError as error:
         raise UsageError(str(error).replace("Request.__init__()", "simulate()")) from None
+    known(request.formulation, request.backend, request.index)
+    return request
 
 
 def _changes(options: dict[str, Any]) -> dict[str, Any]:
@@ -250,6 +252,8 @@ def _changes(options: dict[str, Any]) -> dict[str, Any]:
     at = given.get("at")
     if at is not None and not isinstance(at, str):
         given["at"] = ",".join(text_of(t) for t in np.atleast_1d(at))
+    if isinstance(given.get("index"), int):
+        given["index"] = str(given["index"])
     if "o" in given:
         given["output"] = given.pop("o")
     if "no_timings" in given:

@@ -12,6 +12,8 @@ from sysdyn.cli.export.files import manifest_of
 from sysdyn.cli.export.index_parameters import index_parameters
 from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tables
 from sysdyn.cli.export.naming import elements
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import FORMULATIONS, INDICES
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.flat_laws import impossible
 from sysdyn.cli.run.loaded import KEPT, place_of
@@ -24,6 +26,8 @@ from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model.failures import NoSuchForm
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
+
+BACKENDS = ("c", "numpy")
 
 
 class Module:
@@ -162,7 +166,7 @@ def compile_model(
     model: str | None = None,
     scene: str | None = None,
     formulation: str = "auto",
-    index: str = "auto",
+    index: str | int = "auto",
     backend: str = "c",
     no_prune: bool = False,
 ) -> Module:
@@ -170,6 +174,8 @@ def compile_model(
 
     index: 3 as written, 2 stabilised, 2v, 1, 0 (yd - F(t, y)); auto: the one that `simulate` takes.
     """
+    index = str(index)
+    known(formulation, backend, index)
     report = Report()
     document = targets.read(str(path), report)
     target = targets.whole(document, str(path), model, scene, report)
@@ -195,6 +201,14 @@ def compile_model(
         except NoSuchForm as error:
             report.error("E607", impossible(prepared, error)[0], prepared.network.place)
             raise ModelError(report.diagnostics) from error
+
+
+def known(formulation: str | None, backend: str, index: str | None) -> None:
+    """UsageError where there is no such formulation, backend or index form."""
+    given = {"formulation": (formulation, FORMULATIONS), "backend": (backend, BACKENDS), "index": (index, INDICES)}
+    for what, (said, names) in given.items():
+        if said is not None and said not in names:
+            raise UsageError(f"{what} {said!r}: {', '.join(names[:-1])} or {names[-1]}")
 
 
 def shown(values: Mapping[str, Any]) -> dict[str, Any]:

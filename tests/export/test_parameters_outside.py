@@ -116,3 +116,15 @@ def test_sizes_of_a_module(tmp_path):
     found = api.compile_model(path, scene="s", index="0")
     with pytest.raises(api.ModelError, match="index form 0"):
         found.residual(0.0, found.y0, found.yd0, {"n": 5})
+
+
+def test_names_that_there_are_not(tmp_path):
+    """A formulation was a KeyError, a backend of any name taken."""
+    path = written(tmp_path, ROW)
+    for call in (api.simulate, api.load, lambda path, **said: api.compile_model(path, scene="s", **said)):
+        for said in ({"formulation": "lagrange"}, {"backend": "fortran"}, {"index": "9"}):
+            with pytest.raises(api.UsageError, match=next(iter(said.values()))):
+                call(path, **said)
+    at = api.compile_model(path, scene="s", index=2)
+    assert at.manifest["index"] == api.compile_model(path, scene="s", index="2").manifest["index"]
+    assert api.simulate(path, index=2, output=tmp_path / "out.h5").time[-1] == 1.0
