@@ -173,12 +173,14 @@ def _anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, 
     largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
     near = np.where(np.abs(near - there) <= NOISE * largest, there, near)
     back = np.where(np.abs(near - guess) <= BACK * largest, guess, near)
-    steep = bool(starter.system.form.scales)
-    for moved in (back, near):
+    steep, last = bool(starter.system.form.scales), near
+    if steep:  # rows of small terms are lost beside all that moves: the rest by the least change from there
+        last = stepped(problem_of(starter, t, near, near, rows=starter.every, free=free, least=True), near)
+    for moved in (back, near, last):
         found, holds = rescaled(starter, t, np.where(state, moved, x), guess, free & ~state, least=False)
         held = holds and found.residual <= max(CLOSED, best.residual)
         # what is left where a guess of twelve digits stays is no round-off: beside steep laws that is no start
-        if held and (moved is near or not steep or _sharp(starter, t, found, free) is not None):
+        if held and (moved is last or not steep or _sharp(starter, t, found, free) is not None):
             return found, True
     return best, False
 
