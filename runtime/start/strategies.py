@@ -183,10 +183,7 @@ def around(starter: Starter, t: float, x: Floats, free: Mask) -> Iterator[Floats
     for amplitude in _AMPLITUDES:
         if starter.work.done:
             return
-        move = np.where(free, amplitude * starter.scale(t, x) * random.standard_normal(x.size), 0.0)
-        while not np.isfinite(starter.residual(t, x + move)).all() and (x + move != x).any():
-            move *= 0.5
-        yield x + move
+        yield x + np.where(free, amplitude * starter.scale(t, x) * random.standard_normal(x.size), 0.0)
 
 
 def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:

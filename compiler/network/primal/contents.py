@@ -167,7 +167,8 @@ class Contents:
         self._stems: list[str] = []
         self._settled: set[int] = set()  # numbers of followers that are no stores, whose constant the text tells
         self._free: list[Element] = []  # those whose constant follows from what they begin at
-        self._sought = {i.target.data[0] for i in initials if _is_effort(i)}  # which a law tells the start alone
+        targets = [i.target.data for i in initials if i.target.op == "var"]
+        self._sought = {data[0] for data in targets if data[1:] == ("be", 0)}  # whose content the start alone can tell
         self._loose = any(not _is_content(i) and not _of_momenta(i) for i in initials)
         for initial in filter(_is_content, initials):
             within = ranges_of(initial.loops, reader.sizes, initial.place)
@@ -297,11 +298,6 @@ class Contents:
 def _is_content(initial: Initial) -> bool:
     """Whether a statement tells a displacement of a branch by itself."""
     return initial.target.op == "var" and initial.target.data[1:] == ("bq", 0) and not variables(initial.value)
-
-
-def _is_effort(initial: Initial) -> bool:
-    """Whether a statement tells the effort of a branch by itself."""
-    return initial.target.op == "var" and initial.target.data[1:] == ("be", 0)
 
 
 def _of_momenta(initial: Initial) -> bool:

@@ -60,8 +60,8 @@ def measured(
 def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
     """Guesses of the contents of a statement's elements: by the text, and zero where it guesses nothing.
 
-    Left out is what it guesses in words that tell no content; what is fixed is guessed as well, at any value where only
-    the start can tell it: it stays what it is, whatever the others hold.
+    Left out is what it guesses in words that tell no content; what is fixed is guessed as well (at zero where only the
+    start can tell it).
     """
     telling, contents = [i for i in initials if _tells(i, b)], set[Initial]()
     for i, loops, content in told(b, telling, sizes):
