@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.api.compiled import Module, compile_model, shown
+from sysdyn.api.compiled import Module, compile_model, known, shown
 from sysdyn.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.analysis.resting import Equilibrium
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.checking import checked
-from sysdyn.cli.run.loaded import Loaded
+from sysdyn.cli.run.loaded import Loaded, text_of
 from sysdyn.cli.run.running import Ran, run
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.cli.sweep.opened import Sweep
@@ -227,15 +227,17 @@ def _request(path: str, options: dict[str, Any]) -> Request:
     given = dict(options)
     settings = given.pop("set", None) or given.pop("settings", ())
     pairs: Iterable[tuple[str, Any]] = settings.items() if isinstance(settings, Mapping) else settings
-    given["settings"] = tuple((name, _text(value)) for name, value in pairs)
+    given["settings"] = tuple((name, text_of(value)) for name, value in pairs)
     return _made(Request, path, **_changes(given))
 
 
 def _made(make: Any, *arguments: Any, **options: Any) -> Request:
     try:
-        return make(*arguments, **options)  # type: ignore[no-any-return]
+        request: Request = make(*arguments, **options)
     except TypeError as error:
         raise UsageError(str(error).replace("Request.__init__()", "simulate()")) from None
+    known(request.formulation, request.backend, request.index)
+    return request
 
 
 def _changes(options: dict[str, Any]) -> dict[str, Any]:
@@ -246,10 +248,12 @@ def _changes(options: dict[str, Any]) -> dict[str, Any]:
         given["levels"] = tuple(level.items() if isinstance(level, Mapping) else level)
     for name in ("until", "max_wall"):
         if given.get(name) is not None:
-            given[name] = _text(given[name])
+            given[name] = text_of(given[name])
     at = given.get("at")
     if at is not None and not isinstance(at, str):
-        given["at"] = ",".join(_text(t) for t in np.atleast_1d(at))
+        given["at"] = ",".join(text_of(t) for t in np.atleast_1d(at))
+    if isinstance(given.get("index"), int):
+        given["index"] = str(given["index"])
     if "o" in given:
         given["output"] = given.pop("o")
     if "no_timings" in given:
@@ -257,7 +261,3 @@ def _changes(options: dict[str, Any]) -> dict[str, Any]:
     if given.get("output") is not None:
         given["output"] = str(given["output"])
     return given
-
-
-def _text(value: Any) -> str:
-    return value if isinstance(value, str) else repr(float(value))

@@ -12,8 +12,11 @@ from sysdyn.cli.export.files import manifest_of
 from sysdyn.cli.export.index_parameters import index_parameters
 from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tables
 from sysdyn.cli.export.naming import elements
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import FORMULATIONS, INDICES
 from sysdyn.cli.run import targets
 from sysdyn.cli.run.flat_laws import impossible
+from sysdyn.cli.run.loaded import KEPT, place_of
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.starting import start
 from sysdyn.dsl import load as load_
@@ -23,6 +26,8 @@ from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model.failures import NoSuchForm
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
+
+BACKENDS = ("c", "numpy")
 
 
 class Module:
@@ -44,32 +49,48 @@ class Module:
         self.parameters = shown(formed.prepared.binding.values)
         pattern = self._numbers.state or self._numbers.system
         self.indptr, self.indices = pattern.column, pattern.row
-        self._systems: dict[tuple[tuple[str, float], ...], System] = {(): formed.system}
+        self._systems: dict[tuple[tuple[str, bytes], ...], System] = {(): formed.system}
 
-    def _system(self, parameters: Mapping[str, float] | None) -> System:
+    def _system(self, parameters: Mapping[str, Any] | None) -> System:
         """The system with other values of parameters."""
-        key = tuple(sorted((parameters or {}).items()))
+        said = sorted((parameters or {}).items())
+        key = tuple((name, np.asarray(value, dtype=float).tobytes()) for name, value in said)
         if key not in self._systems:
             prepared, system = self._formed.prepared, self._formed.system
-            sizes = {p.name for p in prepared.network.parameters if p.whole} if prepared.network.branches else set()
-            for name in sizes & {name for name, _ in key}:  # which elements are alike depends on where ranges meet
-                message = f"the size '{name}' is part of the text where elements sit between nodes"
+            fixed = prepared.network.branches or self._numbers.state is not None  # y0 says which unknowns are the state
+            sizes = {p.name for p in prepared.network.parameters if p.whole} if fixed else set()
+            given = {place_of(name): np.asarray(value, dtype=float) for name, value in said}
+            for name in sizes & given.keys():  # which elements are alike depends on where ranges meet
+                where = "where elements sit between nodes" if prepared.network.branches else "in index form 0"
+                message = f"the size '{name}' is part of the text {where}"
                 help_ = f"a text with another {name}, compiled for itself"
                 raise ModelError([Diagnostic("E805", message, None, help_)])
-            arrays = prepared.arrays_of(prepared.compiled.bind(dict(key)))
+            arrays = prepared.arrays_of(prepared.compiled.bind(given))
             made = System(prepared.structure, arrays, prepared.carrier, system.form.name)
+            if len(self._systems) > KEPT:
+                self._systems.pop(next(each for each in self._systems if each))
             self._systems[key] = made.without(system.left_out) if system.left_out else made
         return self._systems[key]
+
+    def _at(self, parameters: Mapping[str, Any] | None, *given: NDArray[np.float64]) -> tuple[System, Any, Any]:
+        """The system with these parameters, and y, ydot as it takes them.  ValueError where one has another shape."""
+        system = self._system(parameters)
+        number = system.unknowns if self._numbers.state is None else self.y0.size
+        y, ydot = (np.ascontiguousarray(vector, dtype=float) for vector in given)
+        for vector in (y, ydot):
+            if vector.shape != (number,):
+                raise ValueError(f"y and ydot have {number} unknowns: an array of shape {vector.shape} was given")
+        return system, y, ydot
 
     def residual(
         self,
         t: float,
         y: NDArray[np.float64],
         ydot: NDArray[np.float64],
-        parameters: Mapping[str, float] | None = None,
+        parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """F(t, y, ydot) [rows]; parameters: values that replace the model's."""
-        system, y, ydot = self._system(parameters), np.asarray(y, dtype=float), np.asarray(ydot, dtype=float)
+        system, y, ydot = self._at(parameters, y, ydot)
         if self._numbers.state is None:
             return system.residual(t, y, ydot)
         return np.asarray(ydot - self._slopes(system, t, y)[1][self._numbers.state.places])
@@ -80,14 +101,14 @@ class Module:
         y: NDArray[np.float64],
         ydot: NDArray[np.float64],
         cj: float,
-        parameters: Mapping[str, float] | None = None,
+        parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """Entries of dF/dy + cj dF/dydot on the pattern: scipy.sparse.csc_array((values, indices, indptr))."""
-        system, y = self._system(parameters), np.asarray(y, dtype=float)
+        system, y, ydot = self._at(parameters, y, ydot)
         if self._numbers.state is not None:
             inside, rates = self._slopes(system, t, y)
             return state_jacobian(self._numbers, system, t, inside, rates, cj)
-        jy, jyd = system.jacobian(t, y, np.asarray(ydot, dtype=float))
+        jy, jyd = system.jacobian(t, y, ydot)
         return jy + cj * jyd
 
     def mass(
@@ -95,23 +116,24 @@ class Module:
         t: float,
         y: NDArray[np.float64],
         ydot: NDArray[np.float64],
-        parameters: Mapping[str, float] | None = None,
+        parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """Entries of dF/dydot on the pattern."""
+        system, y, ydot = self._at(parameters, y, ydot)
         if self._numbers.state is not None:
             columns = np.repeat(np.arange(self.y0.size), np.diff(self.indptr))
             return np.asarray(self.indices == columns, dtype=float)
-        return self._system(parameters).jacobian(t, np.asarray(y, dtype=float), np.asarray(ydot, dtype=float))[1]
+        return system.jacobian(t, y, ydot)[1]
 
     def outputs(
         self,
         t: float,
         y: NDArray[np.float64],
         ydot: NDArray[np.float64],
-        parameters: Mapping[str, float] | None = None,
+        parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """What the scene traces at a point; not a number where it reads a ledger of a whole run."""
-        system, y, ydot = self._system(parameters), np.asarray(y, dtype=float), np.asarray(ydot, dtype=float)
+        system, y, ydot = self._at(parameters, y, ydot)
         if self._numbers.state is not None:
             y, ydot = self._slopes(system, t, y)
         kinetic, potential = system.audit(t, y, ydot)[:2]
@@ -119,7 +141,7 @@ class Module:
         places = [output.place for output in self._numbers.outputs]
         return np.asarray(system.observe(t, y, ydot, known)[places])
 
-    def start(self, parameters: Mapping[str, float] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def start(self, parameters: Mapping[str, Any] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Consistent (y, ydot) at t0 for other parameters.  Raises InconsistentStart."""
         system = self._system(parameters)
         y, yd = consistent_start(system, self.t0).for_form(system)
@@ -144,7 +166,7 @@ def compile_model(
     model: str | None = None,
     scene: str | None = None,
     formulation: str = "auto",
-    index: str = "auto",
+    index: str | int = "auto",
     backend: str = "c",
     no_prune: bool = False,
 ) -> Module:
@@ -152,6 +174,8 @@ def compile_model(
 
     index: 3 as written, 2 stabilised, 2v, 1, 0 (yd - F(t, y)); auto: the one that `simulate` takes.
     """
+    index = str(index)
+    known(formulation, backend, index)
     report = Report()
     document = targets.read(str(path), report)
     target = targets.whole(document, str(path), model, scene, report)
@@ -177,6 +201,14 @@ def compile_model(
         except NoSuchForm as error:
             report.error("E607", impossible(prepared, error)[0], prepared.network.place)
             raise ModelError(report.diagnostics) from error
+
+
+def known(formulation: str | None, backend: str, index: str | None) -> None:
+    """UsageError where there is no such formulation, backend or index form."""
+    given = {"formulation": (formulation, FORMULATIONS), "backend": (backend, BACKENDS), "index": (index, INDICES)}
+    for what, (said, names) in given.items():
+        if said is not None and said not in names:
+            raise UsageError(f"{what} {said!r}: {', '.join(names[:-1])} or {names[-1]}")
 
 
 def shown(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -146,11 +146,15 @@ def sd_mass(t: float, y: Any, yd: Any, p: Any = None) -> _Floats:
 
 def sd_follow(p: Any) -> _Floats:
     """The parameters p with what follows from others (param b = 2*a) and constants of integrated rows written anew."""
+    return _followed(np.array(_model().parameters(p)), [])
+
+
+def _followed(p: _Floats, replaced: list[tuple[slice, _Floats]]) -> _Floats:
+    """What follows written into p, in the order in which it is used; what is replaced does not follow."""
     m = _model()
-    p = np.array(m.parameters(p))
     y = np.zeros(m.tables["followed"] + 1)
     for kind in ("parameter", "initial", "constant"):
-        _groups(m, kind, p, y)
+        _groups(m, kind, p, y, replaced)
     return m.parameters(p)
 
 
@@ -158,15 +162,10 @@ def parameters(**changed: float) -> _Floats:
     """The parameters as bound but for those named (SI; arrays whole), and what follows from them."""
     m = _model()
     p = np.array(m.p)
-    known = {item["name"]: item for item in m.said["parameters"]}
+    known = {item["name"]: slice(item["place"], item["place"] + item["size"]) for item in m.said["parameters"]}
     for name, value in changed.items():
-        item = known[name]
-        p[item["place"] : item["place"] + item["size"]] = np.ravel(value)
-    follows = sd_follow(p)
-    for name in changed:
-        item = known[name]
-        follows[item["place"] : item["place"] + item["size"]] = p[item["place"] : item["place"] + item["size"]]
-    return follows
+        p[known[name]] = np.ravel(value)
+    return _followed(m.parameters(p), [(known[name], p[known[name]].copy()) for name in changed])
 
 
 def sd_outputs(t: float, y: Any, yd: Any, p: Any = None) -> _Floats:
@@ -199,8 +198,8 @@ def _observe(m: _Model, call: dict[str, Any], t: float, y: _Floats, yd: _Floats,
     globals()[f"{call['block']}_rows"](p, m.ix, at, to, t, y, yd, out)
 
 
-def _groups(m: _Model, kind: str, p: _Floats, y: _Floats) -> None:
-    """Values of all groups of one kind: into p, into y, or added up in p."""
+def _groups(m: _Model, kind: str, p: _Floats, y: _Floats, replaced: Any = ()) -> None:
+    """Values of all groups of one kind: into p, into y, or added up in p; what is replaced stands behind each group."""
     for group in m.tables["groups"]:
         if group["kind"] != kind:
             continue
@@ -212,6 +211,8 @@ def _groups(m: _Model, kind: str, p: _Floats, y: _Floats) -> None:
             np.add.at(p, target, v[source])
         else:
             (y if kind == "initial" else p)[target] = v[source]
+        for places, value in replaced:
+            p[places] = value
 
 
 # -- index form 0 -----------------------------------------------------------------------------------------------------
@@ -345,7 +346,7 @@ class _Seeking:
 
     def attempt(self, use: NDArray[np.int_], free: NDArray[np.int_]) -> bool:
         """Whether the rows hold at self.x afterwards; else it is what it was."""
-        x, now = self.x.copy(), np.inf
+        x, base, now = self.x.copy(), self.guess, np.inf
         for m in range(_ITERATIONS):
             a = self.matrix(x)[np.ix_(use, free)]
             size = np.abs(a) @ np.asarray(self.tables["scale"])[free]
@@ -357,20 +358,23 @@ class _Seeking:
             a = a * self.unit[free]
             norm = np.linalg.norm(a, axis=1)
             norm = np.where(norm > 0.0, norm, 1.0)
-            aim = a @ ((x - self.guess)[free] / self.unit[free]) - r
+            aim = a @ ((x - base)[free] / self.unit[free]) - r
             if not np.isfinite(aim).all():
                 break
             trial = x.copy()
-            trial[free] = self.guess[free] + self.unit[free] * np.linalg.lstsq(a / norm[:, None], aim / norm, _RANK)[0]
+            trial[free] = base[free] + self.unit[free] * np.linalg.lstsq(a / norm[:, None], aim / norm, _RANK)[0]
             for _ in range(_HALVINGS):
                 reached = _largest(self.rows(trial)[use] / size)
                 nearer = reached < now or (m == 0 and now < _HELD and np.isfinite(reached))
                 if nearer:
                     break
                 trial = x + 0.5 * (trial - x)
-            if not nearer:
+            if nearer:
+                x, now = trial, reached
+            elif base is self.guess:  # rows of terms that are small beside all of u: the least change
+                base = x
+            else:
                 break
-            x, now = trial, reached
         if now < _HELD:
             self.x = x
         return bool(now < _HELD)

@@ -1,7 +1,8 @@
 /* ---- a consistent start: the nearest to the guesses, on all rows that hold there ---------------------------------------
  *
  * Gauss-Newton in u = weight (x - guess)/scale: each step is the u of least norm of the linearised rows A u = A u_k - r, by
- * Householder's factors of A^T with columns pivoted, redundant rows left out (Golub & Van Loan, section 5.5). */
+ * Householder's factors of A^T with columns pivoted, redundant rows left out (Golub & Van Loan, section 5.5).  What that
+ * leaves of rows whose terms are small beside all of u goes by the least change from where it ended. */
 
 #if START
 enum { ITERATIONS_OF_START = 60, HALVINGS_OF_START = 12 };
@@ -11,7 +12,8 @@ typedef struct {
     sd_system system;
     sd_call calls[START_CALLS];
     double *y, *yd, *r, *jy, *jyd, *v;   /* of the full layout and its pattern */
-    double *x, *trial, *guess, *before;  /* [START_X] */
+    double *x, *trial, *guess, *before, *ended; /* [START_X] */
+    const double *from;                  /* [START_X] what steps are least from */
     double *a, *b, *u, *size, *norm;     /* the linearised rows */
     int32_t *row_of, *order;             /* [rows] place among the rows in use, or -1; order of elimination */
     int32_t *column_of;                  /* [START_X] */
@@ -23,14 +25,14 @@ static int open_seeking(seeking *s, const double *p)
 {
     const size_t x = START_X, rows = (size_t)start_form.rows, entries = (size_t)start_form.entries;
     memset(s, 0, sizeof *s);
-    s->memory = calloc(2 * (size_t)START_FULL + 4 * rows + 2 * entries + START_SCRATCH + 6 * x + rows * x + 8, sizeof(double));
+    s->memory = calloc(2 * (size_t)START_FULL + 4 * rows + 2 * entries + START_SCRATCH + 7 * x + rows * x + 8, sizeof(double));
     s->places = calloc(2 * rows + x + 1, sizeof(int32_t));
     if (!s->memory || !s->places)
         return -1;
     s->y = s->memory, s->yd = s->y + START_FULL, s->r = s->yd + START_FULL, s->b = s->r + rows;
     s->size = s->b + rows, s->norm = s->size + rows, s->jy = s->norm + rows, s->jyd = s->jy + entries;
     s->v = s->jyd + entries, s->x = s->v + START_SCRATCH, s->trial = s->x + x, s->guess = s->trial + x;
-    s->before = s->guess + x, s->u = s->before + x, s->a = s->u + 2 * x;
+    s->before = s->guess + x, s->ended = s->before + x, s->u = s->ended + x, s->a = s->u + 2 * x;
     s->row_of = s->places, s->order = s->row_of + rows, s->column_of = s->order + rows;
     s->system = bound(&start_form, p, s->calls, s->v);
     return 0;
@@ -170,7 +172,7 @@ static double step_of(seeking *s, const sd_trial *trial)
         const double *row = s->a + (size_t)i * START_X;
         for (int32_t j = 0; j < trial->free; j++) {
             const int32_t place = trial->place[j];
-            sum += row[j] * (s->x[place] - s->guess[place]) * start_weight[place] / start_scale[place];
+            sum += row[j] * (s->x[place] - s->from[place]) * start_weight[place] / start_scale[place];
         }
         s->b[i] = sum;
     }
@@ -179,7 +181,7 @@ static double step_of(seeking *s, const sd_trial *trial)
     memcpy(s->trial, s->x, START_X * sizeof *s->x);
     for (int32_t j = 0; j < trial->free; j++) {
         const int32_t place = trial->place[j];
-        s->trial[place] = s->guess[place] + s->u[j] * start_scale[place] / start_weight[place];
+        s->trial[place] = s->from[place] + s->u[j] * start_scale[place] / start_weight[place];
     }
     return now;
 }
@@ -196,6 +198,7 @@ static int attempt(seeking *s, const sd_trial *trial)
     for (int32_t k = 0; k < trial->free; k++)
         s->column_of[trial->place[k]] = k;
     memcpy(s->before, s->x, START_X * sizeof *s->x);
+    s->from = s->guess;
     double now = INFINITY, reached = INFINITY;
     for (int m = 0; m < ITERATIONS_OF_START; m++) {
         now = step_of(s, trial);
@@ -211,8 +214,13 @@ static int attempt(seeking *s, const sd_trial *trial)
             if (reached < now || (m == 0 && isfinite(reached) && now < held))
                 break;
         }
-        if (!(reached < now) && (m > 0 || now >= held || !isfinite(reached)))
-            break; /* no nearer */
+        if (!(reached < now) && (m > 0 || now >= held || !isfinite(reached))) { /* no nearer */
+            if (s->from != s->guess)
+                break;
+            memcpy(s->ended, s->x, START_X * sizeof *s->x);
+            s->from = s->ended;
+            continue;
+        }
         memcpy(s->x, s->trial, START_X * sizeof *s->x);
         now = reached;
     }

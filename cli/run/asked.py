@@ -80,6 +80,8 @@ def check_tolerances(request: Request) -> None:
         raise UsageError(f"--rtol {request.rtol:g}: from {FINEST_RTOL:g} to less than 1, what double precision allows")
     if request.accuracy is not None and not FINEST_ACCURACY <= request.accuracy < 1.0:
         raise UsageError(f"--accuracy {request.accuracy:g}: from {FINEST_ACCURACY:g} to less than 1, what can be told")
+    if request.max_steps is not None and request.max_steps < 1:
+        raise UsageError(f"--max-steps {request.max_steps}: one at least")
     if request.atol is not None and not 0.0 <= request.atol < math.inf:
         raise UsageError(f"--atol {request.atol:g}: it must not be negative")
 

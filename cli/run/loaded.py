@@ -114,7 +114,13 @@ class Compiled:
         return compiled.bind(numbers)
 
 
-def _text_of(value: Any) -> str:
+def place_of(name: str) -> str | tuple[str | int, ...]:
+    """A parameter as a binding has it: `m[2]` is ("m", 2)."""
+    element = _ELEMENT.fullmatch(name)
+    return (element[1], *map(int, element[2].split(","))) if element else name
+
+
+def text_of(value: Any) -> str:
     """A value as --set takes it."""
     if np.ndim(value):
         return f"[{', '.join(repr(float(v)) for v in value)}]"
@@ -217,8 +223,8 @@ class Loaded:
         known = self.parameters
         numbers, texts = dict[Any, Any](), list[tuple[str, str]]()
         for name, value in settings.items():
-            element = _ELEMENT.fullmatch(name)
-            plain = element[1] if element else name
+            key = place_of(name)
+            plain = key if isinstance(key, str) else str(key[0])
             parameter = known.get(plain)
             number = value
             if parameter is None and np.ndim(value):
@@ -228,13 +234,12 @@ class Loaded:
                 with ex.fresh():
                     number = load.constant(self.target.document, value, parameter.unit.dimension, name, silent)
             if parameter is None or number is None or isinstance(number, str) or plain in self.sizes:
-                texts.append((name, _text_of(value)))
+                texts.append((name, text_of(value)))
             else:
-                key = (plain, *map(int, element[2].split(","))) if element else name
                 numbers[key] = np.asarray(number, dtype=float)
         if texts:  # a list fits the sizes that are set with it, not those of the text
             whole = [name for name in numbers if np.ndim(numbers[name])]
-            texts += [(name, _text_of(numbers.pop(name).tolist())) for name in whole]
+            texts += [(name, text_of(numbers.pop(name).tolist())) for name in whole]
         return numbers, tuple(texts)
 
     def bound(self, settings: Settings) -> tuple[Prepared, Compiled]:
@@ -245,7 +250,7 @@ class Loaded:
             return compiled.prepared, compiled
         if self._refused(numbers):  # the rules say what is wrong with them
             each = [one for name, value in settings.items() for one in self._elements(name, value)]
-            shown = ((f"{name}[{','.join(map(str, at))}]" if at else name, _text_of(value)) for name, at, value in each)
+            shown = ((f"{name}[{','.join(map(str, at))}]" if at else name, text_of(value)) for name, at, value in each)
             compiled = self._text(tuple(shown))
             return compiled.prepared, compiled
         try:
@@ -256,7 +261,7 @@ class Loaded:
             if not scalar or not {d.code for d in error.diagnostics} <= {"E605", "E805"}:
                 raise
             # a value that asks for another form: a mass that is zero, an array without an inside
-            compiled = self._text(tuple((name, _text_of(value)) for name, value in settings.items()))
+            compiled = self._text(tuple((name, text_of(value)) for name, value in settings.items()))
             return compiled.prepared, compiled
         return replace(compiled.prepared, binding=binding, cpu_compile_s=0.0), compiled
 

@@ -86,7 +86,8 @@ class ModelError(Exception):
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics: tuple[Diagnostic, ...] = tuple(diagnostics)
-        super().__init__("; ".join(f"{item.code}: {item.message}" for item in self.diagnostics))
+        told = [item for item in self.diagnostics if item.severity == "error"] or self.diagnostics
+        super().__init__("; ".join(f"{item.code}: {item.message}" for item in told))
 
     def __reduce__(self) -> tuple[type[ModelError], tuple[tuple[Diagnostic, ...]]]:
         return ModelError, (self.diagnostics,)

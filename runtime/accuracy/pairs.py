@@ -156,6 +156,9 @@ def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats, *, known: bool 
     use = (size != 0.0) & np.isfinite(target)
     if before.shape != fine.values.shape or len(before) < 2 or not use.any() or fine.jumps:
         return 0.0, 0.0  # what jumps may be nothing between its jumps
+    use &= ~zero(coarse, fine, target)  # round-off has not come to rest
+    if not use.any():
+        return 0.0, 0.0
     with np.errstate(all="ignore"):
         far = apart(coarse, fine)[:, use]
         over = far / (size * target)[use]

@@ -23,9 +23,10 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.gauss_newton import Problem, Work, solve
+from sysdyn.runtime.numerics.gauss_newton import Problem, solve
 from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.numerics.rank import least_squares, null_space
+from sysdyn.runtime.numerics.work import Work
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.values import dataclass

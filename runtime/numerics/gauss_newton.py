@@ -7,7 +7,6 @@ A u = A u_k - r (least_change.py), with halving of the step while the rows grow 
 from __future__ import annotations
 
 import ctypes as c
-import time
 from collections.abc import Callable
 from dataclasses import field, replace
 from functools import cached_property
@@ -20,23 +19,16 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES, Mask, in_order, least_norm
 from sysdyn.runtime.numerics.products import add_product, add_sizes, pieces
 from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
+from sysdyn.runtime.numerics.work import Work
 from sysdyn.values import dataclass
 
 SMALL = 32
 """Rows and unknowns up to which a problem that the core knows is solved there."""
-GRANTED = 3.6e9
-"""Operations that a search may take: two or three seconds; the hardest start of our models takes half of it."""
-ITERATIONS = 40
-"""Iterations that a search may take however large they are."""
-EVALUATION = 1e6
-"""Operations that evaluating the rows takes whatever their number: calls, not arithmetic."""
-EACH = 40.0
-"""Operations that an entry of the matrix takes in an evaluation."""
 _ITERATIONS = 60
 _FOLDS = 709
 """Iterations that an exponential, falling by e in each, takes from the largest number: as long as rows shrink as fast
 as their terms do none is counted."""
-_HALVINGS = 12
+_HALVINGS, _FLATTEST = 12, 1023
 _LOST = 3
 """Directions one after the other along which no step makes the rows smaller: the next ones do not either."""
 _ROUND_OFF = 2e-15
@@ -44,52 +36,6 @@ _ROUNDINGS = 8.0
 """Times the unit round-off of its terms by their slopes: what evaluating a row of several operations may be off by."""
 _BESIDE = 1e-8
 """Scaled rows below which round-off alone can keep them from shrinking."""
-
-
-class OutOfTimeError(Exception):
-    """The wall time granted is over."""
-
-
-@dataclass(slots=True)
-class Work:
-    """What a search has left to spend, in operations counted by size: the same on every machine.
-
-    A share of GRANTED, or as much as ITERATIONS iterations of the largest problem met take.  until: `time.monotonic()`
-    beyond which counting raises OutOfTimeError.
-    """
-
-    share: float = 1.0
-    until: float | None = None
-    spent: float = 0.0
-    largest: float = 0.0
-
-    def iteration(self, shape: tuple[int, int], entries: int) -> None:
-        """Count one linearisation with its solution, of so many rows and unknowns."""
-        rows, unknowns = shape
-        solution = 2e3 * (rows + unknowns + entries)
-        if max(shape) <= SINGULAR_VALUES:
-            solution = 15.0 * rows * unknowns * min(shape)
-        elif max(shape) <= DENSE:
-            solution = 4.0 * (rows + unknowns) ** 3
-        self.clocked()
-        whole = solution + EVALUATION + EACH * entries
-        self.largest = max(self.largest, whole)
-        self.spent += whole
-
-    def evaluation(self, entries: int) -> None:
-        """Count one evaluation of all rows."""
-        self.clocked()
-        self.spent += EVALUATION + EACH * entries
-
-    def clocked(self) -> None:
-        """Raise OutOfTimeError where the wall time is over."""
-        if self.until is not None and time.monotonic() > self.until:
-            raise OutOfTimeError
-
-    @property
-    def done(self) -> bool:
-        """Whether nothing is left."""
-        return self.spent > self.share * max(GRANTED, ITERATIONS * self.largest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,16 +283,23 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             break
         step, tried, move = 1.0, x, np.subtract(target, linear.moved(x), out=target)
         move *= linear.unit
+
+        def on(part: float, x: Floats = x, move: Floats = move, measure: Any = measure) -> tuple[float, Floats]:
+            there = x.copy()
+            there[problem.free] += part * move
+            return float(np.linalg.norm(measure(there)[1])), there
+
         for _ in range(_HALVINGS):
-            tried = x.copy()
-            tried[problem.free] += step * move
-            now = float(np.linalg.norm(measure(tried)[1]))
+            now, tried = on(step)
             if np.isfinite(now) and now <= max((1.0 - 0.1 * step) * norm, 1e-11):
                 lost = 0
                 break
             step *= 0.5
         else:
-            lost += 1
+            flat = _flat(on, norm)
+            lost = 0 if flat[0] < norm else lost + 1
+            now, tried = flat if not lost else (now, tried)
+        del on
         if best.residual >= 1e-12 and now <= 0.5 * norm:
             stale, taken = 0, taken - 1  # rows that shrink as fast as their terms do (a junction far above its voltage)
         del linear, measure, target, move  # of a large one the room counts
@@ -354,6 +307,17 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             break
         x = tried
     return best
+
+
+def _flat(on: Callable[[float], tuple[float, Floats]], norm: float) -> tuple[float, Floats]:
+    """About where rows stop to shrink on the first of a way that is too long by powers of ten, by bisection of the
+    exponent: that of a law that is flat (a junction that blocks, and shall conduct).
+    """
+    above, below = _HALVINGS, _FLATTEST
+    while below - above > 1:
+        halvings = (above + below) // 2
+        above, below = (above, halvings) if on(2.0**-halvings)[0] <= norm else (halvings, below)
+    return on(2.0**-below)
 
 
 def stepped(problem: Problem, x: Floats) -> Floats:

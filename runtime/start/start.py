@@ -18,17 +18,10 @@ from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.slopes import labels, rows_without_slope
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.gauss_newton import (
-    OutOfTimeError,
-    Solution,
-    Work,
-    corrected,
-    least_residual,
-    solve,
-    stepped,
-)
+from sysdyn.runtime.numerics.gauss_newton import Solution, corrected, least_residual, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
+from sysdyn.runtime.numerics.work import OutOfTimeError, Work
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.moved import moved_guesses
@@ -181,12 +174,14 @@ def _anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, 
     largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
     near = np.where(np.abs(near - there) <= NOISE * largest, there, near)
     back = np.where(np.abs(near - guess) <= BACK * largest, guess, near)
-    steep = bool(starter.system.form.scales)
-    for moved in (back, near):
+    steep, last = bool(starter.system.form.scales), near
+    if steep:  # rows of small terms are lost beside all that moves: the rest by the least change from there
+        last = stepped(problem_of(starter, t, near, near, rows=starter.every, free=free, least=True), near)
+    for moved in (back, near, last):
         found, holds = rescaled(starter, t, np.where(state, moved, x), guess, free & ~state, least=False)
         held = holds and found.residual <= max(CLOSED, best.residual)
         # what is left where a guess of twelve digits stays is no round-off: beside steep laws that is no start
-        if held and (moved is near or not steep or _sharp(starter, t, found, free) is not None):
+        if held and (moved is last or not steep or _sharp(starter, t, found, free) is not None):
             return found, True
     return best, False
 
@@ -228,7 +223,7 @@ def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) ->
     """X after corrections that vanish, and whether the rows hold to their round-off then and leave no state or effort
     open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little.
     """
-    told, begun, agrees = starter.moves(*STATE, "e"), x, True
+    told, begun, agrees, last = starter.moves(*STATE, "e"), x, True, np.inf
     for _ in range(SHARPER):
         problem = problem_of(starter, t, x, x, rows=rows, free=free)
         near = corrected(problem, x)
@@ -236,11 +231,12 @@ def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) ->
             return begun, agrees
         agrees = near.agrees
         step, size = np.abs(near.x - x), np.maximum(problem.scale, np.abs(x))
-        if (step <= EXACT * size).all():
+        most = float(np.max(step / size, initial=0.0))
+        if most <= EXACT and (agrees or most > 0.5 * last):  # a steep law tells 1e-13 of a volt from its round-off
             return x, agrees and not (near.open_ > starter.largest_alike(size))[told].any()
         if starter.work.done:
             return begun, False
-        x = near.x
+        x, last = near.x, most
     return begun, True
 
 

@@ -27,9 +27,10 @@ from sysdyn.runtime.model.inertia import Inertia, own_inertia, own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.gauss_newton import Problem, Work
+from sysdyn.runtime.numerics.gauss_newton import Problem
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.numerics.products import add_sizes
+from sysdyn.runtime.numerics.work import Work
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.runtime.start.residue import Residue
 from sysdyn.runtime.start.sums import Sums, Weights, of_few, of_many, weights

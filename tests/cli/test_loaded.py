@@ -239,7 +239,7 @@ def test_a_ladder_of_another_length_is_that_ladder(tmp_path, n):
 def test_the_residual_of_a_network_is_that_of_one_size(tmp_path):
     (tmp_path / "m.sd").write_text(LADDER)
     module = compile_model(tmp_path / "m.sd")
-    zeros = np.zeros(len(module.manifest["unknowns"]))
+    zeros = np.zeros(module.y0.size)
     assert np.isfinite(module.residual(0.0, zeros, zeros, {"Rr": 500.0})).all()
     with pytest.raises(ModelError, match="the size 'n' is part of the text"):
         module.residual(0.0, zeros, zeros, {"n": 5.0})

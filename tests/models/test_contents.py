@@ -103,6 +103,45 @@ CASES = {
         L: kinetic(p = 0.4 H*f) a[n] -> ground""",
         {"a[0].e": 0.76, "a[n].e": 0.16, "L.f": 0.5, "C[2].q": 0.12},
     ),
+    "an effort that is said of a store whose law tells no content": (  # q/2 + 1.5 q^3 = 0.3
+        """node a, b, c: electrical
+        S: effort(e = 1 V) a -> ground
+        R: dissipator(e = 3 ohm*f) a -> b
+        C1: potential(q = 1 F*e) b -> c
+        C2: potential(e = q/(2 F) + 1.5 V/C^3*q^3) c -> ground
+        init C2.e = 0.3 V""",
+        {"C1.q": 0.0, "C2.q": 0.4032629374759649, "c.e": 0.3},
+    ),
+    "a coil of which nothing is said beside one whose current tells no flux": (
+        """node a, b, c: electrical
+        C1: potential(q = 2.4 F*e) a -> ground
+        R1: dissipator(e = 1 ohm*f) a -> ground
+        L1: kinetic(p = 1.2 H*f) a -> b
+        L2: kinetic(f = p/(0.94 H) + 0.845 A/Wb^3*p^3) b -> c
+        R2: dissipator(e = 2 ohm*f) b -> ground
+        R3: dissipator(e = 3 ohm*f) c -> ground
+        init L2.f = 0.8 A""",
+        {"L1.f": 0.0, "L2.f": 0.8, "b.e": -1.6, "c.e": 2.4},
+    ),
+    "coupled coils in parallel": (
+        """node a, b: electrical
+        S: effort(e = 1 V) a -> ground
+        R: dissipator(e = 3 ohm*f) a -> b
+        K: coupled_inductors(L1 = 2 H, L2 = 1 H, k = 0.5) one = b -> ground, two = b -> ground
+        init K.one.f = 1 A
+        init K.two.f = 0.3 A""",
+        {"K.one.f": 1.0, "K.two.f": 0.3, "b.e": -2.9},
+    ),
+    "efforts of such stores in series": (
+        """node a, b, c: electrical
+        S: effort(e = 1 V) a -> ground
+        R: dissipator(e = 3 ohm*f) a -> b
+        C1: potential(e = q/(1 F) + 1 V/C^3*q^3) b -> c
+        C2: potential(e = q/(2 F) + 1.5 V/C^3*q^3) c -> ground
+        init C1.e = 0.5 V
+        init C2.e = 0.3 V""",
+        {"C1.q": 0.42385379906978327, "C2.q": 0.4032629374759649, "b.e": 0.8},
+    ),
     "strings of inductors that end in capacitors": (
         """param n = 2
         param m = 3
@@ -127,7 +166,8 @@ CASES = {
 @pytest.mark.one_in(20)
 def test_contents(tmp_path, case, formulation):
     body, start = CASES[case]
-    text = ("model net {{\n" + body + SCENE).format(traced=", ".join(start))
+    text = "from std.electrical import coupled_inductors\nmodel net {{\n" + body + SCENE
+    text = text.format(traced=", ".join(start))
     trace = trace_of(tmp_path, text, formulation=formulation)
     reference = trace_of(tmp_path, text, formulation="lagrangian")
     for name, value in start.items():

@@ -6,19 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from sysdyn.runtime.numerics import least_change as module
-from sysdyn.runtime.numerics.gauss_newton import (
-    EACH,
-    EVALUATION,
-    GRANTED,
-    ITERATIONS,
-    OutOfTimeError,
-    Problem,
-    Work,
-    least_residual,
-    solve,
-    stepped,
-)
+from sysdyn.runtime.numerics.gauss_newton import Problem, least_residual, solve, stepped
 from sysdyn.runtime.numerics.least_change import in_order, least_norm
+from sysdyn.runtime.numerics.work import EACH, EVALUATION, GRANTED, ITERATIONS, OutOfTimeError, Work
 
 
 def entries(matrix):

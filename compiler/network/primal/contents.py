@@ -6,10 +6,10 @@ the coordinates, which are one choice of tree; k one constant for each beside it
 
 In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + k, with k its own
 initial content less +- that of the first; it is chosen where not all of these are fixed and a loop of stores and
-efforts may ask for others.  What is no store begins at what the text says of it, else at zero, whatever the first
-store holds.  A store between two nodes of the reflection (an inductor) holds their difference: where
-such stores close loops in which contents are said, each has its own initial content as k; it is chosen where
-nothing is said of it.
+efforts may ask for others, and where an effort is said of one that tells no content (e = q + q^3).  What is no store
+begins at what the text says of it, else at zero, whatever the first store holds.  A store between two nodes of the
+reflection (an inductor) holds their difference: where such stores close loops in which contents are said, each has its
+own initial content as k; it is chosen where nothing is said of it.
 """
 
 from __future__ import annotations
@@ -167,6 +167,8 @@ class Contents:
         self._stems: list[str] = []
         self._settled: set[int] = set()  # numbers of followers that are no stores, whose constant the text tells
         self._free: list[Element] = []  # those whose constant follows from what they begin at
+        targets = [i.target.data for i in initials if i.target.op == "var"]
+        self._sought = {data[0] for data in targets if data[1:] == ("be", 0)}  # whose content the start alone can tell
         self._loose = any(not _is_content(i) and not _of_momenta(i) for i in initials)
         for initial in filter(_is_content, initials):
             within = ranges_of(initial.loops, reader.sizes, initial.place)
@@ -208,12 +210,13 @@ class Contents:
                 self._constant(element, value)
             return
         fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
-        self._constant(element, value if fixed or element.number not in self.looped else None)
+        sought = element.number in self.looped or self._sought & {element.name, *(m.leader.name for m in members)}
+        self._constant(element, value if fixed or not sought else None)
 
     def _chords(self, looped: Sequence[Element]) -> None:
         """The constants of stores between nodes of the reflection whose loops start with contents of their own."""
         given = {e.number for e in looped if any(meet(box, e.named) for _, box in self._given.get(e.name, ()))}
-        for e in looped if given else ():
+        for e in looped if given or self._sought.intersection(e.name for e in looped) else ():
             value = self.start(e.name, indices(e.named), ranges_over(e.named))
             self._constant(e, value if e.number in given else None)
 

@@ -14,6 +14,7 @@
 #define EVALUATION 1e6
 #define EACH 40.0
 #define HALVINGS 12
+#define FLATTEST 1023
 #define LOST 3
 #define FOLDS 709
 #define ROUND_OFF 2e-15
@@ -216,6 +217,31 @@ static void count(sd_search *s, const room *w)
     s->spent += whole;
 }
 
+/* w->tried: part of the way to the target; the norm of the rows there */
+static double tried(sd_search *s, room *w, const double *x, double part)
+{
+    double norm;
+    for (int32_t c = 0; c < s->start->balance.unknowns; c++) {
+        int32_t j = w->column_at[c];
+        w->tried[c] = x[c] + (j >= 0 ? part * (w->target[j] - w->u[j]) * w->unit[c] : 0.0);
+    }
+    measure(s, w->tried, w, &norm);
+    return norm;
+}
+
+/* whether rows shrink on the first of a way that is too long by powers of ten: that of a law that is flat at x (a junction
+ * that blocks, and shall conduct); w->tried: about where they stop to, by bisection of the exponent */
+static int flat(sd_search *s, room *w, const double *x, double norm, double *now)
+{
+    int above = HALVINGS, below = FLATTEST;
+    while (below - above > 1) {
+        int halvings = (above + below) / 2;
+        *(tried(s, w, x, ldexp(1.0, -halvings)) <= norm ? &below : &above) = halvings;
+    }
+    *now = tried(s, w, x, ldexp(1.0, -below));
+    return *now < norm;
+}
+
 static void iterate(sd_search *s, room *w, double *x)
 {
     size_t all = (size_t)s->start->balance.unknowns, rows = (size_t)s->start->balance.rows;
@@ -250,15 +276,15 @@ static void iterate(sd_search *s, room *w, double *x)
         double step = 1.0, now = INFINITY;
         int halvings = 0;
         for (; halvings < HALVINGS; halvings++, step *= 0.5) {
-            memcpy(w->tried, x, all * sizeof *x);
-            for (size_t c = 0; c < all; c++)
-                if (w->column_at[c] >= 0)
-                    w->tried[c] += step * (w->target[w->column_at[c]] - w->u[w->column_at[c]]) * w->unit[c];
-            measure(s, w->tried, w, &now);
+            now = tried(s, w, x, step);
             if (isfinite(now) && now <= fmax((1.0 - 0.1 * step) * norm, 1e-11))
                 break;
         }
-        lost = halvings < HALVINGS ? 0 : lost + 1;
+        if (halvings == HALVINGS && !(flat(s, w, x, norm, &now))) {
+            lost++;
+            now = tried(s, w, x, 2.0 * step);
+        } else
+            lost = 0;
         if (s->residual >= 1e-12 && now <= 0.5 * norm) { /* rows that shrink as fast as their terms do */
             stale = 0;
             taken--;
