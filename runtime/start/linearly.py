@@ -25,6 +25,8 @@ ALIKE = 1e-9
 """Of a slope: what it differs by elsewhere and is constant."""
 MISSES, REFINED = 1e-4, 2
 """Of the terms of a row: what is left of it that is no round-off; solutions, each of what the one before left over."""
+ROUND_OFF = 1e-13
+"""Of the largest singular value: one that is less is no way out; valves in series with a stiff chamber have 2.5e-10."""
 NOTHING = 1e-6
 """Of its magnitude: what an unknown is of which nothing but round-off may be there."""
 
@@ -61,7 +63,7 @@ class Rows:
         by_row, by_column = factors(matrix)
         even, change = by_row[:, None] * matrix * by_column, np.zeros(x.size)
         for _ in range(REFINED):
-            change += by_column * least_squares(even, -by_row * (matrix @ change + residual))
+            change += by_column * least_squares(even, -by_row * (matrix @ change + residual), ROUND_OFF)
         terms = np.abs(matrix) @ np.abs(change)
         np.add.at(terms, self.rows, np.abs(here) * np.maximum(np.abs(x), NOTHING * self.size)[self.columns])
         left = np.abs(matrix @ change + residual)
