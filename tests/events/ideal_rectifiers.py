@@ -1,4 +1,4 @@
-"""Random rectifiers of ideal diodes: python tests/events/rectifiers.py [NUMBER] [--from K]
+"""Random rectifiers of ideal diodes: python tests/events/ideal_rectifiers.py [NUMBER] [--from K]
 
 NUMBER (60) seeded circuits: one to three bridges in series, each of one to three phases behind coils, resistors or
 nothing, with or without a capacitor and a way to ground; a load with or without coil and capacitor.  Each runs as a

@@ -1,7 +1,7 @@
-"""A slice of the random rectifiers; the whole is `python tests/events/rectifiers.py`."""
+"""A slice of the random rectifiers; the whole is `python tests/events/ideal_rectifiers.py`."""
 
 import pytest
-from rectifiers import APART, Circuit, apart
+from ideal_rectifiers import APART, Circuit, apart
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 6, 8, 14])
