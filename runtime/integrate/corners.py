@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from sysdyn.runtime.integrate.crossing import JUMP
+from sysdyn.runtime.integrate.segments import core_pieces
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.scales import GROUP, ROUND_OFF, SWEEPS, UNKNOWN, alike, noisy
 from sysdyn.runtime.model.system import LARGE
@@ -35,7 +36,7 @@ class Corners:
         core.time, core.resolves = run.sizes.time, run.sizes.resolves
         core.t_end = c.addressof(method) + type(method).t_end.offset
         core.expanded = c.addressof(run.method.expanded.contents) if run.method.expanded else None
-        pieces = (lib.Piece * len(run.segments))(*(lib.Piece(s.begin, s.end, s.label) for s in run.segments))
+        pieces = core_pieces(run.segments)
         self._keep.append(pieces)
         core.piece, core.pieces = c.addressof(pieces), len(pieces)
         self._sizes(run)

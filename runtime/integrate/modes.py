@@ -17,6 +17,7 @@ from sysdyn.runtime.events.handler import STALLED, Handler, Watched
 from sysdyn.runtime.events.kinks import WORDS
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.integrate.crossing import JUMP
+from sysdyn.runtime.integrate.segments import core_pieces
 from sysdyn.runtime.integrate.strikes import Balance, of_momenta, struck
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN
@@ -136,7 +137,7 @@ class Modes:
         for k, kink in enumerate(plan.kinks):
             functions = kink.branch, kink.value, kink.rate, kink.above, kink.below
             kinks[k] = lib.Kink(*functions, kink.inner, kink.jumps)
-        pieces = (lib.Piece * len(self.run.segments))(*(lib.Piece(s.begin, s.end, s.label) for s in self.run.segments))
+        pieces = core_pieces(self.run.segments)
         systems = (c.c_void_p * len(self._systems))(*(c.addressof(s.core) for s in self._systems))
         self._keep += [contacts, kinks, systems, pieces]
         core.piece, core.pieces, core.differs = c.addressof(pieces), len(pieces), max(self.run.request.rtol, JUMP)

@@ -8,7 +8,12 @@ the first where it jumps right behind the start.
 
 from __future__ import annotations
 
+import ctypes as c
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.values import dataclass
 
@@ -48,3 +53,8 @@ def segments(t0: float, t1: float, stops: Floats | None) -> tuple[Segment, ...]:
             found.append(Segment(begin, before, label))
         begin, label = after, first
     return (*found, Segment(begin, t1, label))
+
+
+def core_pieces(pieces: Sequence[Segment]) -> c.Array[Any]:
+    """The same as the core has them (sd_piece)."""
+    return (lib.Piece * len(pieces))(*(lib.Piece(s.begin, s.end, s.label) for s in pieces))

@@ -44,15 +44,6 @@ static void look(sd_run *run, double t, const double *y, const double *yd, doubl
     sd_run_quantities(run, t, values);
 }
 
-/* whether an unknown that nothing is known of begins to move */
-static int shows_first(const sd_corners *c, int32_t written)
-{
-    for (int32_t i = 0; i < written; i++)
-        if (c->unnamed[i] && c->met[i] <= c->round_off && c->magnitude[i] == c->unknown_size && c->yd[i] != 0.0)
-            return 1;
-    return 0;
-}
-
 /* what stood at zero and begins to move is as large as a part of its like, at least */
 static void begin_to_move(const sd_corners *c)
 {
@@ -127,7 +118,9 @@ int sd_corners_end(sd_run *run)
     last_point(run, c);
     if (c->keeps)
         share(c);
-    if (!across(run, c, next->begin) || shows_first(c, run->written))
+    if (!across(run, c, next->begin))
+        return SD_FINISHED;
+    if (sd_landing_shows(run->written, c->unnamed, c->met, c->magnitude, c->yd, c->round_off, c->unknown_size))
         return SD_FINISHED;
     int starts = next->label == c->piece[0].label;
     if (starts || sd_run_asks(run, next->label)) {

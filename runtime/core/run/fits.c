@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "run/landing.h"
+
 #define FULL_SENSE 1e-9  /* of a sense: what it may pass its end by */
 #define SLIP 1e-9        /* of a bound of friction */
 #define SLIDES 2.0       /* branches, as events/kinks.py names them */
@@ -107,10 +109,7 @@ int sd_mode_fits(const sd_modes *m, const double *before, const double *v)
 
 int sd_mode_sized(const sd_modes *m)
 {
-    for (int32_t i = 0; i < m->unknowns; i++)
-        if (m->unnamed[i] && m->met[i] <= m->round_off && m->magnitude[i] == m->unknown_size && m->rate[i] != 0.0)
-            return 0;
-    return 1;
+    return !sd_landing_shows(m->unknowns, m->unnamed, m->met, m->magnitude, m->rate, m->round_off, m->unknown_size);
 }
 
 int sd_mode_ordinary(const sd_modes *m)

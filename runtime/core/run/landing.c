@@ -117,6 +117,15 @@ int sd_landing_jumps(int32_t number, const double *before, const double *behind,
     return 0;
 }
 
+int sd_landing_shows(int32_t n, const int32_t *unnamed, const double *met, const double *magnitude, const double *rate,
+                     double zero, double unknown)
+{
+    for (int32_t i = 0; i < n; i++)
+        if (unnamed[i] && met[i] <= zero && magnitude[i] == unknown && rate[i] != 0.0)
+            return 1;
+    return 0;
+}
+
 int sd_landing_room(const sd_run *run, double t)
 {
     int32_t rows = ROWS_OF_EVENT;

@@ -21,6 +21,11 @@ int sd_landing_keeps(sd_settle *settle, double t, double *y, double *yd, const s
 /* Whether values [number] behind an instant differ from those before by more than that part of the largest so far. */
 int sd_landing_jumps(int32_t number, const double *before, const double *behind, const double *largest, double part);
 
+/* Whether one of n unknowns whose size nothing names, and that has stood at zero so far, moves: rate [n].  Of such a one
+ * nothing is known but `unknown`. */
+int sd_landing_shows(int32_t n, const int32_t *unnamed, const double *met, const double *magnitude, const double *rate,
+                     double zero, double unknown);
+
 /* Room for the rows of the last step up to t and of what happens there: 1; 0: not now; -1: never. */
 int sd_landing_room(const sd_run *run, double t);
 

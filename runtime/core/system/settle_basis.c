@@ -7,10 +7,10 @@
 #define LEAST_PIVOT 1e-11 /* part of its column below which a row of the basis follows from the others */
 #define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
 
-/* 1 / weight of an unknown or rate; of a state that is to stay where it is 0 */
-static inline double lift(const sd_settle *settle, int32_t j)
+/* 1 / weight of an unknown or rate, which carries the state or not; of a state that is to stay where it is 0 */
+static inline double lift(const sd_settle *settle, int carries)
 {
-    return settle->state[j] ? !settle->determined : 1.0 / settle->follows;
+    return carries ? !settle->determined : 1.0 / settle->follows;
 }
 
 int sd_settle_basis_new(sd_settle *settle, const int32_t *order)
@@ -47,7 +47,7 @@ static int leaves_open(const sd_settle *settle)
 static void add_to_basis(sd_settle *settle, int32_t unknown, int32_t number, const double *slope)
 {
     const sd_system *system = settle->system;
-    double weight = lift(settle, number);
+    double weight = lift(settle, settle->state[number]);
     for (int32_t e = system->column[unknown]; e < system->column[unknown + 1]; e++) {
         int32_t at = settle->basis_column[system->row[e] + 1]++; /* which is the end of that column at last */
         settle->basis_row[at] = number;
@@ -99,14 +99,14 @@ int sd_settle_choose(sd_settle *settle)
 double sd_settle_move_basic(sd_settle *settle, double *y, double *yd, double *state)
 {
     int32_t n = settle->unknowns, moves = n + settle->rates;
-    const double states = settle->determined ? 0.0 : 1.0, others = 1.0 / settle->follows;
+    const double lifts[2] = {lift(settle, 0), lift(settle, 1)};
     double most[2] = {0.0, 0.0}, *b = settle->r; /* of what follows, of states; which is measured anew behind it */
     for (int32_t i = 0; i < settle->rows; i++)
         b[i] = -settle->r[i] * settle->row_scale[i];
     sd_sparse_basic(settle->basis, b, settle->step, settle->step + moves);
     for (int32_t j = 0; j < moves; j++) {
         const int carries = settle->state[j] != 0;
-        const double move = settle->step[j] *= carries ? states : others, size = fabs(move);
+        const double move = settle->step[j] *= lifts[carries], size = fabs(move);
         most[carries] = size > most[carries] ? size : most[carries];
     }
     for (int32_t j = 0; j < n; j++)
