@@ -17,6 +17,8 @@
 #define SLOW 0.9            /* contraction above which Newton gives up */
 #define STAGNANT 0.1        /* of the tolerance: corrections this small that do not shrink are round-off */
 #define OLD_JACOBIAN 40     /* steps; measured: older ones cost more iterations than they save */
+#define GROWN 10.0          /* growth of a step beyond which slopes are taken afresh: taken where cj outweighed them they may
+                             * be wrong by orders (within van der Pol's jump), and make whatever is left look small */
 #define SLUGGISH 0.2        /* contraction above which the next step takes a fresh Jacobian */
 #define STEEP_SLUGGISH 0.05 /* the same with steep laws, whose slopes change by themselves: 6 to 20 % fewer residuals */
 #define LAX 10.0            /* a steep row may be off by as many tolerances of its terms; beside 3: error over steps times tolerance
@@ -140,6 +142,7 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
     if (fresh) {
         int32_t bad = sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->magnitude, bdf->jy, bdf->jyd);
         bdf->jacobian_age = 0;
+        bdf->cj_slopes = bdf->cj;
         bdf->fresh_jacobian = 1;
         if (*bdf->system->stop)
             return SD_STOPPED;
@@ -273,7 +276,8 @@ static int correct(sd_bdf *bdf)
     bdf->fresh_jacobian = 0;
     sd_bdf_weigh(bdf, SD_NEWTON_TEST);
     for (;;) {
-        int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->taken == 0 || bdf->fresh_jacobian < 0;
+        int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->cj * GROWN < bdf->cj_slopes || bdf->taken == 0 ||
+                    bdf->fresh_jacobian < 0;
         if (fresh || !bdf->ready || bdf->cj != bdf->cj_factored) {
             int cause = factorise(bdf, t, fresh);
             if (cause == SD_SINGULAR && bdf->fresh_jacobian == 0) {

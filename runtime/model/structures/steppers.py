@@ -74,6 +74,7 @@ class Bdf(c.Structure):
         ("h_used", D),
         ("cj", D),
         ("cj_factored", D),
+        ("cj_slopes", D),
         ("contraction", D),
         ("order", I),
         ("order_used", I),
