@@ -9,6 +9,7 @@ Sets that fit are found by pivoting.py; gaps that close are struck before (impac
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,8 @@ UNTOLD = 1e-9
 
 BESIDE = 1e-20
 """m/s and the like: a flow in the plane that is no flow yet, and has a direction."""
+EDGE = 2.0
+"""Times what is zero of a flow: within it is what an event is located by, and what a step ends beyond."""
 BEYOND = 1e-6
 """Of the largest value of a gap: one that is less than nothing by more has jumped, and does not stay where it is."""
 
@@ -63,17 +66,42 @@ class Contacts:
         """
         self.time = time
         kinds, largest = self.system.kinds, self.observer.largest
-        families = self.system.description.families
-        units = np.array([families[k].unit if k >= 0 else "" for k in self.system.family_of])
         for contact, place in zip(self.contacts, self.multiplier, strict=True):
             own = kinds == ("q" if contact.kind == "phi" else "f")
-            alike = own & (units == self.observer.unit(contact.value))
+            alike = own & self._of_unit(self.observer.unit(contact.value))
             size = FAINT * float(magnitude[: kinds.size][alike if alike.any() else own].max(initial=0.0))
             rows = ((contact.value, size), (contact.rate, size / time), (contact.acceleration, size / time**2))
             loaded = FAINT * float(magnitude[place]) if place >= 0 else 0.0
             for row, least in (*rows, (contact.multiplier, loaded)):
                 if row >= 0:
                     largest[row] = max(largest[row], least)
+
+    def _of_unit(self, unit: str) -> NDArray[np.bool_]:
+        """Unknowns that have it."""
+        families = self.system.description.families
+        return np.array([k >= 0 and families[k].unit == unit for k in self.system.family_of])
+
+    @cached_property
+    def _flows(self) -> dict[int, NDArray[np.bool_]]:
+        """Of each inequality of a flow that can hold: the flows [unknowns as written] of its unit."""
+        flows, number = self.system.are("f", "s"), self.system.form.written
+        kept = (k for k, c in enumerate(self.contacts) if c.kind == "psi" and self.multiplier[k] >= 0)
+        return {k: (flows & self._of_unit(self.observer.unit(self.contacts[k].value)))[:number] for k in kept}
+
+    def impulses(self, y: Floats, found: tuple[Floats, Floats, Floats]) -> Floats:
+        """Those that took y to what was found [unknowns as written], zero of inequalities of flows where these moved by
+        no more than what is zero of one: located at its edge, a current may be stopped that is none.
+        """
+        struck = found[2]
+        holding = [k for k in self._flows if self.active[k] and struck[self.multiplier[k]] < 0.0]
+        if not holding:
+            return struck
+        struck, moved = struck.copy(), np.abs(found[0] - y)
+        for k in holding:
+            most = moved[: self._flows[k].size][self._flows[k]].max(initial=0.0)
+            if most <= EDGE * self.observer.zero(self.contacts[k].value):
+                struck[self.multiplier[k]] = 0.0
+        return struck
 
     def begin(self) -> None:
         """Nothing holds and nothing slips: where a start is sought from."""
@@ -167,7 +195,8 @@ class Contacts:
 
     def fits(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> bool:
         """Whether every condition holds at what was found (y, yd, impulses) behind y."""
-        return self.wrong(self.observer(t, *found[:2]), found[2]) < 0 and not self.backwards(t, y, found)
+        values, struck = self.observer(t, *found[:2]), self.impulses(y, found)
+        return self.wrong(values, struck) < 0 and not self.backwards(t, y, found)
 
     def wrongs(self, values: Floats, impulses: Floats) -> Iterator[int]:
         """Contacts whose condition does not hold."""

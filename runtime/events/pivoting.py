@@ -90,7 +90,8 @@ class Pivoting:
             # of a set that does not hold no size stays: where it has no rank its multipliers are without bound
             self.contacts.observer.largest[:] = known
             values = self.contacts.observer(t, found[0], found[1])
-            wrong = sorted({*self.contacts.wrongs(values, found[2]), *self.contacts.backwards(t, y, found)})
+            struck = self.contacts.impulses(y, found)
+            wrong = sorted({*self.contacts.wrongs(values, struck), *self.contacts.backwards(t, y, found)})
             if not wrong:
                 return found[0], found[1]
             if again:  # driven back by either sense: it does not go through where other constraints hold than before

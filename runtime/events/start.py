@@ -69,14 +69,24 @@ def _pivoted(
     found: list[ConsistentState] = []
     errors: list[InconsistentStart] = []
     near: ConsistentState | None = None
+    known = dict[tuple[float, tuple[float, ...]], ConsistentState | None]()  # by instant and set
 
-    def settle(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+    def started(t: float) -> ConsistentState | None:
         try:
-            found.append(consistent_start(system, t, near, until, constants=constants, quickly=quickly))
+            return consistent_start(system, t, near, until, constants=constants, quickly=quickly)
         except InconsistentStart as error:
             errors.append(error)
             return None
-        y, yd = found[-1].y, found[-1].yd
+
+    def settle(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+        which = t, contacts.state()
+        if constants or which not in known:  # these are written where it is found
+            known[which] = started(t)
+        state = known[which]
+        if state is None:
+            return None
+        found.append(state)
+        y, yd = state.y, state.yd
         contacts.size(*magnitudes(system, t, t + SPAN, y, yd))
         return y, yd, np.zeros_like(zeros)
 
@@ -99,6 +109,7 @@ def _pivoted(
         failed = errors[0] if errors else InconsistentStart("stuck", float("inf"), names=error.names)
     for asked in found[: -1 - BETWEEN : -1] if quickly else ():
         near = asked
+        known.clear()
         with suppress(NoActiveSetError):
             return fitted()
     raise failed

@@ -94,10 +94,6 @@ class Succession:
             self._follows[stood, tuple(touched)] = self.contacts.state()
         return self._closed(t, found), True
 
-    def _quickly(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
-        """The point of a set that has one without a search."""
-        return self._restart.struck(t, y, yd, quickly=True)
-
     def _let_through(self, k: int, t: float, y: Floats, yd: Floats) -> None:
         """Whether the value of a relation goes through zero: neither it nor its rate follows the sense at once."""
         contacts, contact = self.contacts, self.contacts.contacts[k]
@@ -201,9 +197,10 @@ class Succession:
         """
         y, yd = point
         kept, open_ = (self.contacts.active.copy(), self.p.copy()), None
+        nowhere = set[tuple[float, ...]]()
         for later in AHEAD:
             time = later * self.contacts.time
-            found = self._later(t, time, (y, yd), stood)
+            found = self._later(t, time, (y, yd), stood, nowhere)
             if found is not None and self.determined.leaves(t, *found) == 0:
                 return found
             if found is not None and open_ is None:
@@ -216,17 +213,27 @@ class Succession:
         self.contacts.apply()
         return open_[0]
 
-    def _later(self, t: float, time: float, point: Point, stood: tuple[float, ...]) -> Point | None:
+    def _later(
+        self, t: float, time: float, point: Point, stood: tuple[float, ...], nowhere: set[tuple[float, ...]]
+    ) -> Point | None:
         """The point at t with the active set that fits `time` (s) later; None where that is the one that stood, or
-        none is found without a search: it only tells sets apart.
+        none is found without a search: it only tells sets apart.  nowhere: sets that have no point ahead of t, added.
         """
+
+        def quickly(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+            state = self.contacts.state()
+            found = None if state in nowhere else self._restart.struck(t, y, yd, quickly=True)
+            if found is None:
+                nowhere.add(state)
+            return found
+
         y, yd = point
         found = self._restart.struck(t + time, y + time * yd, yd)
         # a flow that begins at rest moves by time^2 alone; a gap that such a move closes is another event's
         straight = self._restart.settler.system.are("q")
         mean = yd if found is None else np.where(straight, yd, 0.5 * (yd + found[1]))
         try:
-            self.determined.fit(t + time, y + time * mean, yd, self._quickly)
+            self.determined.fit(t + time, y + time * mean, yd, quickly)
         except NoActiveSetError:
             return None
         found = self._restart.struck(t, y, yd) if self.contacts.state() != stood else None

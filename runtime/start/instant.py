@@ -79,8 +79,9 @@ class Instant:
         self.system, kinds = settled, settled.kinds
         over = self._over = integrated(settled)
         self._row, self._column, self._moved = over.row, over.column, over.moved
-        self._pulses = over.pulses(over.moved, over.force)
         self._balances = settled.of_groups("dynamics")
+        self._loose = self._without_displacement()
+        self._pulses = over.pulses(over.moved, over.force | self._loose)
         self._momenta = settled.of_groups("momentum")
         self._states, self._constraints = settled.of_groups("momentum", "gamma"), settled.of_groups("phi_rate", "psi")
         self._moving = np.isin(kinds, ("f", "p", "e")) | over.contents
@@ -92,6 +93,16 @@ class Instant:
         answered = inertial.copy()
         answered[self._row[in_rate | (in_y & flow)]] = True
         self._given = settled.of_groups("phi", "dynamics", "gamma") & ~answered
+
+    def _without_displacement(self) -> Mask:
+        """Flows [unknowns] of no displacement and without inertia (of a source in a loop of stores): what passes them
+        at once is an integral of their own.
+        """
+        over = self._over
+        inert = np.zeros(self.system.unknowns, dtype=bool)
+        rates = over.in_rate & self._balances[self._row]
+        inert[self._column[rates | self.system.of_groups("momentum")[self._row]]] = True
+        return (self.system.kinds == "f") & (over.moved < 0) & ~inert
 
     def _reacting(self) -> tuple[Mask, Mask]:
         """Gammas [rows] of implicit efforts that follow from multipliers (friction on a reaction) or that contents of
@@ -147,7 +158,7 @@ class Instant:
         slope, inertia = self._slopes(t, y, yd, magnitude)
         heavy, carried = self._held
         jumps, met = (self.system.kinds == "q") | self._over.contents, self._now(self._light) | self._over.rates
-        taken, held = self._taken(met, jumps, self._acting()), np.flatnonzero(heavy | carried)
+        taken, held = self._taken(met, jumps, self._acting() | self._loose), np.flatnonzero(heavy | carried)
         i = 2 * np.append(self._pulses.row[taken], self._row[held]) + 1
         j = np.append(self._pulses.column[taken], 2 * self._moved[self._column[held]])
         v = np.append(self._pulses.values(slope, inertia)[taken], np.where(heavy, inertia, slope)[held])
@@ -293,4 +304,6 @@ class Instant:
         off = np.where(meant.met, missed((i, j, mean), size, (aim, wanted))[1::2], 0.0)
         if off.any():
             raise UnbalancedError(int(np.argmax(off)))
-        return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._over.force, integral, 0.0)
+        return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(
+            self._over.force | self._loose, integral, 0.0
+        )

@@ -93,11 +93,8 @@ def unmet(settler: Settler, t: float, y: Floats, yd: Floats, state: Mask) -> boo
     return rows.contradict(np.concatenate([y, yd[rates]]))
 
 
-def no_start(starter: Starter, t: float, guess: Floats) -> bool:
-    """The same of a start from a guess [unknowns of the start]."""
-    size = starter.scale(t, guess)
-    at = starter.rows, starter.columns
-    rows = Rows(
-        lambda x: starter.residual(t, x), lambda x: starter.jacobian(t, x), *at, starter.every, starter.free, size
-    )
-    return rows.contradict(guess)
+def no_start(starter: Starter, t: float, x: Floats, free: Mask) -> bool:
+    """The same of a start, from x [unknowns of the start] by what is free."""
+    at, size = (starter.rows, starter.columns), starter.scale(t, x)
+    residual, slopes = (lambda x: starter.residual(t, x)), (lambda x: starter.jacobian(t, x))
+    return Rows(residual, slopes, *at, starter.every, free, size).contradict(x)

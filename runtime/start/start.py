@@ -369,7 +369,7 @@ def _consistent(
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
         guess = starter.unknowns(t0, y, np.zeros(y.size))
-    if quickly and no_start(starter, t0, guess):
+    if quickly and no_start(starter, t0, guess, starter.free):
         raise InconsistentStart("stuck", float("inf"))
     best, strategy = _attempt(starter, t0, guess, starter.free, 1 if quickly else None)
     if quickly and not strategy:

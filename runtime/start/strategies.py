@@ -13,10 +13,14 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve
 from sysdyn.runtime.start.equations import HIDDEN
+from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter, problem_of
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
-_RESCALINGS = 6
+_RESCALINGS, _DOUBTED = 6, 3
+"""Times that magnitudes are taken anew; after which of them a state that is held is asked whether it can be, of active
+sets, which may contradict it.
+"""
 EXACT = 1e-9
 OWN = 1e-6
 CLOSED = 1e-12
@@ -40,6 +44,8 @@ def rescaled(
     at, best = x if sized is None else sized, Solution(x, np.inf)
     for k in range(_RESCALINGS):
         if k and starter.work.done:
+            break
+        if k == _DOUBTED and not least and starter.system.description.switches.places and no_start(starter, t, x, free):
             break
         problem = problem_of(starter, t, at, guess, rows=starter.every, free=free, least=least)
         best = solve(problem, best.x)
@@ -103,7 +109,9 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         found, nearly = rescaled(starter, t, x, guess, follows, least=False)
         exact = nearly and (found.residual <= CLOSED or own_residual(starter, t, found.x, found.x) <= CLOSED)
         yield found, exact
-    yield rescaled(starter, t, x, guess, free)
+    with starter.granted():  # what a state that contradicts has taken is not missed then
+        everything = rescaled(starter, t, x, guess, free)
+    yield everything
     if nearly:
         yield found, True
 

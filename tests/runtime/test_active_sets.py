@@ -48,6 +48,9 @@ class Problem:
         w, z = np.split(values, 2)
         return [k for k in range(len(self.q)) if (z if self.active[k] else w)[k] < -ROUND_OFF]
 
+    def impulses(self, y, found):
+        return found[2]
+
     def fits(self, t, y, found):
         return not self.wrongs(found[0], found[2])
 
