@@ -103,7 +103,8 @@ class Pivoting:
             several = MANY < len(wrong) < fewest and all(self.contacts.contacts[k].kind == "psi" for k in wrong)
             block = (self.contacts.active.copy(), wrong[0], values) if several else None
             fewest = min(fewest, len(wrong))
-            for k in wrong if several else wrong[:1]:
+            another = (seen[state] - 1) % len(wrong)  # where the first leads back
+            for k in wrong if several else wrong[another : another + 1]:
                 turned.setdefault(k, set()).add(bool(self.contacts.active[k]))
                 changed.append(k)
                 self.contacts.turn(k, values)
