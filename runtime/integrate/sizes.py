@@ -177,8 +177,12 @@ class Sizes:
         self._at_least(open_)
 
     def resolve_by_rows(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
-        """The same of all that the rows determine, by the inverse of their Jacobian: where steps fail by it."""
-        self._at_least(np.where(carries, 0.0, open_unknowns(self.system, t, y, yd, self.time)))
+        """The same of all that the rows determine, by the inverse of their Jacobian: where steps fail by it.  A state
+        has its size from what it was; one that was never more than what is open (the charge through a diode that
+        blocks, beside large ones) has none.
+        """
+        open_ = open_unknowns(self.system, t, y, yd, self.time)
+        self._at_least(np.where(carries & (self.at(y)[0] > open_), 0.0, open_))
 
     @property
     def resolves(self) -> float:

@@ -1,7 +1,9 @@
 """A slice of the random rectifiers; the whole is `python tests/events/ideal_rectifiers.py`."""
 
+import numpy as np
 import pytest
-from ideal_rectifiers import APART, Circuit, apart
+from ideal_rectifiers import APART, Circuit, apart, voltage
+from sysdyn.api import simulate
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 6, 8, 14, 38, 42, 48])
@@ -9,6 +11,17 @@ from ideal_rectifiers import APART, Circuit, apart
 @pytest.mark.filterwarnings("ignore")
 def test_a_run_and_one_by_the_bdf_agree(seed, tmp_path):
     assert apart(tmp_path, seed)[0] < 0.1 * APART
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_charge_that_is_round_off_does_not_stop_a_run(tmp_path):
+    """That of a diode which blocks from the start, beside 0.07 C, asked steps of 1e-19 s for less than round-off (E930)."""
+    file = tmp_path / "m.sd"
+    file.write_text(Circuit(10).text)
+    first, second = (
+        voltage(simulate(file, output=tmp_path / "a.h5", method=method, rtol=1e-8)) for method in ("radau", "bdf")
+    )
+    assert np.abs(first - second).max() < 1e-5 * np.abs(second).max()
 
 
 def test_the_same_for_ever():
