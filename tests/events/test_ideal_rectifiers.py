@@ -15,7 +15,7 @@ def test_a_run_and_one_by_the_bdf_agree(seed, tmp_path):
 
 @pytest.mark.filterwarnings("ignore")
 def test_a_charge_that_is_round_off_does_not_stop_a_run(tmp_path):
-    """That of a diode which blocks from the start, beside 0.07 C, asked steps of 1e-19 s for less than round-off (E930)."""
+    """That of a diode which blocks from the start, beside 0.07 C, asked steps of 1e-19 s (E930)."""
     file = tmp_path / "m.sd"
     file.write_text(Circuit(10).text)
     first, second = (
