@@ -1,8 +1,11 @@
 """Loose tolerances beside steep laws: rows are off by some tolerances, not by what no law bears (by SciPy)."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from sysdyn import models
 from sysdyn.api import simulate
 
 RECTIFIER = """from std.electrical import voltage, resistor, capacitor
@@ -86,3 +89,15 @@ def test_a_relaxation_returns_to_its_limit_cycle(tmp_path, rtol):
     trace = simulate(path, method="bdf", rtol=rtol, output=tmp_path / "t.h5")
     amplitude = np.abs(trace["x"].values).max()
     assert abs(amplitude - 2.0) < 2.0 * rtol
+
+
+def test_rows_of_an_explicit_step_at_the_edge_of_stability_stay_between_its_ends(tmp_path):
+    """Between ends that the error test had passed further stages lay 16 V too high: rows of 1e189 A, told as done."""
+    path = Path(models.__file__).parent / "seed" / "rectifier_motor_crank.sd"
+    loose, fine = (
+        simulate(path, method=method, rtol=rtol, scene="reference", output=tmp_path / "t.h5")
+        for method, rtol in (("dopri", 1e-3), ("radau", 1e-8))
+    )
+    v, true = (trace["v_C"].values for trace in (loose, fine))
+    assert np.abs(v - np.interp(loose.time, fine.time, true)).max() < 0.1 * np.abs(true).max()
+    assert np.abs(loose["i1"].values).max() < 4.0 * np.abs(fine["i1"].values).max()

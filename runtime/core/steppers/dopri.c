@@ -149,6 +149,7 @@ void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd
     dopri->h = fmin(dopri->fixed_h > 0.0 ? dopri->fixed_h : h, dopri->h_max);
     dopri->h_used = 0.0;
     dopri->error_accepted = 1e-4;
+    dopri->speed = 0.0;
     dopri->rejected = dopri->stiff = dopri->smooth = dopri->outrun = dopri->even = dopri->dense = 0;
 }
 
@@ -288,7 +289,8 @@ static int is_stiff(sd_dopri *dopri)
     double turn = squares(dopri, dopri->rate[SD_DOPRI_STAGES], dopri->rate[SD_DOPRI_STAGES - 1]);
     if (dopri->spare > 0.0 && far > 0.0 && is_outrun(dopri, dopri->h * dopri->h * turn / far))
         return 1;
-    count(&dopri->stiff, &dopri->smooth, far > 0.0 && dopri->h * sqrt(turn / far) > BOUNDARY);
+    dopri->speed = far > 0.0 ? dopri->h * sqrt(turn / far) : 0.0;
+    count(&dopri->stiff, &dopri->smooth, dopri->speed > BOUNDARY);
     double steps = (dopri->t_end - dopri->t) / dopri->h;
     return dopri->stiff >= (steps > FAR * dopri->patience ? SOON : STIFF) && steps > dopri->patience;
 }

@@ -33,7 +33,7 @@ typedef struct sd_dopri {
     double spare;             /* the same of one whose system is faster than its motion; 0: never */
     double opening;           /* over rtol^(1/8): the first step as an earlier run found it fit, 0: chosen; then as this one does */
     /* state of the integration */
-    double t, h, h_used, error_accepted;
+    double t, h, h_used, error_accepted, speed; /* speed: h |lambda| of the last step */
     int32_t rejected, dense;  /* dense: the interpolant of the last step is there */
     int32_t stiff, smooth, outrun, even; /* steps counted */
     double *phi, *yd;         /* [n] the last accepted point */

@@ -3,7 +3,11 @@
 
 #include "linear/lanes.h"
 
+#include <math.h>
 #include <string.h>
+
+#define BEYOND 4.0 /* times the largest slope of a step: one between its stages is no more */
+#define EDGE 5.0   /* of h |lambda|: a motion that fast is not what a step follows; the region of stability ends at 6 */
 
 /* the three further stages; 0 done */
 static int more_stages(sd_dopri *dopri)
@@ -21,6 +25,28 @@ static int more_stages(sd_dopri *dopri)
             return 1;
     }
     return 0;
+}
+
+/* Whether values between the ends are none: a step that stability bounds may pass the error test with stages that lie
+ * where a steep law makes anything of them (a diode at 11 V: 1e191 A), those of the step or the further ones. */
+static int stray(const sd_dopri *dopri)
+{
+    double *const *k = dopri->rate, h = dopri->h_used;
+    for (int32_t i = 0; i < dopri->n; i++) {
+        double most = 0.0;
+        for (int s = 0; s <= SD_DOPRI_STAGES; s++)
+            most = fmax(most, fabs(k[s][i]));
+        for (int s = SD_DOPRI_STAGES + 1; s < SD_DOPRI_ALL; s++)
+            if (h * (fabs(k[s][i]) - BEYOND * most) * dopri->weight[i] > 1.0)
+                return 1;
+    }
+    return dopri->speed > EDGE;
+}
+
+/* a slope at an end, times h, with which a cubic stays between the ends (Fritsch & Carlson, SIAM J. Numer. Anal. 17, 1980) */
+static inline double between(double slope, double change)
+{
+    return slope * change <= 0.0 ? 0.0 : copysign(fmin(fabs(slope), 3.0 * fabs(change)), change);
 }
 
 /* f0, f1, f2 of one unknown from what it changes by over the step and its slopes at the ends, all times h */
@@ -59,9 +85,11 @@ static void integrals(sd_dopri *dopri, int terms)
 static void prepare(sd_dopri *dopri)
 {
     double h = dopri->h_used, **f = dopri->f, *const *k = dopri->rate;
-    const int terms = more_stages(dopri) ? 0 : SD_DOPRI_ALL; /* without them it is the cubic of both ends */
-    for (int32_t i = 0; i < dopri->n; i++)
-        cubic(f, i, dopri->phi[i] - dopri->y[0][i], h * k[0][i], h * k[SD_DOPRI_STAGES][i]);
+    const int astray = more_stages(dopri) || stray(dopri), terms = astray ? 0 : SD_DOPRI_ALL; /* 0: the cubic of both ends */
+    for (int32_t i = 0; i < dopri->n; i++) {
+        double change = dopri->phi[i] - dopri->y[0][i], begin = h * k[0][i], end = h * k[SD_DOPRI_STAGES][i];
+        cubic(f, i, change, astray ? between(begin, change) : begin, astray ? between(end, change) : end);
+    }
     for (int m = 3; m < SD_DOPRI_DENSE; m++) {
         sd_dopri_add_up(dopri->n, terms, sd_dopri_d[m - 3], k, f[m]);
         for (int32_t i = 0; i < dopri->n; i++)

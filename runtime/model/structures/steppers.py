@@ -221,7 +221,7 @@ class Dopri(c.Structure):
         ("tested", I),
         *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
         *[(name, P) for name in ["atol", "magnitude", "met", "test", "power"]],
-        *[(name, D) for name in ["patience", "spare", "opening", "t", "h", "h_used", "error_accepted"]],
+        *[(name, D) for name in ["patience", "spare", "opening", "t", "h", "h_used", "error_accepted", "speed"]],
         *[(name, I) for name in ["rejected", "dense", "stiff", "smooth", "outrun", "even"]],
         *[(name, P) for name in ["phi", "yd"]],
         *[(name, P * DOPRI_STAGES) for name in ["y", "rate"]],
