@@ -87,6 +87,12 @@ def test_mistakes_in_an_instance(line, code):
     assert code in codes_of(text)
 
 
+def test_a_port_among_the_arguments_is_told_as_one():
+    pad = "component pad {\n  port p: electrical\n  R: resistor(R = 1 ohm) p -> ground\n}\nmodel rc {"
+    text = RC.replace("model rc {", pad).replace("r: resistor(R = R) a -> b", "r: pad(p = a)")
+    assert ("E405", "pad(...) p = a") in [(d.code, d.help) for d in network(text)[1].diagnostics]
+
+
 def test_domains_do_not_mix():
     text = RC.replace("node a, b: electrical", "node a: electrical\n  node b: rotation")
     assert "E401" in codes_of(text)
