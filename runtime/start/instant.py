@@ -102,7 +102,8 @@ class Instant:
         inert = np.zeros(self.system.unknowns, dtype=bool)
         rates = over.in_rate & self._balances[self._row]
         inert[self._column[rates | self.system.of_groups("momentum")[self._row]]] = True
-        return (self.system.kinds == "f") & (over.moved < 0) & ~inert
+        found: Mask = (self.system.kinds == "f") & (over.moved < 0) & ~inert
+        return found
 
     def _reacting(self) -> tuple[Mask, Mask]:
         """Gammas [rows] of implicit efforts that follow from multipliers (friction on a reaction) or that contents of
