@@ -488,6 +488,7 @@ def test_the_table_names_modes_and_transfer_functions(tmp_path, capsys):
     ("options", "message"),
     [
         (("--inputs", "uu"), "there is no parameter or input 'uu'; nearest: 'u'"),
+        (("--inputs", "supply.e"), "'supply.e' is no parameter or input, but what an element gives"),
         (("--inputs", "u[1]"), "'u[1]': is no array"),
         (("--at", "1", "--equilibrium"), "an instant of a run, or a state of rest"),
         (("--at", "-1"), "--at -1 s lies before the start"),
