@@ -81,7 +81,7 @@ def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -
                 raise UsageError(f"input '{name}' follows a formula in time: --set {name}=... gives it a constant")
             near, element = nearest(name, [*known, *own]), name.partition(".")[0]
             if near is None and element in (s.decl.name for s in target.model.body if isinstance(s, syntax.Instance)):
-                how = f"an input of the model in its formula, 'input u ... = 0' and '{element}: ...( ... + u)', moves it"
+                how = f"an input in its formula, 'input u ... = 0' and '{element}: ...( ... + u)', moves it"
                 raise UsageError(f"--inputs: '{name}' is no parameter or input, but what an element gives: {how}")
             listed = f"nearest: '{near}'" if near else f"there are: {', '.join(known) or 'none'}"
             raise UsageError(f"--inputs: there is no parameter or input '{name}'; {listed}")
