@@ -1,0 +1,181 @@
+"""What a word of a text stands for: the names in sight of a place, and those behind a dot."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+from sysdyn.cli.lsp import outline
+from sysdyn.cli.lsp.documents import Document
+from sysdyn.cli.lsp.outline import Declared
+from sysdyn.dsl.elaborate.files import LIBRARY, prelude
+from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
+from sysdyn.dsl.parser.parse import parse
+from sysdyn.dsl.text.diagnostics import ModelError
+from sysdyn.dsl.text.source import SourceText
+from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
+
+_WORD = re.compile(r"[^\W\d]\w*")
+_BEFORE = re.compile(r"(?:[^\W\d]\w*(?:\[[^\[\]\n]*\])?\.)+$")
+_DEEPEST = 20
+"""Names behind dots that are followed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A name in a text with the names and dots before it."""
+
+    path: tuple[str, ...]
+    name: str
+    start: int
+    end: int
+
+
+def quiet(document: Document, offset: int) -> bool:
+    """Whether a place is inside a comment."""
+    return any(c.span.start < offset <= c.span.end for c in document.tree.comments)
+
+
+def word_at(document: Document, offset: int) -> Word | None:
+    """The word that a place touches; None in comments."""
+    source = document.source
+    if quiet(document, offset):
+        return None
+    line, _ = source.position(offset)
+    start = source.line_starts[line - 1]
+    for match in _WORD.finditer(source.line(line)):
+        if start + match.start() <= offset <= start + match.end():
+            begin = start + match.start()
+            return Word(path_before(source, begin), match[0], begin, start + match.end())
+    return None
+
+
+def path_before(source: SourceText, offset: int) -> tuple[str, ...]:
+    """The names before a place that ends with a dot, indices left out: `a[1].b.` is a, b."""
+    line, _ = source.position(offset)
+    match = _BEFORE.search(source.text[source.line_starts[line - 1] : offset])
+    if match is None:
+        return ()
+    return tuple(re.sub(r"\[[^\[\]]*\]", "", match[0]).split(".")[:-1])
+
+
+def item_at(document: Document, offset: int) -> syntax.TopLevel | None:
+    """The item of the file that a place is in."""
+    return next((i for i in document.tree.items if i.span.start <= offset <= i.span.end), None)
+
+
+def local(document: Document, offset: int) -> Iterator[Declared]:
+    """The names that the model, component or scene around a place has in sight."""
+    item = item_at(document, offset)
+    if isinstance(item, syntax.Scene):
+        name = item.model.names[-1]
+        item = next((i for i in document.tree.items if isinstance(i, syntax.Model) and i.name.name == name), None)
+    if isinstance(item, (syntax.Model, syntax.Component)):
+        yield from outline.body(document.source, item.body)
+    elif isinstance(item, (syntax.Function, syntax.Table)):
+        for p in item.params:
+            place = document.source.place(p.span.start, p.span.start + len(p.name))
+            yield Declared(p.name, "argument", place, p.span, "", p.unit.text)
+
+
+def of_file(tree: syntax.File) -> Iterator[Declared]:
+    """The names of a file, those that it imports, and those that every file has."""
+    yield from outline.items(tree)
+    for item in tree.items:
+        if isinstance(item, syntax.Import):
+            module = module_of(tree.source, item.module.names)
+            wanted = {word.name for word in item.names}
+            yield from (d for d in outline.items(module) if d.name in wanted) if module else ()
+    yield from outline.items(prelude())
+
+
+def module_of(source: SourceText, names: tuple[str, ...]) -> syntax.File | None:
+    """The tree of a module that a text imports; None where there is none to read."""
+    inside = names[0] == "std"
+    if inside:
+        path = LIBRARY.joinpath(*names[1:]).with_suffix(".sd") if len(names) > 1 else LIBRARY
+        return _of_library(path) if path.is_file() else None
+    path = Path(source.name).parent.joinpath(*names).with_suffix(".sd")
+    try:
+        return parse(SourceText.read(path))[0]
+    except (OSError, ModelError, ValueError):
+        return None
+
+
+@cache
+def _of_library(path: Path) -> syntax.File:
+    return parse(SourceText.read(path, f"std/{path.name}"))[0]
+
+
+def find(document: Document, word: Word) -> list[Declared]:
+    """The declarations that a word may mean, the nearest first; of one name all in one scope (levels, statements)."""
+    if not word.path:
+        near = [d for d in local(document, word.start) if d.name == word.name]
+        return near or [d for d in of_file(document.tree) if d.name == word.name][:1]
+    return [d for d in members(document, word.path, word.start) if d.name == word.name]
+
+
+def members(document: Document, path: tuple[str, ...], offset: int) -> list[Declared]:
+    """What is declared inside the component that a path of names leads to; nothing behind elements of the language."""
+    if path[0] == "std":
+        module = module_of(document.source, path)
+        return [] if module is None else [*outline.items(module)]
+    tree, among = document.tree, [*local(document, offset), *of_file(document.tree)]
+    for name in path[:_DEEPEST]:
+        owner = next((d for d in among if d.name == name), None)
+        if owner is None:
+            return []
+        component = owner if owner.kind in ("component", "model") else component_of(tree, owner)
+        if component is None:
+            return []
+        tree = tree_of(tree, component)
+        among = [*outline.body(component.place.source, component.body)]
+    return among
+
+
+def component_of(tree: syntax.File, owner: Declared) -> Declared | None:
+    """The component that an instance is of; tree: of the file that the instance stands in."""
+    name = owner.of.partition(".")[0]
+    if owner.kind != "instance":
+        return None
+    return next((d for d in of_file(tree) if d.kind == "component" and d.name == name), None)
+
+
+def tree_of(tree: syntax.File, component: Declared) -> syntax.File:
+    """The tree of the file that a component stands in."""
+    source = component.place.source
+    if source is tree.source:
+        return tree
+    for item in tree.items:
+        if isinstance(item, syntax.Import):
+            module = module_of(tree.source, item.module.names)
+            if module is not None and module.source.name == source.name:
+                return module
+    return tree
+
+
+def owner_of(document: Document, path: tuple[str, ...], offset: int) -> Declared | None:
+    """What the last name of a path is."""
+    if len(path) == 1:
+        return next((d for d in [*local(document, offset), *of_file(document.tree)] if d.name == path[0]), None)
+    return next((d for d in members(document, path[:-1], offset) if d.name == path[-1]), None)
+
+
+def letters(document: Document, owner: Declared) -> tuple[str, ...]:
+    """The members that the language itself gives to what has power: e, f, q, p, ..."""
+    if owner.of in TWO_PORTS:
+        return tuple(f"{letter}{k}" for k in (1, 2) for letter in "efqp")
+    if owner.kind in ("element", "branch") or owner.of in ONE_PORTS:
+        return ("e", "f", "q", "p", "power", "energy")
+    if owner.kind == "instance" and (component := component_of(document.tree, owner)) is not None:
+        single = any(isinstance(s, syntax.Branch) and not s.decls for s in component.body)
+        return ("e", "f", "q", "p", "power", "energy") if single else ()
+    return {
+        "node": ("e", "f", "q", "p"),
+        "port": ("e", "f"),
+        "coordinate": ("e", "p"),
+        "constraint": ("multiplier", "residual"),
+    }.get(owner.kind, ())
