@@ -13,7 +13,7 @@ from typing import Any
 
 from sysdyn.cli.failures import classify
 from sysdyn.cli.run.checking import Checked, file_checked
-from sysdyn.dsl.text.source import UNSAVED
+from sysdyn.dsl.text.source import UNSAVED, real
 
 DELAY = 0.15
 """s: between a change and its check, for the next key to be pressed."""
@@ -32,6 +32,7 @@ class Checker:
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._busy: tuple[str, float] | None = None
+        self._text: str | None = None  # that is checked
 
     def ask(self, name: str, at_once: bool = False) -> None:
         """Check a text, after a while in which nobody asks for it again."""
@@ -69,6 +70,7 @@ class Checker:
             self.begin()
         assert self._pipe is not None
         self._busy = name, time.monotonic()
+        self._text = UNSAVED.get(str(real(name)))
         with contextlib.suppress(OSError):  # it died meanwhile: seen when its answer is taken
             self._pipe.send((name, dict(UNSAVED)))
 
@@ -80,17 +82,17 @@ class Checker:
         self._process.start()
         other.close()
 
-    def answer(self) -> tuple[str, Checked]:
-        """The text that was checked and what was found."""
+    def answer(self) -> tuple[str, str | None, Checked]:
+        """The name and the text that were checked and what was found."""
         assert self._pipe is not None
         assert self._busy is not None
         name = self._busy[0]
         self._busy = None
         try:
-            return name, self._pipe.recv()
+            return name, self._text, self._pipe.recv()
         except (EOFError, OSError):
             self.end()
-            return name, Checked(unread="a fault in sysdyn: the process that checked the text died")
+            return name, self._text, Checked(unread="a fault in sysdyn: the process that checked the text died")
 
     def end(self) -> None:
         """No process goes on."""

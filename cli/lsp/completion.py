@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from sysdyn.cli.lsp import sight
+from sysdyn.cli.lsp import outline, sight
 from sysdyn.cli.lsp.documents import Document
 from sysdyn.cli.lsp.hover import LETTERS
 from sysdyn.cli.lsp.outline import Declared
@@ -43,7 +43,7 @@ def complete(document: Document, offset: int) -> list[dict[str, Any]]:
     start = offset - (len(begun[0]) if begun else 0)
     if (match := _IMPORT.match(before)) is not None:
         module = sight.module_of(source, tuple(match[1].split(".")))
-        return [] if module is None else [_named(d) for d in sight.outline.items(module)]
+        return [] if module is None else [_named(d) for d in outline.items(module)]
     if (match := _FROM.match(before)) is not None:
         return _modules(match[1])
     statement = re.split(r"[;{}]", before)[-1]
@@ -135,7 +135,7 @@ def _arguments(document: Document, statement: str) -> Iterator[dict[str, Any]]:
         return
     component = next((d for d in sight.of_file(document.tree) if d.name == match[1] and d.kind == "component"), None)
     if component is not None:
-        for d in sight.outline.body(component.place.source, component.body):
+        for d in outline.body(component.place.source, component.body):
             if d.kind in ("parameter", "input"):
                 yield _named(d) | {"insertText": f"{d.name} = "}
 
@@ -153,4 +153,3 @@ def _expression(document: Document, offset: int, statement: str, words: frozense
 
 def _once(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return list({item["label"]: item for item in reversed(found)}.values())[::-1]
-

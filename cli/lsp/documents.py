@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sysdyn.cli.lsp import positions
+from sysdyn.cli.lsp.marks import Marks, marks
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.dsl.text.source import UNSAVED, SourceText, real
@@ -20,6 +21,8 @@ class Document:
     def __init__(self, uri: str, text: str, version: int | None) -> None:
         self.uri = uri
         self.name = positions.name_of(uri)
+        self.key = str(real(self.name))
+        """Of its file, whatever links lead there."""
         self.version = version
         self.source = SourceText(self.name, text)
 
@@ -43,6 +46,11 @@ class Document:
     def tree(self) -> syntax.File:
         """The tree of what could be read."""
         return self.parsed[0]
+
+    @cached_property
+    def marks(self) -> Marks:
+        """Where names and units are."""
+        return marks(self.tree)
 
     @cached_property
     def accounts(self) -> dict[str, dict[str, Any]]:
@@ -80,23 +88,28 @@ class Documents:
     def put(self, document: Document) -> None:
         """Open a document, or hold its newer text."""
         self._open[document.uri] = document
-        UNSAVED[str(real(document.name))] = document.source.text
+        UNSAVED[document.key] = document.source.text
 
     def close(self, uri: str) -> None:
         """The file stands for itself again."""
         document = self._open.pop(uri, None)
         if document is not None:
-            UNSAVED.pop(str(real(document.name)), None)
+            UNSAVED.pop(document.key, None)
 
     def named(self, name: str) -> Document | None:
         """The open document of a file."""
         wanted = str(real(name))
-        return next((d for d in self._open.values() if str(real(d.name)) == wanted), None)
+        return next((d for d in self._open.values() if d.key == wanted), None)
+
+    def uri_of(self, name: str) -> str:
+        """The URI of a text, as the editor wrote it where it holds the text."""
+        document = next((d for d in self._open.values() if d.name == name), None)
+        return positions.uri_of(name) if document is None else document.uri
 
     def dependent(self, document: Document) -> list[Document]:
         """The open documents that read a text: itself, those that import it, and those that import these."""
-        found, reached = [document], {str(real(document.name))}
+        found, reached = [document], {document.key}
         while more := [d for d in self._open.values() if d not in found and not reached.isdisjoint(d.imports())]:
             found += more
-            reached |= {str(real(d.name)) for d in more}
+            reached |= {d.key for d in more}
         return [d for d in found if self._open.get(d.uri) is d]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from sysdyn.cli.lsp import positions
@@ -31,12 +31,11 @@ def unread(said: str) -> dict[str, Any]:
     return {"range": positions.START, "severity": 1, "source": "sysdyn", "message": said, "relatedInformation": []}
 
 
-def by_uri(found: Iterable[Diagnostic], own: str) -> dict[str, list[dict[str, Any]]]:
+def by_uri(found: Iterable[Diagnostic], own: str, uri_of: Callable[[str], str]) -> dict[str, list[dict[str, Any]]]:
     """Diagnostics by the document that they are in; own: that which was checked, where those without a place go."""
     listed: dict[str, list[dict[str, Any]]] = {own: []}
-    name = positions.name_of(own)
     for d in found:
-        uri = own if d.place is None or d.place.file == name else positions.uri_of(d.place.file)
+        uri = own if d.place is None else uri_of(d.place.file)
         listed.setdefault(uri, []).append(diagnostic(d))
     return listed
 

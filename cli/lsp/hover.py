@@ -9,8 +9,10 @@ from typing import Any
 from sysdyn.cli.lsp import positions, sight
 from sysdyn.cli.lsp.documents import Document
 from sysdyn.cli.lsp.outline import Declared
+from sysdyn.dsl.model import units
 from sysdyn.dsl.model.functions import FUNCTIONS
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
+from sysdyn.dsl.parser.automaton import words
 from sysdyn.dsl.text import codes
 from sysdyn.dsl.text.diagnostics import Diagnostic
 from sysdyn.dsl.text.source import Place, Span
@@ -55,6 +57,9 @@ def _code(code: str) -> str:
 
 def _said(document: Document, word: sight.Word) -> list[str]:
     """What is known of a word, one text for each of its declarations."""
+    if document.marks.unit(word.start):
+        found = units.known(word.name)
+        return [] if found is None else [f"`{word.name}`: {float(found[1]):.12g} {units.si_text(found[0])}"]
     declared = sight.find(document, word)
     if declared:
         return [_told(document, word, d) for d in declared[:4]]
@@ -65,6 +70,8 @@ def _said(document: Document, word: sight.Word) -> list[str]:
             unit = _unit(document, word)
             return [f"`{'.'.join((*word.path, word.name))}`: {LETTERS[letter]}{unit}"]
         return []
+    if word.name.rstrip("12") in sight.OWN and sight.instance_at(document, word.start) is not None:
+        return [f"`{word.name}`: {LETTERS[word.name.rstrip('12')]} of the element"]
     if word.name in (*ONE_PORTS, *TWO_PORTS):
         return [f"`{word.name}`: an element of the language (`sysdyn help elements`)"]
     if word.name in FUNCTIONS:
@@ -150,8 +157,8 @@ def references(document: Document, offset: int, with_declaration: bool) -> list[
         return []
     found = []
     for match in re.finditer(rf"(?<!\w){re.escape(word.name)}(?!\w)", document.source.text):
-        other = sight.word_at(document, match.start())
-        if other is None or other.name != word.name:
+        other = sight.word_at(document, match.start()) if match.start() in document.marks.names else None
+        if other is None:
             continue
         place = document.source.place(match.start(), match.end())
         if not with_declaration and place in wanted:
@@ -160,3 +167,21 @@ def references(document: Document, offset: int, with_declaration: bool) -> list[
             found.append(positions.location(place))
     return found
 
+
+def renamed(document: Document, offset: int, name: str) -> dict[str, Any]:
+    """The change that gives the word under the cursor another name in this text; ValueError where that cannot be."""
+    word = sight.word_at(document, offset)
+    declared = [] if word is None else sight.find(document, word)
+    if word is None or not declared:
+        raise ValueError("there is no name of the text to be changed here")
+    if any(d.severity == "error" for d in document.parsed[1]):
+        raise ValueError("the text has errors of syntax: names in what cannot be read would be left")
+    if any(d.place.source is not document.source for d in declared):
+        raise ValueError(f"'{word.name}' is declared in {declared[0].place.file}")
+    if not name.isidentifier() or name in words():
+        raise ValueError(f"'{name[:60]}' cannot be a name")
+    other = sight.Word(word.path, name, declared[0].place.span.start, declared[0].place.span.start)
+    if sight.find(document, other):
+        raise ValueError(f"'{name}' is declared already")
+    found = references(document, offset, True)
+    return {"changes": {document.uri: [{"range": r["range"], "newText": name} for r in found]}}

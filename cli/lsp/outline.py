@@ -142,9 +142,7 @@ def _inner(source: SourceText, item: Declared) -> list[dict[str, Any]]:
     found, seen = [], set[tuple[str, Span]]()
     levels = [d for d in body(source, item.body) if d.kind == "level"]
     for d in body(source, item.body):
-        inside = d.kind != "level" and any(
-            level.span.start < d.place.span.start < level.span.end for level in levels
-        )
+        inside = d.kind != "level" and any(level.span.start < d.place.span.start < level.span.end for level in levels)
         if d.kind == "index" or inside or (d.name, d.place.span) in seen:
             continue
         seen.add((d.name, d.place.span))

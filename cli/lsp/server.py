@@ -23,10 +23,15 @@ CAPABILITIES = {
     "hoverProvider": True,
     "definitionProvider": True,
     "referencesProvider": True,
+    "renameProvider": True,
     "documentSymbolProvider": True,
     "completionProvider": {"triggerCharacters": [".", ":"]},
 }
 Send = Callable[[dict[str, Any]], None]
+
+
+class RefusedError(Exception):
+    """What was asked cannot be done; the message says why."""
 
 
 class Server:
@@ -49,6 +54,7 @@ class Server:
             "textDocument/hover": self._hover,
             "textDocument/definition": self._definition,
             "textDocument/references": self._references,
+            "textDocument/rename": self._renamed,
             "textDocument/documentSymbol": self._symbols,
             "textDocument/completion": self._completion,
         }
@@ -67,6 +73,9 @@ class Server:
             self._refuse(None, message.code, str(message))
             return
         method, number = message.get("method"), message.get("id")
+        if number is not None and type(number) not in (int, str):
+            self._refuse(None, wire.INVALID_REQUEST, "the id of a message is a whole number or a text")
+            return
         if not isinstance(method, str):
             if "id" not in message or not ("result" in message or "error" in message):
                 self._refuse(number, wire.INVALID_REQUEST, "a message without a method")
@@ -92,6 +101,8 @@ class Server:
         else:
             try:
                 result = self._requests[method](params)
+            except RefusedError as error:
+                self._refuse(number, wire.REQUEST_FAILED, str(error))
             except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
                 _log(method, error)
                 self._refuse(number, wire.INVALID_PARAMS, f"parameters of '{method}' that cannot be read: {error!r}")
@@ -154,14 +165,14 @@ class Server:
         for other in self._documents.dependent(document):
             self.checker.ask(other.name, at_once)
 
-    def checked(self, name: str, result: Checked) -> None:
-        """Publish what the check of a text found, if it is open still."""
+    def checked(self, name: str, text: str | None, result: Checked) -> None:
+        """Publish what the check of a text found, if it is open still and no newer one waits."""
         document = self._documents.named(name)
-        if document is None:
+        if document is None or document.source.text != text:
             return
         found = shown(result)
         self._found[document.uri] = tuple(found)
-        listed = findings.by_uri(found, document.uri)
+        listed = findings.by_uri(found, document.uri, self._documents.uri_of)
         if result.unread is not None:
             listed[document.uri].append(findings.unread(result.unread))
         self._publish(document.uri, listed)
@@ -175,7 +186,7 @@ class Server:
             document = self._documents.get(uri)
             by = [self._published.get(uri, {})] if document is not None else [*self._published.values()]
             told = [d for found in by for d in found.get(uri, [])]
-            params = {"uri": uri, "diagnostics": [d for k, d in enumerate(told) if d not in told[:k]]}
+            params: dict[str, Any] = {"uri": uri, "diagnostics": [d for k, d in enumerate(told) if d not in told[:k]]}
             if document is not None and document.version is not None:
                 params["version"] = document.version
             self._send({"method": "textDocument/publishDiagnostics", "params": params})
@@ -193,9 +204,9 @@ class Server:
         document = self._document(params)
         if document is None:
             return None
-        asked = Span(*(positions.offset(document.source, params["range"][side]) for side in ("start", "end")))
+        start, end = (positions.offset(document.source, params["range"][side]) for side in ("start", "end"))
         only: Sequence[str] = params.get("context", {}).get("only") or ()
-        return findings.actions(document, self._found.get(document.uri, ()), asked, only)
+        return findings.actions(document, self._found.get(document.uri, ()), Span(start, end), only)
 
     def _placed(self, params: dict[str, Any]) -> tuple[Document, int] | None:
         document = self._document(params)
@@ -213,6 +224,13 @@ class Server:
         at = self._placed(params)
         whole = bool(params.get("context", {}).get("includeDeclaration", True))
         return None if at is None else hover.references(*at, whole)
+
+    def _renamed(self, params: dict[str, Any]) -> Any:
+        at = self._placed(params)
+        try:
+            return None if at is None else hover.renamed(*at, str(params["newName"]))
+        except ValueError as error:
+            raise RefusedError(str(error)) from None
 
     def _symbols(self, params: dict[str, Any]) -> Any:
         document = self._document(params)

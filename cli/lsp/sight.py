@@ -20,6 +20,8 @@ from sysdyn.values import dataclass
 
 _WORD = re.compile(r"[^\W\d]\w*")
 _BEFORE = re.compile(r"(?:[^\W\d]\w*(?:\[[^\[\]\n]*\])?\.)+$")
+OWN = ("e", "f", "q", "p")
+"""Variables of power, of which an element's law is made."""
 _DEEPEST = 20
 """Names behind dots that are followed."""
 
@@ -70,15 +72,20 @@ def item_at(document: Document, offset: int) -> syntax.TopLevel | None:
 def local(document: Document, offset: int) -> Iterator[Declared]:
     """The names that the model, component or scene around a place has in sight."""
     item = item_at(document, offset)
-    if isinstance(item, syntax.Scene):
+    if isinstance(item, syntax.Scene) and offset > item.model.span.end:
         name = item.model.names[-1]
         item = next((i for i in document.tree.items if isinstance(i, syntax.Model) and i.name.name == name), None)
-    if isinstance(item, (syntax.Model, syntax.Component)):
+    if isinstance(item, (syntax.Model, syntax.Component)) and not _of_head(item, offset):
         yield from outline.body(document.source, item.body)
-    elif isinstance(item, (syntax.Function, syntax.Table)):
+    elif isinstance(item, (syntax.Function, syntax.Table)) and not _of_head(item, offset):
         for p in item.params:
             place = document.source.place(p.span.start, p.span.start + len(p.name))
             yield Declared(p.name, "argument", place, p.span, "", p.unit.text)
+
+
+def _of_head(item: syntax.Model | syntax.Component | syntax.Function | syntax.Table, offset: int) -> bool:
+    """Whether a place is at the item's own name."""
+    return item.span.start <= offset <= item.name.span.end
 
 
 def of_file(tree: syntax.File) -> Iterator[Declared]:
@@ -112,10 +119,49 @@ def _of_library(path: Path) -> syntax.File:
 
 def find(document: Document, word: Word) -> list[Declared]:
     """The declarations that a word may mean, the nearest first; of one name all in one scope (levels, statements)."""
+    if document.marks.unit(word.start):
+        return []
+    around = instance_at(document, word.start)
+    if around is not None and not word.path:
+        of = ".".join(around.component.names)
+        if of in ONE_PORTS and word.name in OWN and any(_within(word, arg) for arg in around.args or ()):
+            return []  # the element's own variable
+        if of in TWO_PORTS and any(arg.span.start == word.start for arg in around.args or ()):
+            return []
+        if any(word.start == start for start in named(around)):
+            inside = members(document, (around.decl.name,), word.start)
+            return [d for d in inside if d.name == word.name]
+    if not word.path and around is not None and around.component.span.start == word.start:
+        return [d for d in of_file(document.tree) if d.name == word.name][:1]  # labels and values do not hide it
     if not word.path:
         near = [d for d in local(document, word.start) if d.name == word.name]
         return near or [d for d in of_file(document.tree) if d.name == word.name][:1]
     return [d for d in members(document, word.path, word.start) if d.name == word.name]
+
+
+def _within(word: Word, arg: syntax.Arg) -> bool:
+    return arg.span.start <= word.start < arg.span.end
+
+
+def named(instance: syntax.Instance) -> Iterator[int]:
+    """Where an instance's arguments and connections name what is inside its component."""
+    yield from (arg.span.start for arg in instance.args or () if arg.name is not None)
+    for c in instance.connections:
+        if isinstance(c, (syntax.Bind, syntax.BindAcross)):
+            yield c.name.span.start
+
+
+def instance_at(document: Document, offset: int) -> syntax.Instance | None:
+    """The element or component statement around a place."""
+    item = item_at(document, offset)
+    stack = list(item.body) if isinstance(item, (syntax.Model, syntax.Component)) else []
+    while stack:
+        s = stack.pop()
+        if s.span.start <= offset <= s.span.end:
+            if isinstance(s, syntax.Instance):
+                return s
+            stack += s.body if isinstance(s, (syntax.For, syntax.Level)) else ()
+    return None
 
 
 def members(document: Document, path: tuple[str, ...], offset: int) -> list[Declared]:
@@ -169,12 +215,12 @@ def letters(document: Document, owner: Declared) -> tuple[str, ...]:
     if owner.of in TWO_PORTS:
         return tuple(f"{letter}{k}" for k in (1, 2) for letter in "efqp")
     if owner.kind in ("element", "branch") or owner.of in ONE_PORTS:
-        return ("e", "f", "q", "p", "power", "energy")
+        return (*OWN, "power", "energy")
     if owner.kind == "instance" and (component := component_of(document.tree, owner)) is not None:
         single = any(isinstance(s, syntax.Branch) and not s.decls for s in component.body)
-        return ("e", "f", "q", "p", "power", "energy") if single else ()
+        return (*OWN, "power", "energy") if single else ()
     return {
-        "node": ("e", "f", "q", "p"),
+        "node": OWN,
         "port": ("e", "f"),
         "coordinate": ("e", "p"),
         "constraint": ("multiplier", "residual"),

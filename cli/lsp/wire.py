@@ -79,12 +79,16 @@ def _length(head: bytes) -> int | None:
 def _read(body: bytes) -> dict[str, Any] | BadMessage:
     """The object of a body."""
     try:
-        found = json.loads(body)
+        found = json.loads(body, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
         return BadMessage(PARSE_ERROR, f"a message is no JSON: {error}")
     if not isinstance(found, dict):
         return BadMessage(INVALID_REQUEST, "a message is no object")
     return found
+
+
+def _no_number(word: str) -> float:
+    raise ValueError(f"{word} is no number of JSON")
 
 
 def written(message: dict[str, Any]) -> bytes:

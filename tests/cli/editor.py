@@ -116,4 +116,6 @@ def editor(folder):
         yield one
     finally:
         one.process.kill()
-        one.process.communicate()
+        one.process.wait()
+        for stream in (one.process.stdin, one.process.stdout, one.process.stderr):
+            stream.close()

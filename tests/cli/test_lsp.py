@@ -106,7 +106,7 @@ def test_positions_count_units_of_utf_16():
 def test_findings_are_those_of_check(client, tmp_path, capsys):
     """Errors, warnings and notes of unsaved text, with help and other places; columns behind astral characters."""
     wrong = SPRING.replace("1/2*m*x'^2", "1/2*n*x'^2").replace("m = 1.5 kg", "m = 1.5 kg # 😀\n  param m = 2 kg")
-    wrong += 'scene other of sprig { time 0 s to 1 s }\n'
+    wrong += "scene other of sprig { time 0 s to 1 s }\n"
     (tmp_path / "a.sd").write_text(wrong)
     assert run(["check", str(tmp_path / "a.sd"), "--json"]) == 1
     told = [d for d in json.loads(capsys.readouterr().out)["diagnostics"] if d["code"][0] == "E"]
@@ -145,8 +145,9 @@ def test_changes_are_made_in_order_and_the_newest_text_wins(client):
         {"range": {"start": {"line": 6, "character": 18}, "end": {"line": 6, "character": 19}}, "text": "nn"},
     )
     for _ in range(5):
-        client.change("a.sd", {"range": {"start": {"line": 6, "character": 18}, "end": {"line": 6, "character": 19}},
-                               "text": "n"})
+        client.change(
+            "a.sd", {"range": {"start": {"line": 6, "character": 18}, "end": {"line": 6, "character": 19}}, "text": "n"}
+        )
     (found,) = client.findings("a.sd", 7)
     assert found["code"] == "E101"
     assert found["range"] == {"start": {"line": 6, "character": 18}, "end": {"line": 6, "character": 20}}
@@ -158,17 +159,21 @@ def test_changes_are_made_in_order_and_the_newest_text_wins(client):
 
 def test_imports_are_read_from_open_documents_and_from_files(client, tmp_path):
     part = "component part {\n  branch: translation\n  param c = 1 N/m\n  law e = c*q\n}\n"
-    user = "from parts import part\nmodel m {\n  node a: translation\n  M: kinetic(1 kg) a\n  S: part(c = 2 N/m) a\n}\n"
+    user = "from parts import part\nmodel m {\n  node a: translation\n"
+    user += "  M: kinetic(f = p/(1 kg)) a\n  S: part(c = 2 N/m) a\n}\n"
     (tmp_path / "parts.sd").write_text(part.replace("param c", "param d").replace("c*q", "d*q"))
     client.open("user.sd", user)
     (found,) = client.findings("user.sd")
-    assert "'c'" in found["message"]
+    assert found["code"] == "E405"
+    assert "'part' has no parameter 'c'" in found["message"]
     client.open("parts.sd", part)
     client.findings("parts.sd")
     assert client.findings("user.sd") == [], "of the open document"
     (place,) = client.at("definition", "user.sd", user, "part(c")
-    assert place == {"uri": client.uri("parts.sd"), "range": {"start": {"line": 0, "character": 10},
-                                                            "end": {"line": 0, "character": 14}}}
+    assert place == {
+        "uri": client.uri("parts.sd"),
+        "range": {"start": {"line": 0, "character": 10}, "end": {"line": 0, "character": 14}},
+    }
     client.change("parts.sd", {"text": part.replace("law e", "law e e")})
     found = client.findings("parts.sd", 2)
     assert [d["severity"] for d in found] == [1]
@@ -209,8 +214,10 @@ def test_safe_changes_are_offered_and_mend(client):
     assert fix["diagnostics"] == found[:1]
     (change,) = fix["edit"]["changes"][client.uri("a.sd")]
     column = text.split("\n")[7].index("**")
-    assert change == {"range": {"start": {"line": 7, "character": column}, "end": {"line": 7, "character": column + 2}},
-                      "newText": "^"}
+    assert change == {
+        "range": {"start": {"line": 7, "character": column}, "end": {"line": 7, "character": column + 2}},
+        "newText": "^",
+    }
     assert everything["kind"] == "source.fixAll"
     assert everything["edit"]["changes"][client.uri("a.sd")][0]["newText"] == SPRING
     client.change("a.sd", {"range": change["range"], "text": change["newText"]})
@@ -255,12 +262,62 @@ def test_definitions_and_references(client):
     assert [p["range"]["start"] for p in found] == [{"line": 5, "character": 18}, {"line": 6, "character": 23}]
 
 
+def test_names_are_changed_where_they_mean_the_same(client):
+    text = """component part {
+  branch: electrical
+  param R: ohm
+  law e = R*f
+}
+model m {
+  param R = 3 ohm
+  param p = 2 uF
+  param m = 1 kg # m
+  coord x: translation = 1 m
+  energy T* = 1/2*m*x'^2
+  node a: electrical
+  E: effort(1 V) a
+  P: part(R = R) a
+  C: potential(q = p*e) a
+}
+scene s of m { time 0 s to 1 s; set R = 2 ohm; trace P.R, R, P.f }
+"""
+    client.open("r.sd", text)
+    (place,) = client.at("definition", "r.sd", text, "R = R) a")
+    assert place["range"]["start"] == {"line": 2, "character": 8}, "of the component"
+    (place,) = client.at("definition", "r.sd", text, "R) a")
+    assert place["range"]["start"] == {"line": 6, "character": 8}, "of the model"
+    changed = client.at("rename", "r.sd", text, "R = 3", newName="R0")["changes"][client.uri("r.sd")]
+    assert [(c["range"]["start"]["line"], c["range"]["start"]["character"]) for c in changed] == [
+        (6, 8),
+        (13, 14),
+        (16, 36),
+        (16, 58),
+    ]
+    changed = client.at("rename", "r.sd", text, "R: ohm", newName="Rp")["changes"][client.uri("r.sd")]
+    assert [(c["range"]["start"]["line"], c["range"]["start"]["character"]) for c in changed] == [
+        (2, 8),
+        (3, 10),
+        (13, 10),
+        (16, 55),
+    ]
+    changed = client.at("rename", "r.sd", text, "m = 1", newName="mass")["changes"][client.uri("r.sd")]
+    starts = [(c["range"]["start"]["line"], c["range"]["start"]["character"]) for c in changed]
+    assert starts == [(8, 8), (10, 18)], "no unit, no comment, no model"
+    assert client.at("hover", "r.sd", text, "m\n  energy")["contents"]["value"] == "`m`: 1 m"
+    where = {"line": 6, "character": 8}
+    for name, said in (("p", "declared already"), ("1x", "cannot be a name"), ("param", "cannot be a name")):
+        given = {"textDocument": {"uri": client.uri("r.sd")}, "position": where, "newName": name}
+        assert said in client.answer("textDocument/rename", **given)["error"]["message"]
+
+
 def test_symbols_are_those_of_the_text(client):
     client.open("a.sd", SPRING)
     model, scene = client.ask("textDocument/documentSymbol", textDocument={"uri": client.uri("a.sd")})
     assert [model["name"], scene["name"]] == ["spring", "swing"]
     assert [(c["name"], c["detail"]) for c in model["children"]] == [
-        ("m", "parameter"), ("k", "parameter"), ("x", "coordinate translation")
+        ("m", "parameter"),
+        ("k", "parameter"),
+        ("x", "coordinate translation"),
     ]
     assert model["children"][0]["selectionRange"]["start"] == {"line": 3, "character": 8}
 
@@ -287,8 +344,10 @@ def test_completion_offers_what_fits(client):
     assert parts["resistor"]["detail"].startswith("component")
     assert parts["capacitor"]["detail"] == "std.electrical"
     (change,) = parts["capacitor"]["additionalTextEdits"]
-    assert change == {"range": {"start": {"line": 0, "character": 35}, "end": {"line": 0, "character": 35}},
-                      "newText": ", capacitor"}
+    assert change == {
+        "range": {"start": {"line": 0, "character": 35}, "end": {"line": 0, "character": 35}},
+        "newText": ", capacitor",
+    }
     assert "electrical" in _labels(client, "c.sd", text, "electrical\n  E", 2)
     assert {"V", "ohm"} <= set(_labels(client, "c.sd", text, "kohm", 1))
     assert "electrical" in _labels(client, "c.sd", text, "electrical import", 2)
@@ -297,13 +356,19 @@ def test_completion_offers_what_fits(client):
 
 def test_hostile_texts_harm_nobody(client):
     """Bytes of all kinds, deep nests and half messages: answers, and nothing else on standard output."""
-    for k, text in enumerate(("(" * 5000, "\x00\ud800", "model m { param a = __import__('os').system('x') }", "{" * 9999)):
+    for k, text in enumerate(
+        ("(" * 5000, "\x00\ud800", "model m { param a = __import__('os').system('x') }", "{" * 9999)
+    ):
         name = f"h{k}.sd"
         document = {"uri": client.uri(name), "languageId": "sysdyn", "version": 1, "text": text}
         client.raw(_ascii({"method": "textDocument/didOpen", "params": {"textDocument": document}}))
         assert client.findings(name)
         client.at("completion", name, "\n", "\n")
         client.at("hover", name, "\n", "\n")
+    client.send({"id": 1.5, "method": "shutdown"})
+    assert client.receive()["error"]["code"] == -32600
+    client.raw(_ascii({"id": float("nan"), "method": "shutdown"}))
+    assert client.receive()["error"]["code"] == -32700
     client.tell("textDocument/didChange", textDocument=5)
     client.tell("textDocument/didOpen")
     assert client.end() == 0
