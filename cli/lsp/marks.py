@@ -19,6 +19,10 @@ class Marks:
 
     names: frozenset[int]
     units: tuple[Span, ...]
+    domains: frozenset[int]
+    """Offsets of names that can only be those of domains."""
+    levels: dict[int, syntax.Expr | None]
+    """Offsets of names that can only be those of levels, with what a scene sets to the level."""
 
     def unit(self, offset: int) -> bool:
         """Whether a place is in a unit."""
@@ -28,15 +32,22 @@ class Marks:
 def marks(tree: syntax.File) -> Marks:
     """All names and units of a tree."""
     names, units = set[int](), list[Span]()
+    domains, levels = set[int](), dict[int, syntax.Expr | None]()
     stack: list[object] = list(tree.items)
     while stack:
         node = stack.pop()
         if isinstance(node, syntax.Unit):
             units.append(node.span)
             continue
+        if isinstance(node, (syntax.Node, syntax.Port, syntax.Branch, syntax.Coord, syntax.BundleMember)):
+            domains.add(node.domain.span.start)
+        elif isinstance(node, syntax.SceneLevel):
+            levels[node.level.span.start] = node.target
+        elif isinstance(node, syntax.Level):
+            levels |= {w.span.start: None for w in (node.name, node.extends) if w is not None}
         names.update(_names(node, tree.source.text))
         stack += children(node)
-    return Marks(frozenset(names), tuple(units))
+    return Marks(frozenset(names), tuple(units), frozenset(domains), levels)
 
 
 def _names(node: object, text: str) -> Iterator[int]:

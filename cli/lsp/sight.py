@@ -131,12 +131,23 @@ def find(document: Document, word: Word) -> list[Declared]:
         if any(word.start == start for start in named(around)):
             inside = members(document, (around.decl.name,), word.start)
             return [d for d in inside if d.name == word.name]
-    if not word.path and around is not None and around.component.span.start == word.start:
-        return [d for d in of_file(document.tree) if d.name == word.name][:1]  # labels and values do not hide it
-    if not word.path:
-        near = [d for d in local(document, word.start) if d.name == word.name]
-        return near or [d for d in of_file(document.tree) if d.name == word.name][:1]
-    return [d for d in members(document, word.path, word.start) if d.name == word.name]
+    if word.path:
+        return [d for d in members(document, word.path, word.start) if d.name == word.name]
+    marks = document.marks
+    if word.start in marks.levels:
+        target = marks.levels[word.start]
+        among = local(document, word.start) if target is None else _inside(document, target)
+        return [d for d in among if d.name == word.name and d.kind == "level"]
+    near = [d for d in local(document, word.start) if d.name == word.name and d.kind != "level"]
+    if word.start in marks.domains or (around is not None and around.component.span.start == word.start):
+        near = []  # labels and values do not hide it
+    return near or [d for d in of_file(document.tree) if d.name == word.name][:1]
+
+
+def _inside(document: Document, target: syntax.Expr) -> list[Declared]:
+    """What is declared in the component that an expression leads to."""
+    text = document.source.text[target.span.start : target.span.end]
+    return members(document, tuple(re.sub(r"\[[^\[\]]*\]|\s", "", text).split(".")), target.span.start)
 
 
 def _within(word: Word, arg: syntax.Arg) -> bool:

@@ -310,6 +310,28 @@ scene s of m { time 0 s to 1 s; set R = 2 ohm; trace P.R, R, P.f }
         assert said in client.answer("textDocument/rename", **given)["error"]["message"]
 
 
+def test_levels_are_names_of_their_own(client):
+    text = """component part {
+  port p: electrical
+  param electrical = 1 ohm
+  level one default { R: dissipator(e = electrical*f) p }
+  level electrical extends one { C: potential(q = 1 uF*e) p }
+}
+model m {
+  node a: electrical
+  E: effort(1 V) a
+  P: part p = a
+}
+scene s of m { level P = electrical; time 0 s to 1 s; trace P.p.f }
+"""
+    client.open("l.sd", text)
+    for word, place in (("electrical; time", (4, 8)), ("electrical*f", (2, 8)), ("one {", (3, 8))):
+        (found,) = client.at("definition", "l.sd", text, word)
+        assert tuple(found["range"]["start"].values()) == place, word
+    (found,) = client.at("definition", "l.sd", text, "electrical\n  param")
+    assert found["uri"].endswith("/std/prelude.sd")
+
+
 def test_symbols_are_those_of_the_text(client):
     client.open("a.sd", SPRING)
     model, scene = client.ask("textDocument/documentSymbol", textDocument={"uri": client.uri("a.sd")})
