@@ -11,8 +11,10 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from sysdyn.cli.console import ROUTINE
 from sysdyn.cli.failures import classify
 from sysdyn.cli.run.checking import Checked, file_checked
+from sysdyn.dsl.text.diagnostics import Diagnostic, Report, shortened
 from sysdyn.dsl.text.source import UNSAVED, real
 
 DELAY = 0.15
@@ -21,6 +23,9 @@ PATIENCE = 1.0
 """s: that a check of an older text may take before it is given up for a newer one; a process takes 0.6 s to start."""
 LONGEST = 60.0
 """s: that it may take before it is given up for another text."""
+SPENT = "E119"
+"""More than a model may take: it is not taken again."""
+Accounts = dict[str, dict[str, Any]]
 _CONTEXT = multiprocessing.get_context("spawn")
 
 
@@ -33,6 +38,7 @@ class Checker:
         self._pipe: Connection | None = None
         self._busy: tuple[str, float] | None = None
         self._text: str | None = None  # that is checked
+        self._told = False  # whether its findings are
 
     def ask(self, name: str, at_once: bool = False) -> None:
         """Check a text, after a while in which nobody asks for it again."""
@@ -70,6 +76,7 @@ class Checker:
             self.begin()
         assert self._pipe is not None
         self._busy = name, time.monotonic()
+        self._told = False
         self._text = UNSAVED.get(str(real(name)))
         with contextlib.suppress(OSError):  # it died meanwhile: seen when its answer is taken
             self._pipe.send((name, dict(UNSAVED)))
@@ -82,17 +89,21 @@ class Checker:
         self._process.start()
         other.close()
 
-    def answer(self) -> tuple[str, str | None, Checked]:
-        """The name and the text that were checked and what was found."""
+    def answer(self) -> tuple[str, str | None, Checked | Accounts]:
+        """The name and the text that were checked and what was found: first what is wrong, then what there is."""
         assert self._pipe is not None
         assert self._busy is not None
         name = self._busy[0]
-        self._busy = None
         try:
-            return name, self._text, self._pipe.recv()
+            said = self._pipe.recv()
+            self._told = isinstance(said, Checked)
+            if not self._told:
+                self._busy = None
+            return name, self._text, said
         except (EOFError, OSError):
             self.end()
-            return name, self._text, Checked(unread="a fault in sysdyn: the process that checked the text died")
+            died = Checked(unread="a fault in sysdyn: the process that checked the text died")
+            return name, self._text, {} if self._told else died
 
     def end(self) -> None:
         """No process goes on."""
@@ -115,7 +126,9 @@ def serve(pipe: Connection) -> None:
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while True:
             name, unsaved = pipe.recv()
-            pipe.send(found(name, unsaved))
+            checked = found(name, unsaved)
+            pipe.send(checked)
+            pipe.send({} if any(d.code == SPENT for d in checked.found) else accounts(name))
 
 
 def found(name: str, unsaved: dict[str, str]) -> Checked:
@@ -128,10 +141,26 @@ def found(name: str, unsaved: dict[str, str]) -> Checked:
         return Checked(unread=classify(error)[1])
 
 
-def shown(result: Checked) -> Any:
-    """The findings that `check` shows."""
-    from sysdyn.cli.console import ROUTINE
-    from sysdyn.dsl.text.diagnostics import Report, shortened
+def accounts(name: str) -> Accounts:
+    """What `sysdyn list` tells of each model of a file that has no errors."""
+    from sysdyn.cli.manual import names
+    from sysdyn.dsl import load
+    from sysdyn.dsl.model import expression as ex
 
+    told = {}
+    try:
+        document = load.read(name, Report())
+        for model in document.models.values():
+            with ex.fresh():
+                listing = load.listing(document, model, None, Report())
+                if listing is not None:
+                    told[model.name.name] = names.account(document, model, listing)
+    except Exception:  # the check has said why
+        return {}
+    return told
+
+
+def shown(result: Checked) -> list[Diagnostic]:
+    """The findings that `check` shows."""
     kept = shortened(Report(result.found).diagnostics)
     return [d for d in kept if d.severity == "error" or d.code not in ROUTINE]

@@ -10,7 +10,7 @@ from typing import Any
 from sysdyn.cli.lsp import positions
 from sysdyn.cli.lsp.marks import Marks, marks
 from sysdyn.dsl.parser.parse import parse
-from sysdyn.dsl.text.diagnostics import Diagnostic, Report
+from sysdyn.dsl.text.diagnostics import Diagnostic
 from sysdyn.dsl.text.source import UNSAVED, SourceText, real
 from sysdyn.dsl.tree import syntax
 
@@ -25,6 +25,8 @@ class Document:
         """Of its file, whatever links lead there."""
         self.version = version
         self.source = SourceText(self.name, text)
+        self.accounts: dict[str, dict[str, Any]] = {}
+        """What `sysdyn list` tells of each model that has no errors, once the check has found it."""
 
     def changed(self, changes: Sequence[dict[str, Any]], version: int | None) -> Document:
         """The document with changes made, each of the text that the one before it left."""
@@ -51,22 +53,6 @@ class Document:
     def marks(self) -> Marks:
         """Where names and units are."""
         return marks(self.tree)
-
-    @cached_property
-    def accounts(self) -> dict[str, dict[str, Any]]:
-        """What `sysdyn list` tells of each model that has no errors."""
-        from sysdyn.cli.manual import names
-        from sysdyn.dsl import load
-        from sysdyn.dsl.model import expression as ex
-
-        found = {}
-        whole = load.document(self.source, Report())
-        for name, model in whole.models.items():
-            with ex.fresh():
-                listing = load.listing(whole, model, None, Report())
-                if listing is not None:
-                    found[name] = names.account(whole, model, listing)
-        return found
 
     def imports(self) -> Iterator[str]:
         """The real paths of the files of the author's that it imports."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from sysdyn import __version__
 from sysdyn.cli.lsp import completion, findings, hover, outline, positions, wire
-from sysdyn.cli.lsp.checker import Checker, shown
+from sysdyn.cli.lsp.checker import Accounts, Checker, shown
 from sysdyn.cli.lsp.documents import Document, Documents
 from sysdyn.cli.run.checking import Checked
 from sysdyn.dsl.text.diagnostics import Diagnostic
@@ -165,10 +165,13 @@ class Server:
         for other in self._documents.dependent(document):
             self.checker.ask(other.name, at_once)
 
-    def checked(self, name: str, text: str | None, result: Checked) -> None:
+    def checked(self, name: str, text: str | None, result: Checked | Accounts) -> None:
         """Publish what the check of a text found, if it is open still and no newer one waits."""
         document = self._documents.named(name)
         if document is None or document.source.text != text:
+            return
+        if not isinstance(result, Checked):
+            document.accounts = result
             return
         found = shown(result)
         self._found[document.uri] = tuple(found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 from sysdyn.cli.lsp import outline
@@ -76,7 +76,7 @@ def local(document: Document, offset: int) -> Iterator[Declared]:
         name = item.model.names[-1]
         item = next((i for i in document.tree.items if isinstance(i, syntax.Model) and i.name.name == name), None)
     if isinstance(item, (syntax.Model, syntax.Component)) and not _of_head(item, offset):
-        yield from outline.body(document.source, item.body)
+        yield from _declared(document.source, item)
     elif isinstance(item, (syntax.Function, syntax.Table)) and not _of_head(item, offset):
         for p in item.params:
             place = document.source.place(p.span.start, p.span.start + len(p.name))
@@ -90,13 +90,13 @@ def _of_head(item: syntax.Model | syntax.Component | syntax.Function | syntax.Ta
 
 def of_file(tree: syntax.File) -> Iterator[Declared]:
     """The names of a file, those that it imports, and those that every file has."""
-    yield from outline.items(tree)
+    yield from _items(tree)
     for item in tree.items:
         if isinstance(item, syntax.Import):
             module = module_of(tree.source, item.module.names)
             wanted = {word.name for word in item.names}
-            yield from (d for d in outline.items(module) if d.name in wanted) if module else ()
-    yield from outline.items(prelude())
+            yield from (d for d in _items(module) if d.name in wanted) if module else ()
+    yield from _items(prelude())
 
 
 def module_of(source: SourceText, names: tuple[str, ...]) -> syntax.File | None:
@@ -107,7 +107,7 @@ def module_of(source: SourceText, names: tuple[str, ...]) -> syntax.File | None:
         return _of_library(path) if path.is_file() else None
     path = Path(source.name).parent.joinpath(*names).with_suffix(".sd")
     try:
-        return parse(SourceText.read(path))[0]
+        return _parsed(SourceText.read(path))
     except (OSError, ModelError, ValueError):
         return None
 
@@ -115,6 +115,21 @@ def module_of(source: SourceText, names: tuple[str, ...]) -> syntax.File | None:
 @cache
 def _of_library(path: Path) -> syntax.File:
     return parse(SourceText.read(path, f"std/{path.name}"))[0]
+
+
+@lru_cache(32)
+def _parsed(source: SourceText) -> syntax.File:
+    return parse(source)[0]
+
+
+@lru_cache(64)
+def _items(tree: syntax.File) -> tuple[Declared, ...]:
+    return (*outline.items(tree),)
+
+
+@lru_cache(64)
+def _declared(source: SourceText, item: syntax.Model | syntax.Component) -> tuple[Declared, ...]:
+    return (*outline.body(source, item.body),)
 
 
 def find(document: Document, word: Word) -> list[Declared]:
