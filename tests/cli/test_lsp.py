@@ -1,12 +1,22 @@
 """The language server through the protocol itself: positions and texts, not that something came."""
 
 import json
+import os
+import signal
+from pathlib import Path
 
 import pytest
+import sysdyn.models
 from editor import editor
-from sysdyn.cli.lsp import positions
+from sysdyn.cli.lsp import hover, outline, positions
+from sysdyn.cli.lsp.documents import Document
 from sysdyn.cli.lsp.wire import BadMessage, Inbox
 from sysdyn.cli.main import run
+from sysdyn.cli.run.targets import all_targets
+from sysdyn.dsl import load
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.parser.parse import expected
+from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 
 SPRING = """## A mass on a spring.
@@ -396,6 +406,64 @@ def test_hostile_texts_harm_nobody(client):
     client.tell("textDocument/didChange", textDocument=5)
     client.tell("textDocument/didOpen")
     assert client.end() == 0
+
+
+def test_a_check_that_dies_is_told_and_the_next_text_is_checked(client, tmp_path):
+    client.open("a.sd", SPRING)
+    assert client.findings("a.sd") == []
+    children = Path(f"/proc/{client.process.pid}/task/{client.process.pid}/children")
+    if not children.exists():
+        pytest.skip("not on this system")
+    for child in children.read_text().split():
+        os.kill(int(child), signal.SIGKILL)
+    client.change("a.sd", {"text": SPRING.replace("*m*", "*n*")})
+    found = client.findings("a.sd", 2)
+    if "died" in found[0]["message"]:  # it was given the text before it was gone
+        client.change("a.sd", {"text": SPRING.replace("*m*", "*n*")})
+        found = client.findings("a.sd", 3)
+    assert [d["code"] for d in found] == ["E101"]
+    assert client.end() == 0
+
+
+def test_json_is_refused(capsys):
+    assert run(["lsp", "--json"]) == 2
+    assert "standard output belongs to the protocol" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("model", ["seed/dc_motor.sd", "gallery/ev_powertrain.sd"])
+def test_a_name_changed_everywhere_leaves_a_model_what_it_is(model):
+    """Every name of a model text under another one: the same kinds of network, and no errors."""
+    path = Path(sysdyn.models.__file__).parent / model
+    document = Document(path.as_uri(), path.read_text(), 1)
+    declared = [*outline.items(document.tree)]
+    declared += [d for i in declared if i.body for d in outline.body(document.source, i.body)]
+    assert len(declared) > 10
+    for d in {d.place.span: d for d in declared}.values():
+        changes = hover.renamed(document, d.place.span.start, "other_name")["changes"][document.uri]
+        text = document.source.text
+        for change in reversed(changes):
+            start, end = (positions.offset(document.source, change["range"][side]) for side in ("start", "end"))
+            assert text[start:end] == d.name
+            text = text[:start] + "other_name" + text[end:]
+        report = Report()
+        whole = load.document(SourceText(str(path), text), report)
+        for target in all_targets(whole, report):
+            with ex.fresh():
+                load.network(whole, target.model, target.scene, report, required=False)
+        assert not report.failed, (d.name, [f.message for f in report])
+
+
+def test_words_that_the_grammar_allows():
+    def words(text):
+        return expected(SourceText("x", text))
+
+    assert {"model", "component", "scene"} <= words("")
+    assert "trace" not in words("")
+    assert {"param", "law", "for"} <= words("model m {\n  param k = 1\n  ")
+    assert words("model m {\n  coord x: translation ") >= {"tangible", "intangible"}
+    assert "to" in words("scene s of m {\n  time 0 s ")
+    assert "every" in words("scene s of m {\n  trace x ")
+    assert words("model m { law e = (((" + "(" * 300) is not None
 
 
 def _ascii(message):
