@@ -83,13 +83,16 @@ class Documents:
             UNSAVED.pop(document.key, None)
 
     def named(self, name: str) -> Document | None:
-        """The open document of a file."""
-        wanted = str(real(name))
-        return next((d for d in self._open.values() if d.key == wanted), None)
+        """The open document of that name."""
+        return next((d for d in self._open.values() if d.name == name), None)
+
+    def all(self) -> list[Document]:
+        """Every open document."""
+        return [*self._open.values()]
 
     def uri_of(self, name: str) -> str:
         """The URI of a text, as the editor wrote it where it holds the text."""
-        document = next((d for d in self._open.values() if d.name == name), None)
+        document = self.named(name)
         return positions.uri_of(name) if document is None else document.uri
 
     def dependent(self, document: Document) -> list[Document]:

@@ -65,6 +65,7 @@ class Server:
             "textDocument/didChange": self._changed,
             "textDocument/didSave": self._saved,
             "textDocument/didClose": self._closed,
+            "workspace/didChangeWatchedFiles": self._others_changed,
         }
 
     def receive(self, message: dict[str, Any] | wire.BadMessage) -> None:
@@ -143,6 +144,10 @@ class Server:
         document = self._documents.get(params["textDocument"]["uri"])
         if document is not None:  # files beside it may have changed too
             self._ask(document, at_once=True)
+
+    def _others_changed(self, _: dict[str, Any]) -> None:
+        for document in self._documents.all():
+            self.checker.ask(document.name)
 
     def _closed(self, params: dict[str, Any]) -> None:
         document = self._documents.get(params["textDocument"]["uri"])

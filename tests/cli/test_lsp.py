@@ -176,6 +176,10 @@ def test_imports_are_read_from_open_documents_and_from_files(client, tmp_path):
     (found,) = client.findings("user.sd")
     assert found["code"] == "E405"
     assert "'part' has no parameter 'c'" in found["message"]
+    (tmp_path / "parts.sd").write_text(part)
+    client.tell("workspace/didChangeWatchedFiles", changes=[])
+    assert client.findings("user.sd") == [], "of the file"
+    (tmp_path / "parts.sd").write_text("")
     client.open("parts.sd", part)
     client.findings("parts.sd")
     assert client.findings("user.sd") == [], "of the open document"
@@ -189,6 +193,21 @@ def test_imports_are_read_from_open_documents_and_from_files(client, tmp_path):
     assert [d["severity"] for d in found] == [1]
     client.close("parts.sd")
     assert client.end() == 0
+
+
+def test_names_of_files_are_as_the_editor_writes_them(client, tmp_path):
+    """A URI with more signs escaped than need be, a folder with a blank, and a text that is no file."""
+    folder = tmp_path / "a folder é#1"
+    folder.mkdir()
+    (folder / "parts.sd").write_text("component part {\n  branch: electrical\n  law e = 1 ohm*f\n}\n")
+    text = "from parts import part\nmodel m {\n  node a: electrical\n  E: effort(e = 1 V) a\n  P: part(R = 2) a\n}\n"
+    for uri in ((folder / "m.sd").as_uri().replace("m.sd", "%6D.sd"), "untitled:Untitled-1"):
+        document = {"uri": uri, "languageId": "sysdyn", "version": 1, "text": text}
+        client.tell("textDocument/didOpen", textDocument=document)
+        message = client.receive()
+        assert message["params"]["uri"] == uri
+        code = "E103" if uri.startswith("untitled") else "E405"
+        assert [d["code"] for d in message["params"]["diagnostics"]] == [code]
 
 
 def test_layout_is_that_of_fmt(client, tmp_path, capsys):
