@@ -29,6 +29,8 @@ _LABEL = re.compile(r"\s*(\w+)(?:\[[^\]]*\])?\s*:\s*\w*$")
 _NUMBER = re.compile(r"(?<![\w.])\d[\d.]*(?:[eE][+-]?\d+)?[ \t]+(?:[\w./^]*[./])?\w*$")
 _ARGUMENT = re.compile(r"\s*\w+(?:\[[^\]]*\])?\s*:\s*(\w+)(?:\.\w+)?\((?:[^()]|\([^()]*\))*$")
 _READ = ("const", "function", "table", "component")
+_FIRST = frozenset({"param", "trace", "model"})
+"""Words of which one fits wherever a statement or an item begins."""
 _DOMAINS = ("node", "port", "branch", "coord", "cocoord")
 
 
@@ -57,7 +59,7 @@ def complete(document: Document, offset: int) -> list[dict[str, Any]]:
     words = expected(SourceText(source.name, source.text[:start]))
     if inside and (match := _LABEL.match(statement)) is not None and match[1] not in words:
         return _components(document)
-    return [*_arguments(document, statement), *_expression(document, offset, statement, words)]
+    return [*_arguments(document, statement), *_expression(document, offset, words)]
 
 
 def _item(label: str, kind: int, detail: str = "", doc: str = "") -> dict[str, Any]:
@@ -140,10 +142,10 @@ def _arguments(document: Document, statement: str) -> Iterator[dict[str, Any]]:
                 yield _named(d) | {"insertText": f"{d.name} = "}
 
 
-def _expression(document: Document, offset: int, statement: str, words: frozenset[str]) -> list[dict[str, Any]]:
-    """Words of the language that fit, and behind the first word of a statement the names in sight."""
+def _expression(document: Document, offset: int, words: frozenset[str]) -> list[dict[str, Any]]:
+    """Words of the language that fit, and where no statement begins the names in sight."""
     found = []
-    if statement.strip() and not _BEGUN.fullmatch(statement.strip()):
+    if _FIRST.isdisjoint(words):
         found += [_named(d) for d in sight.local(document, offset)]
         found += [_named(d) for d in sight.of_file(document.tree) if d.kind in _READ]
         found += [_item(name, FUNCTION, "function") for name in FUNCTIONS if name.isidentifier()]

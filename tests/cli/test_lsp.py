@@ -386,6 +386,11 @@ def test_completion_offers_what_fits(client):
     assert {"param", "node", "coord", "energy"} <= set(words)
     assert not {"trace", "model", "from"} & set(words)
     assert {"model", "component", "from"} <= set(_labels(client, "c.sd", text, "scene s"))
+    assert not {"R0", "sin"} & set(words)
+    text = text.replace("trace R1.", "set R0 = 2 ohm; trace R1.")
+    client.change("c.sd", {"text": text})
+    assert _labels(client, "c.sd", text, "R0 = 2 ohm")["R0"]["detail"].startswith("parameter")
+    assert "R0" not in _labels(client, "c.sd", text, "trace R1")
     members = _labels(client, "c.sd", text, "R1. }", 3)
     assert {"e", "f", "q", "p", "R"} <= set(members)
     assert members["e"]["detail"] == "effort"
