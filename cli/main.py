@@ -34,6 +34,7 @@ COMMANDS = {
     "import": "Write a SPICE netlist as a model text.",
     "linearize": "Matrices, eigenvalues, poles and zeros about a state.",
     "list": "List the names of a model: parameters, what can be traced, scenes, levels.",
+    "lsp": "Serve an editor: findings, layout, hover, completion.",
     "new": "Begin a project: model, scenes, golden trace, CI file.",
     "plot": "Draw quantities of a trace.",
     "reduce": "Find what a scene does not need, and leave it out.",

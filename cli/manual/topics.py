@@ -35,6 +35,7 @@ FIRST = [
     "formulations",
     "accuracy",
     "habits",
+    "editors",
 ]
 """The order in which the pages are read."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from sysdyn.cli.run.targets import all_targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
@@ -16,7 +18,7 @@ def mended(source: SourceText) -> tuple[str, list[Diagnostic]]:
     done: list[Diagnostic] = []
     for _ in range(ROUNDS):
         found = _found(source)
-        chosen = _apart([d for d in found if d.edit is not None and d.edit.place.source.text == source.text])
+        chosen = apart([d for d in found if d.edit is not None and d.edit.place.source.text == source.text])
         if not chosen:
             break
         text = _changed(source.text, [d.edit for d in chosen if d.edit is not None])
@@ -43,7 +45,7 @@ def _said(found: list[Diagnostic], chosen: list[Diagnostic]) -> int:
     return sum((d.code, d.message) in known for d in found)
 
 
-def _apart(found: list[Diagnostic]) -> list[Diagnostic]:
+def apart(found: Sequence[Diagnostic]) -> list[Diagnostic]:
     """Those whose changes do not overlap, in the order of the text."""
     kept: list[Diagnostic] = []
     end = -1

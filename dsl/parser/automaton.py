@@ -8,6 +8,7 @@ to be done about a token that does not fit is decided in `recovery`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 from sysdyn.dsl.parser import build_expressions, build_scenes, build_statements
@@ -82,6 +83,12 @@ def _actions() -> tuple[tuple[str, int, Build | None, bool, tuple[tuple[int, boo
 _TABLE_ROWS = _Rows()
 _TABLE_GOTOS = _Gotos()
 _TABLE_RULES = _actions()
+
+
+@cache
+def words() -> frozenset[str]:
+    """Every word that the language itself has somewhere."""
+    return frozenset(word for word in LOOKAHEADS.split() if word.isidentifier())
 
 
 def action_of(state: int, kind: str) -> int | None:

@@ -7,7 +7,7 @@ block, and a `Broken` node stands where the statement was.
 from __future__ import annotations
 
 from sysdyn.dsl.model.collecting import at_rest
-from sysdyn.dsl.parser.automaton import MAX_NESTING, Automaton
+from sysdyn.dsl.parser.automaton import MAX_NESTING, Automaton, words
 from sysdyn.dsl.parser.patterns import Patterns
 from sysdyn.dsl.parser.recovery import Recovery
 from sysdyn.dsl.text.decoding import MAX_BYTES
@@ -32,13 +32,33 @@ def parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
         return _parse(source)
 
 
+def expected(source: SourceText) -> frozenset[str]:
+    """The words of the language that may follow a text: what an editor offers behind it."""
+    if _refused(source) is not None:
+        return frozenset()
+    with at_rest():
+        automaton = _followed(source, len(source.text))
+        return frozenset(word for word in words() if automaton.accepts(word))
+
+
 def _parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
     """Run the automaton to the end of the text."""
+    automaton = _followed(source)
+    comments = tuple(automaton.scanner.comments)
+    tree = File(source, automaton.values[-1], comments, Span(0, len(source.text)))
+    return tree, automaton.notes.report.diagnostics
+
+
+def _followed(source: SourceText, until: int | None = None) -> Automaton:
+    """The automaton behind a text; until: before what is added at its end to finish statements and blocks."""
     automaton = Automaton(source)
     recovery, patterns = Recovery(automaton), Patterns(automaton)
     scanner = automaton.scanner
     while not automaton.finished:
-        kind = recovery.checked(scanner.read(automaton.row))
+        kind = scanner.read(automaton.row)
+        if scanner.start == until:
+            break
+        kind = recovery.checked(kind)
         if not automaton.advance(kind):
             recovery.recover(kind)
         elif automaton.depths[-1] > MAX_NESTING:
@@ -47,8 +67,7 @@ def _parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
             recovery.too_long()
         else:
             patterns.follow(kind)
-    tree = File(source, automaton.values[-1], tuple(scanner.comments), Span(0, len(source.text)))
-    return tree, automaton.notes.report.diagnostics
+    return automaton
 
 
 def _refused(source: SourceText) -> Diagnostic | None:

@@ -21,6 +21,8 @@ def real(path: str | Path) -> Path:
     return Path(os.path.realpath(path))
 
 
+UNSAVED: dict[str, str] = {}
+"""Texts that stand for their files, by the files' real paths: what an editor holds and has not saved (cli/lsp)."""
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _OPTION = re.compile("--[a-z]+(-[a-z]+)*( .*)?", re.DOTALL)
 
@@ -51,13 +53,15 @@ class SourceText:
 
     @classmethod
     def read(cls, path: str | Path, name: str | None = None) -> SourceText:
-        """Read a UTF-8 file, with or without a byte-order mark.
+        """Read a UTF-8 file, with or without a byte-order mark, or what an editor holds of it.
 
         Raises OSError where the file cannot be read, and ModelError (E116) where it is too long or
         its bytes are no text.
         """
         from sysdyn.dsl.text.decoding import decode
 
+        if UNSAVED and (text := UNSAVED.get(str(real(path)))) is not None:
+            return cls(name if name is not None else str(path), text)
         with Path(path).open("rb") as stream:
             return decode(name if name is not None else str(path), stream)
 
