@@ -274,7 +274,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
 static double kind_here(const sd_run *run, int asked)
 {
     int32_t kind = asked ? run->instant_kind[run->next] : 0;
-    kind |= (run->every_step ? 1 : 0) | (run->sample_steps ? 2 : 0);
+    kind |= (run->every_step ? 1 : 0) | (run->glances ? SD_SAMPLED : 0);
     return (double)kind;
 }
 
@@ -287,6 +287,12 @@ static int passes_over(const sd_run *run, double t)
     return run->instant[next] < run->t_row + run->apart * (t - run->t_from) && !(last && t < *run->stepper->t);
 }
 
+/* The next instant within a step that ends at t at which something is watched alone; t where that is none. */
+static double next_glance(const sd_run *run, double t)
+{
+    return run->glanced + 1 < run->glances ? run->t_from + (t - run->t_from) * (run->glanced + 1) / run->glances : t;
+}
+
 /* rows of the last step that are still to be written; 1: no room left */
 int sd_run_drain(sd_run *run)
 {
@@ -297,6 +303,12 @@ int sd_run_drain(sd_run *run)
         if (run->rows + 1 >= run->room)
             return 1;
         int asked = run->next < run->instants && run->instant[run->next] <= t;
+        double glance = next_glance(run, t);
+        if (glance < t && !(asked && run->instant[run->next] <= glance)) {
+            run->glanced++;
+            emit(run, glance, glance, SD_SAMPLED, 0);
+            continue;
+        }
         if (asked && run->instant[run->next] < t) {
             if (passes_over(run, t)) {
                 run->next++;
@@ -425,6 +437,7 @@ static void measure(sd_run *run, double from, double t)
     }
     /* powers at the start of the next step are kept apart until the rows of this one are written */
     run->pending = 1;
+    run->glanced = 0;
 }
 
 static double now(void)
