@@ -9,6 +9,7 @@ from typing import Any
 from sysdyn.cli.lsp import positions, sight
 from sysdyn.cli.lsp.documents import Document
 from sysdyn.cli.lsp.outline import Declared
+from sysdyn.dsl.elaborate.authors import without_indices
 from sysdyn.dsl.model import units
 from sysdyn.dsl.model.functions import FUNCTIONS
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
@@ -116,7 +117,7 @@ def _unit(document: Document, word: sight.Word) -> str:
     path = ".".join((*word.path, word.name))
     if account is not None:
         for entry in account["readable"]:
-            if re.sub(r"\[[^\]]*\]", "", entry["name"]) == path:
+            if without_indices(entry["name"]) == path:
                 return f" in {entry['unit']}"
     return ""
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from sysdyn.cli.lsp import outline
 from sysdyn.cli.lsp.documents import Document
 from sysdyn.cli.lsp.outline import Declared
+from sysdyn.dsl.elaborate.authors import without_indices
 from sysdyn.dsl.elaborate.files import LIBRARY, prelude
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
 from sysdyn.dsl.parser.parse import parse
@@ -61,7 +62,7 @@ def path_before(source: SourceText, offset: int) -> tuple[str, ...]:
     match = _BEFORE.search(source.text[source.line_starts[line - 1] : offset])
     if match is None:
         return ()
-    return tuple(re.sub(r"\[[^\[\]]*\]", "", match[0]).split(".")[:-1])
+    return tuple(without_indices(match[0]).split(".")[:-1])
 
 
 def item_at(document: Document, offset: int) -> syntax.TopLevel | None:
@@ -162,7 +163,8 @@ def find(document: Document, word: Word) -> list[Declared]:
 def _inside(document: Document, target: syntax.Expr) -> list[Declared]:
     """What is declared in the component that an expression leads to."""
     text = document.source.text[target.span.start : target.span.end]
-    return members(document, tuple(re.sub(r"\[[^\[\]]*\]|\s", "", text).split(".")), target.span.start)
+    path = "".join(without_indices(text).split()).split(".")
+    return members(document, tuple(path), target.span.start)
 
 
 def _within(word: Word, arg: syntax.Arg) -> bool:

@@ -52,11 +52,12 @@ def _author(elaborator: Elaborator, space: Space) -> Place | None:
     for depth, label in enumerate(labels):
         around = ".".join(labels[:depth])
         for outer, body in elaborator.bodies:
-            if outer.source is elaborator.source and _plain(outer.path) == around:
+            if outer.source is elaborator.source and without_indices(outer.path) == around:
                 made = [s for s, _ in body if isinstance(s, syntax.Instance) and s.decl.name == label]
                 inner = made[0] if made else inner
     return None if inner is None else Place(elaborator.source, inner.span)
 
 
-def _plain(path: str) -> str:
+def without_indices(path: str) -> str:
+    """A path of names as a text has it without elements: `a[1].b` is `a.b`."""
     return re.sub(r"\[[^\]]*\]", "", path)

@@ -261,7 +261,7 @@ class Instances(Elements):
                 message = f"'{s.decl.name}' has no parameter '{arg.name}' at level {space.level}: left out"
                 self.report.note("N905", message, Place(self.resolver.source, arg.span))
                 continue
-            if arg.name not in head.parameters and arg.name in head.ports:
+            if arg.name in head.ports:
                 text = self.source_text(arg.value.span)
                 message = f"'{arg.name}' of '{component.name}' is a port: it stands behind the parentheses"
                 raise self.resolver.fail("E405", message, arg.span, help=f"{component.name}(...) {arg.name} = {text}")

@@ -68,7 +68,7 @@ class Contacts:
         kinds, largest = self.system.kinds, self.observer.largest
         for contact, place in zip(self.contacts, self.multiplier, strict=True):
             own = kinds == ("q" if contact.kind == "phi" else "f")
-            alike = own & self._of_unit(self.observer.unit(contact.value))
+            alike = own & (self._units == self.observer.unit(contact.value))
             size = FAINT * float(magnitude[: kinds.size][alike if alike.any() else own].max(initial=0.0))
             rows = ((contact.value, size), (contact.rate, size / time), (contact.acceleration, size / time**2))
             loaded = FAINT * float(magnitude[place]) if place >= 0 else 0.0
@@ -76,17 +76,18 @@ class Contacts:
                 if row >= 0:
                     largest[row] = max(largest[row], least)
 
-    def _of_unit(self, unit: str) -> NDArray[np.bool_]:
-        """Unknowns that have it."""
+    @cached_property
+    def _units(self) -> NDArray[np.str_]:
+        """Of the unknowns."""
         families = self.system.description.families
-        return np.array([k >= 0 and families[k].unit == unit for k in self.system.family_of])
+        return np.array([families[k].unit if k >= 0 else "" for k in self.system.family_of])
 
     @cached_property
     def _flows(self) -> dict[int, NDArray[np.bool_]]:
         """Of each inequality of a flow that can hold: the flows [unknowns as written] of its unit."""
         flows, number = self.system.are("f", "s"), self.system.form.written
         kept = (k for k, c in enumerate(self.contacts) if c.kind == "psi" and self.multiplier[k] >= 0)
-        return {k: (flows & self._of_unit(self.observer.unit(self.contacts[k].value)))[:number] for k in kept}
+        return {k: (flows & (self._units == self.observer.unit(self.contacts[k].value)))[:number] for k in kept}
 
     def impulses(self, y: Floats, found: tuple[Floats, Floats, Floats]) -> Floats:
         """Those that took y to what was found [unknowns as written], zero of inequalities of flows where these moved by

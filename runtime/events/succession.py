@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.impacts import UNSEEN, Impacts
-from sysdyn.runtime.events.pivoting import NoActiveSetError
+from sysdyn.runtime.events.pivoting import NoActiveSetError, Settle
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -197,10 +197,19 @@ class Succession:
         """
         y, yd = point
         kept, open_ = (self.contacts.active.copy(), self.p.copy()), None
-        nowhere = set[tuple[float, ...]]()
+        nowhere = set[tuple[float, ...]]()  # sets that have no point there
+
+        def quickly(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+            """As `struck` without a search; a set that has no point at one instant has none at the next."""
+            state = self.contacts.state()
+            found = None if state in nowhere else self._restart.struck(t, y, yd, quickly=True)
+            if found is None:
+                nowhere.add(state)
+            return found
+
         for later in AHEAD:
             time = later * self.contacts.time
-            found = self._later(t, time, (y, yd), stood, nowhere)
+            found = self._later(t, time, (y, yd), stood, quickly)
             if found is not None and self.determined.leaves(t, *found) == 0:
                 return found
             if found is not None and open_ is None:
@@ -213,20 +222,10 @@ class Succession:
         self.contacts.apply()
         return open_[0]
 
-    def _later(
-        self, t: float, time: float, point: Point, stood: tuple[float, ...], nowhere: set[tuple[float, ...]]
-    ) -> Point | None:
+    def _later(self, t: float, time: float, point: Point, stood: tuple[float, ...], quickly: Settle) -> Point | None:
         """The point at t with the active set that fits `time` (s) later; None where that is the one that stood, or
-        none is found without a search: it only tells sets apart.  nowhere: sets that have no point ahead of t, added.
+        none is found `quickly`: it only tells sets apart.
         """
-
-        def quickly(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
-            state = self.contacts.state()
-            found = None if state in nowhere else self._restart.struck(t, y, yd, quickly=True)
-            if found is None:
-                nowhere.add(state)
-            return found
-
         y, yd = point
         found = self._restart.struck(t + time, y + time * yd, yd)
         # a flow that begins at rest moves by time^2 alone; a gap that such a move closes is another event's

@@ -81,7 +81,8 @@ class Instant:
         self._row, self._column, self._moved = over.row, over.column, over.moved
         self._balances = settled.of_groups("dynamics")
         self._loose = self._without_displacement()
-        self._pulses = over.pulses(over.moved, over.force | self._loose)
+        self._integrated = over.force | self._loose
+        self._pulses = over.pulses(over.moved, self._integrated)
         self._momenta = settled.of_groups("momentum")
         self._states, self._constraints = settled.of_groups("momentum", "gamma"), settled.of_groups("phi_rate", "psi")
         self._moving = np.isin(kinds, ("f", "p", "e")) | over.contents
@@ -305,6 +306,4 @@ class Instant:
         off = np.where(meant.met, missed((i, j, mean), size, (aim, wanted))[1::2], 0.0)
         if off.any():
             raise UnbalancedError(int(np.argmax(off)))
-        return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(
-            self._over.force | self._loose, integral, 0.0
-        )
+        return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._integrated, integral, 0.0)

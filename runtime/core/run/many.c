@@ -24,9 +24,6 @@
 #define TAME 1e-6
 #define BEYOND 100.0     /* an unknown within a step, in magnitudes of steps (accuracy/compared.py) */
 #define SAME 1e-12       /* of an instant: a claim's */
-#define TRACE 1
-#define STEP 2
-#define COMPARED 4
 
 static double cpu_now(void)
 {
@@ -158,11 +155,11 @@ static void take(sd_many *many, sd_run *run, sd_samples *own, sd_samples *there)
     for (int32_t k = 0; k < run->rows; k++) {
         const double *row = run->row + (size_t)k * (size_t)(SD_ROW_HEAD + 2 * many->observed);
         int32_t kind = (int32_t)row[1];
-        if ((kind & COMPARED) && there->number < there->room)
+        if ((kind & SD_COMPARED) && there->number < there->room)
             put(many, there, there->number++, row);
-        if (kind & (TRACE | STEP))
+        if (kind & (SD_TRACE | SD_SAMPLE))
             claim(many, row, 0);
-        if (!(kind & TRACE))
+        if (!(kind & SD_TRACE))
             continue;
         if (!many->known)
             thin(many, own, row);
@@ -293,7 +290,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         taken_before = taken;
         taken = 0;
         for (int32_t k = 0; !many->known && k < last->number; k++)
-            many->kind[k] = COMPARED | (lean && k == last->number - 1 ? TRACE : 0);
+            many->kind[k] = SD_COMPARED | (lean && k == last->number - 1 ? SD_TRACE : 0);
         prepare(many, &many->passes[1], next, longest, many->known ? NULL : last, opened);
         many->passes[1].run->every_step = many->passes[1].run->every_step && !lean;
         many->passes[1].run->sizes_at_steps = !lean;

@@ -143,7 +143,7 @@ static void settle_row(sd_run *run, double t, int32_t kind)
 /* derivatives at the ends of the last steps as exact as the rows within the last one want them */
 static void refine(sd_run *run)
 {
-    int32_t kinds = 0;
+    int32_t kinds = run->glances > 1 ? SD_SAMPLE : 0;
     for (int32_t k = run->next; k < run->instants && run->instant[k] < run->t_to; k++)
         kinds |= run->instant_kind[k];
     if (!kinds)
@@ -274,7 +274,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
 static double kind_here(const sd_run *run, int asked)
 {
     int32_t kind = asked ? run->instant_kind[run->next] : 0;
-    kind |= (run->every_step ? 1 : 0) | (run->glances ? SD_SAMPLED : 0);
+    kind |= (run->every_step ? SD_TRACE : 0) | (run->glances ? SD_SAMPLE : 0);
     return (double)kind;
 }
 
@@ -306,7 +306,7 @@ int sd_run_drain(sd_run *run)
         double glance = next_glance(run, t);
         if (glance < t && !(asked && run->instant[run->next] <= glance)) {
             run->glanced++;
-            emit(run, glance, glance, SD_SAMPLED, 0);
+            emit(run, glance, glance, SD_SAMPLE, 0);
             continue;
         }
         if (asked && run->instant[run->next] < t) {

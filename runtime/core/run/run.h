@@ -19,11 +19,11 @@
 #include "steppers/stepper.h"
 
 #define SD_ROW_HEAD 8
-#define SD_TRACE 1    /* kind of a row of the trace */
+#define SD_TRACE 1    /* kinds of a row (integrate/request.py): of the trace, */
+#define SD_SAMPLE 2   /* of a step, which is watched alone, */
+#define SD_COMPARED 4 /* that runs are compared by */
 #define SD_PARTS 4    /* of a step, at whose ends what is watched is looked at */
 #define SD_FINEST 1024 /* parts of a step that what is watched does not follow in fewer */
-#define SD_SAMPLED 2 /* kind of a row that is watched alone, */
-#define SD_COMPARED 4 /* kind of a row that runs are compared by (integrate/request.py) */
 
 enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3, SD_EVENT = 4 };
 
@@ -44,7 +44,7 @@ typedef struct sd_run {
     const double *instant;            /* [instants] ascending, within the span */
     const int32_t *instant_kind;      /* [instants] kind of the row */
     int32_t instants, every_step;
-    int32_t glances, glanced;           /* instants of a step that are watched, at even parts of it, its end among them; those
+    int32_t glances, glanced;         /* instants of a step that are watched, at even parts of it, its end among them; those
                                        * within it that are written */
     int32_t sizes_at_steps;           /* largest is over the ends of all steps, not of those with a row alone */
     int32_t bare;                     /* what is observed follows from the state: rows for comparison alone are not settled */
