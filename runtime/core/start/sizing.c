@@ -56,6 +56,7 @@ int sd_relaxed(const sd_system *system, const sd_order *order, int32_t rungs, co
         return -1;
     }
     double *push = memory, *step = push + rows, *moved = step + rows, *values = linear->scaled;
+    int told = 0;
     for (int32_t j = 0; j < n; j++)
         for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
             push[system->row[e]] += jyd[e] * yd[j];
@@ -68,11 +69,10 @@ int sd_relaxed(const sd_system *system, const sd_order *order, int32_t rungs, co
             sd_linear_solve(linear, step);
             for (int32_t i = 0; i < n; i++)
                 moved[i] = fmax(moved[i], fabs(step[i]));
-        } else {
-            memcpy(moved, far, (size_t)n * sizeof *moved);
+            told = 1;
         }
     }
-    for (int32_t i = 0; i < n; i++)
+    for (int32_t i = 0; i < n && told; i++)
         far[i] = isfinite(moved[i]) ? sd_smaller(moved[i], far[i]) : far[i];
     sd_linear_free(linear);
     free(memory);

@@ -265,11 +265,12 @@ double sd_radau_norm(const sd_radau *radau, const double *x)
 }
 
 /* what is interpolated meets no steep law, of what follows from differences of unknowns too little, and has a lower
- * order than more stages: powers are those of the stages */
+ * order than more stages; and slopes at a start may be of a motion that is over at once (an inductor that megaohms tie):
+ * powers are those of the stages */
 static void show_nodes(sd_radau *radau)
 {
     const sd_radau_method *used = radau->used;
-    int stages = radau->system->scales > 0 || radau->system->left || used->stages > 3;
+    int stages = radau->system->scales > 0 || radau->system->left || used->stages > 3 || radau->taken < SD_POINTS;
     radau->stepper.nodes = stages ? used->stages : 0;
     radau->stepper.node = used->c;
     radau->stepper.node_weight = used->b;
@@ -372,6 +373,8 @@ static int estimate_error(sd_radau *radau, double *error)
             radau->y[i] = radau->phi[i] + (radau->test[i] >= 0 ? ee[i] : 0.0);
     }
     *error *= strict;
+    if (!(radau->fixed_h > 0.0))
+        *error = fmax(*error, sd_radau_between(radau));
     *error = isfinite(*error) ? fmax(*error, 1e-10) : INFINITY;
     return SD_FINE;
 }
@@ -454,11 +457,11 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
         radau->yd[i] = radau->rate[i] / h;
     }
     memcpy(radau->slope[0], radau->yd, size);
-    show_nodes(radau);
     double t = radau->t + h;
     radau->t = fabs(radau->t_end - t) <= 1e-12 * h ? radau->t_end : t;
     radau->steps++;
     radau->taken++;
+    show_nodes(radau);
     sd_radau_note_points(radau);
     radau->rejected = 0;
     /* the Jacobian lasts while Newton converges fast; the factors while the step hardly changes */

@@ -131,6 +131,8 @@ int sd_radau_step(sd_radau *radau);
 void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd);
 /* settled derivatives at the points that sd_radau_dense uses, and which unknowns they lead */
 void sd_radau_refine(sd_radau *radau, sd_settle *settle);
+/* how far values within the step at hand may be off, in the weights of the error test, of what slopes do not lead */
+double sd_radau_between(const sd_radau *radau);
 /* 1: between the nodes of the step at hand, whose stages are z, a steep law is beyond all magnitudes: the step passes
  * over something that happens.  Works in y, rate, d[0] and terms. */
 int sd_radau_astray(sd_radau *radau);

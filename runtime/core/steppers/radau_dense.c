@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#define BULGES 32 /* places at which its largest is sought */
 #define MANY 100.0 /* unknowns up to which each is asked for what the error test asks of all */
 
 void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1])
@@ -181,13 +182,18 @@ void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
     of_slopes(radau, t, y, yd);
 }
 
+/* In the weights of the error test, which is of the mean: how far one of many unknowns may be off */
+static double most_off(const sd_radau *radau)
+{
+    return radau->system->scales > 0 ? 1.0 : fmax(1.0, sqrt((double)radau->n / MANY));
+}
+
 /* Slopes lead no unknown that they would take further off the polynomial of the stages than the step's error may be: there
- * they are of a motion before, or what a stiff law makes of the point's own error.  (The error test is of the mean: of many
- * unknowns one may be off by more.) */
+ * they are of a motion before, or what a stiff law makes of the point's own error. */
 static void mistrust(sd_radau *radau)
 {
     const int looks = radau->used->stages > 3 ? 1 : 2; /* of more stages the first gap is the one that slopes bend */
-    const double most = radau->system->scales > 0 ? 1.0 : fmax(1.0, sqrt((double)radau->n / MANY));
+    const double most = most_off(radau);
     for (int k = 1; k <= looks; k++) {
         double t = radau->t - radau->h_used * (1.0 - (looks > 1 ? k / 3.0 : 0.5 * radau->used->c[0]));
         of_stages(radau, t, 1, radau->y, radau->rate);
@@ -243,6 +249,45 @@ int sd_radau_astray(sd_radau *radau)
             return 1;
     }
     return 0;
+}
+
+/* x (x - c_1) ... (x - c_s) */
+static double bulge(const sd_radau_method *method, double x)
+{
+    double product = x;
+    for (int s = 0; s < method->stages; s++)
+        product *= x - method->c[s];
+    return product;
+}
+
+/* the largest within the step */
+static double largest_bulge(const sd_radau_method *method)
+{
+    double most = 0.0;
+    for (int k = 1; k < BULGES; k++)
+        most = fmax(most, fabs(bulge(method, (double)k / BULGES)));
+    return most;
+}
+
+/* The polynomial of the stages leaves the start of the step before by `off`: what that makes of it between the nodes, where
+ * the next power of x would be as large.  The estimate at the end sees nothing of it where a stiff law pulls. */
+double sd_radau_between(const sd_radau *radau)
+{
+    const sd_radau_method *method = radau->method;
+    double v[SD_STAGES + 1], d[SD_STAGES + 1], largest = 0.0;
+    if (radau->taken == 0)
+        return 0.0;
+    const double before = -radau->h_used / radau->h;
+    lagrange(radau, method, before, v, d);
+    for (int32_t i = 0; i < radau->n; i++)
+        if (radau->test[i] == 0 && !radau->led[i]) {
+            double off = radau->phi[i] - sd_radau_last(radau, i);
+            for (int s = 0; s < method->stages; s++)
+                off += v[s + 1] * radau->z[s][i];
+            off = fabs(off) * sd_radau_weight(radau, i);
+            largest = off > largest ? off : largest;
+        }
+    return largest > 0.0 ? largest / most_off(radau) * largest_bulge(method) / fabs(bulge(method, before)) : 0.0;
 }
 
 void sd_radau_extrapolate(sd_radau *radau, double h)
