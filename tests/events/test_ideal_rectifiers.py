@@ -27,9 +27,9 @@ def test_a_charge_that_is_round_off_does_not_stop_a_run(tmp_path):
 @pytest.mark.parametrize("seed", [4, 11, 26, 39])
 @pytest.mark.filterwarnings("ignore")
 def test_six_digits(seed, tmp_path):
-    """Behind an event inductors that megaohms tie move within 1e-9 s: values between the ends of the next steps followed
-    the slopes of that motion (the ledger was off by 2e-2 J), the sizes of currents were those of their first slopes, and
-    a current that follows a resistor was off within steps that the error at their ends had passed.
+    """Behind an event inductors that megaohms tie move within 1e-9 s: values between the ends of the next steps
+    followed the slopes of that motion (the ledger was off by 2e-2 J), sizes of currents were those of their first
+    slopes, and a current that follows a resistor was off within steps that the error at their ends had passed.
     """
     file = tmp_path / "m.sd"
     file.write_text(Circuit(seed).text.replace("1e-4", "1e-6"))

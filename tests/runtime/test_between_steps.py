@@ -18,7 +18,7 @@ scene s of coil { time 0 s to 50 ms; trace L.f as i every 0.5 ms }
 
 
 def test_a_current_that_follows_a_resistor(tmp_path: Path):
-    """Its estimate at the ends of steps of a millisecond is damped by 1 / (h R / L): they were off by 2.5e-4 between."""
+    """Its estimate at the ends of steps of 1 ms is damped by 1 / (h R / L): they were off by 2.5e-4 between."""
     file = tmp_path / "m.sd"
     file.write_text(COIL)
     run = api.simulate(file, output=tmp_path / "m.h5", method="radau", rtol=1e-3)
