@@ -6,7 +6,7 @@ Receives manifest, binding, carrier and options; hands back an `Outcome`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,8 @@ class Outcome:
     them; reached [s]; error_estimate relative (None without accuracy control); warnings: sentences; failure: of a run
     that stopped (its trace has final = 0); judgement: of a run that ended; below_round_off: the estimate is less than
     double precision resolves; reason: why method auto took its method ("" where it was named); cancelled: traced
-    differences of terms much larger than they are; events: of a run that ended; steps: of the run that stands.
+    differences of terms much larger than they are; events: of a run that ended; steps: of the run that stands; extrema:
+    least and largest values of what is traced within its steps (infinite where there are none), if they were asked for.
     """
 
     trace: Path | None
@@ -73,6 +74,7 @@ class Outcome:
     events: tuple[Happened, ...] = ()
     held: Trace | None = None
     steps: int = 0
+    extrema: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def traced(self) -> Trace:
@@ -373,7 +375,16 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     lost = tuple(cancelled(runs.quantities.terms(finished.largest), writer.seen(), options.accuracy, estimate))
     below = achieved is not None and achieved.below_round_off
     told = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
-    return outcome(True, options.t_end, achieved, None, steps=finished.statistics.steps, **told)
+    told |= {"steps": finished.statistics.steps, "extrema": _extrema(runs)}
+    return outcome(True, options.t_end, achieved, None, **told)
+
+
+def _extrema(runs: Runs) -> dict[str, tuple[float, float]]:
+    """Within the steps of a run, by traced name; nothing where they were not asked for."""
+    if runs.done is None or runs.done[0].extrema is None:
+        return {}
+    least, most = runs.done[0].extrema
+    return {column.name: (float(least[column.place]), float(most[column.place])) for column in runs.columns}
 
 
 def close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:

@@ -67,6 +67,7 @@ class Request:
     no_prune: bool = False
     no_lock: bool = False
     own: bool = False  # refuse a formulation whose rows are those of another
+    extrema: bool = False  # least and largest values of what is traced are kept, within steps too
     text: str | None = None  # what stood on standard input, for processes beside the one that read it
 
 
@@ -178,6 +179,7 @@ def options_of(
         max_steps=steps,
         max_wall=wall,
         sample_steps=any(e.moment == "always" for e in prepared.network.expectations),
+        extrema=request.extrema,
         watch=watch(prepared) if prepared.network.expectations else None,
         timings=request.timings,
         cpu_compile=prepared.cpu_compile_s,

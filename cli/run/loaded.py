@@ -6,6 +6,7 @@ one (an input, a text with names, a level) is elaborated and compiled once and t
 
 from __future__ import annotations
 
+import copy
 import re
 import threading
 import time
@@ -144,6 +145,12 @@ class Loaded:
         made = self.first.prepared.network.parameters
         self.parameters = {p.name: p for p in made if not p.name.startswith("#")}  # those are the compiler's own
         report.raise_if_failed()
+
+    def keeping(self, *, extrema: bool) -> Loaded:
+        """The same text, and what is compiled of it, for runs that keep least and largest values, or do not."""
+        other = copy.copy(self)
+        other.request = replace(self.request, extrema=extrema)
+        return other
 
     @cached_property
     def sizes(self) -> frozenset[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -33,7 +34,8 @@ class Runner:
     def __init__(
         self, request: Request, keep: str = "traces", *, core: bool = True, loaded: Loaded | None = None
     ) -> None:
-        self.request, self.keep, self.core = request, keep, core
+        self.request, self.keep, self.core = replace(request, extrema=keep != "end"), keep, core
+        loaded = None if loaded is None else loaded.keeping(extrema=keep != "end")
         self._loaded: dict[tuple[tuple[str, str], ...], Loaded] = {} if loaded is None else {(): loaded}
         self._in_core: dict[Any, Cases | str] = {}
 
@@ -131,7 +133,7 @@ def _kept(number: int, ran: Ran, report: Report, keep: str) -> Kept:
     values = {name: np.asarray(trace[name]) for name in trace.names}
     some = trace.time.size > 0
     time, traces = _thinned(ran, trace, values) if some and keep == "traces" else (None, None)
-    extrema = some and keep != "end"
+    extrema, within, none = some and keep != "end", o.extrema, (math.inf, -math.inf)
     return Kept(
         number,
         ran.exit,
@@ -142,8 +144,8 @@ def _kept(number: int, ran: Ran, report: Report, keep: str) -> Kept:
         int(o.statistics["steps"]),
         float(o.timings["cpu_integrate_s"]),
         {n: float(v[-1]) for n, v in values.items()} if some else None,
-        {n: float(v.min()) for n, v in values.items()} if extrema else None,
-        {n: float(v.max()) for n, v in values.items()} if extrema else None,
+        {n: min(float(v.min()), within.get(n, none)[0]) for n, v in values.items()} if extrema else None,
+        {n: max(float(v.max()), within.get(n, none)[1]) for n, v in values.items()} if extrema else None,
         time,
         traces,
         None if ran.exit == 0 else finding(report.diagnostics),

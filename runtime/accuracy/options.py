@@ -38,8 +38,8 @@ class Options:
     step [s]; order: of bdf at most, of radau (5, 9, 13) at every step; stops: ascending instants at which the text
     jumps or has kinks: a step ends and the integration restarts there; redundancy: what becomes of redundant
     constraints: drop (the last written of each dependent group is left out), minimum_norm (the least multipliers),
-    error (the caller has seen to it); sample_steps: the watcher sees accepted steps and what is within them too; watch:
-    what of a run the samples are to hold.
+    error (the caller has seen to it); sample_steps: the watcher sees accepted steps and what is within them too;
+    extrema: least and largest values are sought within steps; watch: what of a run the samples are to hold.
     """
 
     output: str | Path | None
@@ -65,6 +65,7 @@ class Options:
     max_steps: int | None = None
     max_wall: float | None = None
     sample_steps: bool = False
+    extrema: bool = False
     watch: Watch | None = None
     timings: bool = True
     cpu_compile: float = 0.0

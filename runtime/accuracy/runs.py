@@ -123,6 +123,7 @@ class Runs:
             instant_kinds=kinds,
             every_step=options.every is None,
             sample_steps=options.sample_steps,
+            extrema=options.extrema and not draft,
             rtol=rtol,
             atol=atol,
             max_steps=self.most_steps,

@@ -81,6 +81,7 @@ class Driver:
             run.least_norm = self._least_norm.address
         self._observers(start_rate)
         self._asked(request)
+        self._extrema(request)
         run.rough = request.settled_to
         run.bare = int(not request.audited and shows(system, keeps))
         run.told = CREDIT if not request.audited and self._follows_sums(settler, keeps) else 0
@@ -113,6 +114,21 @@ class Driver:
         run.glances, run.apart = GLANCES * request.sample_steps, request.apart
         self.rows = np.empty((ROOM if width < ROOM else 64, width))
         run.row, run.room = lib.pointer(self.rows), self.rows.shape[0]
+
+    def _extrema(self, request: Request) -> None:
+        """Where they are asked for, and all that is observed has its value at any point: of multipliers that are open
+        and of integrals of powers rows alone tell.
+        """
+        self.extrema: Floats | None = None
+        if not request.extrema or self._least_norm is not None or not self._unread:
+            return
+        rooms = np.zeros((6, max(self.observed, 1)))
+        self.extrema = rooms[:2]
+        least, most, *looks, settled = map(lib.pointer, rooms)
+        core = self._extrema_core = lib.Extrema(columns=self.observed, least=least, most=most, settled=settled)
+        core.look[:] = looks
+        lib.core.sd_extrema_begin(c.byref(core))
+        self.run.extrema = c.addressof(core)
 
     def _follows_sums(self, settler: Settler, keeps: NDArray[np.bool_]) -> bool:
         """Tells the settler by which sums all that a row shows follows from the state, where so and without rates."""

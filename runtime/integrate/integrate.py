@@ -386,6 +386,7 @@ class Integration:
             self.happened(),
             self.driver.run.beyond,
             opening=method.opening if self.request.method in OPENED else 0.0,
+            extrema=self.driver.extrema,
         )
         if spent and self.system.unknowns > LARGE:
             del method

@@ -45,7 +45,8 @@ class Request:
     stages: of radau, in the first step and at most, None: chosen;
     opening: of dopri, rosenbrock: first step as an earlier run found it fit (core/steppers/dopri.h), 0: chosen;
     unstrained: it is given up where Newton fails in every second step (cause strained);
-    apart: part of a step; instants within it that are nearer to the row before are passed over.
+    apart: part of a step; instants within it that are nearer to the row before are passed over;
+    extrema: what is observed is looked at within steps for its least and largest values.
     """
 
     t_end: float
@@ -53,6 +54,7 @@ class Request:
     instant_kinds: Ints | None = None
     every_step: bool = True
     sample_steps: bool = False
+    extrema: bool = False
     rtol: float = 1e-6
     atol: float | None = None
     max_steps: int | None = None
@@ -112,7 +114,8 @@ class Finished:
     magnitude [kinds and units]: the largest, as the run confirmed it; largest [observed]: of the values and of the
     terms of their expressions; cpu [s]; ledgers: what came of them is read of the run that is kept; beyond: the largest
     unknown of a row within a step, in magnitudes that it has at steps; last: what gives y and yd at its end
-    [unknowns], the largest |y| of each kind and unit; opening: for the next run's request.
+    [unknowns], the largest |y| of each kind and unit; opening: for the next run's request; extrema: least and largest
+    values within steps [2, observed] (infinite where there are none), where they were asked for.
     """
 
     reached: float
@@ -126,6 +129,7 @@ class Finished:
     beyond: float = 0.0
     last: tuple[Callable[[], tuple[Floats, Floats]], Floats] | None = None
     opening: float = 0.0
+    extrema: Floats | None = None
 
     @property
     def balances(self) -> tuple[Balance, ...]:

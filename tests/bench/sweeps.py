@@ -35,7 +35,7 @@ def row(name: str, parameter: str | None, runs: int, keep: str, until: str | Non
     parameter = parameter or some[0]
     cases = [{parameter: float(v)} for v in np.linspace(0.9, 1.1, runs) * known[parameter]]
     try:
-        core = Cases(loaded, [parameter], keep)
+        core = Cases(loaded.keeping(extrema=keep != "end"), [parameter], keep)
     except NotApplicableError as error:
         return f"{name:20s} {parameter:8s} one by one: {error}"
     spent = []

@@ -19,7 +19,7 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs += [("LeastNorm", "sd_least_norm"), ("Run", "sd_run"), ("Ledgers", "sd_ledgers"), ("Record", "sd_record")]
     pairs += [("Many", "sd_many"), ("Pass", "sd_pass"), ("Region", "sd_region"), ("RunClaim", "sd_claim")]
     pairs += [("RunSamples", "sd_samples"), ("Modes", "sd_modes"), ("Mode", "sd_mode"), ("Held", "sd_held")]
-    pairs += [("Strike", "sd_strike"), ("Corners", "sd_corners")]
+    pairs += [("Strike", "sd_strike"), ("Corners", "sd_corners"), ("Extrema", "sd_extrema")]
     pairs += [("Transition", "sd_transition"), ("Contact", "sd_contact"), ("Kink", "sd_kink"), ("Piece", "sd_piece")]
     pairs += [("Underlying", "sd_underlying"), ("Dopri", "sd_dopri"), ("Energy", "sd_energy")]
     pairs += [("Rosenbrock", "sd_rosenbrock")]

@@ -197,6 +197,8 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
     own->number = there->number = 0;
     many->stride = 1;
     many->seen = many->rows = many->thinned = many->broken = many->judged = 0;
+    if (run->extrema)
+        sd_extrema_begin(run->extrema);
     for (;;) {
         int64_t before = *run->stepper->taken;
         double from = cpu_now();
@@ -211,6 +213,10 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
             return SD_MANY_FAILED;
     }
     count(many, pass, 1);
+    for (int32_t q = 0; q < many->columns && run->extrema; q++) {
+        many->least[q] = fmin(many->least[q], run->extrema->least[many->column[q]]);
+        many->most[q] = fmax(many->most[q], run->extrema->most[many->column[q]]);
+    }
     if (!many->known && own->number && own->time[own->number - 1] < many->last_time)
         own->number++; /* the last row stands behind the others already */
     return run->beyond > BEYOND ? SD_MANY_ACCURACY : SD_MANY_DONE; /* a step passed over something */

@@ -143,7 +143,7 @@ static void settle_row(sd_run *run, double t, int32_t kind)
 /* derivatives at the ends of the last steps as exact as the rows within the last one want them */
 static void refine(sd_run *run)
 {
-    int32_t kinds = run->glances > 1 ? SD_SAMPLE : 0;
+    int32_t kinds = run->glances > 1 || run->extrema ? SD_SAMPLE : 0;
     for (int32_t k = run->next; k < run->instants && run->instant[k] < run->t_to; k++)
         kinds |= run->instant_kind[k];
     if (!kinds)
@@ -299,6 +299,8 @@ int sd_run_drain(sd_run *run)
     double t = run->t_to;
     if (run->pending && run->settle && run->stepper->refine)
         refine(run);
+    if (run->pending && run->extrema)
+        sd_extrema_within(run);
     while (run->pending) {
         if (run->rows + 1 >= run->room)
             return 1;
@@ -356,6 +358,8 @@ static void rows_of_start(sd_run *run, double label)
         sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after, room_of_contents(run));
     run->t_from = run->t_to = t;
     run->fresh = 0;
+    if (run->extrema)
+        run->extrema->number = 0; /* what jumps has no crest */
 }
 
 /* the start: energies, powers and the first row */

@@ -13,6 +13,7 @@
 #define SYSDYN_RUN_H
 
 #include "system/least_norm.h"
+#include "run/extrema.h"
 #include "run/ledgers.h"
 #include "run/modes.h"
 #include "system/settle.h"
@@ -80,6 +81,7 @@ typedef struct sd_run {
     const double *projected;          /* drift of the last step before the method itself projected it; NULL: it does not */
     sd_modes *modes;                  /* NULL: every event goes to its handler */
     struct sd_corners *corners;       /* NULL: every jump of a text without events goes to Python */
+    sd_extrema *extrema;              /* NULL: nobody asks for them */
     double t_clear, t_seen;           /* within the last step, between which something watched has been seen to change */
     double turns;                     /* s: in which something that is read turns; 0: nothing does */
     double *looked;                   /* [SD_PARTS + 2][observed] values at the ends of parts, and within one */

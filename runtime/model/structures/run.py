@@ -151,6 +151,19 @@ class Corners(c.Structure):
     ]
 
 
+class Extrema(c.Structure):
+    """sd_extrema."""
+
+    _fields_ = [
+        *[(name, I) for name in ["number", "columns"]],
+        *[(name, P) for name in ["least", "most"]],
+        ("look", P * 3),
+        ("settled", P),
+        ("time", D * 2),
+        ("until", D),
+    ]
+
+
 class Run(c.Structure):
     """sd_run."""
 
@@ -212,6 +225,7 @@ class Run(c.Structure):
         ("projected", P),
         ("modes", P),
         ("corners", P),
+        ("extrema", P),
         ("t_clear", D),
         ("t_seen", D),
         ("turns", D),
