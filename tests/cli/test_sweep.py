@@ -19,7 +19,6 @@ from sysdyn.cli.sweep import workers
 from sysdyn.cli.sweep.axes import Axis, axis
 from sysdyn.cli.sweep.journal import Journal
 from sysdyn.cli.sweep.kept import Kept
-from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.cli.sweep.study import study
 from texts import LADDER
 
@@ -56,46 +55,6 @@ def swept(capsys, *arguments):
 
 def plain(name, text):
     return float(text.split()[0])
-
-
-BALL = """
-model ball {
-  param g = 9.81 m/s^2
-  coord x: translation = 1 m
-  energy T* = 1/2*1 kg*x'^2
-  energy V = 1 kg*g*x
-  init x' = 3 m/s
-  phi floor: x >= 0 m restitution 0.8
-}
-scene s of ball { time 0 s to 2 s; trace x, x' as v every 1 s; accuracy 1e-6 }
-"""
-
-
-@pytest.mark.parametrize("core", [True, False])
-@pytest.mark.parametrize("method", ["bdf", "radau", "dopri", "rosenbrock"])
-def test_extrema_lie_between_rows(tmp_path, core, method):
-    """Rows every second missed the crest by any part of it; rows at steps by 2 %."""
-    file = tmp_path / "s.sd"
-    file.write_text(SPRING.replace("every 10 ms", "every 1 s").replace("0 s to 2 s", "0 s to 20.3 s"))
-    runner = Runner(Request(str(file), method=method), "extrema", core=core)
-    tasks = [(0, {"k": 3.0}), (1, {"k": 5.0})]
-    found, left = runner.chunk(tasks)
-    assert bool(found) == core
-    kept = map(found[0].one, range(2)) if core else [runner(*task) for task in left]
-    for one, (_, case) in zip(kept, tasks, strict=True):
-        fastest = np.sqrt(case["k"])
-        assert one.most["x"] == pytest.approx(1.0, abs=1e-6)
-        assert [one.least["x"], one.least["v"] / fastest] == pytest.approx([-1.0, -1.0], abs=1e-6)
-
-
-@pytest.mark.parametrize("method", ["bdf", "radau"])
-def test_extrema_between_impacts(tmp_path, method):
-    file = tmp_path / "s.sd"
-    file.write_text(BALL)
-    one = Runner(Request(str(file), method=method), "extrema")(0, {"g": 10.0})
-    assert one.most["x"] == pytest.approx(1.0 + 9.0 / 20.0, rel=1e-6)
-    assert one.least["v"] == pytest.approx(-np.sqrt(2.0 * 10.0 * 1.45), rel=1e-6)
-    assert one.least["x"] == pytest.approx(0.0, abs=1e-6)
 
 
 # --- what varies ------------------------------------------------------------------------------------------------------
