@@ -294,12 +294,11 @@ class Settler:
     def exactly(self) -> Iterator[None]:
         """Points settle to round-off meanwhile, in a draft too: behind a jump what is left over moves the state."""
         core = self.core.contents
-        before = core.enough, core.slack
-        core.enough = core.slack = 0.0
+        enough, core.enough = core.enough, 0.0
         try:
             yield
         finally:
-            core.enough, core.slack = before
+            core.enough = enough
 
     def held(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
         """The same with the state where it is: of large ones within a basis that moves none of it, if there is one."""

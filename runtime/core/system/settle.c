@@ -247,12 +247,9 @@ static int choose(sd_settle *settle, double t, const double *y, const double *yd
  * else the point is as it was. */
 static int follow(sd_settle *settle, double t, double *y, double *yd, double *best)
 {
-    double limit = fmax(EXACT, settle->enough), state = 0.0, moved = INFINITY;
-    /* where events come and go values within a step leave the sums of the state (currents of coils in series) by as much as
-     * the step's error, and other moves of it than these are no round-off */
-    double still = fmax(settle->determined ? CLOSE : STILL, settle->slack);
+    double limit = fmax(EXACT, settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
     /* near a law's flat place round-off leaves much; of steep ones the saddle-point matrix makes more */
-    double bound = settle->system->scales > 0 || settle->determined ? FINE : CLOSE;
+    double bound = settle->system->scales > 0 ? FINE : CLOSE;
     int fresh = settle->ready != SD_BY_BASIS, failed = fresh && !slopes(settle, t, y, yd, 1);
     double before = failed ? INFINITY : measure(settle, t, y, yd);
     settle->drift = settle->constraints;

@@ -7,10 +7,10 @@
 #define LEAST_PIVOT 1e-11 /* part of its column below which a row of the basis follows from the others */
 #define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
 
-/* 1 / weight of an unknown or rate, which carries the state or not */
+/* 1 / weight of an unknown or rate, which carries the state or not; of a state that is to stay where it is 0 */
 static inline double lift(const sd_settle *settle, int carries)
 {
-    return carries ? 1.0 : 1.0 / settle->follows;
+    return carries ? !settle->determined : 1.0 / settle->follows;
 }
 
 int sd_settle_basis_new(sd_settle *settle, const int32_t *order)
