@@ -10,8 +10,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve
+from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter, problem_of
@@ -179,6 +181,50 @@ def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
     return solve(problem_of(starter, t, x, x, rows=every, free=free), x).x
 
 
+def _between(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """By Newton's method, and down steep laws, from where flows of which nothing is said are between those beside them:
+    a node guessed at 0 V below one at 400 V lies where no slope of a junction is left, or beyond the largest number.
+    With work of its own.
+    """
+    near = _evened(starter, t, x, free)
+    for way in (_newton, _walked) if near is not None else ():
+        with starter.granted():
+            found = first(way(starter, t, near, guess, free), near)
+        yield found
+
+
+def _evened(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
+    """X with these flows where differences of those that read each other in balances are least (as conductors of one
+    size between all nodes would have them), subject to rows that say flows; None where that changes nothing.
+    """
+    flows, own = starter.moves("f"), own_unknown(starter.settled, "dynamics", "f")
+    unsaid, alike = flows & free & ~starter.written, starter.equations.alike
+    one, other = own[starter.rows], starter.columns
+    pairs = (one >= 0) & flows[other] & (one != other) & (alike[one] == alike[other])
+    one, other = (np.append(*ends) for ends in ((one[pairs], other[pairs]), (other[pairs], one[pairs])))
+    one, other = one[unsaid[one]], other[unsaid[one]]
+    said = starter.groups("phi_rate", "psi", "initial")[starter.rows] & unsaid[starter.columns]
+    row, column, values = starter.rows[said], starter.columns[said], starter.jacobian(t, x)[said]
+    saying = np.zeros(starter.settled.rows, dtype=bool)
+    saying[row] = True
+    row, column, size = _numbered(row, saying) + int(unsaid.sum()), _numbered(column, unsaid), int(unsaid.sum())
+    one, inner, beside, apart = _numbered(one, unsaid), unsaid[other], _numbered(other, unsaid), x[other] - x[one]
+    i = np.concatenate([one, one[inner], row, column])  # what rows say has multipliers behind the flows
+    j = np.concatenate([one, beside[inner], column, row])
+    v = np.concatenate([np.ones(one.size), -np.ones(int(inner.sum())), values, values])
+    aim = np.append(np.bincount(one, apart, size), -starter.residual(t, x)[saying])
+    if not (one.size and aim.any() and np.isfinite(v).all() and np.isfinite(aim).all()):
+        return None
+    near = x.copy()
+    near[unsaid] += least_norm((aim.size, aim.size), (i, j, v), aim)[:size]
+    return near
+
+
+def _numbered(places: Ints, used: Mask) -> Ints:
+    """Places by their numbers among those in use."""
+    return (np.cumsum(used) - 1)[places]
+
+
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """Everything at once from points around: where a guess lies on a singular point."""
     for beside in around(starter, t, x, free):
@@ -208,6 +254,7 @@ STRATEGIES: tuple[tuple[str, Strategy], ...] = (
     ("newton", _newton),
     ("rows_as_written", _walked),
     ("homotopy", _led),
+    ("between", _between),
     ("perturbed_guess", _perturbed),
     ("largest_scales", _in_largest_scales),
 )
