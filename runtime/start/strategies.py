@@ -109,6 +109,10 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     follows, nearly = free & starter.following(t, x), False
     if not _beyond(starter, t, x, follows):
         found, nearly = rescaled(starter, t, x, guess, follows, least=False)
+        beside = None if nearly else _off_the_flat(starter, t, x, follows)
+        if beside is not None:
+            again, nearly = rescaled(starter, t, beside, guess, follows, least=False)
+            found = again if nearly else found
         exact = nearly and (found.residual <= CLOSED or own_residual(starter, t, found.x, found.x) <= CLOSED)
         yield found, exact
     with starter.granted():  # what a state that contradicts has taken is not missed then
@@ -116,6 +120,16 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     yield everything
     if nearly:
         yield found, True
+
+
+def _off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats | None:
+    """X with what follows from the state beside its guess where rows have no slope in it there: a turbulent valve at
+    rest under a pressure would have the vessel behind it filled rather than pass anything.  None where all have one.
+    """
+    beside = x + np.where(follows, starter.scale(t, x), 0.0)
+    flat = (starter.jacobian(t, x) == 0.0) & (starter.jacobian(t, beside) != 0.0) & follows[starter.columns]
+    moved = np.bincount(starter.columns, flat & ~starter.groups(*HIDDEN)[starter.rows], x.size) > 0.0
+    return np.where(moved, beside, x) if moved.any() else None
 
 
 def _as_written(starter: Starter, t: float, x: Floats) -> Mask:
