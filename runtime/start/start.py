@@ -33,8 +33,10 @@ from sysdyn.runtime.start.strategies import (
     applicable,
     around,
     first,
+    off_the_flat,
     own_residual,
     rescaled,
+    without_rates,
 )
 from sysdyn.values import dataclass
 
@@ -299,9 +301,10 @@ def _flat(starter: Starter, t: float, guess: Floats, free: Mask) -> Ints:
     if guess.size > DENSE:
         return np.zeros(0, dtype=np.int64)
     starter.work = Work(EXPLAINED, starter.work.until)
-    rows = starter.every & ~starter.groups(*(group for group in HIDDEN if group != "phi_rate"))  # no rate is in these
-    for x in itertools.chain([guess], around(starter, t, guess, free)):
-        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
+    rows, follows = without_rates(starter), free & starter.following(t, guess)
+    moved = ((x, free) for x in itertools.chain([guess], around(starter, t, guess, free)))
+    for x, may in itertools.chain(off_the_flat(starter, t, guess, follows), moved):
+        found = solve(problem_of(starter, t, x, guess, rows=rows, free=may), x)
         if found.residual < EXACT:
             near = starter.without_noise(found.x, starter.scale(t, guess))
             return rows_without_slope(starter.system, t, *starter.expand(near))

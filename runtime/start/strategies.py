@@ -109,10 +109,11 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     follows, nearly = free & starter.following(t, x), False
     if not _beyond(starter, t, x, follows):
         found, nearly = rescaled(starter, t, x, guess, follows, least=False)
-        beside = None if nearly else _off_the_flat(starter, t, x, follows)
-        if beside is not None:
-            again, nearly = rescaled(starter, t, beside, guess, follows, least=False)
-            found = again if nearly else found
+        for beside, may in () if nearly else off_the_flat(starter, t, x, follows):
+            again, nearly = rescaled(starter, t, beside, guess, may, least=False)
+            if nearly:
+                found = again
+                break
         exact = nearly and (found.residual <= CLOSED or own_residual(starter, t, found.x, found.x) <= CLOSED)
         yield found, exact
     with starter.granted():  # what a state that contradicts has taken is not missed then
@@ -122,14 +123,32 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         yield found, True
 
 
-def _off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats | None:
-    """X with what follows from the state beside its guess where rows have no slope in it there: a turbulent valve at
-    rest under a pressure would have the vessel behind it filled rather than pass anything.  None where all have one.
+def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterator[tuple[Floats, Mask]]:
+    """X with what follows from the state beside its guess where rows have no slope in it there, and what is free: those
+    that are missed where the other rows hold, the rest as guessed, then all.  A turbulent valve at rest under pressure
+    would have the vessel behind it filled rather than pass anything; under none it is at rest, which Newton's steps
+    only approach.
     """
     beside = x + np.where(follows, starter.scale(t, x), 0.0)
     flat = (starter.jacobian(t, x) == 0.0) & (starter.jacobian(t, beside) != 0.0) & follows[starter.columns]
-    moved = np.bincount(starter.columns, flat & ~starter.groups(*HIDDEN)[starter.rows], x.size) > 0.0
-    return np.where(moved, beside, x) if moved.any() else None
+    flat &= ~starter.groups(*HIDDEN)[starter.rows]
+    if not flat.any():
+        return
+    flat_rows = np.bincount(starter.rows, flat, starter.settled.rows) > 0.0
+    flat_here = np.bincount(starter.columns, flat, x.size) > 0.0
+    rows = without_rates(starter) & ~flat_rows
+    at = solve(problem_of(starter, t, x, x, rows=rows, free=follows & ~flat_here), x).x
+    missed = np.abs(starter.residual(t, at)) * starter.row_scale(t, at, starter.scale(t, at)) > OWN
+    some = np.bincount(starter.columns, flat & missed[starter.rows], x.size) > 0.0
+    if some.any():
+        yield np.where(some, beside, x), follows & (some | ~flat_here)
+    if (some != flat_here).any():
+        yield np.where(flat_here, beside, x), follows
+
+
+def without_rates(starter: Starter) -> Mask:
+    """Rows in which no rate is [rows]."""
+    return starter.every & ~starter.groups(*(group for group in HIDDEN if group != "phi_rate"))
 
 
 def _as_written(starter: Starter, t: float, x: Floats) -> Mask:

@@ -172,3 +172,39 @@ def test_of_two_vessels_the_one_of_which_nothing_is_said_begins_empty(tmp_path, 
     exact = solve_ivp(rates, (0.0, 60.0), [2e4, 0.0, 0.0], t_eval=trace.time, rtol=1e-9, atol=1e-9, method="Radau").y
     found = np.array([trace[name].values for name in ("p1", "p2", "f")])
     assert (np.abs(found - exact).max(1) <= 1e-4 * np.abs(exact).max(1)).all()
+
+
+RESTING = """\
+from std.fluid import tank, valve
+model resting {
+  node a, b, s: hydraulic
+  S: effort(e = 10 kPa) s -> ground
+  T1: tank(A = 0.3 m^2) a
+  T2: tank(A = 0.1 m^2) b
+  V1: valve(Cr = 2.5e8 Pa.s^2/m^6) a -> b
+  V2: valve(Cr = 1.5e8 Pa.s^2/m^6) a -> s
+  V3: valve(Cr = 2.5e9 Pa.s^2/m^6) a -> ground
+  init T2.store.e = 20 kPa
+}
+scene flows of resting {
+  time 0 s to 20 s
+  trace T1.store.e as p1, T2.store.e as p2 every 0.5 s
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_a_valve_at_rest_beside_others_that_pass(tmp_path, formulation):
+    """What it passes is a root of time: it has no rate at first, and Newton's steps reach its zero as powers of two."""
+
+    def rates(_, y):
+        f1, f2, f3 = (
+            np.sign(e) * np.sqrt(np.abs(e) / c) for e, c in zip((y[0] - y[1], y[0] - 1e4, y[0]), laws, strict=True)
+        )
+        return [-(f1 + f2 + f3) * 9806.65 / 0.3, f1 * 9806.65 / 0.1]
+
+    laws = (2.5e8, 1.5e8, 2.5e9)
+    (tmp_path / "model.sd").write_text(RESTING)
+    trace = api.simulate(tmp_path / "model.sd", formulation=formulation, output=tmp_path / "out.h5")
+    exact = solve_ivp(rates, (0.0, 20.0), [0.0, 2e4], t_eval=trace.time, rtol=1e-9, atol=1e-6, max_step=0.02).y
+    assert np.abs(np.array([trace["p1"].values, trace["p2"].values]) - exact).max() <= 1e-4 * 2e4
