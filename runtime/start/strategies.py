@@ -220,7 +220,9 @@ def _between(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     With work of its own.
     """
     near = _evened(starter, t, x, free)
-    for way in (_newton, _walked) if near is not None else ():
+    if near is None:
+        return
+    for way in (_newton, _walked):
         with starter.granted():
             found = first(way(starter, t, near, guess, free), near)
         yield found
@@ -244,8 +246,8 @@ def _evened(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
     one, inner, beside, apart = _numbered(one, unsaid), unsaid[other], _numbered(other, unsaid), x[other] - x[one]
     i = np.concatenate([one, one[inner], row, column])  # what rows say has multipliers behind the flows
     j = np.concatenate([one, beside[inner], column, row])
-    v = np.concatenate([np.ones(one.size), -np.ones(int(inner.sum())), values, values])
-    aim = np.append(np.bincount(one, apart, size), -starter.residual(t, x)[saying])
+    v: Floats = np.concatenate([np.ones(one.size), -np.ones(int(inner.sum())), values, values])
+    aim: Floats = np.append(np.bincount(one, apart, size), -starter.residual(t, x)[saying])
     if not (one.size and aim.any() and np.isfinite(v).all() and np.isfinite(aim).all()):
         return None
     near = x.copy()
