@@ -36,6 +36,7 @@ from sysdyn.runtime.start.strategies import (
     off_the_flat,
     own_residual,
     rescaled,
+    unasked,
     without_rates,
 )
 from sysdyn.values import dataclass
@@ -311,22 +312,6 @@ def _flat(starter: Starter, t: float, guess: Floats, free: Mask) -> Ints:
     return np.zeros(0, dtype=np.int64)
 
 
-def _without_rates(starter: Starter, flat: Ints) -> bool:
-    """Asks for no rates of these rows of the system; whether any were asked for.
-
-    Where a law is flat, or infinitely steep, the flow that it determines grows as a root of time: the equations hold,
-    and a rate of it there is none.
-    """
-    before = int(starter.every.sum())
-    first = {(group, family): row for group, family, row in starter.settled.form.groups}
-    for group, family, row in starter.system.form.groups:
-        own = flat[(flat >= row) & (flat < row + starter.system.description.rows[family].size)]
-        rates = first.get((f"{group}_rate", family))
-        if rates is not None:
-            starter.every[rates + own - row] = False
-    return int(starter.every.sum()) < before
-
-
 def consistent_start(
     system: System,
     t0: float,
@@ -379,7 +364,7 @@ def _consistent(
         raise InconsistentStart("stuck", best.residual)
     if not strategy:
         flat = _flat(starter, t0, guess, starter.free)
-        if _without_rates(starter, flat):
+        if unasked(starter, flat):
             starter.work = Work(until=until)
             best, strategy = _attempt(starter, t0, guess, starter.free)
         if not strategy:

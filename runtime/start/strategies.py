@@ -12,8 +12,9 @@ from dataclasses import replace
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_unknown
+from sysdyn.runtime.model.slopes import rows_without_slope
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve
-from sysdyn.runtime.numerics.least_change import least_norm
+from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter, problem_of
@@ -111,6 +112,8 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         found, nearly = rescaled(starter, t, x, guess, follows, least=False)
         for beside, may in () if nearly else off_the_flat(starter, t, x, follows):
             again, nearly = rescaled(starter, t, beside, guess, may, least=False)
+            if not nearly:
+                again, nearly = _at_rest(starter, t, beside, guess, may)
             if nearly:
                 found = again
                 break
@@ -140,10 +143,41 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
     at = solve(problem_of(starter, t, x, x, rows=rows, free=follows & ~flat_here), x).x
     missed = np.abs(starter.residual(t, at)) * starter.row_scale(t, at, starter.scale(t, at)) > OWN
     some = np.bincount(starter.columns, flat & missed[starter.rows], x.size) > 0.0
-    if some.any():
-        yield np.where(some, beside, x), follows & (some | ~flat_here)
+    yield np.where(some, beside, x), follows & (some | ~flat_here)
     if (some != flat_here).any():
         yield np.where(flat_here, beside, x), follows
+
+
+def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """From x, in what follows from the state, where rates of laws that are flat at rest are not asked for; these are
+    asked for again where that does not hold.
+    """
+    at, before = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x), starter.every.copy()
+    if at.residual >= EXACT or x.size > DENSE:
+        return at, False
+    near = starter.without_noise(at.x, starter.scale(t, guess))
+    if not unasked(starter, rows_without_slope(starter.system, t, *starter.expand(near))):
+        return at, False
+    found, holds = rescaled(starter, t, at.x, guess, free, least=False)
+    if not holds:
+        starter.every[:] = before
+    return found, holds
+
+
+def unasked(starter: Starter, flat: Ints) -> bool:
+    """Asks for no rates of these rows of the system; whether any were asked for.
+
+    Where a law is flat, or infinitely steep, the flow that it determines grows as a root of time: the equations hold,
+    and a rate of it there is none.
+    """
+    before = int(starter.every.sum())
+    first = {(group, family): row for group, family, row in starter.settled.form.groups}
+    for group, family, row in starter.system.form.groups:
+        own = flat[(flat >= row) & (flat < row + starter.system.description.rows[family].size)]
+        rates = first.get((f"{group}_rate", family))
+        if rates is not None:
+            starter.every[rates + own - row] = False
+    return int(starter.every.sum()) < before
 
 
 def without_rates(starter: Starter) -> Mask:
