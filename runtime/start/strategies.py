@@ -108,9 +108,10 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     guess rounded to ten digits satisfies rows nearly, and a stiff model pays for the rest with its first step.
     """
     follows, nearly = free & starter.following(t, x), False
-    if not _beyond(starter, t, x, follows):
-        found, nearly = rescaled(starter, t, x, guess, follows, least=False)
-        for beside, may in () if nearly else off_the_flat(starter, t, x, follows):
+    begun = _stated(starter, t, x, guess, free) if _beyond(starter, t, x, follows) else x
+    if begun is not None:
+        found, nearly = rescaled(starter, t, begun, guess, follows, least=False)
+        for beside, may in () if nearly else off_the_flat(starter, t, begun, follows):
             again, nearly = rescaled(starter, t, beside, guess, may, least=False)
             if not nearly:
                 again, nearly = _at_rest(starter, t, beside, guess, may)
@@ -126,6 +127,25 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         yield found, True
 
 
+def _stated(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats | None:
+    """Where laws are flat at x: the point at which rows hold that read nothing of what follows from the state, by the
+    least change of this; else None.
+    """
+    follows = starter.following(t, x)
+    if x.size > DENSE or not _flat_at(starter, t, x, free & follows).any():
+        return None
+    rows = starter.every & (np.bincount(starter.rows, (free & follows)[starter.columns], starter.settled.rows) == 0)
+    found = solve(problem_of(starter, t, x, guess, rows=rows, free=free & ~follows, least=True), x)
+    return found.x if found.residual < EXACT else None
+
+
+def _flat_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
+    """Entries [entries] of rows that have no slope in what follows from the state at x, but beside it."""
+    beside = x + np.where(follows, starter.scale(t, x), 0.0)
+    flat = (starter.jacobian(t, x) == 0.0) & (starter.jacobian(t, beside) != 0.0) & follows[starter.columns]
+    return np.asarray(flat & ~starter.groups(*HIDDEN)[starter.rows])
+
+
 def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterator[tuple[Floats, Mask]]:
     """X with what follows from the state beside its guess where rows have no slope in it there, and what is free: those
     that are missed where the other rows hold, the rest as guessed, then all.  A turbulent valve at rest under pressure
@@ -133,8 +153,7 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
     only approach.
     """
     beside = x + np.where(follows, starter.scale(t, x), 0.0)
-    flat = (starter.jacobian(t, x) == 0.0) & (starter.jacobian(t, beside) != 0.0) & follows[starter.columns]
-    flat &= ~starter.groups(*HIDDEN)[starter.rows]
+    flat = _flat_at(starter, t, x, follows)
     if not flat.any():
         return
     flat_rows = np.bincount(starter.rows, flat, starter.settled.rows) > 0.0
@@ -152,7 +171,8 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     """From x, in what follows from the state, where rates of laws that are flat at rest are not asked for; these are
     asked for again where that does not hold.
     """
-    at, before = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x), starter.every.copy()
+    before = starter.every.copy()
+    at = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x)
     if at.residual >= EXACT or x.size > DENSE:
         return at, False
     near = starter.without_noise(at.x, starter.scale(t, guess))
