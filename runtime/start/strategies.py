@@ -112,7 +112,8 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     if begun is not None:
         found, nearly = rescaled(starter, t, begun, guess, follows, least=False)
         for beside, may in () if nearly else off_the_flat(starter, t, begun, follows):
-            again, nearly = rescaled(starter, t, beside, guess, may, least=False)
+            if beside is not begun:
+                again, nearly = rescaled(starter, t, beside, guess, may, least=False)
             if not nearly:
                 again, nearly = _at_rest(starter, t, beside, guess, may)
             if nearly:
@@ -162,8 +163,8 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
     at = solve(problem_of(starter, t, x, x, rows=rows, free=follows & ~flat_here), x).x
     missed = np.abs(starter.residual(t, at)) * starter.row_scale(t, at, starter.scale(t, at)) > OWN
     some = np.bincount(starter.columns, flat & missed[starter.rows], x.size) > 0.0
-    yield np.where(some, beside, x), follows & (some | ~flat_here)
-    if (some != flat_here).any():
+    yield np.where(some, beside, x) if some.any() else x, follows & (some | ~flat_here)
+    if some.any() and (some != flat_here).any():
         yield np.where(flat_here, beside, x), follows
 
 
