@@ -31,6 +31,7 @@ from sysdyn.values import dataclass
 SOUGHT = {
     "rows_as_written": "down steep laws, from the equations without their derivatives",
     "homotopy": "along what fades of the misses at the guess",
+    "between": "from where what nothing is said of lies between its neighbours",
     "perturbed_guess": "from a point beside the guess",
     "largest_scales": "in the largest scales that the equations propose",
 }

@@ -33,8 +33,11 @@ from sysdyn.runtime.start.strategies import (
     applicable,
     around,
     first,
+    off_the_flat,
     own_residual,
     rescaled,
+    unasked,
+    without_rates,
 )
 from sysdyn.values import dataclass
 
@@ -299,29 +302,14 @@ def _flat(starter: Starter, t: float, guess: Floats, free: Mask) -> Ints:
     if guess.size > DENSE:
         return np.zeros(0, dtype=np.int64)
     starter.work = Work(EXPLAINED, starter.work.until)
-    rows = starter.every & ~starter.groups(*(group for group in HIDDEN if group != "phi_rate"))  # no rate is in these
-    for x in itertools.chain([guess], around(starter, t, guess, free)):
-        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
+    rows, follows = without_rates(starter), free & starter.following(t, guess)
+    moved = ((x, free) for x in itertools.chain([guess], around(starter, t, guess, free)))
+    for x, may in itertools.chain(off_the_flat(starter, t, guess, follows), moved):
+        found = solve(problem_of(starter, t, x, guess, rows=rows, free=may), x)
         if found.residual < EXACT:
             near = starter.without_noise(found.x, starter.scale(t, guess))
             return rows_without_slope(starter.system, t, *starter.expand(near))
     return np.zeros(0, dtype=np.int64)
-
-
-def _without_rates(starter: Starter, flat: Ints) -> bool:
-    """Asks for no rates of these rows of the system; whether any were asked for.
-
-    Where a law is flat, or infinitely steep, the flow that it determines grows as a root of time: the equations hold,
-    and a rate of it there is none.
-    """
-    before = int(starter.every.sum())
-    first = {(group, family): row for group, family, row in starter.settled.form.groups}
-    for group, family, row in starter.system.form.groups:
-        own = flat[(flat >= row) & (flat < row + starter.system.description.rows[family].size)]
-        rates = first.get((f"{group}_rate", family))
-        if rates is not None:
-            starter.every[rates + own - row] = False
-    return int(starter.every.sum()) < before
 
 
 def consistent_start(
@@ -376,7 +364,7 @@ def _consistent(
         raise InconsistentStart("stuck", best.residual)
     if not strategy:
         flat = _flat(starter, t0, guess, starter.free)
-        if _without_rates(starter, flat):
+        if unasked(starter, flat):
             starter.work = Work(until=until)
             best, strategy = _attempt(starter, t0, guess, starter.free)
         if not strategy:

@@ -10,8 +10,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.inertia import own_unknown
+from sysdyn.runtime.model.slopes import rows_without_slope
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve
+from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter, problem_of
@@ -105,8 +108,17 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     guess rounded to ten digits satisfies rows nearly, and a stiff model pays for the rest with its first step.
     """
     follows, nearly = free & starter.following(t, x), False
-    if not _beyond(starter, t, x, follows):
-        found, nearly = rescaled(starter, t, x, guess, follows, least=False)
+    begun = _stated(starter, t, x, guess, free) if _beyond(starter, t, x, follows) else x
+    if begun is not None:
+        found, nearly = rescaled(starter, t, begun, guess, follows, least=False)
+        for beside, may in () if nearly else off_the_flat(starter, t, begun, follows):
+            if beside is not begun:
+                again, nearly = rescaled(starter, t, beside, guess, may, least=False)
+            if not nearly:
+                again, nearly = _at_rest(starter, t, beside, guess, may)
+            if nearly:
+                found = again
+                break
         exact = nearly and (found.residual <= CLOSED or own_residual(starter, t, found.x, found.x) <= CLOSED)
         yield found, exact
     with starter.granted():  # what a state that contradicts has taken is not missed then
@@ -114,6 +126,84 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     yield everything
     if nearly:
         yield found, True
+
+
+def _stated(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats | None:
+    """Where laws are flat at x: the point at which rows hold that read nothing of what follows from the state, by the
+    least change of this; else None.
+    """
+    follows = starter.following(t, x)
+    if x.size > DENSE or not _flat_at(starter, t, x, free & follows).any():
+        return None
+    rows = starter.every & (np.bincount(starter.rows, (free & follows)[starter.columns], starter.settled.rows) == 0)
+    found = solve(problem_of(starter, t, x, guess, rows=rows, free=free & ~follows, least=True), x)
+    return found.x if found.residual < EXACT else None
+
+
+def _flat_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
+    """Entries [entries] of rows that have no slope in what follows from the state at x, but beside it."""
+    beside = x + np.where(follows, starter.scale(t, x), 0.0)
+    flat = (starter.jacobian(t, x) == 0.0) & (starter.jacobian(t, beside) != 0.0) & follows[starter.columns]
+    return np.asarray(flat & ~starter.groups(*HIDDEN)[starter.rows])
+
+
+def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterator[tuple[Floats, Mask]]:
+    """X with what follows from the state beside its guess where rows have no slope in it there, and what is free: those
+    that are missed where the other rows hold, the rest as guessed, then all.  A turbulent valve at rest under pressure
+    would have the vessel behind it filled rather than pass anything; under none it is at rest, which Newton's steps
+    only approach.
+    """
+    beside = x + np.where(follows, starter.scale(t, x), 0.0)
+    flat = _flat_at(starter, t, x, follows)
+    if not flat.any():
+        return
+    flat_rows = np.bincount(starter.rows, flat, starter.settled.rows) > 0.0
+    flat_here = np.bincount(starter.columns, flat, x.size) > 0.0
+    rows = without_rates(starter) & ~flat_rows
+    at = solve(problem_of(starter, t, x, x, rows=rows, free=follows & ~flat_here), x).x
+    missed = np.abs(starter.residual(t, at)) * starter.row_scale(t, at, starter.scale(t, at)) > OWN
+    some = np.bincount(starter.columns, flat & missed[starter.rows], x.size) > 0.0
+    yield np.where(some, beside, x) if some.any() else x, follows & (some | ~flat_here)
+    if some.any() and (some != flat_here).any():
+        yield np.where(flat_here, beside, x), follows
+
+
+def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """From x, in what follows from the state, where rates of laws that are flat at rest are not asked for; these are
+    asked for again where that does not hold.
+    """
+    before = starter.every.copy()
+    at = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x)
+    if at.residual >= EXACT or x.size > DENSE:
+        return at, False
+    near = starter.without_noise(at.x, starter.scale(t, guess))
+    if not unasked(starter, rows_without_slope(starter.system, t, *starter.expand(near))):
+        return at, False
+    found, holds = rescaled(starter, t, at.x, guess, free, least=False)
+    if not holds:
+        starter.every[:] = before
+    return found, holds
+
+
+def unasked(starter: Starter, flat: Ints) -> bool:
+    """Asks for no rates of these rows of the system; whether any were asked for.
+
+    Where a law is flat, or infinitely steep, the flow that it determines grows as a root of time: the equations hold,
+    and a rate of it there is none.
+    """
+    before = int(starter.every.sum())
+    first = {(group, family): row for group, family, row in starter.settled.form.groups}
+    for group, family, row in starter.system.form.groups:
+        own = flat[(flat >= row) & (flat < row + starter.system.description.rows[family].size)]
+        rates = first.get((f"{group}_rate", family))
+        if rates is not None:
+            starter.every[rates + own - row] = False
+    return int(starter.every.sum()) < before
+
+
+def without_rates(starter: Starter) -> Mask:
+    """Rows in which no rate is [rows]."""
+    return starter.every & ~starter.groups(*(group for group in HIDDEN if group != "phi_rate"))
 
 
 def _as_written(starter: Starter, t: float, x: Floats) -> Mask:
@@ -179,6 +269,52 @@ def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
     return solve(problem_of(starter, t, x, x, rows=every, free=free), x).x
 
 
+def _between(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """By Newton's method, and down steep laws, from where flows of which nothing is said are between those beside them:
+    a node guessed at 0 V below one at 400 V lies where no slope of a junction is left, or beyond the largest number.
+    With work of its own.
+    """
+    near = _evened(starter, t, x, free)
+    if near is None:
+        return
+    for way in (_newton, _walked):
+        with starter.granted():
+            found = first(way(starter, t, near, guess, free), near)
+        yield found
+
+
+def _evened(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
+    """X with these flows where differences of those that read each other in balances are least (as conductors of one
+    size between all nodes would have them), subject to rows that say flows; None where that changes nothing.
+    """
+    flows, own = starter.moves("f"), own_unknown(starter.settled, "dynamics", "f")
+    unsaid, alike = flows & free & ~starter.written, starter.equations.alike
+    one, other = own[starter.rows], starter.columns
+    pairs = (one >= 0) & flows[other] & (one != other) & (alike[one] == alike[other])
+    one, other = (np.append(*ends) for ends in ((one[pairs], other[pairs]), (other[pairs], one[pairs])))
+    one, other = one[unsaid[one]], other[unsaid[one]]
+    said = starter.groups("phi_rate", "psi", "initial")[starter.rows] & unsaid[starter.columns]
+    row, column, values = starter.rows[said], starter.columns[said], starter.jacobian(t, x)[said]
+    saying = np.zeros(starter.settled.rows, dtype=bool)
+    saying[row] = True
+    row, column, size = _numbered(row, saying) + int(unsaid.sum()), _numbered(column, unsaid), int(unsaid.sum())
+    one, inner, beside, apart = _numbered(one, unsaid), unsaid[other], _numbered(other, unsaid), x[other] - x[one]
+    i = np.concatenate([one, one[inner], row, column])  # what rows say has multipliers behind the flows
+    j = np.concatenate([one, beside[inner], column, row])
+    v: Floats = np.concatenate([np.ones(one.size), -np.ones(int(inner.sum())), values, values])
+    aim: Floats = np.append(np.bincount(one, apart, size), -starter.residual(t, x)[saying])
+    if not (one.size and aim.any() and np.isfinite(v).all() and np.isfinite(aim).all()):
+        return None
+    near = x.copy()
+    near[unsaid] += least_norm((aim.size, aim.size), (i, j, v), aim)[:size]
+    return near
+
+
+def _numbered(places: Ints, used: Mask) -> Ints:
+    """Places by their numbers among those in use."""
+    return (np.cumsum(used) - 1)[places]
+
+
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """Everything at once from points around: where a guess lies on a singular point."""
     for beside in around(starter, t, x, free):
@@ -208,6 +344,7 @@ STRATEGIES: tuple[tuple[str, Strategy], ...] = (
     ("newton", _newton),
     ("rows_as_written", _walked),
     ("homotopy", _led),
+    ("between", _between),
     ("perturbed_guess", _perturbed),
     ("largest_scales", _in_largest_scales),
 )

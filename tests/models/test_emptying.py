@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from sysdyn import api
 
 VESSEL = """\
@@ -106,3 +107,137 @@ def test_a_run_that_meets_an_accuracy_meets_it_where_the_vessel_ends(tmp_path, a
     flow = 0.05 * np.sqrt(start)
     share = np.maximum(flow - 0.025**2 * 2.0 * trace.time, 0.0) / flow
     assert np.abs(trace["f"].values / flow - share).max() <= accuracy
+
+
+FILLED = """\
+from std.fluid import tank, valve, check_valve
+model filled {
+  node s, m, k, a: hydraulic
+  supply: effort(e = 2 bar) s -> ground
+  V1: valve(Cr = 1e10 Pa.s^2/m^6) s -> m
+  PASS m -> k
+  V2: valve(Cr = 3e10 Pa.s^2/m^6) k -> a
+  T: tank(A = 1 dm^2) a
+}
+scene flows of filled {
+  time 0 s to 100 s
+  trace V2.f as f, T.store.e as p every 1 s
+}
+"""
+
+
+@pytest.mark.parametrize("between", ["C: check_valve()", "C: valve(Cr = 1e7 Pa.s^2/m^6)"])
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_a_vessel_of_which_nothing_is_said_begins_empty_behind_a_turbulent_valve(tmp_path, between, formulation):
+    """At rest the valve has no slope: it was full, 2 bar, told as met.  The root of the pressure left falls evenly."""
+    (tmp_path / "model.sd").write_text(FILLED.replace("PASS", between))
+    trace = api.simulate(tmp_path / "model.sd", formulation=formulation, output=tmp_path / "out.h5")
+    law, stiff = (4e10 if "check" in between else 4.001e10), 1000.0 * 9.80665 / 0.01
+    flow = np.sqrt(2e5 / law)
+    left = np.maximum(flow - 0.5 * stiff / law * trace.time, 0.0)
+    assert np.abs(trace["f"].values - left).max() <= 1e-4 * flow
+    assert np.abs(trace["p"].values - (2e5 - law * left**2)).max() <= 20.0
+
+
+PARTLY = """\
+from std.fluid import tank, valve, pipe
+model partly {
+  node a, b, c: hydraulic
+  T1: tank(A = 0.5 m^2) a
+  T2: tank(A = 0.2 m^2) b
+  V1: valve(Cr = 1e9 Pa.s^2/m^6) a -> b
+  P: pipe(I = 1e6 Pa.s^2/m^3, R = 1e5 Pa.s/m^3) a = b, b = c
+  V2: valve(Cr = 2e9 Pa.s^2/m^6) c -> ground
+  init T1.store.e = 20 kPa
+}
+scene flows of partly {
+  time 0 s to 60 s
+  trace T1.store.e as p1, T2.store.e as p2, P.inert.f as f every 1 s
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_of_two_vessels_the_one_of_which_nothing_is_said_begins_empty(tmp_path, formulation):
+    """In Lagrange's form alone it was as full as the other."""
+
+    def rates(_, y):
+        p1, p2, f = y
+        flow = np.sign(p1 - p2) * np.sqrt(np.abs(p1 - p2) / 1e9)
+        c1, c2 = (1000.0 * 9.80665 / area for area in (0.5, 0.2))
+        return [-c1 * flow, c2 * (flow - f), (p2 - 1e5 * f - 2e9 * f * np.abs(f)) / 1e6]
+
+    (tmp_path / "model.sd").write_text(PARTLY)
+    trace = api.simulate(tmp_path / "model.sd", formulation=formulation, output=tmp_path / "out.h5")
+    exact = solve_ivp(rates, (0.0, 60.0), [2e4, 0.0, 0.0], t_eval=trace.time, rtol=1e-9, atol=1e-9, method="Radau").y
+    found = np.array([trace[name].values for name in ("p1", "p2", "f")])
+    assert (np.abs(found - exact).max(1) <= 1e-4 * np.abs(exact).max(1)).all()
+
+
+RESTING = """\
+from std.fluid import tank, valve
+model resting {
+  node a, b, s: hydraulic
+  S: effort(e = 10 kPa) s -> ground
+  T1: tank(A = 0.3 m^2) a
+  T2: tank(A = 0.1 m^2) b
+  V1: valve(Cr = 2.5e8 Pa.s^2/m^6) a -> b
+  V2: valve(Cr = 1.5e8 Pa.s^2/m^6) a -> s
+  V3: valve(Cr = 2.5e9 Pa.s^2/m^6) a -> ground
+  init T2.store.e = 20 kPa
+}
+scene flows of resting {
+  time 0 s to 20 s
+  trace T1.store.e as p1, T2.store.e as p2 every 0.5 s
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_a_valve_at_rest_beside_others_that_pass(tmp_path, formulation):
+    """What it passes is a root of time: it has no rate at first, and Newton's steps reach its zero as powers of two."""
+
+    def rates(_, y):
+        f1, f2, f3 = (
+            np.sign(e) * np.sqrt(np.abs(e) / c) for e, c in zip((y[0] - y[1], y[0] - 1e4, y[0]), laws, strict=True)
+        )
+        return [-(f1 + f2 + f3) * 9806.65 / 0.3, f1 * 9806.65 / 0.1]
+
+    laws = (2.5e8, 1.5e8, 2.5e9)
+    (tmp_path / "model.sd").write_text(RESTING)
+    trace = api.simulate(tmp_path / "model.sd", formulation=formulation, output=tmp_path / "out.h5")
+    exact = solve_ivp(rates, (0.0, 20.0), [0.0, 2e4], t_eval=trace.time, rtol=1e-9, atol=1e-6, max_step=0.02).y
+    assert np.abs(np.array([trace["p1"].values, trace["p2"].values]) - exact).max() <= 1e-4 * 2e4
+
+
+GASES = """\
+from std.fluid import accumulator, valve, check_valve
+model gases {
+  node a, b, k, s: hydraulic
+  S: effort(e = 1.5 bar) s -> ground
+  A: accumulator(V0 = 1.5 l, p0 = 2 bar) a
+  B: accumulator(V0 = 6 l, p0 = 2 bar) b
+  V1: valve(Cr = 1e10 Pa.s^2/m^6) b -> k
+  C: check_valve() k -> a
+  V2: valve(Cr = 4e11 Pa.s^2/m^6) b -> s
+}
+scene flows of gases {
+  time 0 s to 1 s
+  trace A.gas.e as p, B.gas.e as q every 0.1 s
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_gases_of_which_nothing_is_said_begin_as_they_are_filled_beside_a_valve_at_rest(tmp_path, formulation):
+    """The valve at rest has no rate at first: both began at the source's 1.5 bar in Lagrange's form, told as met."""
+
+    def rates(_, y):
+        p = 2e5 * 6e-3 / (6e-3 - y[0])
+        return [-np.sign(p - 1.5e5) * np.sqrt(np.abs(p - 1.5e5) / 4e11)]
+
+    (tmp_path / "model.sd").write_text(GASES)
+    trace = api.simulate(tmp_path / "model.sd", formulation=formulation, output=tmp_path / "out.h5")
+    moved = solve_ivp(rates, (0.0, 1.0), [0.0], dense_output=True, rtol=1e-10, atol=1e-15).sol(trace.time)[0]
+    assert np.abs(trace["q"].values - 2e5 * 6e-3 / (6e-3 - moved)).max() <= 20.0
+    assert np.abs(trace["p"].values - 2e5).max() <= 20.0

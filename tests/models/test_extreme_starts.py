@@ -4,7 +4,8 @@ import time
 
 import numpy as np
 import pytest
-from model_runs import FOUR
+from model_runs import FOUR, trace_of
+from scipy.optimize import brentq
 from start_strategies import started
 from sysdyn import api
 from sysdyn.runtime.model.failures import SolverFailure
@@ -283,3 +284,56 @@ def test_a_state_that_is_known_to_1e_13(formulation):
     if formulation.startswith("co_"):
         n1, n3, n4 = (state.y[named(state, system, f"n{k}'")[0]] for k in (1, 3, 4))
         assert 0.567 + 1.303 * (n4 - n3) == pytest.approx((n3 - n1) / 2.148, rel=1e-12)
+
+
+BOOST = """from std.electrical import resistor, capacitor, voltage, inductor
+model boost {{
+  node vin, sw, m, out: electrical
+  Vs: voltage(v = 12 V) vin -> ground
+  L: inductor(L = 1 mH) vin -> sw
+  D: dissipator(f = 1 pA*(exp(e/(25 mV)) - 1)) sw -> m
+  D2: dissipator(f = 1 nA*(exp(e/(40 mV)) - 1)) m -> out
+  C: capacitor(C = 100 uF) out -> ground
+  R: resistor(R = 100 ohm) out -> ground
+  init L.f = 1 A
+  init C.e = {volts} V
+}}
+scene on of boost {{ time 0 s to 10 ns; trace L.f, sw.e, m.e every 1 ns }}
+"""
+
+
+@pytest.mark.parametrize("volts", [400.0, -1e4, 1e5])
+@pytest.mark.parametrize("formulation", FOUR[2:])
+def test_nodes_guessed_far_from_a_charged_neighbour_behind_junctions(tmp_path, formulation, volts):
+    """At 0 V below 400 V their junctions have no slope, above -10 kV no number: inverted laws say where they are."""
+    trace = trace_of(tmp_path, BOOST.format(volts=volts), formulation=formulation)
+    behind = 0.04 * np.log1p(1e9)
+    drop = 0.025 * np.log1p(1e12) + behind
+    assert trace["m.e"].values[0] - volts == pytest.approx(behind, abs=1e-4)
+    assert trace["sw.e"].values[0] - volts == pytest.approx(drop, abs=1e-4)
+    assert 1.0 - trace["L.f"].values[-1] == pytest.approx(1e-5 * (volts + drop - 12.0), rel=1e-3)
+
+
+SLIDING = """from std.mechanical import mass, damper
+model sliding {{
+  node a, b, c: translation
+  M: mass(m = 1 kg) a
+  D: dissipator(e = 1 uN*sinh(f/(0.1 m/s))) a -> b
+  D2: dissipator(e = 1 uN*sinh(f/(0.1 m/s))) b -> c
+  D3: damper(b = 1 N.s/m) b -> c
+  M2: mass(m = 2 kg) c
+  init M.f = {speed} m/s
+  init M2.f = {speed} m/s - 3 m/s
+}}
+scene on of sliding {{ time 0 s to 1 ms; trace b.f every 1 ms }}
+"""
+
+
+@pytest.mark.parametrize("speed", [300.0, -1e5])
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
+def test_a_joint_without_mass_between_bodies_that_move(tmp_path, formulation, speed):
+    """Guessed at rest it is 3000 times the creep of its friction away from both."""
+    trace = trace_of(tmp_path, SLIDING.format(speed=speed), formulation=formulation)
+    ahead = brentq(lambda v: 1e-6 * (np.sinh((3 - v) / 0.1) - np.sinh(v / 0.1)) - v, 1.0, 3.0, xtol=1e-14)
+    assert trace["b.f"].values[0] - (speed - 3.0) == pytest.approx(ahead, abs=1e-6)
