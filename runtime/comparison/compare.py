@@ -150,10 +150,24 @@ def _coverage(times: tuple[Floats, Floats], tau: float) -> list[Compared]:
     return found
 
 
+def _ordered(one: Sequence[Event], two: list[Event], tau: float) -> list[Event]:
+    """The second events, those within tau of each other in the order of the first ones."""
+    for k, wanted in enumerate(one[: len(two)]):
+        at = k
+        while at < len(two) and two[at].name != wanted.name and two[at].time - two[k].time <= tau:
+            at += 1
+        if at < len(two) and two[at].name == wanted.name and two[at].time - two[k].time <= tau:
+            two.insert(k, two.pop(at))
+    return two
+
+
 def _events(ref: Source, test: Source, rescaled: tuple[float, float], tau: float) -> list[Compared]:
-    """Whether the same events happen in the same order, each within tau; None of both: nothing to say."""
+    """Whether the same events happen in the same order, each within tau; None of both: nothing to say.
+
+    Events of one instant have no order.
+    """
     one = ref.events
-    two = tuple(Event(e.time * rescaled[0] + rescaled[1], e.name) for e in test.events)
+    two = _ordered(one, [Event(e.time * rescaled[0] + rescaled[1], e.name) for e in test.events], tau)
     if not one and not two:
         return []
     worst = Worst(0.0, one[0].time if one else two[0].time)

@@ -87,6 +87,20 @@ def test_jumps_and_events_within_the_time_tolerance_are_equal():
     assert not verdict(right, other, Tolerance(tau=0.9e-5)).equal
 
 
+def test_events_of_one_instant_have_no_order():
+    """Formulations list the diodes that commutate together in orders of their own."""
+    right = BASES["bouncing"]()
+    first, *others = right.events
+    names = ("D1", "D2", "D3")
+    one = replace(right, events=(*(Event(first.time, n) for n in names), *others))
+    two = replace(right, events=(*(Event(first.time + k * 1e-7, n) for k, n in enumerate(reversed(names))), *others))
+    assert verdict(one, two, Tolerance(tau=1e-6)).equal
+    assert verdict(two, one, Tolerance(tau=1e-6)).equal
+    assert not verdict(one, two, Tolerance(tau=1e-8)).equal
+    other = replace(right, events=(*(Event(first.time, n) for n in ("D1", "D2", "D4")), *others))
+    assert not verdict(one, other, Tolerance(tau=1e-6)).equal
+
+
 def test_nan_equal_in_both_is_equal():
     right = BASES["oscillator"]()
     values = right.values["x"].copy()
