@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import sys
 import time
-from pathlib import Path
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 
@@ -80,7 +80,7 @@ def write(file: str, text: str) -> None:
     if file == "-":
         sys.stdout.write(text)
     else:
-        Path(file).write_text(text, encoding="utf-8")
+        whole_files.write(file, text)
 
 
 def _seconds(text: str) -> float:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.spice.circuit import Reader
@@ -37,6 +37,6 @@ def command(console: Console, file: str, output: str | None) -> int:
     if output is None:
         console.data(text, verbatim=True)
     else:
-        Path(output).write_text(text, encoding="utf-8")
+        whole_files.write(output, text)
         console.say(f"{output}: {reader.netlist.title or file}")
     return console.finish()

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import INDICES, chosen
@@ -160,7 +161,7 @@ def _write(file: str, linear: Any, curves: Any, over: Any, kinds: tuple[str, ...
 
     kind = Path(file).suffix
     if kind in DATA:
-        Path(file).write_bytes(written(linear, kind, console.result))
+        whole_files.write(file, written(linear, kind, console.result))
         console.say(f"{file}: {len(linear.modes)} states, {len(linear.transfers)} transfer functions")
         return
     drawn = (*kinds, "locus") if kinds else ((*KINDS, "poles") if over is None else ("poles",))
@@ -168,7 +169,7 @@ def _write(file: str, linear: Any, curves: Any, over: Any, kinds: tuple[str, ...
     data = picture(title, linear, curves, over, drawn, "svg" if kind == ".html" else kind.removeprefix("."))
     if kind == ".html":
         data = page(title, data, _tables(linear, over))
-    Path(file).write_bytes(data)
+    whole_files.write(file, data)
     console.say(f"{file}: {', '.join(drawn)}")
 
 

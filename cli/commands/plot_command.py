@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
 
@@ -45,7 +46,7 @@ def command(console: Console, trace: str, names: tuple[str, ...], output: str | 
     if output == "-":
         sys.stdout.buffer.write(data)
     else:
-        target.write_bytes(data)
+        whole_files.write(target, data)
         console.say(f"{target}: {', '.join(drawn)}")
     console.result = {"picture": output if output == "-" else str(target), "traces": files, "quantities": drawn}
     return console.finish()

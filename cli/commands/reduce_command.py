@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import chosen, solved
@@ -69,12 +70,12 @@ def command(
     if plot is not None:
         from sysdyn.cli.reduce.sankey import picture
 
-        Path(plot).write_bytes(picture(found.found, found.name, Path(plot).suffix[1:]))
+        whole_files.write(plot, picture(found.found, found.name, Path(plot).suffix[1:]))
         console.say(plot)
     if not only:
         console.data(_summary(found, target, kept=kept, timings=not no_timings))
         if kept:
-            target.write_text(found.text, encoding="utf-8")
+            whole_files.write(target, found.text)
     return console.finish(0)
 
 

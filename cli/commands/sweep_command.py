@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError, worst
 from sysdyn.cli.options import chosen, solved
@@ -110,7 +111,7 @@ def _shown(console: Console, found: Swept, plot: str | None) -> int:
     if plot is not None:
         from sysdyn.cli.sweep.picture import picture
 
-        Path(plot).write_bytes(picture(found, Path(plot).suffix[1:]))
+        whole_files.write(plot, picture(found, Path(plot).suffix[1:]))
     resumed = f", {found.resumed} of them from before" if found.resumed else ""
     console.say(f"{found.output}: {len(found.cases)} runs{resumed}")
     if found.alone and len(found.cases) > SHOWN:

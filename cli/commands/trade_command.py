@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 from sysdyn import __version__
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import chosen, side_by_side, solved
@@ -78,7 +79,7 @@ def command(
     console.data(_table(found, timings=not no_timings))
     if target is not None:
         drawn = page(found, use).encode() if target.suffix == ".html" else picture(found, target.suffix[1:])
-        target.write_bytes(drawn)
+        whole_files.write(target, drawn)
         console.say(f"{target}: {len(found.measured)} runs")
     if locks and best is not None:
         console.say(f"{_lock(request, found, best)}: {best.combination.name} for {found.name}")

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from sysdyn.cli import whole_files
 from sysdyn.cli.export.binding_c import binding_c, header
 from sysdyn.cli.export.binding_json import binding_json
 from sysdyn.cli.export.index_parameters import index_parameters
@@ -57,6 +58,6 @@ def write(formed: Formed, folder: Path) -> dict[str, Any]:
     made = list(texts(formed))
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in made:
-        (folder / name).write_text(text, encoding="utf-8")
+        whole_files.write(folder / name, text)
     found: dict[str, Any] = json.loads(made[0][1])
     return found

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from sysdyn.cli import whole_files
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.sweep.kept import Block, Done, Item, Kept
 from sysdyn.runtime.model.failures import TraceError
@@ -55,8 +56,9 @@ class Journal:
             raise TraceError(f"{self.path} is damaged: remove it, and the sweep begins anew ({error})") from error
 
     def _line(self, item: dict[str, object]) -> None:
-        self._file.write(json.dumps(item) + "\n")
-        self._file.flush()
+        with whole_files.named(self.path):
+            self._file.write(json.dumps(item) + "\n")
+            self._file.flush()
 
     def take(self, item: Item) -> None:
         """Keeps a result."""
@@ -74,4 +76,5 @@ class Journal:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._file.close()
+        with contextlib.suppress(OSError) if error is not None else whole_files.named(self.path):
+            self._file.close()  # of a full disk what is left cannot be written now either

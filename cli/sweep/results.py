@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sysdyn.cli import whole_files
 from sysdyn.cli.sweep.kept import Done
 from sysdyn.cli.sweep.study import Case
 
@@ -24,11 +25,10 @@ def write(
     *,
     timings: bool,
 ) -> None:
-    """Writes beside and renames: the file at the path is always whole."""
+    """Laid down in memory: HDF5 does not survive a disk that takes no more."""
     import h5py
 
-    part = path.with_name(f".{path.name}.part")
-    with h5py.File(part, "w", libver=("earliest", "v110")) as file:
+    with h5py.File(path.name, "w", driver="core", backing_store=False, libver=("earliest", "v110")) as file:
         for name, value in attributes.items():
             file.attrs[name] = value
         file.attrs["final"] = np.int64(len(done) == len(cases))
@@ -40,7 +40,8 @@ def write(
             if unit is not None:
                 data.attrs["units"] = unit
         _traces(file, run, len(cases), done, units)
-    part.replace(path)
+        file.flush()
+        whole_files.write(path, file.id.get_file_image())
 
 
 def _fixed(column: Any) -> Any:
