@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import click
@@ -37,7 +38,11 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
 
     with ex.fresh():
         request = Request(index=index, **{**options, "backend": "numpy"})
-        made = compiled(request, console.report, inputs=None if form == "linear" else ())
+        inputs = None if form == "linear" else ()
+        made = compiled(request, console.report, inputs=inputs)
+        lagranges = made is not None and made[1].formulation == "lagrangian"
+        if form == "canonical" and lagranges and request.formulation in (None, "auto"):  # nobody named them
+            made = compiled(replace(request, formulation="hamiltonian"), console.report, inputs=inputs)
         if made is None:
             return console.finish(1)
         target, prepared = made

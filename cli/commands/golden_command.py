@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, USAGE, UsageError, worst
 from sysdyn.cli.options import FORMULATIONS, Setting, side_by_side
@@ -397,6 +398,6 @@ def _keep(console: Console, golden: Golden, found: Recorded, size: float) -> int
         console.complain(f"{message}: fewer quantities, a looser --rtol, a shorter scene, or --size {need + 1:.0f}", 1)
         return 1
     structure = {"version": 1, "scene": golden.scene, "formulations": found.structure}
-    golden.structure.write_text(json.dumps(structure, indent=1) + "\n", encoding="utf-8")
+    whole_files.write(golden.structure, json.dumps(structure, indent=1) + "\n")
     book.write(golden)
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from sysdyn.cli import whole_files
 from sysdyn.cli.failures import UsageError
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.diagnostics import SourceText
@@ -38,6 +39,6 @@ def write(folder: Path) -> list[Path]:
         path = folder / place.format(name=name)
         path.parent.mkdir(parents=True, exist_ok=True)
         text = (TEMPLATE / source).read_text(encoding="utf-8")
-        path.write_text(re.sub(r"\bNAME\b", name, text), encoding="utf-8")
+        whole_files.write(path, re.sub(r"\bNAME\b", name, text))
         written.append(path)
     return written

@@ -14,6 +14,7 @@ from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.verdict import About, Event, Incomparable
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.trace.opening import opened
+from sysdyn.runtime.trace.trace_store import in_words
 
 CACHE = 1 << 16
 """Bytes of chunks that HDF5 keeps of each open data set: its own default is 8 MB, and a trace has hundreds."""
@@ -51,8 +52,8 @@ class Recorded:
         except FileNotFoundError as error:
             raise TraceError(f"{self.path}: no such file") from error
         except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
-            first = (str(error).splitlines() or [type(error).__name__])[0]
-            raise TraceError(f"{self.path}: not readable as a trace: {first}") from error
+            what = "not readable as a trace: "
+            raise TraceError(f"{self.path}: {what}{in_words(error).removeprefix(what)}") from error
 
     def _layout(self) -> None:
         import h5py

@@ -76,13 +76,22 @@ def columns_of(description: Description) -> tuple[Column, ...]:
     return tuple(found)
 
 
+def in_words(error: Exception) -> str:
+    """What the operating system or HDF5 says; of a file that is none of HDF5's, so."""
+    said = getattr(error, "strerror", None) or (str(error).splitlines() or [type(error).__name__])[0]
+    for sign, words in (("file signature not found", "this is no HDF5 file"), ("truncated file", "it is cut short")):
+        if sign in said:
+            return f"not readable as a trace: {words}"
+    return str(said)
+
+
 @contextlib.contextmanager
 def input_output(path: Path) -> Iterator[None]:
     """Faults of the operating system and of HDF5 as TraceError."""
     try:
         yield
     except (OSError, RuntimeError, ValueError) as error:
-        raise TraceError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
+        raise TraceError(f"{path}: {in_words(error)}") from error
 
 
 def _keep(group: Any, parameters: Sequence[Parameter]) -> None:

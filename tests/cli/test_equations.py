@@ -1,6 +1,7 @@
 """`sysdyn equations`: golden texts read against the book, and every simplification against numbers."""
 
 import itertools
+import json
 import os
 import re
 
@@ -21,7 +22,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, without_signals
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.text.diagnostics import Report
-from texts import ROOT, run_json, write
+from texts import PENDULUM, ROOT, run_json, write
 
 SEED = ROOT / "models" / "seed"
 MODELS = sorted(p.stem for p in SEED.glob("*.sd"))
@@ -671,3 +672,13 @@ def test_long_terms_are_not_factored(tmp_path, monkeypatch, capsys):
     assert run(["equations", write(tmp_path, FOUR_BAR), "--form", "underlying"]) == 1
     assert "more than 2000 operations" in capsys.readouterr().err
     assert max(longest) <= matrices.FACTORED
+
+
+@pytest.mark.parametrize("asked", [[], ["--formulation", "auto"]])
+def test_canonical_equations_choose_hamiltons_formulation(asked, tmp_path, capsys):
+    """What README shows; 'auto' took Lagrange's, and refused (E607)."""
+    model = write(tmp_path, PENDULUM)
+    assert run(["equations", model, "--form", "canonical", "--json", *asked]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["result"]["formulation"] == "hamiltonian"
+    assert run(["equations", model, "--form", "canonical", "--formulation", "lagrangian"]) == 1

@@ -197,3 +197,14 @@ def test_curves_between_jumps_are_interpolants_too():
 )
 def test_units(unit, text):
     assert unit_text(unit) == text
+
+
+@pytest.mark.usefixtures("traces")
+@pytest.mark.parametrize(("size", "said"), [(None, "this is no HDF5 file"), (3000, "it is cut short")])
+def test_what_is_no_trace_is_told_as_that(tmp_path, capsys, size, said):
+    """HDF5's own words were 'Unable to synchronously open file'."""
+    content = (tmp_path / "a.h5").read_bytes()
+    (tmp_path / "c.h5").write_bytes(b"model m {}" if size is None else content[:size])
+    for command in (["plot", "c.h5"], ["diff", "a.h5", "c.h5"]):
+        assert run(command) == 5
+        assert capsys.readouterr().err == f"sysdyn: c.h5: not readable as a trace: {said}\n"
