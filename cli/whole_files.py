@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,7 +31,7 @@ def write(path: str | Path, data: str | bytes) -> None:
 
 
 def _replace(target: Path, content: bytes) -> None:
-    part = target.with_name(f".{os.getpid()}.part")
+    part = target.with_name(f".{os.getpid()}-{threading.get_ident()}.part")
     try:
         handle = part.open("wb")
     except PermissionError:
