@@ -164,14 +164,21 @@ class Starter:
     @functools.cached_property
     def idle(self) -> Mask:
         """Displacements that stand in constraints alone and move without inertia: they hold nothing [unknowns]."""
-        form, inertial = self.system.form, np.zeros(self.system.unknowns, dtype=bool)
+        form, inertial = self.system.form, np.zeros(self.equations.unknowns, dtype=bool)
         inertial[self.system.pattern.columns_of()[self.system.structural()[1]]] = True
         inertial[self._flow] = True
-        held = np.zeros(self.equations.unknowns, dtype=bool)
-        held[form.k_q] = ~self.given.written[form.k_q] & ~inertial[form.k_f]
-        known = self.equations
-        held[known.columns[~self.groups("phi")[known.rows]]] = False
-        return held
+        found = self.hollow.copy()
+        found[form.k_q] &= ~inertial[form.k_f]
+        return found
+
+    @functools.cached_property
+    def hollow(self) -> Mask:
+        """Displacements that stand in constraints alone, and of which nothing is said: no store holds them [unknowns]."""
+        form, known = self.system.form, self.equations
+        found = np.zeros(known.unknowns, dtype=bool)
+        found[form.k_q] = ~self.given.written[form.k_q]
+        found[known.columns[~self.groups("phi")[known.rows]]] = False
+        return found
 
     def expand(self, x: Floats) -> tuple[Floats, Floats]:
         """y, yd of x = (y, chosen derivatives)."""
@@ -332,6 +339,7 @@ class Starter:
             inert = own_inertia(self.system, jy, jyd)
             del jy, jyd
         weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
+        weight[self.hollow] = WEIGHT["following"]
         content = scale.copy()
         content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
         measured = content / largest_of_group(self.measures, content)
