@@ -173,7 +173,7 @@ class Starter:
 
     @functools.cached_property
     def hollow(self) -> Mask:
-        """Displacements that stand in constraints alone, and of which nothing is said: no store holds them [unknowns]."""
+        """Displacements in constraints alone, of which nothing is said: no store holds them [unknowns]."""
         form, known = self.system.form, self.equations
         found = np.zeros(known.unknowns, dtype=bool)
         found[form.k_q] = ~self.given.written[form.k_q]
