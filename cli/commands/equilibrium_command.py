@@ -52,5 +52,5 @@ def command(console: Console, tries: int, no_prune: bool, index: str | None, **o
         return console.finish(SOLVER)
     name, formulation = found.target.name, found.prepared.formulation
     console.say(f"{name}: {formulation}, {len(states)} found, time held at {found.state.t:g} s")
-    console.data("\n\n".join(state.to_text(number) for number, state in enumerate(states, 1)))
+    console.results("\n\n".join(state.to_text(number) for number, state in enumerate(states, 1)))
     return console.finish(0)

@@ -103,7 +103,7 @@ def command(
     if over is not None:
         console.result["locus"] = answers.locus_to_json(over)
         parts.append(answers.locus_to_text(over))
-    console.data("\n\n".join(parts))
+    console.results("\n\n".join(parts))
     for file in files:
         _write(file, linear, curves, over, kinds, found.target.name, console)
     if files:

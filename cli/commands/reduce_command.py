@@ -66,14 +66,14 @@ def command(
         return console.unable() if console.report.failed else console.finish(SOLVER)
     kept = any(t.kept for t in found.trials)
     console.result = _result(found, str(target) if kept else None, timings=not no_timings)
-    console.data(_activity(found.found))
+    console.results(_activity(found.found))
     if plot is not None:
         from sysdyn.cli.reduce.sankey import picture
 
         whole_files.write(plot, picture(found.found, found.name, Path(plot).suffix[1:]))
         console.say(plot)
     if not only:
-        console.data(_summary(found, target, kept=kept, timings=not no_timings))
+        console.results(_summary(found, target, kept=kept, timings=not no_timings))
         if kept:
             whole_files.write(target, found.text)
     return console.finish(0)

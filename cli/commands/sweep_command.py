@@ -107,7 +107,7 @@ def _default(file: str, runner: Runner) -> str:
 
 def _shown(console: Console, found: Swept, plot: str | None) -> int:
     console.result = to_json(found)
-    console.data(_table(found))
+    console.results(_table(found))
     if plot is not None:
         from sysdyn.cli.sweep.picture import picture
 

@@ -76,7 +76,7 @@ def command(
     best = found.chosen
     use = "" if best is None else command_of(request, best, found.name)
     console.result = _result(found, use, timings=not no_timings)
-    console.data(_table(found, timings=not no_timings))
+    console.results(_table(found, timings=not no_timings))
     if target is not None:
         drawn = page(found, use).encode() if target.suffix == ".html" else picture(found, target.suffix[1:])
         whole_files.write(target, drawn)
@@ -126,7 +126,7 @@ def _judged(found: Traded, console: Console, use: str) -> int:
         text = f"errors count up to {found.reference.until:g} s of {found.span[1]:g} s: beyond, the finest runs differ"
         console.say(text)
     if use:
-        console.data(use, verbatim=True)
+        console.results(use)
         return 0
     remedy = "a looser --accuracy, or --full" if found.ended else "the budget was spent first: a longer --max-wall"
     console.complain(f"{verdict(found)}; {remedy}", SOLVER)

@@ -66,7 +66,7 @@ def command(
     if found is None:
         return console.unable()
     console.result = _result(found, keep=output is not None, timings=not no_timings)
-    console.data(_table(found, timings=not no_timings))
+    console.results(_table(found, timings=not no_timings))
     code = _judged(found, console)
     if found.interrupted:
         console.complain("interrupted: these are the runs so far", INTERRUPTED)

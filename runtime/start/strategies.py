@@ -111,10 +111,11 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     begun = _stated(starter, t, x, guess, free) if _beyond(starter, t, x, follows) else x
     if begun is not None:
         found, nearly = rescaled(starter, t, begun, guess, follows, least=False)
+        movable = bool((free & ~follows & ~starter.hollow).any())  # else what is all but at rest has rates
         for beside, may in () if nearly else off_the_flat(starter, t, begun, follows):
             if beside is not begun:
                 again, nearly = rescaled(starter, t, beside, guess, may, least=False)
-            if not nearly:
+            if not nearly and movable:
                 again, nearly = _at_rest(starter, t, beside, guess, may)
             if nearly:
                 found = again

@@ -155,7 +155,8 @@ def test_strict_counts_warnings(tmp_path, capsys, monkeypatch):
 
 def test_quiet_leaves_errors_only(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
-    for arguments in (["check", path], ["simulate", path], ["compile", path, "-o", "out"], ["plot", "model-swing.h5"]):
+    commands = ["check", "simulate", "verify", "trade", "linearize", "equilibrium", "reduce"]
+    for arguments in (*([name, path] for name in commands), ["compile", path, "-o", "out"], ["plot", "model-swing.h5"]):
         assert run([*arguments, "--quiet"]) == 0
         assert capsys.readouterr() == ("", "")
     assert run(["check", "-q", write(tmp_path, BROKEN)]) == 1
