@@ -38,7 +38,7 @@ class Console:
         """Another form of the findings (those of texts, those without a place), for standard output."""
         self.result: dict[str, Any] = {}
         self._plain: list[dict[str, object]] = []
-        self._results: list[str] = []
+        self._results: list[tuple[str, bool]] = []
 
     def renew(self) -> None:
         """Forget what was found: another round begins."""
@@ -67,12 +67,12 @@ class Console:
             text = text if verbatim and not sys.stdout.isatty() else shown(text)
             put(text if text.endswith("\n") else text + "\n")
 
-    def results(self, text: str) -> None:
+    def results(self, text: str, *, verbatim: bool = False) -> None:
         """What a command came to; under --quiet only where it is the reason for an exit other than 0."""
         if self.quiet:
-            self._results.append(text)
+            self._results.append((text, verbatim))
         else:
-            self.data(text, verbatim=True)
+            self.data(text, verbatim=verbatim)
 
     def finish(self, code: int = 0) -> int:
         """Show the findings; the exit code (1 where there are errors)."""
@@ -80,8 +80,8 @@ class Console:
         if self.report.failed:
             typed = any(d.severity == "error" and d.place and d.place.source.typed for d in self.report)
             code = worst((code or 1, USAGE if typed else 0))
-        for text in self._results if code else ():
-            self.data(text, verbatim=True)
+        for text, verbatim in self._results if code else ():
+            self.data(text, verbatim=verbatim)
         if self.as_json:
             diagnostics = [*(d.to_json() for d in found), *self._plain]
             if self.command == "check":

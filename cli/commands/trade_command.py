@@ -126,7 +126,7 @@ def _judged(found: Traded, console: Console, use: str) -> int:
         text = f"errors count up to {found.reference.until:g} s of {found.span[1]:g} s: beyond, the finest runs differ"
         console.say(text)
     if use:
-        console.results(use)
+        console.results(use, verbatim=True)
         return 0
     remedy = "a looser --accuracy, or --full" if found.ended else "the budget was spent first: a longer --max-wall"
     console.complain(f"{verdict(found)}; {remedy}", SOLVER)
