@@ -162,16 +162,6 @@ class Starter:
         return self._own_balance.core
 
     @functools.cached_property
-    def idle(self) -> Mask:
-        """Displacements that stand in constraints alone and move without inertia: they hold nothing [unknowns]."""
-        form, inertial = self.system.form, np.zeros(self.equations.unknowns, dtype=bool)
-        inertial[self.system.pattern.columns_of()[self.system.structural()[1]]] = True
-        inertial[self._flow] = True
-        found = self.hollow.copy()
-        found[form.k_q] &= ~inertial[form.k_f]
-        return found
-
-    @functools.cached_property
     def hollow(self) -> Mask:
         """Displacements in constraints alone, of which nothing is said: no store holds them [unknowns]."""
         form, known = self.system.form, self.equations
@@ -339,7 +329,6 @@ class Starter:
             inert = own_inertia(self.system, jy, jyd)
             del jy, jyd
         weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
-        weight[self.hollow] = WEIGHT["following"]
         content = scale.copy()
         content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
         measured = content / largest_of_group(self.measures, content)
@@ -413,7 +402,7 @@ def problem_of(
         unsaid = state & ~starter.written
         placed = starter.moves("start")
         said = state & starter.written
-        levels = said & ~placed, said & placed, unsaid & ~starter.idle, unsaid & starter.idle
+        levels = said & ~placed, said & placed, unsaid & ~starter.hollow, unsaid & starter.hollow
         scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
     weight = starter.weights(t, x, scale)
     scale = np.where(starter.pinned & ~free, np.abs(x), scale)
