@@ -67,7 +67,7 @@ def test_what_carries_inertia_is_state_and_the_tension_follows():
     x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
     follows = by_name(found, found.following(0.0, x))
     assert {name for name, yes in follows.items() if not yes} == {"q_1", "q_2", "f_1", "f_2"}
-    assert not found.idle.any()
+    assert not found.hollow.any()  # all positions are said
     assert by_name(found, found.given.fixed)["q_1"]
 
 
