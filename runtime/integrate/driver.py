@@ -20,7 +20,7 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.settled import Settler
 
 GLANCES = 8
-"""Instants of a step at which what shall hold always is looked at: a crest of hω = 1.2 is missed by 3e-3 of itself."""
+"""Instants of a step at which what shall hold always is looked at, beside its crests (core/run/extrema.h)."""
 ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
@@ -120,12 +120,13 @@ class Driver:
         and of integrals of powers rows alone tell.
         """
         self.extrema: Floats | None = None
-        if not request.extrema or self._least_norm is not None or not self._unread:
+        if not (request.extrema or request.sample_steps) or self._least_norm is not None or not self._unread:
             return
         rooms = np.zeros((6, max(self.observed, 1)))
         self.extrema = rooms[:2]
         least, most, *looks, settled = map(lib.pointer, rooms)
         core = self._extrema_core = lib.Extrema(columns=self.observed, least=least, most=most, settled=settled)
+        core.watched = int(request.sample_steps)
         core.look[:] = looks
         lib.core.sd_extrema_begin(c.byref(core))
         self.run.extrema = c.addressof(core)

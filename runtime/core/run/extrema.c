@@ -50,6 +50,8 @@ static double crest(sd_run *run, int32_t q, double at, double between)
     }
     double when = turns(v) ? vertex(t, v, &value) : at;
     sd_run_observe(run, when, run->extrema->settled);
+    if (run->extrema->watched)
+        sd_run_sample(run, when);
     return run->extrema->settled[q];
 }
 

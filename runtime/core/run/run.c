@@ -14,6 +14,7 @@
 
 #define POLL 4  /* steps between two looks at the clock */
 #define FAILS 4 /* rows that meet their sums for each that does not: fewer are not worth looking */
+#define CRESTS 32 /* rows of what is watched that a step may have beside those at its parts */
 #define GROWN 1.1 /* times the largest so far: beyond it the size of a step is not believed as the method left it */
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
@@ -270,6 +271,12 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
             run->point[run->audit_at[k]] = 0.0;
 }
 
+void sd_run_sample(sd_run *run, double t)
+{
+    if (run->rows + 1 < run->room)
+        emit(run, t, t, SD_SAMPLE, 0);
+}
+
 /* kind of the row at the end of a step, or at the start */
 static double kind_here(const sd_run *run, int asked)
 {
@@ -299,8 +306,11 @@ int sd_run_drain(sd_run *run)
     double t = run->t_to;
     if (run->pending && run->settle && run->stepper->refine)
         refine(run);
-    if (run->pending && run->extrema)
+    if (run->pending && run->extrema) {
+        if (run->extrema->watched && run->rows + CRESTS >= run->room && run->rows)
+            return 1;
         sd_extrema_within(run);
+    }
     while (run->pending) {
         if (run->rows + 1 >= run->room)
             return 1;

@@ -106,6 +106,8 @@ int sd_run_accept(sd_run *run, double to, int32_t kind);
 int sd_run_drain(sd_run *run);
 /* a row of kind `kind` at the end of the last step, which counts and whose rows are drained */
 void sd_run_row(sd_run *run, int32_t kind);
+/* a row of what is watched at t within the last step, where there is room for one */
+void sd_run_sample(sd_run *run, double t);
 /* run->point, point_d at t within the last step moved onto the equations: by what the method has at hand, where that does; the
  * end of a step may be there */
 void sd_run_settle(sd_run *run, double t);

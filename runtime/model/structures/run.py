@@ -155,7 +155,7 @@ class Extrema(c.Structure):
     """sd_extrema."""
 
     _fields_ = [
-        *[(name, I) for name in ["number", "columns"]],
+        *[(name, I) for name in ["number", "columns", "watched"]],
         *[(name, P) for name in ["least", "most"]],
         ("look", P * 3),
         ("settled", P),
