@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -26,20 +25,19 @@ def write(path: str | Path, data: str | bytes) -> None:
     with named(path):
         if target.exists() and not target.is_file():  # a device, a pipe, a folder
             target.write_bytes(content)
-        else:
-            _replace(target, content)
+            return
+        try:
+            replace(target, content)
+        except PermissionError:  # the folder takes no new file, but this one may be written
+            target.write_bytes(content)
 
 
-def _replace(target: Path, content: bytes) -> None:
-    part = target.with_name(f".{os.getpid()}-{threading.get_ident()}.part")
+def replace(target: Path, data: str | bytes) -> None:
+    """Beside the file, then renamed, or not at all: it is never half written."""
+    part = target.with_name(f".{os.urandom(8).hex()}.part")
     try:
-        handle = part.open("wb")
-    except PermissionError:
-        target.write_bytes(content)  # the folder takes no new file, but this one may be written
-        return
-    try:
-        with handle:
-            handle.write(content)
+        with part.open("xb") as stream:
+            stream.write(data.encode("utf-8") if isinstance(data, str) else data)
         if target.exists():
             part.chmod(target.stat().st_mode)
         part.replace(target)

@@ -51,7 +51,7 @@ class Outcome:
     that stopped (its trace has final = 0); judgement: of a run that ended; below_round_off: the estimate is less than
     double precision resolves; reason: why method auto took its method ("" where it was named); cancelled: traced
     differences of terms much larger than they are; events: of a run that ended; steps: of the run that stands; extrema:
-    least and largest values of what is traced within its steps (infinite where there are none), if they were asked for.
+    least and largest values of what is traced within its steps (infinite where there are none), if these are looked at.
     """
 
     trace: Path | None

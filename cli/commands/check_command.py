@@ -100,14 +100,16 @@ def _all(console: Console, files: Sequence[str], refused: bool, jobs: int | None
 
 def _fixed(console: Console, path: str) -> list[dict[str, object]]:
     """Mend a file in place; the findings that were mended."""
-    from sysdyn.cli.commands.fmt_command import difference, replace
+    from sysdyn.cli import whole_files
+    from sysdyn.cli.commands.fmt_command import difference
     from sysdyn.cli.run.mending import mended
     from sysdyn.dsl.text.diagnostics import SourceText
+    from sysdyn.dsl.text.source import real
 
     source = SourceText.read(path)
     text, done = mended(source)
     if done:
-        replace(Path(path), text)
+        whole_files.replace(real(Path(path)), text)
         if console.format is None:
             console.data("".join(difference(source, text, "fixed")), verbatim=True)
         console.say(f"{path}: {len(done)} of its findings mended")

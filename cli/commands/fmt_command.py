@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import difflib
-import os
 import sys
-import tempfile
 from pathlib import Path
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import INPUT_OUTPUT, classify
 from sysdyn.dsl.format.format import format_text
@@ -55,7 +54,7 @@ def _one(console: Console, name: str, *, check: bool, diff: bool) -> bool:
     elif name == "-" and not check:
         console.data(text, verbatim=True)
     elif text != source.text and not check:
-        replace(Path(name), text)
+        whole_files.replace(real(Path(name)), text)
     return text != source.text
 
 
@@ -63,17 +62,3 @@ def difference(source: SourceText, text: str, what: str = "formatted") -> list[s
     """The lines of a unified diff from a file to what is made of it."""
     before, after = source.text.splitlines(keepends=True), text.splitlines(keepends=True)
     return list(difflib.unified_diff(before, after, source.name, f"{source.name} ({what})"))
-
-
-def replace(path: Path, text: str) -> None:
-    """Write beside the file, then rename: a file is never half written."""
-    target = real(path)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=".sd")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="") as stream:
-            stream.write(text)
-        os.chmod(temporary, target.stat().st_mode)  # noqa: PTH101
-        os.replace(temporary, target)  # noqa: PTH105
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise

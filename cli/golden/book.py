@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.failures import UsageError
 from sysdyn.values import dataclass
 
@@ -140,9 +141,7 @@ def write(golden: Golden) -> None:
     ]
     for g in sorted([*others, golden], key=lambda g: g.name):
         lines += ["", *_lines(g)]
-    part = path.with_suffix(".part")
-    part.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    part.replace(path)
+    whole_files.replace(path, "\n".join(lines) + "\n")
 
 
 def _lines(g: Golden) -> list[str]:

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from sysdyn.cli import whole_files
 from sysdyn.cli.options import FORMULATIONS, INDICES
 from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.parser.parse import parse
@@ -212,9 +213,7 @@ def write(file: str, target: Target, lock: Lock, version: str) -> Path:
         "level": dict(lock.levels),
     }
     files = hashes(target.document.file.source, target.document.file.items)
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(_text(files, version, scenes), encoding="utf-8")
-    temporary.replace(path)
+    whole_files.replace(path, _text(files, version, scenes))
     return path
 
 

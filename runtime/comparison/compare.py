@@ -153,10 +153,9 @@ def _coverage(times: tuple[Floats, Floats], tau: float) -> list[Compared]:
 def _ordered(one: Sequence[Event], two: list[Event], tau: float) -> list[Event]:
     """The second events, those within tau of each other in the order of the first ones."""
     for k, wanted in enumerate(one[: len(two)]):
-        at = k
-        while at < len(two) and two[at].name != wanted.name and two[at].time - two[k].time <= tau:
-            at += 1
-        if at < len(two) and two[at].name == wanted.name and two[at].time - two[k].time <= tau:
+        ends = (at for at in range(k, len(two)) if two[at].name == wanted.name or two[at].time - two[k].time > tau)
+        at = next(ends, k)
+        if two[at].time - two[k].time <= tau:
             two.insert(k, two.pop(at))
     return two
 

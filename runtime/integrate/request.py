@@ -115,7 +115,7 @@ class Finished:
     terms of their expressions; cpu [s]; ledgers: what came of them is read of the run that is kept; beyond: the largest
     unknown of a row within a step, in magnitudes that it has at steps; last: what gives y and yd at its end
     [unknowns], the largest |y| of each kind and unit; opening: for the next run's request; extrema: least and largest
-    values within steps [2, observed] (infinite where there are none), where they were asked for.
+    values within steps [2, observed] (infinite where there are none), where these were looked into.
     """
 
     reached: float

@@ -108,7 +108,7 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     guess rounded to ten digits satisfies rows nearly, and a stiff model pays for the rest with its first step.
     """
     follows, nearly = free & starter.following(t, x), False
-    begun = _stated(starter, t, x, guess, free) if _beyond(starter, t, x, follows) else x
+    begun = _stated(starter, t, x, guess, (free, follows)) if _beyond(starter, t, x, follows) else x
     if begun is not None:
         found, nearly = rescaled(starter, t, begun, guess, follows, least=False)
         movable = bool((free & ~follows & ~starter.hollow).any())  # else what is all but at rest has rates
@@ -129,21 +129,26 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         yield found, True
 
 
-def _stated(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Floats | None:
+def _stated(starter: Starter, t: float, x: Floats, guess: Floats, moves: tuple[Mask, Mask]) -> Floats | None:
     """Where laws are flat at x: the point at which rows hold that read nothing of what follows from the state, by the
-    least change of this; else None.
+    least change of this; else None.  moves: what is free, and what of that follows.
     """
-    follows = starter.following(t, x)
-    if x.size > DENSE or not _flat_at(starter, t, x, free & follows).any():
+    free, follows = moves
+    if x.size > DENSE or not _flat_at(starter, t, x, follows).any():
         return None
-    rows = starter.every & (np.bincount(starter.rows, (free & follows)[starter.columns], starter.settled.rows) == 0)
+    rows = starter.every & (np.bincount(starter.rows, follows[starter.columns], starter.settled.rows) == 0)
     found = solve(problem_of(starter, t, x, guess, rows=rows, free=free & ~follows, least=True), x)
     return found.x if found.residual < EXACT else None
 
 
+def _beside(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats:
+    """X with what follows moved by its magnitude."""
+    return x + np.where(follows, starter.scale(t, x), 0.0)
+
+
 def _flat_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Entries [entries] of rows that have no slope in what follows from the state at x, but beside it."""
-    beside = x + np.where(follows, starter.scale(t, x), 0.0)
+    beside = _beside(starter, t, x, follows)
     flat = (starter.jacobian(t, x) == 0.0) & (starter.jacobian(t, beside) != 0.0) & follows[starter.columns]
     return np.asarray(flat & ~starter.groups(*HIDDEN)[starter.rows])
 
@@ -154,7 +159,7 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
     would have the vessel behind it filled rather than pass anything; under none it is at rest, which Newton's steps
     only approach.
     """
-    beside = x + np.where(follows, starter.scale(t, x), 0.0)
+    beside = _beside(starter, t, x, follows)
     flat = _flat_at(starter, t, x, follows)
     if not flat.any():
         return
