@@ -10,8 +10,9 @@ import numpy as np
 from sysdyn.cli.export.tables import Stage, Start, assembled
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.start.starter import Mask, Starter, problem_of
+from sysdyn.runtime.start.starter import Mask, Starter
 
 LARGEST = 1500
 """Unknowns and rows up to which a start is sought outside: with full matrices."""

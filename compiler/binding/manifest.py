@@ -11,6 +11,7 @@ from typing import Any
 
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.forms.descriptor import BESIDE, DescriptorForm, Equations, Unknowns
+from sysdyn.compiler.formulations import COMPLEMENTARY
 from sysdyn.compiler.model.integers import Index, Reference
 from sysdyn.compiler.model.mirror import letter, spelled
 from sysdyn.compiler.model.parameters import Extents
@@ -33,6 +34,7 @@ def structure(form: DescriptorForm, program: Program, network: Network) -> dict[
         return {} if family is None else {"elements": elements[family]}
 
     return {
+        "complementary": form.formulation in COMPLEMENTARY,
         "branches": [program.scalars.index(k.branch) for k in form.kinks if k.slide],
         "switches": [{"owner": s.label, "at": list(s.at)} for s in network.switches if s.holds is None],
         "families": [_family(f) | gathered(f.name) for f in form.families],

@@ -86,7 +86,7 @@ class Offset:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """`init`: target = value (fixed) or ~ value, for all iterations of the nest; store, unit, said: as in `Initial`."""
+    """`init`: target = value (fixed) or ~ value, for all iterations of the nest; the others: as in `Initial`."""
 
     target: Node
     value: Node
@@ -96,6 +96,7 @@ class Target:
     store: str = ""
     unit: str = "1"
     said: bool = True
+    apart: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,7 +271,7 @@ def _assigned(network: Network) -> Iterator[str]:
 def _initials(network: Network) -> Iterator[Target]:
     for i in network.initials:
         nest, (target, value) = canonical(i.loops, flows(i.target), flows(i.value))
-        yield Target(target, value, i.fixed, nest, i.place, i.store, i.unit, i.said)
+        yield Target(target, value, i.fixed, nest, i.place, i.store, i.unit, i.said, i.apart)
 
 
 def _quantities(network: Network) -> Iterator[Quantity]:

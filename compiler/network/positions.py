@@ -95,7 +95,7 @@ def with_positions(network: Network, wanted: frozenset[Wanted]) -> Network:
     springs = tuple(_springs(network, wanted))
     read = (n for n in ex.topological(expressions(network, "initials")) if n.op == "var")
     said = {n.data[0] for n in read if n.data[1] in ("nq", "bq", "be")}
-    parts = _parts(network, springs, said | {name for name, _ in wanted})
+    parts = _parts(network, springs, said | {name for name, _ in wanted}, open_=_says_of_others(network))
     told = _told(network, springs, parts, said)
 
     def position(end: Terminal) -> Node:
@@ -133,14 +133,28 @@ def _point_of(node: NodeFamily) -> _Join:
     return _Join(node.name, quadrature(node.name, at), Terminal(node.name, at), Terminal(None, ()), loops, node.place)
 
 
-def _parts(network: Network, springs: Sequence[_Join], said: set[str]) -> dict[str, str]:
+def _says_of_others(network: Network) -> bool:
+    """Whether initial conditions are about what holds neither a content nor a momentum, and may ask for these."""
+    stores = {b.name for b in network.branches if b.kind in ("potential", "kinetic")}
+    moved = {b.plus.node for b in network.branches if b.kind == "kinetic" and b.plus}
+    read = (n for n in ex.topological(expressions(network, "initials")) if n.op == "var")
+    return any(
+        n.data[1] == "ne"
+        or (n.data[1] == "nf" and n.data[0] not in moved)
+        or (n.data[1] in ("be", "bf") and n.data[0] not in stores)
+        for n in read
+    )
+
+
+def _parts(network: Network, springs: Sequence[_Join], said: set[str], *, open_: bool) -> dict[str, str]:
     """Common-flow nodes, each with what stands for its part, of parts of which something is said, or in which stores
-    may stand in loops; said: nodes and branches.
+    may stand in loops; open_: of all that stores join; said: nodes and branches.
     """
     parts, ends = Joined[str](), [(j.plus.node or "", j.minus.node or "", 1 + len(j.loops)) for j in springs]
     looped = in_loops(ends)
     for k, join in enumerate(springs):
-        said = said | set(join.nodes) if k in looped or join.name in said else said
+        among = k in looped or join.name in said or (open_ and len(join.nodes) > 1)
+        said = said | set(join.nodes) if among else said
         if join.nodes:
             parts.join(join.nodes[0], join.nodes[-1])
     asked = {parts.first(name) for name in said}

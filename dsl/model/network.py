@@ -261,7 +261,7 @@ class Initial:
 
     Where target is an unknown itself (var q, f, p, s, e) it pins that unknown; otherwise it is an equation.
     store: whose content a guess is about, by which it is measured; said: whether the text guesses it; unit: of a
-    displacement, of the rate of a momentum.
+    displacement, of the rate of a momentum; apart: a guess of what no store holds, which pins no flow that a store has.
     depth: 0 of a scene, 1 of the model, 2 of its components, ...: what has less goes before what has more.
     """
 
@@ -274,6 +274,7 @@ class Initial:
     unit: str = "1"
     depth: int = 1
     said: bool = True
+    apart: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -216,6 +216,7 @@ class Description:
     alive: WeakValueDictionary[Any, Any] = field(default_factory=WeakValueDictionary, compare=False)
     room: list[Floats] = field(default_factory=list, compare=False)
     constants: tuple[tuple[int, int, int], ...] = ()
+    complementary: bool = False
 
     def put(self, p: Floats) -> None:
         """Takes these numbers; those of a binding, where nothing writes into them, it has."""
@@ -360,6 +361,7 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
         systems={} if binding.get("alone") else None,
         layouts=layouts,
         constants=tuple((int(row), int(place), int(number)) for row, place, number in binding.get("offsets", ())),
+        complementary=bool(structure.get("complementary")),
     )
     if binding.get("alone"):
         layouts["last"] = found

@@ -134,6 +134,21 @@ class _Linear:
         size[~(size > 0.0)] = 1.0
         return np.divide(1.0, size, out=size)
 
+    def scaled(self, r: Floats) -> Floats:
+        """Rows r [number], zero where not in use, by the size of their terms in what is free; where nothing that they
+        read is free by that of all.  r is spent.
+        """
+        problem, scaled = self.problem, np.multiply(r, self.row_scale, out=r)
+        scaled[~problem.use] = 0.0
+        perhaps = (scaled != 0.0) & (self.row_scale == 1.0)
+        if perhaps.any():
+            at = np.flatnonzero(perhaps[problem.rows])
+            rows, columns = problem.rows[at], problem.columns[at]
+            terms = np.nan_to_num(np.abs(problem.jacobian(self._x)[at]) * problem.scale[columns], posinf=0.0)
+            free, size = (np.bincount(rows, terms * of, r.size) for of in (problem.free[columns], 1.0))
+            np.divide(scaled, size, out=scaled, where=perhaps & (free == 0.0) & (size > 0.0))
+        return scaled
+
     @property
     def unit(self) -> Floats:
         """What u counts each free unknown in; made when asked."""
@@ -259,7 +274,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
 
         def measure(z: Floats, linear: _Linear = linear) -> tuple[float, Floats]:
             problem.work.evaluation(problem.rows.size)
-            scaled = np.where(problem.use, problem.residual(z) * linear.row_scale, 0.0)
+            scaled = linear.scaled(problem.residual(z))
             largest = float(np.abs(scaled).max(initial=0.0))
             return (largest if np.isfinite(largest) else np.inf), scaled
 

@@ -117,7 +117,7 @@ def in_order(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floa
     row, column = factors(a)
     a, aim, found = row[:, None] * a, row * aim, np.zeros(shape[1])
     later = np.ones(shape[1], dtype=bool)
-    for level in levels:
+    for level in filter(np.any, levels):
         later = later & ~level
         left, sigma, _ = decomposed(a[:, later] * column[later])
         only = left[:, count(sigma) :].T  # what rows say of the level whatever comes later

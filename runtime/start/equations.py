@@ -14,7 +14,7 @@ from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Ints, Places
 from sysdyn.runtime.model.inertia import joined, own_unknown, with_flows
 from sysdyn.runtime.model.redirected import redirected
-from sysdyn.runtime.model.scales import alike
+from sysdyn.runtime.model.scales import alike, kinds_and_units
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates_of
 
@@ -30,7 +30,8 @@ class Equations:
     hold; rows, columns [entries]: of what some block writes in the matrix; alike [unknowns]: number of the kind and
     unit of each; member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them;
     joined [unknowns of y]: flows whose coordinates hold inertia of each other; momenta: (unknowns beside flows and
-    momenta that are contents of their kind, one of these flows each).
+    momenta that are contents of their kind, one of these flows each); balanced: flows have balances of their own, which
+    say what their stores hold (in Kane's form they are shared).
     """
 
     def __init__(self, system: System, settled: System) -> None:
@@ -39,6 +40,8 @@ class Equations:
         self.unsettled = inertial_rates(settled)
         self.unknowns = self.n + self.rates.size
         self.momentum, self.flow = with_flows(system)
+        owners = {system.description.rows[family].owner for _, family, _ in system.form.groups}
+        self.balanced = all(f.owner in owners for f in system.description.families if f.kind == "f")
         self._entries(settled)
         misses = np.append(settled.are("slack", "unsaid"), np.zeros(self.rates.size, dtype=bool))[self.columns]
         self.guessed = self.rows[misses], self.columns[misses]
@@ -69,6 +72,14 @@ class Equations:
 
     def _kinds(self, settled: System) -> None:
         kinds = alike(settled)
+        contents = self.contents(settled)
+        if contents.any():  # what chords hold is of the kind of coordinates
+            families, numbers = settled.description.families, kinds_and_units(settled)
+            of_q = np.array([*(numbers.get(("q", f.unit), numbers[f.kind, f.unit]) for f in families), 0])
+            held = np.zeros(self.n, dtype=bool)
+            held[self.columns[contents[self.rows] & (self.columns < self.n)]] = True
+            kinds = kinds.copy()
+            kinds[held] = of_q[settled.family_of[held]]
         self.alike = np.concatenate([kinds, kinds.max(initial=0) + 1 + kinds[self.rates]]).astype(np.int32)
         number: dict[str, int] = {}
         of_family = [number.setdefault(f.kind, len(number)) for f in settled.description.families]
@@ -76,7 +87,7 @@ class Equations:
         self.members = len(number)
 
     @staticmethod
-    def _contents(settled: System) -> Mask:
+    def contents(settled: System) -> Mask:
         """Rows that guess contents of stores [rows]."""
         found = np.zeros(settled.rows, dtype=bool)
         for group, family, first in settled.form.groups:
@@ -86,7 +97,7 @@ class Equations:
 
     def _measured(self, settled: System) -> Mask:
         """Unknowns of y that the contents of stores measure; a momentum with its flow."""
-        mask, contents = np.zeros(self.n, dtype=bool), self._contents(settled)
+        mask, contents = np.zeros(self.n, dtype=bool), self.contents(settled)
         own = contents[self.rows] & (self.columns < self.written)
         row, column = self.rows[own], self.columns[own]
         flow, moving = settled.are("f")[column], np.zeros(settled.rows, dtype=bool)
@@ -99,7 +110,7 @@ class Equations:
         """Unknowns that are contents of the kind of momenta, and a flow with such a content each: what guesses of
         contents made of flows miss, dynamic variables that integrate efforts of a balance.
         """
-        made, contents = np.full(settled.rows, -1, dtype=np.int64), self._contents(settled)
+        made, contents = np.full(settled.rows, -1, dtype=np.int64), self.contents(settled)
         flows = np.flatnonzero(contents[self.rows] & np.append(settled.are("f"), self.rates < 0)[self.columns])
         made[self.rows[flows]] = self.columns[flows]
         row, column, (in_y, in_rate) = settled.pattern.row, settled.pattern.columns_of(), settled.structural()
@@ -112,6 +123,33 @@ class Equations:
         rows, missed = self.guessed
         unknown, flow = np.append(missed, column[gains]), made[np.append(rows, row[gains])]
         return unknown[flow >= 0], flow[flow >= 0]
+
+    def _measured_by(self, settled: System) -> list[str]:
+        """The measure of each family of unknowns: contents of one unit have one, whatever gives them, momenta one with
+        the flows that make them.
+        """
+        rows, families = settled.description.rows, settled.description.families
+        groups = settled.form.groups if self.balanced else ()
+        effort = {rows[k].owner: rows[k].unit for group, k, _ in groups if group == "dynamics"}
+        kinds = {"q": "", "s": "", "f": "p ", "p": "p ", "slack": "", "unsaid": ""}
+        return [kinds.get(f.kind, f.kind) + (effort if f.kind in "fp" else {}).get(f.owner, f.unit) for f in families]
+
+    def measures(self, settled: System) -> Ints:
+        """The number of the measure of each unknown."""
+        number: dict[str, int] = {}
+        names = self._measured_by(settled)
+        of_family = np.array([*(number.setdefault(s, len(number)) for s in names), 0], dtype=np.int32)
+        of_y = of_family[settled.family_of]
+        contents, flow = self.momenta
+        of_y[contents] = of_y[flow]
+        return np.append(of_y, np.full(self.rates.size, len(number), dtype=np.int32))
+
+    def moving(self, settled: System) -> Mask:
+        """Whether the measure of each unknown is one of momenta."""
+        names = self._measured_by(settled)
+        found = np.array([*(s.startswith("p ") for s in names), False])[settled.family_of]
+        found[self.momenta[0]] = True
+        return np.append(found, np.zeros(self.rates.size, dtype=bool))
 
     def core(self, system: System, settled: System) -> lib.RowsOfStart:
         """The core's structure for the rows of one settled system."""

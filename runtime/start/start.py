@@ -23,9 +23,10 @@ from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.numerics.work import OutOfTimeError, Work
 from sysdyn.runtime.start.equations import HIDDEN
+from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.moved import moved_guesses
-from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter, problem_of
+from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter
 from sysdyn.runtime.start.strategies import (
     CLOSED,
     EXACT,
@@ -37,6 +38,7 @@ from sysdyn.runtime.start.strategies import (
     own_residual,
     rescaled,
     unasked,
+    unmoved,
     without_rates,
 )
 from sysdyn.values import dataclass
@@ -251,7 +253,8 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | 
     best = Solution(x, np.inf)
     for name, strategy in itertools.islice(applicable(starter, t, x), most):
         found, holds = first(strategy(starter, t, x, guess, free), x)
-        again, sure = _anew(starter, t, found, x, guess, free)
+        where = unmoved(starter, t, found, guess, free) if holds else None
+        again, sure = (where, True) if where is not None else _anew(starter, t, found, x, guess, free)
         sharp = _sharp(starter, t, again, free) if holds or sure else None
         if sharp is not None:
             return sharp, name

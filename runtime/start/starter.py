@@ -23,11 +23,10 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import LARGEST, Balance
 from sysdyn.runtime.model.description import START, Floats, Initial, Ints, Places, stated
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
-from sysdyn.runtime.model.inertia import Inertia, own_inertia, own_unknown
+from sysdyn.runtime.model.inertia import Inertia, own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.gauss_newton import Problem
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.numerics.products import add_sizes
 from sysdyn.runtime.numerics.work import Work
@@ -38,12 +37,9 @@ from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 STATE = ("q", "f", "p", "s", *START)
-WEIGHT = {"unwritten": 1e-3, "following": 1e-6}
 NOISE = 1e-13
 WRITTEN = 4.0 * float(np.finfo(float).eps)
 """Of the largest of its like: a fixed value that is no round-off of the text's own."""
-FLOOR = 1e-5
-"""Of the largest alike: below it rows hold to EXACT of that, ten times the round-off that full matrices make of it."""
 EQUATIONS = "equations of the start"
 
 
@@ -291,12 +287,6 @@ class Starter:
         y = self.given.guess + shift * (1.0 + np.abs(self.given.guess)) * np.cos(np.arange(self.n))
         return Inertia(self.settled, *self.settled.jacobian(0.0, y, np.zeros(self.n)))
 
-    @property
-    def balanced(self) -> bool:
-        """Flows have balances of their own, which say what their stores hold; in Kane's form they are shared."""
-        owners = {self.system.description.rows[family].owner for _, family, _ in self.system.form.groups}
-        return all(f.owner in owners for f in self.system.description.families if f.kind == "f")
-
     @remembered
     def following(self, t: float, x: Floats) -> Mask:
         """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
@@ -316,43 +306,10 @@ class Starter:
         found[: self.n] = ~carries
         return found
 
-    def weights(self, t: float, x: Floats, scale: Floats) -> Floats:
-        """Of changes in magnitudes [unknowns]: unknowns of one kind and unit are moved by one measure, whatever their
-        values; those that hold what stores do by their contents, flows by their momenta.
-        """
-        inert = np.zeros(0)
-        if self.balanced:
-            y, yd = self.expand(x)
-            some = self._momentum.size > 0
-            jy, jyd = self.system.jacobian(t, y, yd) if some else (None, self.system.slopes(t, y, yd, rate=True))
-            del y, yd
-            inert = own_inertia(self.system, jy, jyd)
-            del jy, jyd
-        weight = np.where(self.following(t, x), WEIGHT["following"], np.where(self.written, 1.0, WEIGHT["unwritten"]))
-        content = scale.copy()
-        content[: inert.size] *= np.where(inert != 0.0, np.abs(inert), 1.0)
-        measured = content / largest_of_group(self.measures, content)
-        if x.size > LARGE:
-            self.__dict__.pop("measures", None)
-        measured[self.n :] = 1.0  # rates have magnitudes of their own each
-        return np.asarray(weight * measured)
-
     @functools.cached_property
     def measures(self) -> Ints:
-        """Number of the measure of each unknown: contents of one unit have one, whatever gives them; momenta one with
-        the flows that make them.
-        """
-        rows, families = self.system.description.rows, self.system.description.families
-        groups = self.system.form.groups if self.balanced else ()
-        effort = {rows[k].owner: rows[k].unit for group, k, _ in groups if group == "dynamics"}
-        kinds = {"q": "", "s": "", "f": "p ", "p": "p ", "slack": "", "unsaid": ""}
-        named = [kinds.get(f.kind, f.kind) + (effort if f.kind in "fp" else {}).get(f.owner, f.unit) for f in families]
-        number: dict[str, int] = {}
-        of_family = np.array([*(number.setdefault(s, len(number)) for s in named), 0], dtype=np.int32)
-        of_y = of_family[self.settled.family_of]
-        contents, flow = self.equations.momenta
-        of_y[contents] = of_y[flow]
-        return np.append(of_y, np.full(self.rates.size, len(number), dtype=np.int32))
+        """As `Equations.measures` tells."""
+        return self.equations.measures(self.settled)
 
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit; what the
@@ -386,42 +343,3 @@ class Starter:
             found[missed] = self.largest_alike(found)[missed]
             found = np.where(found > 1e-280, found, 1.0)
         return found
-
-
-def problem_of(
-    starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask, least: bool = False
-) -> Problem:
-    """The equations `rows` in the unknowns `free`, the others as in x; magnitudes and weights are those of x.
-
-    least: the state moves least in the order of what is said of it, however much what follows has to; else by weights.
-    """
-    scale = starter.scale(t, x)
-    levels: tuple[Mask, ...] = ()
-    if least:
-        state = free & ~starter.following(t, x)
-        unsaid = state & ~starter.written
-        placed = starter.moves("start")
-        said = state & starter.written
-        levels = said & ~placed, said & placed, unsaid & ~starter.hollow, unsaid & starter.hollow
-        scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
-    weight = starter.weights(t, x, scale)
-    scale = np.where(starter.pinned & ~free, np.abs(x), scale)
-    starter.spare()
-    return Problem(
-        residual=lambda z: starter.residual(t, z),
-        jacobian=lambda z: starter.jacobian(t, z),
-        rows=starter.rows,
-        columns=starter.columns,
-        number=starter.settled.rows,
-        use=rows,
-        free=free,
-        guess=guess,
-        scale=scale,
-        weight=weight,
-        levels=levels,
-        idle=np.arange(x.size) >= starter.n,
-        work=starter.work,
-        core=None if starter.summed else (starter.core, t),
-        check=starter.settled.failure.check,
-        spare=lambda: starter.system.trim(LARGE),
-    )

@@ -6,6 +6,7 @@ Magnitudes that prove wrong on the way are taken anew.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -16,8 +17,9 @@ from sysdyn.runtime.model.slopes import rows_without_slope
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.start.equations import HIDDEN
+from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import no_start
-from sysdyn.runtime.start.starter import NOISE, Mask, Starter, problem_of
+from sysdyn.runtime.start.starter import NOISE, Mask, Starter
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
 _RESCALINGS, _DOUBTED = 6, 3
@@ -95,12 +97,23 @@ def first(tries: Tries, x: Floats) -> tuple[Solution, bool]:
     return best, False
 
 
-def _beyond(starter: Starter, t: float, x: Floats, free: Mask) -> bool:
-    """Whether rows that read none of these unknowns are missed: loops of springs, constraints of the state."""
-    known = starter.equations
-    read = np.bincount(known.rows, free[known.columns], starter.settled.rows)
-    missed = np.where((read == 0) & ~known.unsettled, np.abs(starter.residual(t, x)), 0.0)
+def _of_the_state(starter: Starter, follows: Mask) -> Mask:
+    """Rows that read nothing of what follows from the state: loops of springs, constraints of the state [rows]."""
+    read = np.bincount(starter.rows, follows[starter.columns], starter.settled.rows)
+    return np.asarray(starter.every & (read == 0))
+
+
+def _beyond(starter: Starter, t: float, x: Floats, follows: Mask) -> bool:
+    """Whether rows of the state alone are missed."""
+    missed = np.where(_of_the_state(starter, follows), np.abs(starter.residual(t, x)), 0.0)
     return bool(missed.any() and (missed * starter.row_scale(t, x, starter.scale(t, x)) > OWN).any())
+
+
+def _on_its_rows(starter: Starter, t: float, x: Floats, guess: Floats, state: Mask, follows: Mask) -> Floats | None:
+    """X with the state on the rows of the state alone, by its least change; None where that was not found."""
+    problem = problem_of(starter, t, x, guess, rows=_of_the_state(starter, follows), free=state, least=True)
+    found = solve(problem, x)
+    return found.x if found.residual < EXACT else None
 
 
 def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
@@ -108,17 +121,18 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     guess rounded to ten digits satisfies rows nearly, and a stiff model pays for the rest with its first step.
     """
     follows, nearly = free & starter.following(t, x), False
-    begun = _stated(starter, t, x, guess, (free, follows)) if _beyond(starter, t, x, follows) else x
+    begun: Floats | None = x
+    if _beyond(starter, t, x, follows):
+        at_rest = x.size <= DENSE and _flat_at(starter, t, x, follows).any()
+        begun = _on_its_rows(starter, t, x, guess, free & ~follows, follows) if at_rest else None
     if begun is not None:
-        found, nearly = rescaled(starter, t, begun, guess, follows, least=False)
-        movable = bool((free & ~follows & ~starter.hollow).any())  # else what is all but at rest has rates
-        for beside, may in () if nearly else off_the_flat(starter, t, begun, follows):
-            if beside is not begun:
-                again, nearly = rescaled(starter, t, beside, guess, may, least=False)
-            if not nearly and movable:
-                again, nearly = _at_rest(starter, t, beside, guess, may)
+        flat, whole = off_the_flat(starter, t, begun, follows), [(begun, follows)]
+        for beside, may in itertools.chain(flat, whole) if x.size <= DENSE else itertools.chain(whole, flat):
+            found, nearly = rescaled(starter, t, beside, guess, may, least=False)
+            # where no state can move what is all but at rest has rates
+            if not nearly and may is not follows and (free & ~follows & ~starter.hollow).any():
+                found, nearly = _at_rest(starter, t, beside, guess, may)
             if nearly:
-                found = again
                 break
         exact = nearly and (found.residual <= CLOSED or own_residual(starter, t, found.x, found.x) <= CLOSED)
         yield found, exact
@@ -127,18 +141,6 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     yield everything
     if nearly:
         yield found, True
-
-
-def _stated(starter: Starter, t: float, x: Floats, guess: Floats, moves: tuple[Mask, Mask]) -> Floats | None:
-    """Where laws are flat at x: the point at which rows hold that read nothing of what follows from the state, by the
-    least change of this; else None.  moves: what is free, and what of that follows.
-    """
-    free, follows = moves
-    if x.size > DENSE or not _flat_at(starter, t, x, follows).any():
-        return None
-    rows = starter.every & (np.bincount(starter.rows, follows[starter.columns], starter.settled.rows) == 0)
-    found = solve(problem_of(starter, t, x, guess, rows=rows, free=free & ~follows, least=True), x)
-    return found.x if found.residual < EXACT else None
 
 
 def _beside(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats:
@@ -167,6 +169,7 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
     flat_here = np.bincount(starter.columns, flat, x.size) > 0.0
     rows = without_rates(starter) & ~flat_rows
     at = solve(problem_of(starter, t, x, x, rows=rows, free=follows & ~flat_here), x).x
+    at = starter.without_noise(at, starter.scale(t, x))
     missed = np.abs(starter.residual(t, at)) * starter.row_scale(t, at, starter.scale(t, at)) > OWN
     some = np.bincount(starter.columns, flat & missed[starter.rows], x.size) > 0.0
     yield np.where(some, beside, x) if some.any() else x, follows & (some | ~flat_here)
@@ -189,6 +192,30 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     if not holds:
         starter.every[:] = before
     return found, holds
+
+
+def unmoved(starter: Starter, t: float, found: Solution, guess: Floats, free: Mask) -> Solution | None:
+    """In place of a solution whose state moved that with the state where it has to be: at its guess but for what rows
+    of the state alone say; None where the rest does not follow from there.  Newton's steps along laws without a slope
+    move what need not move.
+    """
+    x = found.x
+    follows = free & starter.following(t, x)
+    state = free & ~follows
+    if x.size > DENSE or (x == guess)[state].all() or not _bent(starter, t, x).any():
+        return None
+    with starter.granted():
+        begun = np.where(state, guess, x)
+        if _beyond(starter, t, begun, follows):
+            on = _on_its_rows(starter, t, x, guess, state, follows)  # on the root that was found
+            begun = x if on is None else on
+        if (np.abs(begun - x) <= EXACT * starter.largest_alike(x))[state].all():
+            return None
+        for beside, may in ((begun, follows), *off_the_flat(starter, t, begun, follows)):
+            again, holds = rescaled(starter, t, beside, guess, may, least=False)
+            if holds:
+                return again
+    return None
 
 
 def unasked(starter: Starter, flat: Ints) -> bool:

@@ -17,7 +17,7 @@ CORNER = {
     "rings": ["compiler/network/primal/cycles.py"],
     "contents": ["compiler/network/primal/contents.py"],
     "floating": ["compiler/forms/relative_coordinates.py"],
-    "starter": ["runtime/start/starter.py", "runtime/start/equations.py", "runtime/start/sums.py"],
+    "starter": [f"runtime/start/{name}.py" for name in ("starter", "least", "equations", "sums")],
     "start": ["runtime/start/start.py", "runtime/start/strategies.py", "runtime/start/moved.py"],
     "impulses": ["runtime/start/instant.py"],
     "redundancy": ["runtime/structure/redundancy.py"],

@@ -1,9 +1,9 @@
 """Random networks whose stores are partly said: every formulation must begin with the contents of the closed form.
 
-`python tests/models/random_starts.py scalar|arrays NUMBER [FIRST_SEED]` prints the seeds that do not, and a table.
-`scalar`: trees of resistors, capacitors and inductors with chords (loops of capacitors, meshes of inductors, both in
-series), sizes a thousand apart; about a third of the stores each is fixed, guessed, open.  `arrays`: chains of
-families of stores over sections, said over ranges.  All are compared with the closed form.
+`python tests/models/random_starts.py scalar|others|arrays NUMBER [FIRST_SEED]` prints the seeds that do not, and a
+table.  `scalar`: trees of resistors, capacitors and inductors with chords (loops of capacitors, meshes of inductors,
+both in series), sizes a thousand apart; about a third of the stores each is fixed, guessed, open.  `others`: something
+is said of one or two resistors too.  `arrays`: chains of families of stores over sections, said over ranges.
 """
 
 import sys
@@ -33,8 +33,8 @@ class Circuit:
     text: str = ""
 
 
-def circuit(seed, saying="=~"):
-    """A circuit of which a part is said."""
+def circuit(seed, saying="=~", *, others=False):
+    """A circuit of which a part is said; others: of resistors too."""
     random, found = np.random.default_rng(seed), Circuit()
     nodes = ["ground", *(f"n{k}" for k in range(int(random.integers(2, 6))))]
     edges = [(nodes[k], nodes[int(random.integers(k))]) for k in range(1, len(nodes))]
@@ -50,54 +50,83 @@ def circuit(seed, saying="=~"):
         found.elements.append((f"x{k}", kind, value, a, b))
     stores = [(name, KINDS[kind][2]) for name, kind, *_ in found.elements if KINDS[kind][2]]
     if not stores:
-        return circuit(seed + 1_000_000, saying)
+        return circuit(seed + 1_000_000, saying, others=others)
     for name, content in stores:
         say = str(random.choice(["=", "~", ""]))
         value = float(f"{random.uniform(-2.0, 2.0):.3f}")
         if say and say in saying:
             found.said[name] = say, value
             lines.append(f"  init {name}.{content} {say} {value!r} {UNITS[content]}")
-    for node in nodes[1:]:  # every node leaks: what floats is another matter
-        lines.append(f"  leak_{node}: resistor(R = 3 ohm) {node} -> ground")
-    traced = "".join(f"; trace {name}.{content}" for name, content in stores)
+    leaks = [f"leak_{node}" for node in nodes[1:]]  # every node leaks: what floats is another matter
+    lines += [f"  {leak}: resistor(R = 3 ohm) {leak[5:]} -> ground" for leak in leaks]
+    read = [f"; trace {name}.{content}" for name, content in stores]
+    told = [*(e[0] for e in found.elements if e[1] == "resistor"), *leaks]
+    found.elements += [(name, "resistor", 3.0, name[5:], "ground") for name in leaks]
+    for k, name in enumerate(random.permutation(told)[: int(random.integers(1, 3)) if others else 0]):
+        say, letter = str(random.choice(["=", "="] if k else ["=", "~"])), str(random.choice(["e", "f"]))
+        found.said[str(name)] = say, float(f"{random.uniform(-2.0, 2.0):.3f}"), letter
+        lines.append(f"  init {name}.{letter} {say} {found.said[str(name)][1]!r} {UNITS[letter]}")
+        read.append(f"; trace {name}.e")  # what nothing asks for is not modelled
     head = f"{HEAD}  node {', '.join(nodes[1:])}: electrical"
-    found.text = "\n".join([head, *lines, "}", f"scene run of net {{ time 0 s to 1 s{traced} }}\n"])
+    found.text = "\n".join([head, *lines, "}", f"scene run of net {{ time 0 s to 1 s{''.join(read)} }}\n"])
     return found
 
 
 def closed_form(of):
-    """Efforts of capacitors and flows of inductors, in their order: the least sum of squares of changes of contents,
-    first of those that are guessed, then of those that nothing is said of, such that voltages around loops of
-    capacitors add up to zero.  None where what is fixed contradicts that.
+    """Efforts of capacitors and flows of inductors, in their order: those at which what is fixed holds and voltages
+    around loops of capacitors add up to zero, with the least sum of squares of changes of contents, first of fluxes
+    that are guessed, then of charges, then of what guesses of resistors miss, then of fluxes and charges that nothing
+    is said of.  None where what is fixed contradicts itself.
     """
     nodes = list({n: 0 for *_, a, b in of.elements for n in (a, b) if n != "ground"})
-    capacitors = [e for e in of.elements if e[1] == "capacitor"]
-    incidence = np.zeros((len(capacitors), len(nodes)))
-    for k, (*_, a, b) in enumerate(capacitors):
+    stores = [e for e in of.elements if e[1] != "resistor"]
+    rows = {name: np.zeros(len(nodes)) for name, *_ in of.elements}  # voltages by those of nodes
+    for name, _, _, a, b in of.elements:
         for node, sign in ((a, 1.0), (b, -1.0)):
             if node != "ground":
-                incidence[k, nodes.index(node)] += sign
-    left, sigma, _ = np.linalg.svd(incidence) if capacitors else (np.zeros((0, 0)), np.zeros(0), None)
+                rows[name][nodes.index(node)] += sign
+    capacitors, inductors = ([e for e in stores if e[1] == kind] for kind in ("capacitor", "inductor"))
+    incidence = np.array([rows[name] for name, *_ in capacitors]).reshape(len(capacitors), len(nodes))
+    left, sigma, _ = np.linalg.svd(incidence)
     around = left[:, int((sigma > 1e-9).sum()) :].T  # loops [loops, capacitors]
-    size = np.array([value for _, _, value, *_ in capacitors])
-    around = np.where(np.abs(around) > NONE, around, 0.0) / size
-    held = size * [of.said.get(name, ("", 0.0))[1] for name, *_ in capacitors]
-    words = np.array([of.said.get(name, ("", 0.0))[0] for name, *_ in capacitors])
-    small, aim = 1e-9 * np.abs(around).max(initial=0.0), -around @ held
-    for word, below in (("~", words == ""), ("", np.zeros(len(words), dtype=bool))):
-        left, sigma, _ = np.linalg.svd(around[:, below])
+    around = np.where(np.abs(around) > NONE, around, 0.0)
+    size = np.array([value for _, _, value, *_ in stores])
+    told = [(name, of.said[name]) for name, kind, *_ in of.elements if kind == "resistor" and name in of.said]
+    system = np.zeros((len(around) + len(told), len(stores) + len(told)))  # contents, what is missed
+    is_c = np.array([e[1] == "capacitor" for e in stores], dtype=bool)
+    system[: len(around), np.flatnonzero(is_c)] = around / size[is_c]
+    aim = np.zeros(len(system))
+    if told:
+        conductance = sum(np.outer(rows[n], rows[n]) / v for n, kind, v, *_ in of.elements if kind == "resistor")
+        whole = np.block([[conductance, incidence.T], [incidence, np.zeros((len(incidence),) * 2)]])
+        drive = np.zeros((len(whole), len(stores)))
+        for k, (name, kind, value, *_) in enumerate(stores):
+            if kind == "capacitor":
+                drive[len(nodes) + capacitors.index(stores[k]), k] = 1.0 / value
+            else:
+                drive[: len(nodes), k] = -rows[name] / value
+        potentials = (np.linalg.pinv(whole, rcond=1e-12) @ drive)[: len(nodes)]
+        value_of = {name: value for name, _, value, *_ in of.elements}
+        for k, (name, (_, value, letter)) in enumerate(told, len(around)):
+            system[k, : len(stores)] = rows[name] @ potentials / (1.0 if letter == "e" else value_of[name])
+            system[k, len(stores) + k - len(around)], aim[k] = -1.0, value
+    words = [of.said.get(name, ("", 0.0))[0] for name, *_ in stores] + [word for _, (word, *_) in told]
+    sort = ["q" if c else "p" for c in is_c] + ["miss"] * len(told)
+    found = np.append(size * [of.said.get(name, ("", 0.0))[1] for name, *_ in stores], np.zeros(len(told)))
+    order = [("~", "p"), ("~", "q"), ("~", "miss"), ("", "p"), ("", "q")]
+    level = np.array([len(order) if w == "=" else order.index((w, s)) for w, s in zip(words, sort, strict=True)])
+    small = 1e-9 * np.abs(system).max(initial=0.0)
+    for number in range(len(order)):
+        left, sigma, _ = np.linalg.svd(system[:, (level > number) & (level < len(order))])
         rest = left[:, int((sigma > small).sum()) :].T
-        held[words == word] += (
-            np.linalg.pinv(rest @ around[:, words == word], rcond=1e-9)
-            @ (rest @ aim)
-            * (np.abs(rest @ around[:, words == word]).max(initial=0.0) > small)
+        own = rest @ system[:, level == number]
+        found[level == number] += np.linalg.pinv(np.where(np.abs(own) > small, own, 0.0), rcond=1e-9) @ (
+            rest @ (aim - system @ found)
         )
-        aim = -around @ held
-    if np.abs(aim).max(initial=0.0) > 1e-9 * max(np.abs(held / size).max(initial=0.0), 1.0):
+    if np.abs(aim - system @ found).max(initial=0.0) > 1e-9 * max(np.abs(found[: len(size)] / size).max(), 1.0):
         return None
-    found = dict(zip((name for name, *_ in capacitors), held / size, strict=True))
-    found |= {name: of.said.get(name, ("", 0.0))[1] for name, kind, *_ in of.elements if kind == "inductor"}
-    return np.array([found[name] for name, *_ in of.elements if name in found])
+    assert len(capacitors) + len(inductors) == len(stores)
+    return found[: len(size)] / size
 
 
 def array(seed):
@@ -154,7 +183,7 @@ def contents(text):
 
 def judged(seed, sort="scalar", saying="=~"):
     """agree, refused (no formulation has a start), or how they differ."""
-    of = circuit(seed, saying) if sort == "scalar" else array(seed)
+    of = array(seed) if sort == "arrays" else circuit(seed, saying, others=sort == "others")
     found, expected = contents(of.text), closed_form(of)
     values = [value for value in found.values() if value is not None]
     if not values:
@@ -164,7 +193,7 @@ def judged(seed, sort="scalar", saying="=~"):
     size = max(float(np.abs(value).max()) for value in values)
     if expected is None:
         return "begins though what is fixed contradicts itself"
-    apart = max(float(np.abs(value - expected).max()) for value in values)
+    apart = max(float(np.abs(value[: expected.size] - expected).max()) for value in values)
     return "agree" if apart <= CLOSE * max(size, 1e-3) else f"apart by {apart / size:.2g}"
 
 

@@ -77,19 +77,57 @@ def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
     assert set(SOUGHT) == {name for name, _ in STRATEGIES[1:]}
 
 
-HARD = {"scalar": (636,), "arrays": (52, 174, 233)}
-"""Networks whose starts once differed: round-off of what is loosely tied passed for a row (scalar), a fixed value of
-one element beside a guess over its range (arrays)."""
+HARD = {"scalar": (636, 992), "others": (13, 17, 44), "arrays": (52, 174, 233)}
+"""Networks whose starts once differed: round-off of what is loosely tied passed for a row, fluxes of nodes that are
+round-off of what chords hold had magnitudes of their own (scalar); charges gave way to fluxes in one family and fluxes
+to charges in the other, guesses of resistors to guesses of capacitors (others); a fixed value of one element beside a
+guess over its range (arrays)."""
 
 
-@pytest.mark.parametrize(("sort", "number"), [("scalar", 1000), ("arrays", 500)])
+@pytest.mark.parametrize(("sort", "number"), [("scalar", 1000), ("others", 1000), ("arrays", 500)])
 def test_random_networks_partly_said_begin_with_the_contents_of_the_closed_form(sort, number):
     """In all formulations; what is fixed in contradiction has no start in any."""
-    seeds = (*range(number if os.environ.get("SYSDYN_LONG") else 4 if sort == "scalar" else 1), *HARD[sort])
+    seeds = (*range(number if os.environ.get("SYSDYN_LONG") else 1 if sort == "arrays" else 4), *HARD[sort])
     verdicts = {seed: judged(seed, sort) for seed in seeds}
     differ = {seed: verdict for seed, verdict in verdicts.items() if verdict not in {"agree", "refused"}}
     assert not differ
-    assert [*verdicts.values()].count("agree") > 0.75 * len(verdicts)
+    assert [*verdicts.values()].count("agree") > (0.6 if sort == "others" else 0.75) * len(verdicts)
+
+
+SERIES = """from std.electrical import voltage, capacitor, resistor, inductor
+model m {{
+  node n, w: electrical
+  V: voltage(v = 5 V) n -> ground
+  R: resistor(R = 10 ohm) n -> w
+  {}
+}}
+scene s of m {{ time 0 s to 1 us; trace {} }}
+"""
+COILS = "L1: inductor(L = 1 mH) w -> ground\n  L2: inductor(L = 2 mH) w -> ground\n  init R.{}"
+TWO = "node k: electrical\n  C1: capacitor(C = 1 uF) w -> k\n  C2: capacitor(C = 2 uF) k -> ground\n  init {}"
+THREE = (
+    TWO.format("C1.e = 1 V").replace("k -> ground", "k -> l")
+    + "\n  node l: electrical\n  C3: capacitor(C = 3 uF) l -> ground"
+)
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.parametrize(
+    ("parts", "held"),
+    [
+        (COILS.format("f = 1 A"), {"L1.f": 0.8, "L2.f": 0.2}),
+        (COILS.format("e = 10 V"), {"L1.f": 0.8, "L2.f": 0.2}),
+        (TWO.format("R.e = 2 V"), {"C1.e": 2.4, "C2.e": 0.6}),
+        (TWO.format("V.f = 0.2 A"), {"C1.e": 5.6, "C2.e": 1.4}),
+        (TWO.format("w.e ~ 3 V"), {"C1.e": 2.4, "C2.e": 0.6}),
+        (THREE + "\n  init R.f = 0.2 A", {"C1.e": 1.0, "C2.e": 18.0 / 13.0, "C3.e": 8.0 / 13.0}),
+    ],
+)
+@pytest.mark.one_in(6)
+def test_stores_of_which_another_says_something_hold_the_least_in_every_formulation(tmp_path, parts, held, formulation):
+    """Coils in parallel by fluxes, capacitors in series by charges; constants of series classes are not zero then."""
+    trace = trace_of(tmp_path, SERIES.format(parts, ", ".join(held)), formulation=formulation)
+    assert {name: trace[name].values[0] for name in held} == pytest.approx(held, rel=1e-9)
 
 
 ROD = """model rod {{

@@ -87,7 +87,8 @@ def pins_and_equations(
     equations: list[Equation] = []
     for target in model.initials:
         node = target.target
-        if node.op == "var" and node.data[2] == 0 and not variables(target.value) and not target.store:
+        plain = node.op == "var" and node.data[2] == 0 and not variables(target.value)
+        if plain and not target.store and (target.fixed or not _follows(node, target)):
             if node.data[:2] in numbers:
                 family = numbers[node.data[:2]]
                 pins.append(Pin(family, node.args, target.value, target.fixed, target.nest, target.place))
@@ -96,6 +97,11 @@ def pins_and_equations(
                 continue
         equations.append(Equation(f"#init {len(equations)}", target))
     return tuple(pins), tuple(equations)
+
+
+def _follows(node: Node, target: Target) -> bool:
+    """Whether an unknown holds nothing of what a store does: its guess moves the state, as that of an expression."""
+    return node.data[1] in ("kappa", "mu") or (target.apart and node.data[1] == "f")
 
 
 def missing(equations: Sequence[Equation]) -> Iterator[Unknowns]:

@@ -6,10 +6,10 @@ the coordinates, which are one choice of tree; k one constant for each beside it
 
 In a series class the first potential store is the coordinate.  Another one holds q = +-q(class) + k, with k its own
 initial content less +- that of the first; it is chosen where not all of these are fixed and a loop of stores and
-efforts may ask for others, and where an effort is said of one that tells no content (e = q + q^3).  What is no store
+efforts, or what is said of anything else (a resistor, an effort of e = q + q^3), may ask for others.  What is no store
 begins at what the text says of it, else at zero, whatever the first store holds.  A store between two nodes of the
 reflection (an inductor) holds their difference: where such stores close loops in which contents are said, each has its
-own initial content as k; it is chosen where nothing is said of it.
+own initial content as k; it is chosen where nothing is said of it.  The same where something else is said.
 """
 
 from __future__ import annotations
@@ -80,14 +80,20 @@ def told(b: Branch, initials: Iterable[Initial], sizes: Sizes) -> Iterator[tuple
             yield initial, narrowed(b.loops, found[0]), content
 
 
-def at_stores(network: Network, incidence: Incidence, reader: Rewriter) -> Iterator[Initial]:
+def at_stores(network: Network, incidence: Incidence, reader: Rewriter, *, reflected: bool) -> Iterator[Initial]:
     """Initial conditions; efforts of potential stores, and of nodes that a linear one holds to ground, as contents."""
+    kinds = {b.name: b.kind for b in network.branches}
     for initial in network.initials:
-        if initial.target.op == "var" and initial.target.data[1:] == ("ne", 0):
-            for part in _at_store(initial, incidence.cells.get(initial.target.data[0], ()), reader):
+        told = initial.target.op == "var" and not initial.target.data[2]
+        name, kind, _ = initial.target.data if told else ("", "", 0)
+        if kind == "ne":
+            for part in _at_store(initial, incidence.cells.get(name, ()), reader):
                 yield from _as_content(part, reader)
-        else:
-            yield from _as_content(initial, reader)
+            continue
+        apart = kind in ("be", "bf") and kinds[name] not in TELLING
+        if kind == "nf" and reflected:
+            apart = not any(_holds(touch) for cell in incidence.cells.get(name, ()) for touch in cell.touches)
+        yield from _as_content(replace(initial, apart=apart and not initial.fixed), reader)
 
 
 def _as_content(initial: Initial, reader: Rewriter) -> Iterator[Initial]:
@@ -138,6 +144,12 @@ def _between_ground(touch: Touch) -> bool:
     return not touch.free and other.startswith("#ground ") and told
 
 
+def _holds(touch: Touch) -> bool:
+    """Whether a kinetic store stands there between a node and the ground."""
+    e = touch.element
+    return e.branch.kind == "kinetic" and (len(e.ends) < 2 or e.ends[1 - touch.end].node.startswith("#ground "))
+
+
 class Contents:
     """Initial contents of potential stores: constants of followers, and the initial conditions that remain."""
 
@@ -167,9 +179,10 @@ class Contents:
         self._stems: list[str] = []
         self._settled: set[int] = set()  # numbers of followers that are no stores, whose constant the text tells
         self._free: list[Element] = []  # those whose constant follows from what they begin at
-        targets = [i.target.data for i in initials if i.target.op == "var"]
-        self._sought = {data[0] for data in targets if data[1:] == ("be", 0)}  # whose content the start alone can tell
-        self._loose = any(not _is_content(i) and not _of_momenta(i) for i in initials)
+        kinetic = {e.name for e in elements if e.branch.kind == "kinetic"}
+        self._loose = any(  # what is said of others may ask for contents
+            not _is_content(i) and not _of_momenta(i, kinetic) for i in initials
+        )
         for initial in filter(_is_content, initials):
             within = ranges_of(initial.loops, reader.sizes, initial.place)
             box = reader.sizes.reach(initial.target.args, within, initial.place)
@@ -210,13 +223,13 @@ class Contents:
                 self._constant(element, value)
             return
         fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
-        sought = element.number in self.looped or self._sought & {element.name, *(m.leader.name for m in members)}
+        sought = self._loose or element.number in self.looped
         self._constant(element, value if fixed or not sought else None)
 
     def _chords(self, looped: Sequence[Element]) -> None:
         """The constants of stores between nodes of the reflection whose loops start with contents of their own."""
         given = {e.number for e in looped if any(meet(box, e.named) for _, box in self._given.get(e.name, ()))}
-        for e in looped if given or self._sought.intersection(e.name for e in looped) else ():
+        for e in looped if given or self._loose else ():
             value = self.start(e.name, indices(e.named), ranges_over(e.named))
             self._constant(e, value if e.number in given else None)
 
@@ -300,11 +313,11 @@ def _is_content(initial: Initial) -> bool:
     return initial.target.op == "var" and initial.target.data[1:] == ("bq", 0) and not variables(initial.value)
 
 
-def _of_momenta(initial: Initial) -> bool:
-    """Whether a statement tells a flow or a momentum by itself."""
+def _of_momenta(initial: Initial, kinetic: Container[str]) -> bool:
+    """Whether a statement tells the flow or the momentum of a node, or of one of these branches, by itself."""
     target = initial.target
     plain = target.op == "var" and not target.data[2] and not variables(initial.value)
-    return plain and target.data[1] in ("bf", "bp", "nf", "np")
+    return plain and (target.data[1] in ("nf", "np") or (target.data[1] in ("bf", "bp") and target.data[0] in kinetic))
 
 
 def _pin(target: Node, value: Node) -> tuple[Node, Node]:

@@ -99,25 +99,37 @@ static int32_t numbers(int32_t count, const int32_t *use, int32_t *at)
     return found;
 }
 
+/* size [rows]: of the terms of each row in what is free, in magnitudes; of one that reads nothing free of all it reads */
+static void sizes(const sd_search *s, const double *values, double *size)
+{
+    const sd_balance *m = &s->start->balance;
+    memset(size, 0, (size_t)m->rows * sizeof *size);
+    for (int32_t e = 0; e < m->entries; e++)
+        if (s->free[m->column[e]] && isfinite(values[e]))
+            size[m->row[e]] += fabs(values[e]) * s->scale[m->column[e]];
+    for (int32_t e = 0; e < m->entries; e++)
+        if (size[m->row[e]] <= 0.0 && !s->free[m->column[e]] && isfinite(values[e]))
+            size[m->row[e]] -= fabs(values[e]) * s->scale[m->column[e]];
+    for (int32_t r = 0; r < m->rows; r++)
+        size[r] = size[r] != 0.0 ? fabs(size[r]) : 1.0;
+}
+
 /* the linearised rows at x, of the size of their terms, in scaled unknowns: w->a; w->row_scale */
 static void linearise(const sd_search *s, const double *x, room *w)
 {
     const sd_balance *m = &s->start->balance;
     sd_start_jacobian(s->start, s->t, x, w->values);
-    memset(w->size, 0, (size_t)m->rows * sizeof *w->size);
+    sizes(s, w->values, w->size);
     memset(w->a, 0, (size_t)w->rows * (size_t)w->unknowns * sizeof *w->a);
-    for (int32_t e = 0; e < m->entries; e++) {
-        if (!s->use[m->row[e]] || !s->free[m->column[e]] || !isfinite(w->values[e]))
-            w->values[e] = 0.0;
-        w->size[m->row[e]] += fabs(w->values[e]) * s->scale[m->column[e]];
-    }
     for (int32_t r = 0; r < m->rows; r++)
-        w->row_scale[r] = w->size[r] > 0.0 ? 1.0 / w->size[r] : 1.0;
-    for (int32_t e = 0; e < m->entries; e++)
-        if (w->values[e] != 0.0) {
-            int32_t i = w->row_at[m->row[e]], j = w->column_at[m->column[e]];
+        w->row_scale[r] = 1.0 / w->size[r];
+    for (int32_t e = 0; e < m->entries; e++) {
+        int32_t i = w->row_at[m->row[e]], j = w->column_at[m->column[e]];
+        if (i < 0 || j < 0 || !isfinite(w->values[e]))
+            w->values[e] = 0.0;
+        else
             w->a[(size_t)i * w->unknowns + j] += w->values[e] * w->unit[m->column[e]] * w->row_scale[m->row[e]];
-        }
+    }
 }
 
 /* largest scaled row at x; w->scaled */
@@ -348,12 +360,10 @@ int sd_search_measure(sd_search *s)
         return -2;
     double *values = size + rows;
     int failed = sd_start_jacobian(s->start, s->t, s->x, values) | sd_start_residual(s->start, s->t, s->x, s->scaled);
-    for (int32_t e = 0; e < m->entries; e++)
-        if (s->use[m->row[e]] && s->free[m->column[e]] && isfinite(values[e]))
-            size[m->row[e]] += fabs(values[e]) * s->scale[m->column[e]];
+    sizes(s, values, size);
     s->residual = 0.0;
     for (size_t r = 0; r < rows; r++) {
-        double scaled = s->use[r] ? fabs(s->scaled[r] * (size[r] > 0.0 ? 1.0 / size[r] : 1.0)) : 0.0;
+        double scaled = s->use[r] ? fabs(s->scaled[r] / size[r]) : 0.0;
         s->scaled[r] = scaled;
         s->residual = scaled > s->residual || isnan(scaled) ? scaled : s->residual;
     }
