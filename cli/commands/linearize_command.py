@@ -100,6 +100,8 @@ def command(
     if kinds:
         console.result["responses"] = [answers.answer_to_json(a, kinds) for a in curves]
         parts += [answers.answer_to_text(a, kinds) for a in curves]
+        if not curves:
+            console.say(f"no {', '.join(kinds)}: {_missing(linear)}")
     if over is not None:
         console.result["locus"] = answers.locus_to_json(over)
         parts.append(answers.locus_to_text(over))
@@ -135,6 +137,13 @@ def _along(text: str, found: Any) -> tuple[str, list[float]]:
     if along.drawn or len(values) != len(along.values) or not 2 <= len(values) <= MOST:
         raise UsageError(f"--locus '{text}': NAME=FIRST..LAST:NUMBER, or a list of 2 to {MOST} numbers")
     return along.name, values
+
+
+def _missing(linear: Any) -> str:
+    """What a transfer function wants and there is none of."""
+    if linear.inputs:
+        return "nothing is traced: --outputs names expressions"
+    return "the model has no input; --inputs names parameters, and an 'input' in a source's formula is one"
 
 
 def _kinds(response: str | None) -> tuple[str, ...]:

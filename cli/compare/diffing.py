@@ -96,7 +96,7 @@ def sentence(c: Compared) -> str:
         case "differs":
             unit = "" if c.unit == "1" else f" {c.unit}"
             values = f"{w.test:.9g}{unit}, reference {w.reference:.9g}{unit}, limit {c.limit:.3g}{unit}"
-            return f"{c.name}{_at(c)} is {_times(w.ratio)} over the limit: {values}"
+            return f"{c.name}{_at(c)} is {_times(w.ratio)} over the limit: {values}" + (c.note and f"; {c.note}")
         case "coverage" | "events":
             over = f", {_times(w.ratio)} over the limit" if math.isfinite(w.ratio) else ""
             return f"{c.name}: {c.note}{over}"

@@ -99,7 +99,7 @@ def listed(name: str, texts: Sequence[str], evaluate: Evaluate) -> Axis:
 def _number(name: str, text: str, evaluate: Evaluate) -> float:
     value = evaluate(name, text)
     if value is None:
-        raise UsageError(f"--over {name}: '{text}' is not a number of a parameter: give a list")
+        raise UsageError(f"--over {name}: a grid is of numbers of a parameter, and '{name}' is none; give a list")
     return value
 
 

@@ -2,7 +2,9 @@
 
 A branch without a law carries no effort but the reaction of its constraint: of `f >= 0` (f = 0 while g) either the flow
 or the effort is zero.  The same is said of the effort: `-e >= 0` (e = 0 while not g), whose reaction is the flow.  What
-holds of the one is free of the other (`Switch.dual`).
+holds of the one is free of the other (`Switch.dual`).  Of both on one branch (a thyristor: f = 0 while g, f >= 0
+while h) the effort is free while g holds, else -e >= 0 while h does, and zero where neither holds.  An inequality that
+alone holds at times leaves a wire in between, for which there is no row.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ def complements(network: Network) -> Network:
 
     guards = {o.name: o.expression for o in network.observations}
     dual = [s for s in network.switches if s.label in found]
-    watched = dict(pair for s in dual for pair in _watched(s, found[s.label], guards))
+    watched = dict(pair for s in dual for pair in _watched(s, found[s.label]))
+    watched |= dict(_guarded(dual, found, guards))
     network = rewritten(network, felt)
     return replace(
         network,
@@ -44,21 +47,37 @@ def complements(network: Network) -> Network:
 def _of_effort(network: Network) -> Iterator[tuple[Constraint, Node]]:
     """Constraints of an effort for those of a flow of a branch that nothing else holds, and the reactions of these."""
     free = {b.name for b in network.branches if b.law is None and b.kind == "field"}
-    kinds = {s.label: s.kind for s in network.switches}
     read = (n for c in network.constraints for n in ex.variables(c.expression) if n.op == "var")
     held = Counter(n.data[0] for n in read if n.data[1] == "bf")
     said = ex.topological(expressions(network, "energies", "works"))
     stored = {n.data[0] for n in said if n.op == "var" and n.data[1] in ("bf", "bq", "be", "bp")}
+    alone: dict[Node, list[tuple[Constraint, Node]]] = {}
     for c in network.constraints:
         flows = [n for n in ex.variables(c.expression) if n.op == "var" and n.data[1:] == ("bf", 0)]
-        if c.kind != "psi" or kinds.get(c.name) not in ("psi", "guarded") or len(flows) != 1:
-            continue
-        (flow,), factor = flows, derivative(c.expression, flows[0])
-        alone = ex.is_const(factor) and c.expression is ex.mul(factor, flow)
-        if alone and flow.data[0] in free - stored and held[flow.data[0]] == 1:
+        if c.kind == "psi" and len(flows) == 1 and flows[0].data[0] in free - stored:
+            factor = derivative(c.expression, flows[0])
+            if ex.is_const(factor) and c.expression is ex.mul(factor, flows[0]):
+                alone.setdefault(flows[0], []).append((c, factor))
+    for flow, rows in alone.items():
+        if held[flow.data[0]] == len(rows) and _complete(network, [c for c, _ in rows]):
             effort = ex.var(flow.data[0], "be", *flow.args)
-            sign = ex.const(-1.0 if factor.data > 0.0 else 1.0)
-            yield replace(c, expression=ex.mul(sign, effort)), ex.div(effort, factor)
+            for c, factor in rows:
+                sign = ex.const(-1.0 if factor.data > 0.0 else 1.0)
+                yield replace(c, expression=ex.mul(sign, effort)), ex.div(effort, factor)
+
+
+def _complete(network: Network, rows: list[Constraint]) -> bool:
+    """Whether the rows of a branch say all of it: f = 0 while g, f >= 0, or f = 0 while g beside f >= 0 while h."""
+    switches = [s for s in network.switches if s.label in {c.name for c in rows}]
+    kinds = {s.label: (s.kind, s.guard is not None) for s in switches}
+    said = sorted(kinds[c.name] for c in rows if c.name in kinds)
+    if len(rows) == 1:
+        return said in ([("guarded", True)], [("psi", False)])
+    own = {s.multiplier for s in switches}  # its effort is the reaction of either in turn: nothing else may ask which
+    nodes = [o.expression for o in network.observations if o.name not in own]
+    nodes += expressions(network, "constraints", "energies", "works", "dynamics", "branches.law")
+    asked = any(n.op == "var" and n.data[1] == "mu" and n.data[0] in kinds for n in ex.topological(nodes))
+    return said == [("guarded", True), ("psi", True)] and rows[0].loops == rows[1].loops and not asked
 
 
 def _at(what: tuple[Constraint, Node], at: tuple[Node, ...]) -> tuple[Node, Node]:
@@ -69,7 +88,7 @@ def _at(what: tuple[Constraint, Node], at: tuple[Node, ...]) -> tuple[Node, Node
     return expression, effort
 
 
-def _watched(s: Switch, what: tuple[Constraint, Node], guards: Mapping[str, Node]) -> Iterator[tuple[str, Node]]:
+def _watched(s: Switch, what: tuple[Constraint, Node]) -> Iterator[tuple[str, Node]]:
     """What events read of the effort: of an inequality what is not negative while it is free."""
     at = tuple(ex.const(float(k)) for k in s.at)
     row, _ = _at(what, at)
@@ -77,5 +96,24 @@ def _watched(s: Switch, what: tuple[Constraint, Node], guards: Mapping[str, Node
     yield s.value, value
     yield s.rate, time_derivative(value)
     yield s.multiplier, ex.var(s.label, "mu", *at)
-    if s.guard is not None:
-        yield s.guard, ex.sub(ex.const(1.0), guards[s.guard])
+
+
+def _guarded(
+    dual: list[Switch], found: Mapping[str, tuple[Constraint, Node]], guards: Mapping[str, Node]
+) -> Iterator[tuple[str, Node]]:
+    """When rows of efforts hold: while the flow is not held, and no inequality of it is there beside an equation."""
+    branches: dict[Node, list[Switch]] = {}
+    for s in dual:
+        if s.guard is not None:
+            at = tuple(ex.const(float(k)) for k in s.at)
+            (effort,) = (n for n in ex.variables(_at(found[s.label], at)[1]) if n.op == "var")
+            branches.setdefault(effort, []).append(s)
+    for same in branches.values():
+        held = next(s for s in same if s.kind == "guarded")
+        open_ = ex.sub(ex.const(1.0), guards[held.guard or ""])
+        yield held.guard or "", open_
+        for s in same:
+            if s.kind == "psi":
+                there = guards[s.guard or ""]
+                yield s.guard or "", ex.mul(open_, there)
+                yield held.guard or "", ex.mul(open_, ex.sub(ex.const(1.0), there))

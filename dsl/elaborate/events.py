@@ -405,6 +405,13 @@ def _steady(u: Node) -> bool:
     return all(n.op == "time" or (n.data[1] in ("q", "nq", "bq", "s") and not n.data[2]) for n in ex.variables(u))
 
 
+def has_friction(root: Node) -> bool:
+    """Whether a size of flows stands in it."""
+    return any(
+        n.op == "call" and n.data in ("abs", "hypot") and any(map(_rates, n.args)) for n in ex.topological([root])
+    )
+
+
 def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], place: Place) -> Node:
     """A content D with its terms c*abs(u) of flows as those of set-valued friction (decision 7 of the language)."""
     at = loop_indices(loops)

@@ -11,7 +11,7 @@ from sysdyn.dsl.elaborate.parts import Requirement
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Constraint, Dynamic, Energy, Expectation, Golden, Initial, Work
+from sysdyn.dsl.model.network import Constraint, Dynamic, Energy, Expectation, Golden, Initial, Loop, Work
 from sysdyn.dsl.model.quasi import NotLinearError, virtual
 from sysdyn.dsl.model.units import NONE, Dimension, multiply, si
 from sysdyn.dsl.names.failures import Failed
@@ -75,9 +75,9 @@ class Statements(Declarations):
 
     def _content(self, s: syntax.Content) -> None:
         node = self._wants(f"content {s.function}", s.value, dim.POWER)
-        if s.function == "D":
-            node = events.set_valued(self, node, self.resolver.loops, self.place(s.span))
-        self.said(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
+        for part, loops in _parts(node, self.resolver.loops) if s.function == "D" else [(node, self.resolver.loops)]:
+            said = events.set_valued(self, part, loops, self.place(s.span)) if s.function == "D" else part
+            self.said(Energy(s.function, said, loops, self.place(s.span)))
 
     def _work(self, s: syntax.Work) -> None:
         effort = self.resolver.scalar(s.effort)
@@ -242,3 +242,20 @@ STATEMENTS: dict[type, Callable[..., None]] = {
     syntax.When: events.when,
     syntax.Every: events.every,
 }
+
+
+def _parts(node: Node, loops: tuple[Loop, ...]) -> list[tuple[Node, tuple[Loop, ...]]]:
+    """A content as contents that add up to it: of its sums over friction each element is a content of its own."""
+    sums = [n for n in ex.topological([node]) if n.op == "reduce" and n.data[0] == "sum"]
+    if not any(events.has_friction(n.args[2]) for n in sums):
+        return [(node, loops)]
+    if node.op == "sum":
+        of_terms = [(c, part) for c, n in zip(node.data[1], node.args, strict=True) for part in _parts(n, loops)]
+        constant = [(ex.const(node.data[0]), loops)] if node.data[0] else []
+        return [*constant, *((ex.scale(c, n), inside) for c, (n, inside) in of_terms)]
+    factors = zip(node.args, node.data, strict=True) if node.op == "mul" else [(node, 1.0)]
+    sums = [n for n, power in factors if n.op == "reduce" and n.data[0] == "sum" and power == 1.0]
+    if len(sums) != 1:
+        return [(node, loops)]
+    first, last, body = sums[0].args
+    return _parts(ex.substitute(node, {sums[0]: body}), (*loops, Loop(sums[0].data[1], first, last)))

@@ -154,7 +154,9 @@ def smoothness(model: Elaborator, report: Report) -> None:
             slope = derivative(energy.expression, flow)
             if _jumps(slope, flow):
                 message = f"content D with a corner at {flow} = 0 is set-valued friction: not supported yet"
-                report.note("N608", f"{message} (planned: events and inequalities)", energy.place)
+                within = any(n.op == "reduce" for n in ex.topological([energy.expression]))
+                help_ = "each element's by itself: for i in 1..n { content D = ... }" if within else None
+                report.note("N608", f"{message} (planned: events and inequalities)", energy.place, help=help_)
                 break
 
 

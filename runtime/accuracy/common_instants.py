@@ -20,6 +20,8 @@ from sysdyn.values import dataclass
 MOST = 24
 """Instants at which runs are compared, at most twice that; of a long run this part of its steps, at most twice MANY."""
 PART, MANY = 16, 500
+"""Of a run with events at most twice MANY however short it is: behind one a motion relaxes within a step or two, whose
+rows may lie between the instants compared (4 to 8 times off what was asked, told as met, in 3 of 120 runs)."""
 GRID, VALUES = 10_000, 2_000_000
 """Rows of a trace with an interval that are compared at most, and values in them: behind an event a motion may relax
 within a row (of every fourth alone, 13 times the accuracy asked went unseen).  A draft takes what is a part of its
@@ -39,10 +41,11 @@ AT_ONCE = 1e-7
 
 class Thinned:
     """Every k-th row of a stream, k doubled whenever there are too many, and the last one; of two rows at one instant,
-    before and behind a jump, the former.
+    before and behind a jump, the former.  most: rows of a short run, at most twice that.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MOST) -> None:
+        self._most = most
         self._kept: list[Floats] = []
         self._stride, self._seen, self._number = 1, 0, 0
         self._last: Floats | None = None
@@ -59,7 +62,7 @@ class Thinned:
             self._kept.append(rows[first :: self._stride].copy())
             self._number += len(self._kept[-1])
         self._last = rows[-1:].copy()
-        while self._number > 2 * min(max(MOST, self._seen // PART), MANY):
+        while self._number > 2 * min(max(self._most, self._seen // PART), MANY):
             self._kept = [np.concatenate(self._kept)[::2]]
             self._stride, self._number = 2 * self._stride, len(self._kept[0])
 

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 from sysdyn.runtime.accuracy import pairs
-from sysdyn.runtime.accuracy.common_instants import Instants, Thinned, common, late_by
+from sysdyn.runtime.accuracy.common_instants import MANY, MOST, VALUES, Instants, Thinned, common, late_by
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.accuracy.pairs import Sampled
 from sysdyn.runtime.accuracy.quantities import Quantities
@@ -40,11 +40,13 @@ class Compared:
         self._rows: list[Floats] = []
         self._traced: list[Floats] = []
         self._thinned = Thinned()
+        self._with_events = Thinned(min(max(VALUES // max(self._observed, 1), MOST), MANY))
 
     def take(self, rows: Floats, kind: Ints) -> None:
         """Keeps what runs are compared by: rows at the instants of the run before, and its own, thinned."""
         if self.options.every is None:
-            self._thinned.take(rows[(kind & TRACE) > 0])
+            for thinned in (self._thinned, self._with_events):
+                thinned.take(rows[(kind & TRACE) > 0])
         elif (known := self.instants.known) is not None and self.instants.common is not known:
             traced = rows[(kind & TRACE) > 0]  # beside rows at instants of a draft, which this run's steps may pass by
             at = np.minimum(np.searchsorted(known, traced[:, 0]), known.size - 1)
@@ -82,8 +84,9 @@ class Compared:
         trace of few rows.
         """
         if self.options.every is None:
-            self.instants.common = common(self._thinned.time, self.options)
-            return self._thinned.rows(self.instants.common)
+            thinned = self._with_events if finished.events else self._thinned
+            self.instants.common = common(thinned.time, self.options)
+            return thinned.rows(self.instants.common)
         if finished.events or not any(map(len, self._traced)):
             return None
         own = np.concatenate(self._traced)

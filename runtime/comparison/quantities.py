@@ -24,6 +24,7 @@ from sysdyn.runtime.comparison.curve import (
     value_at,
     whole_cells,
 )
+from sysdyn.runtime.comparison.resolution import untold
 from sysdyn.runtime.comparison.tube import band, outside
 from sysdyn.runtime.comparison.verdict import About, Compared, Source, Tolerance, Worst
 from sysdyn.values import dataclass
@@ -81,7 +82,23 @@ def compared(
                 _ends(state, curves, block, tau)
             _nonfinite(state, curves, tau)
             _block(state, curves, cells, block, tau)
-    return [_result(state) for state in states]
+    found = [_result(state) for state in states]
+    return [
+        replace(c, note=_untold(ref, test, times, pair, c, time_scale)) if c.status == "differs" else c
+        for c, pair in zip(found, pairs, strict=True)
+    ]
+
+
+def _untold(
+    ref: Source, test: Source, times: tuple[Floats, Floats], pair: Pair, found: Compared, time_scale: float
+) -> str:
+    """Whether rows are too far apart for what differs between them."""
+    at, excess = found.worst.time, (found.worst.ratio - 1.0) * found.limit
+    if not (math.isfinite(at) and math.isfinite(excess)):
+        return ""
+    cells = [int(cells_at(time, np.array([at]))[0]) for time in times]
+    rows = tuple((max(k - 1, 0), min(k + 3, time.size)) for k, time in zip(cells, times, strict=True))
+    return untold(_curves(ref, test, times, rows, pair, time_scale), at, excess)
 
 
 def _state(ref: Source, pair: Pair, tolerance: Tolerance, rows: int) -> _State:

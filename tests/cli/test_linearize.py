@@ -744,3 +744,13 @@ def test_an_input_that_is_an_array_is_one_input_an_element(tmp_path, capsys):
     expected = np.array([[one, 0, 2 * one], [0, other, 0]])
     for response in (_descriptor(found, s), _reduction(found, s)):
         assert np.abs(response - expected).max() < CLOSE
+
+
+def test_a_response_of_nothing_says_what_is_missing(tmp_path, capsys):
+    text = "model m {\n  state v: V = 1 V\n  dynamic v' = (3 V*sin(t/(1 s)) - v)/(1 s)\n}\n"
+    path = write(tmp_path, text + "scene s of m { time 0 s to 1 s; trace v }\n")
+    for options, said in (((), "the model has no input"), (("--inputs", "t"), None)):
+        code = run(["linearize", str(path), "--response", "bode", "--backend", "numpy", *options])
+        err = capsys.readouterr().err
+        assert (code, "no bode: " in err) == ((0, True) if said else (2, False))
+        assert said is None or said in err

@@ -30,6 +30,16 @@ def test_example_is_right_or_wrong_as_it_says(example):
     assert errors == ({example.code} if example.code else set())
 
 
+@pytest.mark.one_in(6)
+@pytest.mark.parametrize("example", [e for e in EXAMPLES if not e.code], ids=lambda e: f"{e.topic}{EXAMPLES.index(e)}")
+def test_scenes_of_an_example_run(example, tmp_path, capsys):
+    """A coil whose linkage cannot pass 1 mWb stopped at 0.1 ms under 10 V (E930), on the page of components."""
+    (tmp_path / "m.sd").write_text(example.text)
+    for scene in re.findall(r"^scene (\w+) of", example.text, re.M):
+        asked = ["simulate", "-q", "--backend", "numpy", str(tmp_path / "m.sd"), "--scene", scene]
+        assert run([*asked, "-o", str(tmp_path / "out.h5")]) == 0, capsys.readouterr().err
+
+
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda e: f"{e.topic}{EXAMPLES.index(e)}")
 def test_example_is_laid_out_as_fmt_does(example):
     assert format_text(example.text) == example.text

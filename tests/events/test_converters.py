@@ -6,10 +6,11 @@ from converters import ROWS, SPAN, drawn
 from sysdyn import api
 
 NUMBERS = [k for k in range(60) if k != 34]  # of which the reference finds no set of diodes at some steps
+CASES = [(k, f) for f in ("lagrangian", "hamiltonian") for k in NUMBERS]
+CASES += [(k, "co_lagrangian") for k in NUMBERS if all(v[0] != "mosfet" for v in drawn(k).valves)]
 
 
-@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
-@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize(("number", "formulation"), CASES)
 @pytest.mark.one_in(90)
 def test_converters_run_as_by_backward_euler(number, formulation, tmp_path):
     case = drawn(number)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from model_runs import FOUR
-from sysdyn.api import simulate
+from sysdyn.api import ModelError, simulate
 
 PEAK = """from std.electrical import diode, resistor, capacitor
 model m {
@@ -56,6 +56,32 @@ component freewheel {
 }
 scene s of m { time 0 s to 12 s; trace Ja.f, Jb.f, W.one_way.multiplier every 0.1 s; accuracy 1e-6 }
 """
+RECTIFIER = """from std.electrical import thyristor, voltage, resistor, inductor
+model m {
+  node a, b, c: electrical
+  V: voltage(v = 10 V*sin(100 rad/s*pi*t)) a -> ground
+  T: thyristor(gate = if mod(t, 20 ms) > 3 ms and mod(t, 20 ms) < 4 ms then 1 else 0) a -> b
+  R: resistor(R = 2 ohm) b -> c
+  L: inductor(L = 5 mH) c -> ground
+}
+scene s of m { time 0 s to 40 ms; trace L.f as i, T.f, T.e as u every 0.1 ms; accuracy 1e-6 }
+"""
+WIRE_AT_TIMES = """from std.electrical import resistor, voltage
+model m {
+  node a, b: electrical
+  discrete on = true
+  V: voltage(v = -10 V) a -> ground
+  X: gate() a -> b
+  R: resistor(R = 2 ohm) b -> ground
+}
+component gate {
+  branch: electrical
+  discrete on = true
+  psi one_way: f >= 0 A while on
+  every 1 s { on := t < 0.5 s }
+}
+scene s of m { time 0 s to 2 s; trace R.f }
+"""
 DRIVEN = """from std.electrical import capacitor, resistor
 model m {
   node a, b: electrical
@@ -100,6 +126,30 @@ def test_a_capacitor_behind_a_diode_holds_the_peak(tmp_path, formulation):
     exact = 5.0 * np.sin(w * leaves) * np.exp(-(trace.time[inside] - leaves) / tau)
     assert np.abs(trace["v"].values[inside] - exact).max() < 1e-5 * 5.0
     assert np.abs(trace["r"].values[inside] - (exact - 5.0 * np.sin(w * trace.time[inside]))).max() < 1e-5 * 10.0
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_a_thyristor_conducts_from_its_gate_to_the_end_of_its_current(tmp_path, formulation):
+    """i = V/Z (sin(w t - phi) - sin(w t0 - phi) exp(-(t - t0) R/L)) from 3 ms on, as long as it is positive."""
+    trace = run(RECTIFIER, tmp_path, formulation)
+    w, z, phi = 100.0 * np.pi, np.hypot(2.0, 0.5 * np.pi), np.arctan2(0.5 * np.pi, 2.0)
+    t = np.mod(trace.time, 0.02)
+    wave = np.sin(w * t - phi) - np.sin(w * 0.003 - phi) * np.exp(-(t - 0.003) * 400.0)
+    ends = 0.0120963617354448  # its zero
+    exact = 10.0 / z * np.where((t > 0.003) & (t < ends), wave, 0.0)
+    for name in ("i", "T.f"):
+        assert np.abs(trace[name].values - exact).max() < 3e-6 * np.abs(exact).max()
+    off = (np.abs(t - 0.003) > 1e-6) & ((t < 0.003) | (t > ends + 1e-6))
+    assert np.abs(trace["u"].values[off] - 10.0 * np.sin(w * t[off])).max() < 1e-5
+    assert np.abs(trace["u"].values[(t > 0.00301) & (t < ends - 1e-5)]).max() < 1e-9
+
+
+def test_an_inequality_that_holds_at_times_leaves_a_wire_in_between(tmp_path):
+    """It was a gap there in the complementary forms, told as met: no current at 1.5 s for -5 A."""
+    trace = run(WIRE_AT_TIMES, tmp_path, "lagrangian")
+    assert np.abs(trace["R.f"].values - np.where(trace.time < 1.0, 0.0, -5.0))[[0, -1]].max() < 1e-12
+    with pytest.raises(ModelError, match="E602"):
+        run(WIRE_AT_TIMES, tmp_path, "co_lagrangian")
 
 
 @pytest.mark.parametrize("formulation", FOUR[2:])

@@ -161,3 +161,25 @@ def test_a_sign_on_a_reaction_that_turns_drives_nobody(tmp_path):
     text = text.replace("0.3*REACTION", "0.05*lane.multiplier").replace("  phi", "  energy V = 1/2*(30 N/m)*x^2\n  phi")
     (tmp_path / "m.sd").write_text(text)
     assert api.simulate(tmp_path / "m.sd", output=tmp_path / "m.h5").attributes["met"] == 1
+
+
+SUMS = """model m {
+  param n = 3
+  param mu = 0.25
+  for i in 1..n { param Fc[i] = 2 N*i }
+  coord x[1..n]: translation = 0.3 m
+  energy T* = sum(i in 1..n: 1/2*(1 kg)*x[i]'^2)
+  energy V = sum(i in 1..n: 1/2*(10 N/m)*x[i]^2)
+  content D = 2*mu*sum(i in 1..n: Fc[i]*abs(x[i]'))
+}
+scene s of m { time 0 s to 0.9 s; trace x[1..n] every 0.1 s; accuracy 1e-6 }
+"""
+
+
+def test_friction_in_a_sum_is_that_of_each_element(tmp_path):
+    """x = F/k + (x0 - F/k) cos(w t) until the first turn, F = 1, 2 and 3 N: the last is as much as the spring's."""
+    (tmp_path / "m.sd").write_text(SUMS)
+    trace = simulate(tmp_path / "m.sd", output=tmp_path / "m.h5")
+    for k, force in enumerate((1.0, 2.0, 3.0), 1):
+        exact = force / 10.0 + (0.3 - force / 10.0) * np.cos(np.sqrt(10.0) * trace.time)
+        assert np.abs(trace[f"x[{k}]"].values - exact).max() < 1e-6

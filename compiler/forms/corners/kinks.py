@@ -192,13 +192,13 @@ def _renamed(nodes: tuple[Node, ...]) -> tuple[Node, ...]:
 
 def _sampled(u: Node, above: Node, below: Node) -> int | None:
     """By values on u = 0 of the two branches there; None where none are known."""
-    moved = next((n for n in topological([u]) if n.op == "var"), None)
+    others, found, known = _others((above, below), u), SMOOTH, False
+    moved = _mover(u, others)
     if moved is None:
         return SMOOTH
     slopes = [derivative(node, moved) for node in (u, above, below)]
     if _ends((above, below), u, slopes[0], moved):
         return SMOOTH
-    others, found, known = _others((above, below), u), SMOOTH, False
     for k in range(SAMPLES + DRAWS * min(len(others), MANY)):
         asked = k < SAMPLES
         values = _on_surface(u, slopes[0], moved, _drawn((u,), k) if asked else _on_sides(others, u, k))
@@ -262,6 +262,13 @@ def _others(sides: tuple[Node, ...], u: Node) -> tuple[Node, ...]:
         if not known and any(n.op in LEAVES for n in topological([gap])):
             found[gap] = None
     return tuple(found)
+
+
+def _mover(u: Node, others: tuple[Node, ...]) -> Node | None:
+    """The unknown that takes u to zero: the one that fewest other conditions read, so that these keep their sides."""
+    read = [set(variables(gap)) for gap in others]
+    own = [n for n in topological([u]) if n.op == "var"]
+    return min(own, key=lambda n: sum(n in names for names in read), default=None)
 
 
 def _values(nodes: tuple[Node, ...], values: Mapping[Node, float]) -> list[float]:
