@@ -29,20 +29,22 @@ SPAN = 1.0
 def eventful_start(system: System, t0: float, plan: Plan, until: float | None = None) -> ConsistentState:
     """A state at t0 with the active set and the senses that fit it, which the model then has.
 
-    Constants of integrated constraints are what the text says of displacements, zero of those of which it says nothing.
-    Where fixed values and loops of stores ask for others (of three capacitors on a node two side by side, one of them
-    fixed), they are what follows: the constraint is its own integral, whatever it is at the start.
+    Constants of integrated constraints are those of the guess.  Where it is not the start (capacitors alone at a node,
+    in loops), they are what follows: the constraint is its own integral, whatever it is at the start.
     until: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
     """
     try:
-        return _fitting(system, t0, plan, until, constants=False)
-    except InconsistentStart:
-        if not system.description.constants:
-            raise
+        found, why = _fitting(system, t0, plan, until, constants=False), None
+    except InconsistentStart as error:
+        found, why = None, error
+    if system.description.constants and (found is None or found.displaced):
         system.own_numbers()  # the constants are written there
         with suppress(InconsistentStart):
             return _fitting(system, t0, plan, until, constants=True)
-        raise
+    if found is None:
+        assert why is not None
+        raise why
+    return found
 
 
 def _fitting(system: System, t0: float, plan: Plan, until: float | None, *, constants: bool) -> ConsistentState:

@@ -62,6 +62,7 @@ class ConsistentState:
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
     found it; "" of a state that was not sought from guesses.  zeros: where y is what the search left of a zero (None:
     nowhere), by which nothing else is sized: a slope made of such a current would have 1e19 K balance a voltage.
+    displaced: whether a displacement is not as guessed.
     """
 
     t: float
@@ -71,6 +72,7 @@ class ConsistentState:
     residual: float
     strategy: str = ""
     zeros: Mask | None = None
+    displaced: bool = False
 
     @property
     def y(self) -> Floats:
@@ -374,6 +376,8 @@ def _consistent(
             raise _explain(starter, t0, guess, starter.free, best, flat)
     if constants:
         system.description.p[places] += starter.residual(t0, best.x)[integrated]
+    at = starter.moves("q")
+    displaced = bool((best.x[at] != guess[at]).any())
     starter.spare()
     largest = np.maximum(starter.scale(t0, guess), starter.largest_alike(best.x))
     zeros = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: system.form.written]
@@ -386,4 +390,4 @@ def _consistent(
         starter.forget()
         del starter, guess
         system.trim(LARGE)
-    return ConsistentState(t0, y, yd, moved, best.residual, strategy, zeros)
+    return ConsistentState(t0, y, yd, moved, best.residual, strategy, zeros, displaced)

@@ -1,9 +1,10 @@
 """Random networks whose stores are partly said: every formulation must begin with the contents of the closed form.
 
-`python tests/models/random_starts.py scalar|others|arrays NUMBER [FIRST_SEED]` prints the seeds that do not, and a
+`python tests/models/random_starts.py scalar|others|bare|arrays NUMBER [FIRST_SEED]` prints the seeds that do not, and a
 table.  `scalar`: trees of resistors, capacitors and inductors with chords (loops of capacitors, meshes of inductors,
 both in series), sizes a thousand apart; about a third of the stores each is fixed, guessed, open.  `others`: something
-is said of one or two resistors too.  `arrays`: chains of families of stores over sections, said over ranges.
+is said of one or two resistors too.  `bare`: nodes of capacitors or inductors alone.  `arrays`: chains of families of
+stores over sections, said over ranges.
 """
 
 import sys
@@ -33,8 +34,8 @@ class Circuit:
     text: str = ""
 
 
-def circuit(seed, saying="=~", *, others=False):
-    """A circuit of which a part is said; others: of resistors too."""
+def circuit(seed, saying="=~", *, others=False, bare=False):
+    """A circuit of which a part is said; others: of resistors too; bare: nodes that need not leak mostly do not."""
     random, found = np.random.default_rng(seed), Circuit()
     nodes = ["ground", *(f"n{k}" for k in range(int(random.integers(2, 6))))]
     edges = [(nodes[k], nodes[int(random.integers(k))]) for k in range(1, len(nodes))]
@@ -50,14 +51,16 @@ def circuit(seed, saying="=~", *, others=False):
         found.elements.append((f"x{k}", kind, value, a, b))
     stores = [(name, KINDS[kind][2]) for name, kind, *_ in found.elements if KINDS[kind][2]]
     if not stores:
-        return circuit(seed + 1_000_000, saying, others=others)
+        return circuit(seed + 1_000_000, saying, others=others, bare=bare)
     for name, content in stores:
         say = str(random.choice(["=", "~", ""]))
         value = float(f"{random.uniform(-2.0, 2.0):.3f}")
         if say and say in saying:
             found.said[name] = say, value
             lines.append(f"  init {name}.{content} {say} {value!r} {UNITS[content]}")
-    leaks = [f"leak_{node}" for node in nodes[1:]]  # every node leaks: what floats is another matter
+    ends = Counter(node for *_, a, b in found.elements for node in (a, b))
+    leaking = [node for node in nodes[1:] if not bare or ends[node] < 2 or random.random() < 0.4]
+    leaks = [f"leak_{node}" for node in leaking]  # what floats is another matter
     lines += [f"  {leak}: resistor(R = 3 ohm) {leak[5:]} -> ground" for leak in leaks]
     read = [f"; trace {name}.{content}" for name, content in stores]
     told = [*(e[0] for e in found.elements if e[1] == "resistor"), *leaks]
@@ -72,45 +75,64 @@ def circuit(seed, saying="=~", *, others=False):
     return found
 
 
+def _null(matrix):
+    """A basis of what a matrix takes from the left to zero, a row each; unit vectors where there are such."""
+    left, sigma, _ = np.linalg.svd(matrix)
+    found = left[:, int((sigma > 1e-9).sum()) :].T
+    return np.where(np.abs(found) > NONE, found, 0.0)
+
+
+def _potentials(of, across, nodes):
+    """Of all nodes [nodes, stores], by what stores hold, where capacitors are sources of voltage, coils of current."""
+    stores = [e for e in of.elements if e[1] != "resistor"]
+    capacitors = [name for name, kind, *_ in stores if kind == "capacitor"]
+    incidence = np.array([across[name] for name in capacitors]).reshape(len(capacitors), nodes)
+    conductance = sum(np.outer(across[n], across[n]) / v for n, kind, v, *_ in of.elements if kind == "resistor")
+    drive = np.zeros((nodes + len(capacitors), len(stores)))
+    for k, (name, kind, value, *_) in enumerate(stores):
+        if kind == "capacitor":
+            drive[nodes + capacitors.index(name), k] = 1.0 / value
+        else:
+            drive[:nodes, k] = -across[name] / value
+    whole = np.block([[conductance, incidence.T], [incidence, np.zeros((len(capacitors),) * 2)]])
+    return (np.linalg.pinv(whole, rcond=1e-12) @ drive)[:nodes]
+
+
 def closed_form(of):
-    """Efforts of capacitors and flows of inductors, in their order: those at which what is fixed holds and voltages
-    around loops of capacitors add up to zero, with the least sum of squares of changes of contents, first of fluxes
-    that are guessed, then of charges, then of what guesses of resistors miss, then of fluxes and charges that nothing
-    is said of.  None where what is fixed contradicts itself.
+    """Efforts of capacitors and flows of inductors, in their order: those at which what is fixed holds, voltages around
+    loops of capacitors add up to zero and currents into cutsets of inductors too, with the least sum of squares of
+    changes of contents, first of fluxes that are guessed, then of charges, then of what guesses of resistors miss, then
+    of fluxes and charges that nothing is said of.  None where what is fixed contradicts itself.
     """
     nodes = list({n: 0 for *_, a, b in of.elements for n in (a, b) if n != "ground"})
-    stores = [e for e in of.elements if e[1] != "resistor"]
-    rows = {name: np.zeros(len(nodes)) for name, *_ in of.elements}  # voltages by those of nodes
-    for name, _, _, a, b in of.elements:
-        for node, sign in ((a, 1.0), (b, -1.0)):
+    across = {name: np.zeros(len(nodes)) for name, *_ in of.elements}  # voltages by those of nodes
+    for name, _, _, *ends in of.elements:
+        for node, sign in zip(ends, (1.0, -1.0), strict=True):
             if node != "ground":
-                rows[name][nodes.index(node)] += sign
-    capacitors, inductors = ([e for e in stores if e[1] == kind] for kind in ("capacitor", "inductor"))
-    incidence = np.array([rows[name] for name, *_ in capacitors]).reshape(len(capacitors), len(nodes))
-    left, sigma, _ = np.linalg.svd(incidence)
-    around = left[:, int((sigma > 1e-9).sum()) :].T  # loops [loops, capacitors]
-    around = np.where(np.abs(around) > NONE, around, 0.0)
-    size = np.array([value for _, _, value, *_ in stores])
-    told = [(name, of.said[name]) for name, kind, *_ in of.elements if kind == "resistor" and name in of.said]
-    system = np.zeros((len(around) + len(told), len(stores) + len(told)))  # contents, what is missed
-    is_c = np.array([e[1] == "capacitor" for e in stores], dtype=bool)
+                across[name][nodes.index(node)] += sign
+    stores = [e for e in of.elements if e[1] != "resistor"]
+    size, is_c = (np.array([e[k] for e in stores]) for k in (2, 1))
+    is_c = is_c == "capacitor"
+    told = [
+        (name, value, *of.said[name]) for name, kind, value, *_ in of.elements if kind == "resistor" and name in of.said
+    ]
+
+    def incidence(*kinds):
+        found = [across[name] for name, kind, *_ in of.elements if kind in kinds]
+        return np.array(found).reshape(len(found), len(nodes))
+
+    around = _null(incidence("capacitor"))
+    into = _null(incidence("capacitor", "resistor").T) @ incidence("inductor").T
+    system = np.zeros((len(around) + len(into) + len(told), len(stores) + len(told)))  # of contents, what is missed
     system[: len(around), np.flatnonzero(is_c)] = around / size[is_c]
+    system[len(around) : len(around) + len(into), np.flatnonzero(~is_c)] = into / size[~is_c]
     aim = np.zeros(len(system))
-    if told:
-        conductance = sum(np.outer(rows[n], rows[n]) / v for n, kind, v, *_ in of.elements if kind == "resistor")
-        whole = np.block([[conductance, incidence.T], [incidence, np.zeros((len(incidence),) * 2)]])
-        drive = np.zeros((len(whole), len(stores)))
-        for k, (name, kind, value, *_) in enumerate(stores):
-            if kind == "capacitor":
-                drive[len(nodes) + capacitors.index(stores[k]), k] = 1.0 / value
-            else:
-                drive[: len(nodes), k] = -rows[name] / value
-        potentials = (np.linalg.pinv(whole, rcond=1e-12) @ drive)[: len(nodes)]
-        value_of = {name: value for name, _, value, *_ in of.elements}
-        for k, (name, (_, value, letter)) in enumerate(told, len(around)):
-            system[k, : len(stores)] = rows[name] @ potentials / (1.0 if letter == "e" else value_of[name])
-            system[k, len(stores) + k - len(around)], aim[k] = -1.0, value
-    words = [of.said.get(name, ("", 0.0))[0] for name, *_ in stores] + [word for _, (word, *_) in told]
+    for k, (name, resistance, _, value, letter) in enumerate(told, len(stores)):
+        row = len(around) + len(into) + k - len(stores)
+        voltage = across[name] @ _potentials(of, across, len(nodes))
+        system[row, : len(stores)] = voltage / (1.0 if letter == "e" else resistance)
+        system[row, k], aim[row] = -1.0, value
+    words = [of.said.get(name, ("", 0.0))[0] for name, *_ in stores] + [word for _, _, word, *_ in told]
     sort = ["q" if c else "p" for c in is_c] + ["miss"] * len(told)
     found = np.append(size * [of.said.get(name, ("", 0.0))[1] for name, *_ in stores], np.zeros(len(told)))
     order = [("~", "p"), ("~", "q"), ("~", "miss"), ("", "p"), ("", "q")]
@@ -125,7 +147,6 @@ def closed_form(of):
         )
     if np.abs(aim - system @ found).max(initial=0.0) > 1e-9 * max(np.abs(found[: len(size)] / size).max(), 1.0):
         return None
-    assert len(capacitors) + len(inductors) == len(stores)
     return found[: len(size)] / size
 
 
@@ -183,7 +204,7 @@ def contents(text):
 
 def judged(seed, sort="scalar", saying="=~"):
     """agree, refused (no formulation has a start), or how they differ."""
-    of = array(seed) if sort == "arrays" else circuit(seed, saying, others=sort == "others")
+    of = array(seed) if sort == "arrays" else circuit(seed, saying, others=sort == "others", bare=sort == "bare")
     found, expected = contents(of.text), closed_form(of)
     values = [value for value in found.values() if value is not None]
     if not values:
