@@ -184,6 +184,7 @@ def array(seed):
                     found.said[f"{name}[{i}]"] = say, said * (1.0 + i / 4.0)
     lines.append("  for i in 1..n { leak[i]: resistor(R = 3 ohm) v[i] -> ground }")
     scene = "".join(f"; trace {name}.{KINDS[kind][2]}" for name, kind, *_ in found.elements)
+    found.elements += [(f"leak[{i}]", "resistor", 3.0, i, "ground") for i in range(1, n + 1)]
     found.text = HEAD + "\n".join([*lines, "}", f"scene run of net {{ time 0 s to 1 s{scene} }}\n"])
     return found
 
