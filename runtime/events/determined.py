@@ -88,7 +88,7 @@ class Determined:
         """As Pivoting.fit, of a set that leaves as little open as one can; turned: what has just changed changes back
         last.
         """
-        found = self._pivoting.fit(t, y, yd, settle)
+        found = self._pivoting.fit(t, y, yd, settle, turned)
         if self._system.unknowns > DENSE:
             return found
         open_ = self.nullity(t, *found)

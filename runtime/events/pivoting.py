@@ -3,18 +3,21 @@
 A guess of the active set gives flows (impulses in the metric of the inertia where they must jump) and, by the settled
 rows, rates and multipliers; the first condition that does not hold (contacts.py), in the order written, changes its
 member, and so on (Murty's least-index principal pivoting, which ends for a positive definite matrix and is watched for
-cycles).
+cycles).  Of one-way flows alone, where that runs in a circle or a set contradicts itself, an implicit step says which
+set is next (implicit.py).
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from itertools import chain, combinations, islice
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.contacts import Contacts
+from sysdyn.runtime.events.implicit import Implicit
 from sysdyn.runtime.model.description import Floats
 
 NEAR, BESIDE = 3, 60
@@ -23,12 +26,18 @@ MANY = 2
 """Diodes that change at once, at least: fewer are turned one by one."""
 TRIALS = 20
 """Trials a contact, beside TRIALS for all."""
+AHEAD = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
+"""Of the time in which the unknowns change: how long an implicit step is that tells active sets apart, the shortest
+first: what leaks decide about is behind it, what has moved else is less than an error.
+"""
 VISITS = 3
 """Of one set from one point: it is the third time that what was tried in between leads back."""
 
 Settle = Callable[[float, Floats, Floats], tuple[Floats, Floats, Floats] | None]
 """t, y, yd -> y, yd consistent with the active set and the impulses [unknowns] that took the flows there; None: no
 such point was found."""
+
+Point = tuple[Floats, Floats]
 
 
 class NoActiveSetError(Exception):
@@ -45,11 +54,19 @@ class Pivoting:
     def __init__(self, contacts: Contacts, singular: Callable[[float, Floats, Floats], bool]) -> None:
         self.contacts, self.singular = contacts, singular
         self._contradicts: set[tuple[float, ...]] = set()
+        self._flows = not contacts.starting and any(c.kind == "psi" for c in contacts.contacts)
 
-    def fit(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats]:
-        """A consistent point whose active set fits, from the present one; NoActiveSetError."""
+    def fit(self, t: float, y: Floats, yd: Floats, settle: Settle, touched: Sequence[int] = ()) -> Point:
+        """A consistent point whose active set fits, from the present one; NoActiveSetError.  touched: what turned just
+        now, behind a set that left nothing open.
+        """
         self.contacts.reversed.clear()
         before, turned = (self.contacts.active.copy(), self.contacts.p.copy()), dict[int, set[bool]]()
+        found = self._among_flows(t, y, yd, settle, touched) if self._flows else None
+        if found is not None:
+            return found
+        self.contacts.active[:], self.contacts.p[:] = before
+        self.contacts.reversed.clear()
         try:
             return self._pivoted(t, y, yd, settle, turned)
         except NoActiveSetError:
@@ -62,10 +79,49 @@ class Pivoting:
         finally:
             self.contacts.open = frozenset()
 
+    @cached_property
+    def _implicit(self) -> Implicit:
+        return Implicit(self.contacts, self.contacts.system.another("3"))
+
+    def _among_flows(self, t: float, y: Floats, yd: Floats, settle: Settle, touched: Sequence[int]) -> Point | None:
+        """The same where one-way flows alone turn; None: neither turning them nor a short implicit step finds it."""
+        contacts, p, known = self.contacts, self.contacts.p.copy(), self.contacts.observer.largest.copy()
+        turned, stood = contacts.active.copy(), contacts.active.copy()
+        stood[[k for k in touched if contacts.contacts[k].kind == "psi"]] ^= True
+        try:
+            return self._pivoted(t, y, yd, settle, {}, once=True)
+        except NoActiveSetError:
+            contacts.p[:] = p
+        for later in AHEAD:
+            told = self._ahead(t, y, later * contacts.time, (stood, turned))
+            # rows hold only nearly: from its point, where what leaks decide about has moved for it
+            for begin in () if told is None else (y, told):
+                found = settle(t, begin, yd)
+                if found is not None and contacts.fits(t, begin, found):
+                    return found[:2]
+                contacts.observer.largest[:] = known
+        return None
+
+    def _ahead(self, t: float, y: Floats, h: float, bases: Sequence[NDArray[np.bool_]]) -> Floats | None:
+        """The point behind an implicit step of h (s), whose active set then is that of the model; it is sought from the
+        first of the sets that leaves nothing open.
+        """
+        for base in bases:
+            self.contacts.active[:] = base
+            self.contacts.apply()
+            told = self._implicit.after(t, y, h)
+            if told is not None:
+                self.contacts.active[:] = told[0]
+                self.contacts.apply()
+                return told[1]
+        return None
+
     def _pivoted(
-        self, t: float, y: Floats, yd: Floats, settle: Settle, turned: dict[int, set[bool]]
-    ) -> tuple[Floats, Floats]:
-        """The same; turned: those that were turned, and whether they held."""
+        self, t: float, y: Floats, yd: Floats, settle: Settle, turned: dict[int, set[bool]], *, once: bool = False
+    ) -> Point:
+        """The same; turned: those that were turned, and whether they held; once: no set is tried twice, nor beside one
+        that contradicts itself.
+        """
         seen = Counter[tuple[float, ...]]()
         changed: list[int] = []
         fewest = len(self.contacts.contacts)
@@ -77,14 +133,14 @@ class Pivoting:
             state = self.contacts.state()
             again = state in seen
             seen[state] += 1
-            if seen[state] > VISITS:
+            if seen[state] > (1 if once else VISITS):
                 break
             found = self._settled_by(t, y, yd, settle)
             if found is None and block is not None:  # sources that they short: one of them alone
                 self.contacts.active[:], (_, first, values), block, fewest = block[0], block, None, 0
                 self.contacts.turn(first, values)
                 continue
-            found = found or self._beside(t, y, yd, settle, seen)
+            found = found or (None if once else self._beside(t, y, yd, settle, seen))
             if found is None:
                 break
             # of a set that does not hold no size stays: where it has no rank its multipliers are without bound

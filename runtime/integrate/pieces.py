@@ -38,6 +38,10 @@ WIDER = 3.0
 """Times the stretch in which a change was seen, and was none once settled: the next one behind it that is searched."""
 SOON = 1e-2
 """Of the first step behind an event: another one before that is of a dense output which knows nothing so near."""
+NARROW = 1e3
+"""Spacings of t: a step that is no longer is not parted again."""
+LOOKS = 4
+"""Parts of a step at whose ends what falls within it is looked at."""
 HALT = 1e-5
 """Of a step, before friction in the plane comes to rest: there a slip still has a direction."""
 FAINT = 1e3
@@ -202,6 +206,9 @@ class Pieces:
             t, which = found
             if self._by_round_off(which):
                 continue
+            if begun and self._overshoots(which, core.t_from, end):
+                self._again(core.t_from, end, sink)
+                return time.process_time() - began
             with run.settler.exactly():
                 before = self._point(t)
                 which += self._met(t, before, which)
@@ -212,6 +219,22 @@ class Pieces:
                 self._go_on(t, point, before, misled=end - core.t_from if misled else 0.0)
                 return time.process_time() - began
             begin = t
+
+    def _overshoots(self, which: Sequence[Watched], begin: float, end: float) -> bool:
+        """Whether what falls within the first step behind an event lies further below zero there than it has ever been
+        large: a transient too short for such a step, which a stiff law settles, bends the polynomial of its stages.
+        """
+        if end - begin <= NARROW * float(np.spacing(end)):
+            return False
+        largest = [self.handler.observer.largest[w.row] for w in which]
+        looks = [self._values(begin + (end - begin) * k / LOOKS) for k in range(1, LOOKS + 1)]
+        return any(-w.side * values[w.row] > most for values in looks for w, most in zip(which, largest, strict=True))
+
+    def _again(self, begin: float, end: float, sink: Sink) -> None:
+        """The last step counts for nothing; steps of an eighth of it from where it began."""
+        point = self._point(begin)
+        self._accept(begin, 0, sink)
+        self._go_on(begin, point, point, misled=end - begin)
 
     @property
     def _from(self) -> float:

@@ -22,4 +22,4 @@ def test_converters_run_as_by_backward_euler(number, formulation, tmp_path):
         values = trace[name].values
         apart = max(np.abs(values[rows] - exact[j, k]).min() for j, rows in enumerate(at))  # before a jump, or behind
         of_kind = [j for j, other in enumerate(case.traced) if other[0] == name[0]]
-        assert apart < 2e-3 * np.abs(exact[:, of_kind]).max() + 5.0 * off[k]
+        assert apart <= 2e-3 * np.abs(exact[:, of_kind]).max() + 5.0 * off[k]

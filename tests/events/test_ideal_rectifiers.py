@@ -39,6 +39,36 @@ def test_six_digits(seed, tmp_path):
     assert np.abs(voltage(found) - other).max() < 1e-5 * np.abs(other).max()
 
 
+@pytest.mark.parametrize(
+    ("seed", "accuracy", "end"),
+    [(34, "1e-6", "14 ms"), pytest.param(20, "1e-4", "25 ms", marks=pytest.mark.one_in(4))],
+)
+@pytest.mark.filterwarnings("ignore")
+def test_a_set_that_turning_one_after_the_other_does_not_find(seed, accuracy, end, tmp_path):
+    """A source that two diodes short, six of whose neighbours must turn at once; a leak through a megohm that goes
+    backwards through the one set of diodes while the other has a forward voltage (E930).
+    """
+    file = tmp_path / "m.sd"
+    file.write_text(Circuit(seed).text.replace("1e-4", accuracy).replace("50 ms", end))
+    found = simulate(file, output=tmp_path / "a.h5")
+    assert found.met
+    other = voltage(simulate(file, output=tmp_path / "b.h5", method="bdf", unmet="warn"))
+    assert np.abs(voltage(found) - other).max() < 10.0 * float(accuracy) * np.abs(other).max()
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_no_event_of_a_polynomial(tmp_path):
+    """A leak's transient of 1e-10 s within a first step of 5e-8: between 378 V and 4 V the polynomial of radau's stages
+    lay at -28 kV, and diodes chattered (7000 events).
+    """
+    file = tmp_path / "m.sd"
+    file.write_text(Circuit(27).text.replace("50 ms", "4.2 ms"))
+    found = simulate(file, output=tmp_path / "a.h5", max_wall=10.0)
+    other = simulate(file, output=tmp_path / "b.h5", method="bdf", accuracy=1e-5)
+    assert np.abs(voltage(found) - voltage(other)).max() < 1e-4 * np.abs(voltage(other)).max()
+    assert len(found.events) < 3 * len(other.events)
+
+
 def test_the_same_for_ever():
     assert Circuit(5).text == Circuit(5).text
     assert len({Circuit(seed).text for seed in range(60)}) == 60

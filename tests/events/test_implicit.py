@@ -1,0 +1,42 @@
+"""Linear complementarity by Lemke's method, against all sets one by one."""
+
+from itertools import product
+
+import numpy as np
+from sysdyn.runtime.events.implicit import lemke
+
+
+def by_sets(m, q):
+    """Some z that solves the problem, of all 2^n sets; None without."""
+    for held in product((False, True), repeat=q.size):
+        which = np.flatnonzero(held)
+        z = np.zeros(q.size)
+        if which.size:
+            z[which] = np.linalg.lstsq(m[np.ix_(which, which)], -q[which], rcond=None)[0]
+        if (z >= -1e-9).all() and (q + m @ z >= -1e-9).all() and np.abs((q + m @ z)[which]).max(initial=0.0) < 1e-9:
+            return z
+    return None
+
+
+def test_what_is_passive():
+    """Semidefinite of rank 3 with a skew part (what coils and capacitors beside each other make of it): it finds a
+    solution wherever there is one.
+    """
+    chance, some = np.random.default_rng(1), 0
+    for _ in range(60):
+        part, skew = chance.normal(size=(6, 3)), np.triu(chance.normal(size=(6, 6)))
+        m, q = part @ part.T + (skew - skew.T), chance.normal(size=6)
+        z, known = lemke(m, q), by_sets(m, q)
+        assert (z is None) == (known is None)
+        if z is not None:
+            some += 1
+            w = q + m @ z
+            assert (z >= 0.0).all()
+            assert w.min() > -1e-9
+            assert np.abs(z * w).max() < 1e-9
+    assert some > 20
+
+
+def test_none_where_there_is_none():
+    assert lemke(np.zeros((1, 1)), np.array([-1.0])) is None
+    assert lemke(np.array([[0.0, -1.0], [1.0, 0.0]]), np.array([-1.0, -1.0])) is None
