@@ -14,7 +14,7 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.model.slopes import rows_without_slope
-from sysdyn.runtime.numerics.gauss_newton import Solution, solve
+from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.least import problem_of
@@ -110,10 +110,10 @@ def _beyond(starter: Starter, t: float, x: Floats, follows: Mask) -> bool:
 
 
 def _on_its_rows(starter: Starter, t: float, x: Floats, guess: Floats, state: Mask, follows: Mask) -> Floats | None:
-    """X with the state on the rows of the state alone, by its least change; None where that was not found."""
+    """X with the state on the rows of the state alone, by its least change, to round-off; None where none was found."""
     problem = problem_of(starter, t, x, guess, rows=_of_the_state(starter, follows), free=state, least=True)
     found = solve(problem, x)
-    return found.x if found.residual < EXACT else None
+    return stepped(problem, found.x) if found.residual < EXACT else None
 
 
 def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
