@@ -309,6 +309,18 @@ NETS = {
   G: valve(Cr = 6.4e11 Pa.s^2/m^6) b -> ground
   init B.gas.e = 1.5 bar
 """,
+    "fed": """  node a, b, c, s, k: hydraulic
+  S: effort(e = 1.5 bar) s -> ground
+  A: accumulator(V0 = 1.6e-3 m^3, p0 = 1 bar) a
+  B: accumulator(V0 = 4.3e-3 m^3, p0 = 1 bar) b
+  C: accumulator(V0 = 9.1e-3 m^3, p0 = 1 bar) c
+  E: valve(Cr = 1.2e11 Pa.s^2/m^6) a -> k
+  F: check_valve() k -> b
+  G: valve(Cr = 1.4e10 Pa.s^2/m^6) b -> c
+  H: pipe(I = 7.5e6 Pa.s^2/m^3, R = 5.1e7 Pa.s/m^3) a = s, b = a
+  I: pipe(I = 3.1e7 Pa.s^2/m^3, R = 7.1e7 Pa.s/m^3) a = ground, b = a
+  init A.gas.e = 1.5 bar
+""",
     "open": """  node a, b, c, d, s: hydraulic
   S: effort(e = 1.5 bar) s -> ground
   A: accumulator(V0 = 7e-3 m^3, p0 = 1 bar) a
@@ -332,12 +344,14 @@ NETS = {
         ("checked", (1e5, 0.0, 1.5e5, 2e5)),
         ("piped", (0.0, 2e5, 3e5, 0.0)),
         ("at rest", (0.0, 1.5e5)),
+        ("fed", (1.5e5, 1e5, 1e5)),
         ("open", (1e5, 2e5, 3e5, 0.0)),
     ],
 )
 def test_a_state_moves_only_where_it_has_to(tmp_path, net, pressures, formulation):
     """Tanks of which nothing is said begin empty, gases as they are filled: Newton's steps along valves at rest, and
-    fixed pressures that were told from round-off by no size of their own, moved them, told as met or refused.
+    fixed pressures that were told from round-off by no size of their own, moved them, told as met or refused; the first
+    row of "fed" alone was moved onto a rate that a valve at rest has not.
     """
     stores = [
         f"{name}.store.e" if f"{name}: tank" in NETS[net] else f"{name}.gas.e" for name in "ABCD"[: len(pressures)]

@@ -16,6 +16,7 @@
 #define FAILS 4 /* rows that meet their sums for each that does not: fewer are not worth looking */
 #define CRESTS 32 /* rows of what is watched that a step may have beside those at its parts */
 #define GROWN 1.1 /* times the largest so far: beyond it the size of a step is not believed as the method left it */
+#define BEGUN 1e-3 /* magnitudes by which a start may still be moved: at a valve at rest no state gives its law a rate */
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
                    int32_t audited)
@@ -134,8 +135,10 @@ static void settle_row(sd_run *run, double t, int32_t kind)
         double enough = run->settle->enough;
         if (kind == SD_COMPARED)
             run->settle->enough = fmax(enough, run->rough);
+        run->settle->most = run->fresh ? BEGUN : 0.0;
         sd_run_settle(run, t);
         run->settle->enough = enough;
+        run->settle->most = 0.0;
     }
     if (run->least_norm)
         sd_least_norm_apply(run->least_norm, t, run->point, run->point_d);

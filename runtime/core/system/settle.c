@@ -424,6 +424,16 @@ static int holds(sd_settle *settle, double t, const double *y, const double *yd,
     return best <= limit || (measure(settle, t, y, yd), settle->own <= limit);
 }
 
+/* whether the state is further from where it was than it may be */
+static int strays(const sd_settle *settle)
+{
+    if (settle->most > 0.0)
+        for (int32_t j = 0; j < settle->unknowns; j++)
+            if (settle->state[j] && fabs(settle->x[j] - settle->x0[j]) > settle->most * settle->scale[j])
+                return 1;
+    return 0;
+}
+
 /* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */
 static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 {
@@ -473,7 +483,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     }
     /* the best point met, or the given one; a rate may have no bound */
     put(settle, settle->x, y, yd);
-    done = done || holds(settle, t, y, yd, best, CLOSE);
+    done = (done || holds(settle, t, y, yd, best, CLOSE)) && !strays(settle);
     if (done)
         note_met(settle, y, yd);
     else

@@ -51,6 +51,7 @@ typedef struct sd_settle {
     double enough;                   /* scaled residual with which a draft is content; 0: round-off */
     double slack;                    /* move of the state, in magnitudes, by which a basic solution may differ */
     double still;                    /* the same by which it may still be off the least change; 0: round-off */
+    double most;                     /* the same by which a point may move it: one that moves it further stays; 0: any */
     int32_t ready;                   /* whose factors stand: 0 none, else of the matrix or the basis */
     int32_t refused;                 /* attempts by the basis that led nowhere */
     int32_t determined;              /* the basis serves only where all that follows from the state has a pivot in it */

@@ -161,6 +161,7 @@ class Settle(c.Structure):
         ("enough", D),
         ("slack", D),
         ("still", D),
+        ("most", D),
         ("ready", I),
         ("refused", I),
         ("determined", I),
