@@ -222,13 +222,15 @@ class Pieces:
 
     def _overshoots(self, which: Sequence[Watched], begin: float, end: float) -> bool:
         """Whether what falls within the first step behind an event lies further below zero there than it has ever been
-        large: a transient too short for such a step, which a stiff law settles, bends the polynomial of its stages.
+        large, at either end of the step too: a transient too short for such a step, which a stiff law settles, bends
+        the polynomial of its stages.
         """
         if end - begin <= NARROW * float(np.spacing(end)):
             return False
         largest = [self.handler.observer.largest[w.row] for w in which]
-        looks = [self._values(begin + (end - begin) * k / LOOKS) for k in range(1, LOOKS + 1)]
-        return any(-w.side * values[w.row] > most for values in looks for w, most in zip(which, largest, strict=True))
+        looks = [self._values(begin + (end - begin) * k / LOOKS) for k in range(LOOKS + 1)]
+        ends = [max(most, *(abs(looks[k][w.row]) for k in (0, -1))) for w, most in zip(which, largest, strict=True)]
+        return any(-w.side * v[w.row] > most for v in looks[1:-1] for w, most in zip(which, ends, strict=True))
 
     def _again(self, begin: float, end: float, sink: Sink) -> None:
         """The last step counts for nothing; steps of an eighth of it from where it began."""

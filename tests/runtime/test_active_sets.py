@@ -29,7 +29,7 @@ class Problem:
         self.contacts = [SimpleNamespace(kind="phi", name=f"c{k}") for k in range(n)]
         self.active, self.p, self.frozen = np.zeros(n, dtype=bool), np.zeros(0), {}
         self.multiplier, self.open, self.observer, self.reversed = list(range(n)), frozenset(), Observed(), set()
-        self.through = set()
+        self.through, self.starting = set(), False
 
     def state(self):
         return tuple(self.active.tolist())

@@ -9,7 +9,7 @@ initial content less +- that of the first; it is chosen where not all of these a
 efforts, or what is said of anything else (a resistor, an effort of e = q + q^3), may ask for others.  What is no store
 begins at what the text says of it, else at zero, whatever the first store holds.  A store between two nodes of the
 reflection (an inductor) holds their difference: where such stores close loops in which contents are said, each has its
-own initial content as k; it is chosen where nothing is said of it.  The same where something else is said.
+own initial content as k where the text fixes it, else it is chosen.  The same where something else is said.
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ class Contents:
         given = {e.number for e in looped if any(meet(box, e.named) for _, box in self._given.get(e.name, ()))}
         for e in looped if given or self._loose else ():
             value = self.start(e.name, indices(e.named), ranges_over(e.named))
-            self._constant(e, value if e.number in given else None)
+            self._constant(e, value if self._fixed(e.name, e.named) else None)
 
     def _constant(self, element: Element, value: Node | None) -> None:
         """A parameter of that value over the element's indices, none for zero; chosen by the start where None."""
