@@ -47,8 +47,9 @@ def _levels(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[Mask, ..
 
 def weights(starter: Starter, t: float, x: Floats, scale: Floats) -> Floats:
     """Of changes in magnitudes [unknowns]: unknowns of one kind and unit are moved by one measure, whatever their
-    values; those that hold what stores do by their contents, flows by their momenta.  What follows moves freely: by
-    measures of its own it would lose digits (1e-9 of a pressure at a valve at rest).
+    values; those that hold what stores do by their contents, flows by their momenta.  What follows moves freely, by
+    its values alone (by momenta 1e-9 of a pressure at a valve at rest were lost): where rows leave multipliers open
+    they share alike.
     """
     system, known, inert = starter.system, starter.equations, np.zeros(0)
     if known.balanced:
@@ -58,16 +59,17 @@ def weights(starter: Starter, t: float, x: Floats, scale: Floats) -> Floats:
         del y, yd
         inert = own_inertia(system, jy, jyd)
         del jy, jyd
-    follows = starter.following(t, x)
     content = scale.copy()
     np.multiply(content[: inert.size], np.abs(inert), out=content[: inert.size], where=inert != 0.0)
     del inert
     content /= largest_of_group(starter.measures, content)
     if x.size > LARGE:
         starter.__dict__.pop("measures", None)
-    content[starter.n :] = 1.0  # rates have magnitudes of their own each
     np.multiply(content, WEIGHT["unwritten"], out=content, where=~starter.written)
-    content[follows] = WEIGHT["following"]
+    own = largest_of_group(known.alike, scale)
+    np.multiply(WEIGHT["following"], np.divide(scale, own, out=own), out=own)
+    np.copyto(content, own, where=starter.following(t, x))
+    content[starter.n :] = WEIGHT["following"]  # rates have magnitudes of their own each
     return content
 
 
