@@ -56,6 +56,7 @@ def test_a_set_that_turning_one_after_the_other_does_not_find(seed, accuracy, en
     assert np.abs(voltage(found) - other).max() < 10.0 * float(accuracy) * np.abs(other).max()
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 def test_no_event_of_a_polynomial(tmp_path):
     """A leak's transient of 1e-10 s within a first step of 5e-8: between 378 V and 4 V the polynomial of radau's stages
@@ -63,7 +64,7 @@ def test_no_event_of_a_polynomial(tmp_path):
     """
     file = tmp_path / "m.sd"
     file.write_text(Circuit(27).text.replace("50 ms", "4.2 ms"))
-    found = simulate(file, output=tmp_path / "a.h5", max_wall=10.0)
+    found = simulate(file, output=tmp_path / "a.h5", max_wall=100.0)
     other = simulate(file, output=tmp_path / "b.h5", method="bdf", accuracy=1e-5)
     assert np.abs(voltage(found) - voltage(other)).max() < 1e-4 * np.abs(voltage(other)).max()
     assert len(found.events) < 3 * len(other.events)
