@@ -33,18 +33,18 @@ def eventful_start(system: System, t0: float, plan: Plan, until: float | None = 
     in loops), they are what follows: the constraint is its own integral, whatever it is at the start.
     until: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
     """
-    try:
-        found, why = _fitting(system, t0, plan, until, constants=False), None
-    except InconsistentStart as error:
-        found, why = None, error
-    if system.description.constants and (found is None or found.displaced):
+    if system.description.constants:
+        with suppress(InconsistentStart):
+            found = _fitting(system, t0, plan, until, constants=False)
+            if not found.displaced:
+                return found
         system.own_numbers()  # the constants are written there
+        p = system.description.p
+        stood = p.copy()
         with suppress(InconsistentStart):
             return _fitting(system, t0, plan, until, constants=True)
-    if found is None:
-        assert why is not None
-        raise why
-    return found
+        p[:] = stood  # sets that were tried have left theirs
+    return _fitting(system, t0, plan, until, constants=False)
 
 
 def _fitting(system: System, t0: float, plan: Plan, until: float | None, *, constants: bool) -> ConsistentState:
