@@ -75,9 +75,12 @@ class Statements(Declarations):
 
     def _content(self, s: syntax.Content) -> None:
         node = self._wants(f"content {s.function}", s.value, dim.POWER)
-        for part, loops in _parts(node, self.resolver.loops) if s.function == "D" else [(node, self.resolver.loops)]:
-            said = events.set_valued(self, part, loops, self.place(s.span)) if s.function == "D" else part
-            self.said(Energy(s.function, said, loops, self.place(s.span)))
+        loops, place = self.resolver.loops, self.place(s.span)
+        if s.function != "D":
+            self.said(Energy(s.function, node, loops, place))
+            return
+        for part, inside in _parts(node, loops):
+            self.said(Energy("D", events.set_valued(self, part, inside, place), inside, place))
 
     def _work(self, s: syntax.Work) -> None:
         effort = self.resolver.scalar(s.effort)

@@ -45,9 +45,11 @@ class Equations:
         self._entries(settled)
         misses = np.append(settled.are("slack", "unsaid"), np.zeros(self.rates.size, dtype=bool))[self.columns]
         self.guessed = self.rows[misses], self.columns[misses]
-        self._kinds(settled)
-        self.measured = self._measured(settled)
-        self.momenta = self._momenta(settled)
+        contents = self.contents(settled)
+        self._kinds(settled, contents)
+        self.measured = self._measured(settled, contents)
+        self.momenta = self._momenta(settled, contents)
+        del contents  # of a large model the room counts
         self.joined = joined(settled)
         self.rated_rows = settled.of_groups("dynamics_rate")
 
@@ -70,9 +72,8 @@ class Equations:
         moving = columns_of_rates(self.n, self.rates, settled.pattern.columns_of()) >= 0
         return np.flatnonzero(in_y).astype(np.int32), np.flatnonzero(in_rate & moving).astype(np.int32)
 
-    def _kinds(self, settled: System) -> None:
+    def _kinds(self, settled: System, contents: Mask) -> None:
         kinds = alike(settled)
-        contents = self.contents(settled)
         if contents.any():  # what chords hold is of the kind of coordinates
             families, numbers = settled.description.families, kinds_and_units(settled)
             of_q = np.array([*(numbers.get(("q", f.unit), numbers[f.kind, f.unit]) for f in families), 0])
@@ -95,9 +96,9 @@ class Equations:
             found[first : first + rows.size] = group == "initial" and rows.content
         return found
 
-    def _measured(self, settled: System) -> Mask:
+    def _measured(self, settled: System, contents: Mask) -> Mask:
         """Unknowns of y that the contents of stores measure; a momentum with its flow."""
-        mask, contents = np.zeros(self.n, dtype=bool), self.contents(settled)
+        mask = np.zeros(self.n, dtype=bool)
         own = contents[self.rows] & (self.columns < self.written)
         row, column = self.rows[own], self.columns[own]
         flow, moving = settled.are("f")[column], np.zeros(settled.rows, dtype=bool)
@@ -106,11 +107,11 @@ class Equations:
         mask[self.momentum] |= mask[self.flow]
         return mask
 
-    def _momenta(self, settled: System) -> tuple[Places, Places]:
+    def _momenta(self, settled: System, contents: Mask) -> tuple[Places, Places]:
         """Unknowns that are contents of the kind of momenta, and a flow with such a content each: what guesses of
         contents made of flows miss, dynamic variables that integrate efforts of a balance.
         """
-        made, contents = np.full(settled.rows, -1, dtype=np.int64), self.contents(settled)
+        made = np.full(settled.rows, -1, dtype=np.int64)
         flows = np.flatnonzero(contents[self.rows] & np.append(settled.are("f"), self.rates < 0)[self.columns])
         made[self.rows[flows]] = self.columns[flows]
         row, column, (in_y, in_rate) = settled.pattern.row, settled.pattern.columns_of(), settled.structural()

@@ -24,20 +24,15 @@ FLOOR = 1e-5
 
 def _held(starter: Starter, t: float, x: Floats) -> Mask:
     """What stores hold, and positions; not flows without inertia, nor what guesses of these miss [unknowns]."""
-    system, known = starter.system, starter.equations
-    found = starter.moves("q", "p", "s", "unsaid")
+    system, found = starter.system, starter.stored.copy()
     found[: system.unknowns] |= system.differential(system.slopes(t, *starter.expand(x), rate=True))
-    found[known.flow] = True
-    rows, missed = known.guessed
-    found[missed] |= known.contents(starter.settled)[rows]
     return found
 
 
 def _levels(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[Mask, ...]:
     """The unknowns that carry the state, in the order in which they move least [unknowns]."""
     state, placed = free & ~starter.following(t, x), starter.moves("start")
-    held, hollow = _held(starter, t, x), starter.hollow
-    momenta = starter.equations.moving(starter.settled) != starter.system.description.complementary
+    held, hollow, momenta = _held(starter, t, x), starter.hollow, starter.momenta
     said, unsaid = state & starter.written, state & ~starter.written
     stored = said & held & ~placed, unsaid & ~hollow
     (said_p, said_q), (unsaid_p, unsaid_q) = ((of & momenta, of & ~momenta) for of in stored)

@@ -311,6 +311,19 @@ class Starter:
         """As `Equations.measures` tells."""
         return self.equations.measures(self.settled)
 
+    @functools.cached_property
+    def momenta(self) -> Mask:
+        """What is moved by the measure of momenta, of displacements in the complementary family [unknowns]."""
+        return np.asarray(self.equations.moving(self.settled) != self.system.description.complementary)
+
+    @functools.cached_property
+    def stored(self) -> Mask:
+        """What stores hold, and positions, whatever the point: all but flows that make no momentum [unknowns]."""
+        found, (rows, missed) = self.moves("q", "p", "s", "unsaid"), self.equations.guessed
+        found[self._flow] = True
+        found[missed] |= self.equations.contents(self.settled)[rows]
+        return found
+
     def without_noise(self, x: Floats, scale: Floats) -> Floats:
         """X with zeros where it is round-off beside its magnitude, or beside the largest of its kind and unit; what the
         text fixes is as it says.

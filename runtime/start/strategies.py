@@ -211,7 +211,7 @@ def unmoved(starter: Starter, t: float, found: Solution, guess: Floats, free: Ma
             begun = x if on is None else on
         if (np.abs(begun - x) <= EXACT * starter.largest_alike(x))[state].all():
             return None
-        for beside, may in ((begun, follows), *off_the_flat(starter, t, begun, follows)):
+        for beside, may in itertools.chain([(begun, follows)], off_the_flat(starter, t, begun, follows)):
             again, holds = rescaled(starter, t, beside, guess, may, least=False)
             if holds:
                 return again

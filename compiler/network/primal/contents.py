@@ -138,16 +138,19 @@ def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> 
         yield replace(initial, target=target, value=value, loops=loops)
 
 
+def _grounded(touch: Touch) -> bool:
+    """Whether an element's other end is the ground."""
+    return touch.element.ends[1 - touch.end].node.startswith("#ground ")
+
+
 def _between_ground(touch: Touch) -> bool:
-    other = touch.element.ends[1 - touch.end].node
     told = held_at(touch.element.branch, "be", const(1.0)) is not None
-    return not touch.free and other.startswith("#ground ") and told
+    return not touch.free and _grounded(touch) and told
 
 
 def _holds(touch: Touch) -> bool:
     """Whether a kinetic store stands there between a node and the ground."""
-    e = touch.element
-    return e.branch.kind == "kinetic" and (len(e.ends) < 2 or e.ends[1 - touch.end].node.startswith("#ground "))
+    return touch.element.branch.kind == "kinetic" and (len(touch.element.ends) < 2 or _grounded(touch))
 
 
 class Contents:
