@@ -1,6 +1,7 @@
 """What constant sums define leaves the system: results are those of the equations, every unknown is there again."""
 
 import ctypes
+import json
 
 import numpy as np
 import pytest
@@ -331,3 +332,20 @@ def test_no_unknown_leaves_as_the_small_difference_of_large_ones(tmp_path, metho
     trace = simulate(tmp_path / "apart.sd", **asked)
     first = {name: float(trace[name].values[0]) for name in trace.names}
     assert first == pytest.approx({"b.e": 1.0, "R2.f": -1e-9, "R3.f": -40.0}, rel=1e-9, abs=0.0)
+
+
+@pytest.mark.parametrize(("rtol", "error"), [(1e-4, 1e-3), (1e-6, 3e-5)])
+def test_factors_of_a_net_serve_at_other_steps(tmp_path, rtol, error):
+    """They cost ten solutions: made anew for each length of a step (13 and 20 times) they took half of a run."""
+    n = 24
+    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    chain[0, 0] = chain[-1, -1] = 1.0
+    matrix = -(np.kron(chain, np.eye(n)) + np.kron(np.eye(n), chain))
+    matrix[0, 0] -= 10.0
+    exact = _driven(n * n * matrix, 10.0 * n * n * np.eye(n * n)[0])
+    text = GRID.replace("param n = 15", f"param n = {n}").replace("  accuracy 1e-7\n", "")
+    trace = trace_of(tmp_path, text, method="bdf", rtol=rtol)
+    statistics = json.loads(trace.attributes["statistics"])
+    assert trace["far"].values[-1] == pytest.approx(exact[n * n - 1], abs=error * trace["far"].nominal)
+    assert trace["near"].values[-1] == pytest.approx(exact[0], abs=error)
+    assert statistics["factorisations"] < statistics["steps"] / 7

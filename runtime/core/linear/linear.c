@@ -511,3 +511,9 @@ void sd_linear_solve(sd_linear *linear, sd_number *x)
     else
         solve_pivoted(linear, x);
 }
+
+double sd_linear_effort(const sd_linear *linear)
+{
+    const sd_sparse *lu = linear->replayed ? NULL : linear->sparse;
+    return lu && lu->products ? (double)lu->products / ((double)lu->l_start[lu->n] + lu->u_start[lu->n] + lu->n) : 0.0;
+}

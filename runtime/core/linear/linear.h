@@ -91,4 +91,7 @@ void sd_linear_replayed(sd_linear *linear);
 /* as new, but for the lists that served: for another run on matrices of the same kind */
 void sd_linear_again(sd_linear *linear);
 
+/* products of the last factors for each entry of them, of which a solution takes one; 0: few, or not counted */
+double sd_linear_effort(const sd_linear *linear);
+
 #endif

@@ -74,6 +74,7 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_linear_scale_sum sd_linear_z_scale_sum
 #define sd_linear_factor_sum sd_linear_z_factor_sum
 #define sd_linear_rest sd_linear_z_rest
+#define sd_linear_effort sd_linear_z_effort
 #define sd_sparse_rest sd_sparse_z_rest
 #define sd_matrix sd_matrix_z
 #else

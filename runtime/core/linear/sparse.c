@@ -3,6 +3,7 @@
 #include "linear/blocks.h"
 #include "linear/chains.h"
 #include "linear/dense_rest.h"
+#include "linear/substitute.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +14,6 @@
                           * twice their solutions are as good (those of 4650 masses at random: a fifth of the time) */
 #define ROOM 2          /* entries of a factor for each of the matrix: room for them */
 #define SMALL 10000     /* columns up to which room that was not taken is kept for the next pivoting */
-#define NARROW 4        /* entries of both factors a column, or rows that it touches, up to which they are a line's */
 
 void sd_sparse_free(sd_sparse *lu)
 {
@@ -23,6 +23,7 @@ void sd_sparse_free(sd_sparse *lu)
     leave_told(lu);
     free(lu->pivots);
     free(lu->first);
+    free(lu->room);
     free(lu->l_start);
     free(lu->l_row);
     free(lu->u_row);
@@ -420,6 +421,22 @@ static void leave_search(sd_sparse *lu)
     lu->among = NULL;
 }
 
+/* a line's are not counted */
+static void count_products(sd_sparse *lu)
+{
+    lu->products = 0;
+    for (int32_t p = 0; p < lu->u_start[lu->n] && !lu->lowers; p++)
+        lu->products += lu->l_start[lu->u_row[p] + 1] - lu->l_start[lu->u_row[p]];
+}
+
+/* room for what the widest block touches; 0: no memory */
+static int provide_room(sd_sparse *lu)
+{
+    free(lu->room);
+    lu->room = lu->widest ? malloc((size_t)lu->widest * sizeof *lu->room) : NULL;
+    return !lu->widest || lu->room;
+}
+
 int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
 {
     size_t rows = (size_t)lu->rows;
@@ -447,6 +464,8 @@ int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
     }
     lu->widest = failed ? 0 : widest_block(lu);
     leave_search(lu);
+    if (!failed && !provide_room(lu))
+        return 2;
     if (!lu->widest && lu->n > SMALL) { /* no columns fill alike */
         free(lu->first);
         lu->first = NULL;
@@ -454,6 +473,7 @@ int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
     if (!failed) {
         leave_pivots(lu);
         find_chains(lu);
+        count_products(lu);
     }
     if (!failed && lu->lowers && is_long(lu) && !lu->widest && lu->rest == lu->n)
         tell(lu);
@@ -461,14 +481,13 @@ int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
 }
 
 /* x := the k-th column, less the columns before it that stand among the first `number` entries of its column of U */
-static void renewed(sd_sparse *lu, const sd_matrix *matrix, int32_t k,
-                    int32_t number, sd_number *block)
+static void renewed(sd_sparse *lu, const sd_matrix *matrix, int32_t k, int32_t number)
 {
     int32_t c = lu->order[k], from = lu->u_start[k], first = matrix->column[c], entries = matrix->column[c + 1] - first;
     const sd_number *value = sd_column_of(matrix, c);
     for (int32_t e = 0; e < entries; e++)
         lu->x[lu->place[matrix->row[first + e]]] += value[e];
-    apply_columns(lu, number, lu->u_row + from, NULL, lu->u_value + from, lu->x, block);
+    apply_columns(lu, number, lu->u_row + from, NULL, lu->u_value + from, lu->x, lu->room);
 }
 
 /* the k-th column from x, on the pivot that it had: 1: that became unhealthy */
@@ -488,10 +507,9 @@ static int divide_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
     return !keeps_pivot(lu, matrix, k, diagonal, largest);
 }
 
-static int refactor_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k,
-                           sd_number *block)
+static int refactor_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
 {
-    renewed(lu, matrix, k, lu->u_start[k + 1] - lu->u_start[k], block);
+    renewed(lu, matrix, k, lu->u_start[k + 1] - lu->u_start[k]);
     return divide_column(lu, matrix, k);
 }
 
@@ -530,14 +548,14 @@ static int refactor_told(sd_sparse *lu, const sd_matrix *matrix)
 }
 
 /* the columns of the rest, which are full: 1: a pivot became unhealthy, or there is no memory */
-static int renew_rest(sd_sparse *lu, const sd_matrix *matrix, sd_number *block)
+static int renew_rest(sd_sparse *lu, const sd_matrix *matrix)
 {
     int32_t k = lu->rest, m = lu->n - k;
     sd_number *rest = malloc(((size_t)m * (size_t)m + 1) * sizeof *rest);
     if (!rest)
         return 1;
     for (int32_t i = 0; i < m; i++) {
-        renewed(lu, matrix, k + i, lu->u_start[k + i + 1] - lu->u_start[k + i] - i, block);
+        renewed(lu, matrix, k + i, lu->u_start[k + i + 1] - lu->u_start[k + i] - i);
         memcpy(rest + (size_t)i * m, lu->x + k, (size_t)m * sizeof *rest);
         memset(lu->x + k, 0, (size_t)m * sizeof *rest);
     }
@@ -548,11 +566,8 @@ static int renew_rest(sd_sparse *lu, const sd_matrix *matrix, sd_number *block)
 
 int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 {
-    sd_number *block = lu->widest ? malloc((size_t)lu->widest * sizeof *block) : NULL;
-    if ((lu->widest && !block) || !provide_numbers(lu)) {
-        free(block);
+    if (!provide_numbers(lu))
         return 1;
-    }
     int failed = 0;
     lu->smallest = 1.0;
     memset(lu->x, 0, ((size_t)lu->n + 1) * sizeof *lu->x);
@@ -561,59 +576,13 @@ int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
         failed = refactor_told(lu, matrix);
     for (int32_t k = 0; k < lu->rest && !failed && !lu->told; k++)
         failed = is_link(lu, k) ? refactor_link(lu, matrix, k)
-                                : lu->source[k] >= 0 && refactor_column(lu, matrix, k, block);
+                                : lu->source[k] >= 0 && refactor_column(lu, matrix, k);
     if (!failed && lu->rest < lu->n)
-        failed = renew_rest(lu, matrix, block);
+        failed = renew_rest(lu, matrix);
     sd_subnormals(before);
     if (failed)
         lu->pivoted = 0;
-    free(block);
     return failed;
-}
-
-/* work[place] -= part, where those at two places are held apart */
-static inline __attribute__((always_inline)) void lessen(int32_t place, int32_t one, int32_t two, sd_number part,
-                                                         sd_number *at_one, sd_number *at_two, sd_number *work)
-{
-    if (place == two)
-        *at_two -= part;
-    else if (place == one)
-        *at_one -= part;
-    else
-        work[place] -= part;
-}
-
-/* The solution of sd_sparse_solve from its right side in work; narrow: what the next two places wait for stays in
- * registers, for along a line each waits for one of those before it. */
-static inline __attribute__((always_inline)) void substitute(const sd_sparse *lu, sd_number *x, sd_number *work,
-                                                             const double *column_scale, const int narrow)
-{
-    int32_t n = lu->n;
-    sd_number next = n > 0 ? work[0] : 0.0, behind = n > 1 ? work[1] : 0.0;
-    for (int32_t k = 0; k < n; k++) {
-        sd_number v = work[k] = narrow ? next : work[k];
-        next = behind;
-        behind = narrow && k + 2 < n ? work[k + 2] : 0.0;
-        for (int32_t l = lu->l_start[k]; l < lu->l_start[k + 1]; l++)
-            if (narrow)
-                lessen(lu->l_row[l], k + 1, k + 2, lu->l_value[l] * v, &next, &behind, work);
-            else
-                work[lu->l_row[l]] -= lu->l_value[l] * v;
-    }
-    next = n > 0 ? work[n - 1] : 0.0;
-    behind = n > 1 ? work[n - 2] : 0.0;
-    for (int32_t k = n - 1; k >= 0; k--) {
-        sd_number v = (narrow ? next : work[k]) * lu->inverse[k];
-        int32_t c = lu->order[k];
-        next = behind;
-        behind = narrow && k > 1 ? work[k - 2] : 0.0;
-        x[c] = column_scale ? v * column_scale[c] : v;
-        for (int32_t p = lu->u_start[k]; p < lu->u_start[k + 1]; p++)
-            if (narrow)
-                lessen(lu->u_row[p], k - 1, k - 2, lu->u_value[p] * v, &next, &behind, work);
-            else
-                work[lu->u_row[p]] -= lu->u_value[p] * v;
-    }
 }
 
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
@@ -628,7 +597,9 @@ void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double 
         int32_t r = lu->source[k];
         work[k] = r < 0 ? 0.0 : row_scale ? x[r] * row_scale[r] : x[r];
     }
-    if ((int64_t)lu->l_start[n] + lu->u_start[n] <= NARROW * (int64_t)n)
+    if (lu->widest)
+        substitute_blocks(lu, x, work, column_scale);
+    else if ((int64_t)lu->l_start[n] + lu->u_start[n] <= NARROW * (int64_t)n)
         substitute(lu, x, work, column_scale, 1);
     else
         substitute(lu, x, work, column_scale, 0);

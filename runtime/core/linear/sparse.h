@@ -35,6 +35,7 @@ typedef struct sd_sparse {
     uint64_t *among;             /* bits of n positions, likewise */
     int32_t rest;                /* the position from which the factors are full (dense_rest.h); n: none */
     int32_t widest;              /* numbers that the widest block touches; 0: there is none */
+    sd_number *room;             /* [widest] */
     sd_chain *lower, *upper;     /* [lowers], [uppers] of L and of U; none: the factors are no line's */
     int32_t lowers, uppers;
     char *pulled;                /* [n] which substitutions take what a column makes of another position within a chain */
@@ -47,6 +48,7 @@ typedef struct sd_sparse {
     double smallest, null_pivot; /* least pivot as part of its column; below null_pivot a column is left out */
     const int32_t *idle;         /* [n] 1: which may be, of the caller; NULL: any */
     int32_t rank;                /* columns that were not left out */
+    int64_t products;            /* that the factors take on this pattern; 0: not counted, of a long line */
     double dropped;              /* entries of L up to this size are left out, rows in excess that agree with it; 0: none.
                                     The factors serve once: no refactorising on such a pattern */
     int64_t most;                /* entries of the factors beyond which pivoting is given up; 0: none */

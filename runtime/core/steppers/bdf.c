@@ -21,6 +21,10 @@
                              * be wrong by orders (within van der Pol's jump), and make whatever is left look small */
 #define SLUGGISH 0.2        /* contraction above which the next step takes a fresh Jacobian */
 #define STEEP_SLUGGISH 0.05 /* the same with steep laws, whose slopes change by themselves: 6 to 20 % fewer residuals */
+#define DEAR 6.0            /* products of factors for each of a solution from which those of another cj serve, ... */
+#define APART 2.0           /* ... up to this ratio of both: a third is left of a correction at most */
+#define SPENT 0.5           /* of what factors cost, in solutions: what iterations more may cost before they are made anew */
+#define OTHERS 0.03         /* the tolerance of their iteration: what is left is no noise, 0.1 made a fourth more steps at 1e-5 */
 #define LAX 10.0            /* a steep row may be off by as many tolerances of its terms; beside 3: error over steps times tolerance
                              * at most 0.88 instead of 0.52 (an amplifier), 0.42 instead of 0.23 (a diode), in the mean the same */
 #define LOOSEST_ROW 0.3     /* and be off by no more of them: of an exponential that is no law any more any value is within 1 */
@@ -161,7 +165,8 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
         bdf->bad_column = bdf->linear->bad_column;
         return failed == 2 ? SD_MEMORY : SD_SINGULAR;
     }
-    bdf->cj_factored = bdf->cj;
+    bdf->cj_factored = bdf->cj_last = bdf->cj;
+    bdf->extra = 0;
     bdf->contraction = 20.0;
     bdf->ready = 1;
     return SD_FINE;
@@ -219,12 +224,36 @@ static int cause_of(sd_bdf *bdf, double t, int corrections)
     return SD_NEWTON;
 }
 
+/* Whether the factors serve, of another cj where they are dear and no row is judged (Brenan, Campbell & Petzold) */
+static int factors_serve(const sd_bdf *bdf)
+{
+    double ratio = bdf->cj / bdf->cj_factored;
+    if (ratio == 1.0)
+        return 1;
+    double effort = bdf->system->scales ? 0.0 : sd_linear_effort(bdf->linear);
+    return ratio <= APART && ratio >= 1.0 / APART && effort >= DEAR && bdf->extra < SPENT * effort;
+}
+
+/* A correction by factors of another cj, between what it would be where one part of the matrix alone counted, and the other;
+ * multipliers answer to powers of cj besides */
+static void balance(sd_bdf *bdf, double *d)
+{
+    double ratio = bdf->cj / bdf->cj_factored, part = 2.0 / (1.0 + ratio), power[3] = {1.0, ratio, ratio * ratio};
+    if (ratio == 1.0)
+        return;
+    for (int32_t i = 0; i < bdf->n; i++)
+        d[i] *= part;
+    for (int32_t k = 0; k < bdf->powers; k++)
+        d[bdf->powered[k]] *= power[bdf->power[bdf->powered[k]]];
+}
+
 /* Newton's iteration from the prediction with the present factors */
 static int iterate(sd_bdf *bdf, double t)
 {
     double first = 0.0, before = 0.0;
     int converged = 0, idle = 0, judged = bdf->system->scales > 0;
-    double trust = judged ? STEEP_TRUST : TRUST, tolerance = judged ? STEEP : NEWTON_TOLERANCE;
+    int others = bdf->cj != bdf->cj_factored;
+    double trust = judged ? STEEP_TRUST : TRUST, tolerance = judged ? STEEP : others ? OTHERS : NEWTON_TOLERANCE;
     for (int m = 0; m < ITERATIONS + judged; m++) {
         double *d = bdf->delta;
         sd_residual(bdf->system, t, bdf->y, bdf->yd, d);
@@ -239,6 +268,8 @@ static int iterate(sd_bdf *bdf, double t)
             break;
         converged = 0;
         sd_linear_solve(bdf->linear, d);
+        balance(bdf, d);
+        bdf->extra += others && m > 0;
         double size = sd_bdf_move(bdf, m == 0);
         if (!isfinite(size))
             return cause_of(bdf, t, m + 1);
@@ -252,7 +283,7 @@ static int iterate(sd_bdf *bdf, double t)
             converged = rate > SLOW;
             if (!converged)
                 bdf->contraction = rate / (1.0 - rate);
-            if (rate > (judged ? STEEP_SLUGGISH : SLUGGISH))
+            if (rate > (judged ? STEEP_SLUGGISH : SLUGGISH) && !others)
                 bdf->jacobian_age = OLD_JACOBIAN;
         }
         /* they do not shrink, or are round-off of the unknowns whatever they do (a law whose slope vanishes: by halves) */
@@ -278,7 +309,7 @@ static int correct(sd_bdf *bdf)
     for (;;) {
         int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->cj * GROWN < bdf->cj_slopes || bdf->taken == 0 ||
                     bdf->fresh_jacobian < 0;
-        if (fresh || !bdf->ready || bdf->cj != bdf->cj_factored) {
+        if (fresh || !bdf->ready || !factors_serve(bdf)) {
             int cause = factorise(bdf, t, fresh);
             if (cause == SD_SINGULAR && bdf->fresh_jacobian == 0) {
                 bdf->fresh_jacobian = -1;
@@ -287,6 +318,9 @@ static int correct(sd_bdf *bdf)
             if (cause)
                 return cause;
         }
+        if (bdf->cj != bdf->cj_last)
+            bdf->contraction = 20.0;
+        bdf->cj_last = bdf->cj;
         int cause = iterate(bdf, t);
         if (cause == SD_FINE || cause == SD_STOPPED || bdf->fresh_jacobian)
             return cause;

@@ -34,8 +34,8 @@ typedef struct sd_bdf {
     const int32_t *common_from, *common; /* [commons + 1] where each group begins in `common`: its unknowns */
     int32_t commons;          /* groups of unknowns that are states but for what they have in common */
     /* state of the integration */
-    double t, h, h_used, cj, cj_factored, cj_slopes, contraction;
-    int32_t order, order_used, ns, rising, fresh_jacobian, jacobian_age, ready;
+    double t, h, h_used, cj, cj_factored, cj_last, cj_slopes, contraction;
+    int32_t order, order_used, ns, rising, fresh_jacobian, jacobian_age, ready, extra;
     double psi[SD_MAX_ORDER + 2], alpha[SD_MAX_ORDER + 2], beta[SD_MAX_ORDER + 2], sigma[SD_MAX_ORDER + 2],
         gamma[SD_MAX_ORDER + 2];
     double *phi[SD_MAX_ORDER + 2];
