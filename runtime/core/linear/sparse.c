@@ -597,12 +597,10 @@ void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double 
         int32_t r = lu->source[k];
         work[k] = r < 0 ? 0.0 : row_scale ? x[r] * row_scale[r] : x[r];
     }
-    if (lu->widest)
-        substitute_blocks(lu, x, work, column_scale);
-    else if ((int64_t)lu->l_start[n] + lu->u_start[n] <= NARROW * (int64_t)n)
-        substitute(lu, x, work, column_scale, 1);
+    if ((int64_t)lu->l_start[n] + lu->u_start[n] <= NARROW * (int64_t)n)
+        substitute_line(lu, x, work, column_scale);
     else
-        substitute(lu, x, work, column_scale, 0);
+        substitute_blocks(lu, x, work, column_scale);
 }
 
 void sd_sparse_basic(const sd_sparse *lu, const sd_number *b, sd_number *x, sd_number *work)
