@@ -156,7 +156,7 @@ def _structural(
         plural = "s" if facts.redundant > 1 else ""
         message = f"{facts.redundant} redundant constraint{plural}: dependent group {group}"
         report.error("E509", message, where, related=beside)
-    elif facts.undetermined and not facts.singular:  # multipliers of a singular configuration are not determined
+    elif facts.index is None and facts.undetermined and not facts.singular:  # a singular one does not tell multipliers
         names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
         message = f"the equations do not determine {names}"
         report.error(

@@ -2,7 +2,7 @@
 
 A gamma may leave out its own unknown (a controlled flow source does), and its slope may vanish at a point (a valve at
 rest): then the rest of the model must determine the unknown.  Where it does not, the pencil is singular there and
-regular beside it.
+regular beside it.  Of an element's own law that is monotone nothing is asked: a valve at rest passes nothing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,11 @@ def undetermined(system: System, state: ConsistentState, facts: Structure) -> tu
     the form as written.
     """
     implicit = np.flatnonzero(system.are("e"))
-    if facts.index is not None or not implicit.size or system.unknowns > DENSE:
+    if facts.index is not None:
+        laws = {row.label for row in system.description.rows if row.block == "gamma"}
+        found = (name for name in map(system.name, implicit.tolist()) if name in facts.undetermined)
+        return tuple(name for name in found if f"{name.partition('[')[0].removesuffix('.e')}.law" not in laws)
+    if not implicit.size or system.unknowns > DENSE:
         return ()
     y, yd = state.for_form(system)
     clean, slopes = state.without_noise(y), system.jacobian(state.t, y, yd)

@@ -20,6 +20,7 @@ from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
 from sysdyn.runtime.numerics.ordering import net_order_of
+from sysdyn.runtime.numerics.points import normal
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanished
@@ -43,6 +44,9 @@ RESOLVED = 1e-9
 """Least pivot, as part of its column, of factors that tell: where cj is too large, sums of rows in which the rates
 cancel are round-off."""
 SIDES = 2
+BESIDE = 1e-3
+"""Of their magnitudes: how far beside a point what it leaves open is looked at."""
+WAYS = 6
 SLIDES = 2.0
 """Of a branch (events/kinks.py)."""
 
@@ -50,10 +54,11 @@ SLIDES = 2.0
 @dataclass(frozen=True, slots=True)
 class Structure:
     """index: of the form as written, None where the pencil is singular (undetermined: names of unknowns in its null
-    vector).  coordinates n, m1, m2: coordinates and constraint rows; rank of [Phi_q; Psi_f]; dof, redundant,
-    configuration_dof as the language defines them; dependent: labels of a dependent group with its coefficients.
-    singular: rank that the start lacks and points near it have; left_out: (family, position) of the multipliers of
-    constraints that depend on those written before them.
+    vector; where there is an index the pencil is singular at the start alone, and laws are monotone).  coordinates n,
+    m1, m2: coordinates and constraint rows; rank of [Phi_q; Psi_f]; dof, redundant, configuration_dof as the language
+    defines them; dependent: labels of a dependent group with its coefficients.  singular: rank that the start lacks and
+    points near it have; left_out: (family, position) of the multipliers of constraints that depend on those written
+    before them.
     """
 
     index: int | None
@@ -219,13 +224,42 @@ def _small_index(system: System, jy: Floats, jyd: Floats) -> int:
 
 
 def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
-    """Index of the form as written, and the undetermined unknowns where there is none."""
-    y, yd = state.for_form(system)
+    """Index of the form as written, and the unknowns that the pencil leaves open at the state: where they are open
+    there alone the index is that beside it.
+    """
+    point = state.t, *state.for_form(system)
+    index, undetermined = _index_at(system, *point)
+    return _index_beside(system, *point, undetermined) if undetermined else index, undetermined
+
+
+def _index_beside(system: System, t: float, y: Floats, yd: Floats, undetermined: tuple[str, ...]) -> int | None:
+    """Index of a pencil that is singular at a point, and regular wherever undetermined efforts and flows are beside it,
+    in one sense: laws that are flat there alone (turbulent valves at rest, side by side) determine what passes, for
+    they are monotone.  At a fold the sense changes: None.
+    """
+    moved = [k for k in np.flatnonzero(system.are("e", "f")).tolist() if system.name(k) in undetermined]
+    if not moved:
+        return None
+    size, senses, found = balanced(system, y, system.jacobian(t, y, yd)[0])[moved], set[float](), None
+    for way in normal(WAYS, len(moved)):
+        for side in (BESIDE, -BESIDE):
+            beside = y.copy()
+            beside[moved] += side * size * way
+            found = _index_at(system, t, beside, yd)[0]
+            jy, jyd = (system.dense(slopes) for slopes in system.jacobian(t, beside, yd))
+            senses.add(float(np.linalg.slogdet(equilibrated(jy + GENERIC * jyd)[0])[0]))
+            if found is None or len(senses) > 1:
+                return None
+    return found
+
+
+def _index_at(system: System, t: float, y: Floats, yd: Floats) -> tuple[int | None, tuple[str, ...]]:
+    """The same at a point."""
     if system.unknowns == 0:
         return 0, ()
     if system.unknowns > DENSE:
-        return _growth_index(system, list(system.jacobian(state.t, y, yd))), ()
-    jy, jyd = system.jacobian(state.t, y, yd)
+        return _growth_index(system, list(system.jacobian(t, y, yd))), ()
+    jy, jyd = system.jacobian(t, y, yd)
     if system.unknowns <= SMALL and system.rows == system.unknowns:
         found = _small_index(system, jy, jyd)
         if found >= 0:
@@ -233,7 +267,7 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
     size = balanced(system, y, jy)[system.pattern.columns_of()]
     undetermined: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
-    looks = (jy, jyd), (jy * size, jyd * size), (_roused(system, state.t, jy * size), jyd * size)
+    looks = (jy, jyd), (jy * size, jyd * size), (_roused(system, t, jy * size), jyd * size)
     for at, rates in looks:
         names = null_place(system, at, rates)[0]
         index = None if names else pencil_index(system.dense(rates), system.dense(at))
@@ -278,7 +312,7 @@ def _highest_index(system: System, state: ConsistentState) -> tuple[int | None, 
         most, _ = index_of(system, state)
     finally:
         switches.set(before)
-    return (index if most is None else max(index, most)), ()
+    return (index if most is None else max(index, most)), undetermined
 
 
 def structure(system: System, state: ConsistentState) -> Structure:

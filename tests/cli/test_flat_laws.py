@@ -35,6 +35,24 @@ def simulated(tmp_path, capsys, law, *options, b="1e4 Pa"):
     return code, capsys.readouterr().err
 
 
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_valves_side_by_side_pass_nothing_at_rest(tmp_path, capsys, formulation):
+    """None says how much of it the other passes: no slope does, and the laws do, for they are monotone.  A pump that
+    starts later: 5 l/s through 1/sqrt(Cr) of both is a head of 360 Pa, between vessels that hold 1.9 m^3 more.
+    """
+    text = VESSELS.format(law="valve(Cr = 4e7 Pa.s^2/m^6)", b="1e4 Pa").replace("0 s to 10 s", "0 s to 200 s")
+    text = text.replace("  into:", "  W: valve(Cr = 9e7 Pa.s^2/m^6) a -> b\n  into:")
+    text = text.replace("0.1 l/s^2*t", "10 l/s*smoothstep((t - 10 s)/(5 s))")
+    (tmp_path / "m.sd").write_text(text)
+    asked = "--formulation", formulation, "--accuracy", "1e-6", "-o", str(tmp_path / "t.h5")
+    assert run(["simulate", str(tmp_path / "m.sd"), *asked]) == 0, capsys.readouterr().err
+    trace, weight = Trace.open(tmp_path / "t.h5"), 9806.65
+    mean, head = 1e4 + 0.5 * weight * 0.01 * (200.0 - 12.5), (0.005 / (4e7**-0.5 + 9e7**-0.5)) ** 2
+    assert trace["a.e"].values[-1] == pytest.approx(mean + 0.5 * head, rel=1e-6)
+    assert trace["b.e"].values[-1] == pytest.approx(mean - 0.5 * head, rel=1e-6)
+    assert trace["f"].values[0] == 0.0
+
+
 @pytest.mark.parametrize(
     ("formulation", "method", "code"),
     [("lagrangian", "dopri", "E607"), ("co_lagrangian", "dopri", "E607"), ("co_lagrangian", "rosenbrock", "E931")],

@@ -42,6 +42,21 @@ def test_index_and_freedom(name):
     assert _growth_index(system, list(system.jacobian(0.0, state.y, state.yd))) == index
 
 
+@pytest.mark.parametrize(
+    ("content", "index"),
+    [("f_x**4 + 2*f_y**4", 1), ("f_x**3 + 2*f_y**3", None), ("f_x**4 + 2*f_y**3", None), ("(f_x + f_y)**4", None)],
+)
+def test_laws_that_are_flat_at_rest_determine_what_is_monotone(content, index):
+    """Two dampers side by side, at rest: their speeds follow from 4 f^3 and 8 f^3, though not from the slopes there; at
+    a fold, f^2, there are two or none.
+    """
+    manifest, binding, module = models.small("x y", 0, "(q_x + q_y)**2/2", content, initial={"q_x": (0, True)})
+    system = System(manifest, binding, load(module))
+    facts = structure(system, consistent_start(system, 0.0))
+    assert facts.index == index
+    assert {"f_x", "f_y"} <= set(facts.undetermined)
+
+
 def test_redundant_rows_are_named_with_coefficients():
     manifest, binding, module = models.small(
         "x y",
