@@ -188,7 +188,7 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     near = starter.without_noise(at.x, starter.scale(t, guess))
     if not unasked(starter, rows_without_slope(starter.system, t, *starter.expand(near))):
         return at, False
-    found, holds = rescaled(starter, t, at.x, guess, free, least=False)
+    found, holds = rescaled(starter, t, near, guess, free, least=False)  # what round-off left is no magnitude
     if not holds:
         starter.every[:] = before
     return found, holds
