@@ -18,7 +18,7 @@ from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.slopes import labels, rows_without_slope
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.gauss_newton import Solution, corrected, least_residual, solve, stepped
+from sysdyn.runtime.numerics.gauss_newton import Correction, Solution, corrected, least_residual, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.numerics.work import OutOfTimeError, Work
@@ -33,6 +33,7 @@ from sysdyn.runtime.start.strategies import (
     OWN,
     applicable,
     around,
+    at_rest,
     first,
     off_the_flat,
     own_residual,
@@ -185,7 +186,9 @@ def _anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, 
     if steep:  # rows of small terms are lost beside all that moves: the rest by the least change from there
         last = stepped(problem_of(starter, t, near, near, rows=starter.every, free=free, least=True), near)
     for moved in (back, near, last):
-        found, holds = rescaled(starter, t, np.where(state, moved, x), guess, free & ~state, least=False)
+        begun = np.where(state, moved, x)
+        follows = free & ~state & ~at_rest(starter, t, begun, free & ~state)
+        found, holds = rescaled(starter, t, begun, guess, follows, least=False)
         held = holds and found.residual <= max(CLOSED, best.residual)
         # what is left where a guess of twelve digits stays is no round-off: beside steep laws that is no start
         if held and (moved is last or not steep or _sharp(starter, t, found, free) is not None):
@@ -201,6 +204,7 @@ def _sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution |
     if best.x.size > SINGULAR_VALUES:
         return best
     follows, steep = free & starter.following(t, best.x), bool(starter.system.form.scales)
+    follows &= ~at_rest(starter, t, best.x, follows)
     written = starter.every & ~starter.groups(*HIDDEN)
     x, held = _corrected(starter, t, best.x, written, follows & (np.arange(follows.size) < starter.n))
     if not held and steep:
@@ -218,19 +222,31 @@ def _tells(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> boo
     """Whether these rows, rates answering, hold and leave no state or effort of the point open by more than the largest
     of its like: a sum of currents may stand between charges of 1e8 A that cancel in it, and hold to their round-off.
     """
-    problem, told = problem_of(starter, t, x, x, rows=rows, free=free), starter.moves(*STATE, "e")
+    problem = problem_of(starter, t, x, x, rows=rows, free=free)
     near = corrected(problem, x)
-    if near is None:
-        return True
-    largest = starter.largest_alike(np.maximum(problem.scale, np.abs(x)))
-    return near.agrees and not (near.open_ > largest)[told].any()
+    return near is None or (near.agrees and not _leaves_open(starter, t, near, np.maximum(problem.scale, np.abs(x))))
+
+
+def _leaves_open(starter: Starter, t: float, near: Correction, size: Floats) -> bool:
+    """Whether round-off leaves a state or an effort open by more than the largest of its like, and of what rows add to
+    it as it is (the head of an orifice between vessels of one pressure is what is left of these).
+    """
+    told, largest = starter.moves(*STATE, "e"), starter.largest_alike(size)
+    if (near.open_ <= largest)[told].all():
+        return False
+    added = np.abs(starter.jacobian(t, near.x)) == 1.0
+    rows, columns = starter.rows[added], starter.columns[added]
+    terms = np.zeros(starter.settled.rows)
+    np.maximum.at(terms, rows, size[columns])
+    np.maximum.at(largest, columns, terms[rows])
+    return bool((near.open_ > largest)[told].any())
 
 
 def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> tuple[Floats, bool]:
     """X after corrections that vanish, and whether the rows hold to their round-off then and leave no state or effort
     open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little.
     """
-    told, begun, agrees, last = starter.moves(*STATE, "e"), x, True, np.inf
+    begun, agrees, last = x, True, np.inf
     for _ in range(SHARPER):
         problem = problem_of(starter, t, x, x, rows=rows, free=free)
         near = corrected(problem, x)
@@ -240,7 +256,7 @@ def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) ->
         step, size = np.abs(near.x - x), np.maximum(problem.scale, np.abs(x))
         most = float(np.max(step / size, initial=0.0))
         if most <= EXACT and (agrees or most > 0.5 * last):  # a steep law tells 1e-13 of a volt from its round-off
-            return x, agrees and not (near.open_ > starter.largest_alike(size))[told].any()
+            return x, agrees and not _leaves_open(starter, t, near, size)
         if starter.work.done:
             return begun, False
         x, last = near.x, most

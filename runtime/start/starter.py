@@ -118,6 +118,7 @@ class Starter:
         self.n, self.rates, self.measured = known.n, known.rates, known.measured
         self._momentum, self._flow = known.momentum, known.flow
         self.every = ~known.unsettled  # rows that must hold
+        self.resting = np.zeros_like(self.every)  # laws whose rates are not asked for
         self.rows, self.columns = known.rows, known.columns
         unsettled = np.flatnonzero(known.unsettled)
         self._sums = Sums(self._floating(unsettled), unsettled, (known.rows, known.columns), known.unknowns)

@@ -123,7 +123,7 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     follows, nearly = free & starter.following(t, x), False
     begun: Floats | None = x
     if _beyond(starter, t, x, follows):
-        at_rest = x.size <= DENSE and _flat_at(starter, t, x, follows).any()
+        at_rest = x.size <= DENSE and flat_at(starter, t, x, follows).any()
         begun = _on_its_rows(starter, t, x, guess, free & ~follows, follows) if at_rest else None
     if begun is not None:
         flat, whole = off_the_flat(starter, t, begun, follows), [(begun, follows)]
@@ -148,7 +148,7 @@ def _beside(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats:
     return x + np.where(follows, starter.scale(t, x), 0.0)
 
 
-def _flat_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
+def flat_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Entries [entries] of rows that have no slope in what follows from the state at x, but beside it."""
     beside = _beside(starter, t, x, follows)
     flat = (starter.jacobian(t, x) == 0.0) & (starter.jacobian(t, beside) != 0.0) & follows[starter.columns]
@@ -162,7 +162,7 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
     only approach.
     """
     beside = _beside(starter, t, x, follows)
-    flat = _flat_at(starter, t, x, follows)
+    flat = flat_at(starter, t, x, follows)
     if not flat.any():
         return
     flat_rows = np.bincount(starter.rows, flat, starter.settled.rows) > 0.0
@@ -181,7 +181,7 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     """From x, in what follows from the state, where rates of laws that are flat at rest are not asked for; these are
     asked for again where that does not hold.
     """
-    before = starter.every.copy()
+    before = starter.every.copy(), starter.resting.copy()
     at = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x)
     if at.residual >= EXACT or x.size > DENSE:
         return at, False
@@ -190,8 +190,14 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
         return at, False
     found, holds = rescaled(starter, t, near, guess, free, least=False)  # what round-off left is no magnitude
     if not holds:
-        starter.every[:] = before
+        starter.every[:], starter.resting[:] = before
     return found, holds
+
+
+def at_rest(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
+    """Of what follows what stays as it is at x: flows of laws without a slope there whose rates are not asked for."""
+    flat = flat_at(starter, t, x, follows) & starter.resting[starter.rows]
+    return np.asarray(np.bincount(starter.columns, flat, x.size) > 0.0)
 
 
 def unmoved(starter: Starter, t: float, found: Solution, guess: Floats, free: Mask) -> Solution | None:
@@ -231,6 +237,7 @@ def unasked(starter: Starter, flat: Ints) -> bool:
         rates = first.get((f"{group}_rate", family))
         if rates is not None:
             starter.every[rates + own - row] = False
+            starter.resting[first[group, family] + own - row] = True
     return int(starter.every.sum()) < before
 
 
