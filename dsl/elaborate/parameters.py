@@ -86,7 +86,8 @@ class Parameters(ElaborationContext):
                                 if other != name
                                 else f"circular definition: {name} -> {name}"
                             )
-                            help_ = f"a value of its own for '{other}' or '{name}'"
+                            names = f"'{other}' or '{name}'" if other != name else f"'{name}'"
+                            help_ = f"a value of its own for {names}"
                             self.report.error("E105", message, self.place(span), help=help_)
                             self.scope.broken |= {name, other}
                         elif other not in state:
