@@ -415,7 +415,7 @@ def test_two_edges_of_one_body_leave_a_motion_without_further_factors(tmp_path):
     """The motion that both leave was multiplied by a coefficient that is zero at the start: E516."""
 
     def rates(t, s):
-        x, y, th, u = s
+        th, u = s[2:]
         d, bend = 0.3 * np.sin(1.5 * t), np.tan(0.3 * np.sin(1.5 * t)) / 1.2
         inertia = 90 * (1 + (0.5 * bend) ** 2) + 12 * bend**2
         change = 2 * (90 * 0.25 + 12) * bend * 0.45 * np.cos(1.5 * t) / np.cos(d) ** 2 / 1.2
