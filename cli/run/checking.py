@@ -77,7 +77,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     from sysdyn.cli.run.asked import Request
     from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
     from sysdyn.cli.run.scene_numbers import wrong_numbers
-    from sysdyn.cli.run.starting import described, start
+    from sysdyn.cli.run.starting import counted_as, described, start
     from sysdyn.compiler.binding.certificate import certificate
     from sysdyn.compiler.binding.jumps import jumps
 
@@ -99,7 +99,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     started = start(prepared, t0, report)
     if started is None:
         return {"ok": False}
-    facts = started.facts
+    facts = counted_as(prepared, t0, started.facts)
     judged = certificate(prepared.network, prepared.binding)
     return {
         "ok": not report.failed,

@@ -429,3 +429,11 @@ def test_two_edges_of_one_body_leave_a_motion_without_further_factors(tmp_path):
     found = solve_ivp(rates, (0.0, 4.0), [0.0, 0.0, 0.0, 2.0], "DOP853", trace.time, rtol=1e-11, atol=1e-12)
     for name, true in zip(("x", "y", "th"), found.y, strict=False):
         assert np.abs(trace[name].values - true).max() < 1e-6 * np.abs(true).max()
+
+
+def test_check_counts_the_flow_constraints_whose_reactions_are_left_out(tmp_path, capsys):
+    """It said 'm2 0, dof 3' beside a claim dof == 1 that held."""
+    path = tmp_path / "m.sd"
+    path.write_text(BICYCLE.replace("  time 0 s", "  formulation kane\n  expect static: dof == 1\n  time 0 s"))
+    assert main(["check", str(path)]) == 0
+    assert "coordinates 3, m1 0, m2 2, dof 1, index 1" in capsys.readouterr().err
