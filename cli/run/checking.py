@@ -131,7 +131,9 @@ def _passivity(summary: dict[str, object]) -> str:
 def _line(summary: dict[str, object]) -> str:
     if "index" not in summary:
         return "ok"
-    counts = "coordinates {coordinates}, m1 {m1}, m2 {m2}, dof {dof}, index {index}".format(**summary)
+    counts = "coordinates {coordinates}, m1 {m1}, m2 {m2}, dof {dof}".format(**summary)
+    counts += f", index {summary['index']}" if summary["index"] is not None else ""
+    counts += f", {summary['redundant']} redundant" if summary["redundant"] else ""
     moved = summary["moved"]
     assert isinstance(moved, list)
     from sysdyn.cli.run.starting import shortened

@@ -11,6 +11,7 @@ import pytest
 from sysdyn.api import load
 from sysdyn.cli.equations.letters import Letter, is_letter, named
 from sysdyn.cli.golden.structures import changed
+from sysdyn.cli.main import run
 from sysdyn.cli.page import curves
 from sysdyn.cli.page.source_text import block, highlighted
 from sysdyn.cli.progress import ProgressLine
@@ -308,3 +309,13 @@ def test_a_start_that_no_point_gives_numbers_for_says_what_helps(tmp_path):
         "E903", "no start was found: wherever it was sought the equations are no numbers",
     )  # fmt: skip
     assert "below a division" in found.help
+
+
+def test_where_constraints_are_redundant_check_says_how_many(tmp_path, capsys):
+    """It said 'index None': the form as written has none."""
+    path = tmp_path / "m.sd"
+    text = "model m { coord x, y: translation = 0 m; energy T* = 1/2*(1 kg)*(x'^2 + y'^2); phi a: x = y\n"
+    text += "phi b: 2*x = 2*y }\n"
+    path.write_text(f"{text}scene s of m {{ time 0 s to 1 s; redundancy drop; trace x }}\n")
+    assert run(["check", str(path)]) == 0
+    assert capsys.readouterr().err.endswith("ok: coordinates 2, m1 2, m2 0, dof 1, 1 redundant\n")
