@@ -121,9 +121,9 @@ static int is_off(const sd_dopri *dopri)
 /* The interpolant of a step: the unknowns, and the integrals of those that are not integrated. */
 static void prepare(sd_dopri *dopri)
 {
-    int astray = more_stages(dopri) || stray(dopri);
+    int astray = more_stages(dopri);
     interpolate(dopri, astray);
-    if (!astray && dopri->speed > EDGE && is_off(dopri))
+    if (!astray && (dopri->speed > EDGE || stray(dopri)) && is_off(dopri))
         interpolate(dopri, astray = 1);
     integrals(dopri, astray ? 0 : SD_DOPRI_ALL);
     dopri->dense = 1;
