@@ -21,6 +21,7 @@ from sysdyn.cli.streams import flush, standing_streams
 from sysdyn.dsl.model.collecting import keep
 
 COMMANDS = {
+    "animate": "Play a trace: points that move, curves with a mark.",
     "check": "Check models: everything that needs no time integration.",
     "compile": "Write the residual module and its manifest.",
     "diff": "Compare two traces.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -107,33 +107,33 @@ def network(
     levels: Sequence[tuple[str, str]] = (),
     required: bool = True,
     outputs: Sequence[str] | None = None,
+    moved: Collection[str] = (),
 ) -> Network | None:
     """The network of a model under a scene; settings are (name, value), levels (path, name) of the command line;
-    outputs: names of traced quantities or expressions, observed in the place of what the scene traces.
+    outputs: names of traced quantities or expressions, observed in the place of what the scene traces; moved: names
+    or paths of inputs to whose formulas a parameter of that name, zero, is added.
 
     None where the report has errors, or N608: a network that lacks a part of the text is none, and where a statement
     could not be read only names and units are judged.  required: parameters and inputs must have values.
     """
     with deep(), at_rest(), budget.drawn():
         try:
-            return _network(document, model, scene, report, settings, levels, required=required, outputs=outputs)
+            made = _elaborated(document, model, scene, report, settings, levels, moved)
+            return _network(*made, scene, report, required=required, outputs=outputs)
         except budget.SpentError as spent:
             report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
             return None
 
 
 def _network(
-    document: Document,
-    model: syntax.Model,
+    elaborator: Elaborator,
+    reader: SceneReader,
     scene: syntax.Scene | None,
     report: Report,
-    settings: Sequence[tuple[str, str]],
-    levels: Sequence[tuple[str, str]],
     *,
     required: bool,
     outputs: Sequence[str] | None,
 ) -> Network | None:
-    elaborator, reader = _elaborated(document, model, scene, report, settings, levels)
     try:
         return _judged(elaborator, reader, scene, report, required=required, outputs=outputs)
     finally:
@@ -184,10 +184,12 @@ def _elaborated(
     report: Report,
     settings: Sequence[tuple[str, str]],
     levels: Sequence[tuple[str, str]],
+    moved: Collection[str] = (),
 ) -> tuple[Elaborator, SceneReader]:
     """The model with the levels and settings asked for: its names, elements and statements."""
     files = FileScope(document.file, report)
     elaborator = Elaborator(files, model, report)
+    elaborator.moved = frozenset(moved)
     elaborator.names()
     reader = SceneReader(elaborator)
     given = [s for name, value in settings for s in _set(name, value, report)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from sysdyn.cli.failures import UsageError
@@ -55,34 +56,40 @@ def compiled(
     outputs: tuple[str, ...] | None = None,
     also: Callable[[Network], tuple[str, ...]] | None = None,
     inputs: Inputs = None,
+    choose: Callable[..., Target | None] = targets.one,
 ) -> tuple[Target, Prepared] | None:
     """The target, compiled whole: what a scene does not need may be unstable all the same.
 
     outputs: names or expressions in the place of the scene's traces.  also: what of a network is observed
-    beside.  inputs: those that move in time.  None where the report says why not.
+    beside.  inputs: those that move in time, about what a formula gives them too.  choose: the target
+    among those of the file.  None where the report says why not.
     """
     document = targets.read(request.file, report)
-    target = targets.one(document, request.file, request.model, request.scene, report)
+    target = choose(document, request.file, request.model, request.scene, report)
     if target is None:
         return None
     inner, unasked = Report(), frozenset[str]()
-    network = load.network(
-        document, target.model, target.scene, inner, request.settings, levels=request.levels, outputs=outputs
+    named = _named(target, inputs)
+    read = partial(
+        load.network,
+        document,
+        target.model,
+        target.scene,
+        settings=request.settings,
+        levels=request.levels,
+        moved=named,
     )
+    network = read(report=inner, outputs=outputs)
     prepared: Prepared | None = None
     if network is not None:
-        moves = _moving(network, target, inputs)
+        moves = _moving(network, named)
         with moving(moves):
             asked = also(network) if also is not None else ()
             if asked or moves:
                 names = network.traced
                 unasked = frozenset(asked).difference(names)
                 more = (*names, *(name for name in asked if name not in names))
-                settings, levels = request.settings, request.levels
-                second = load.network(
-                    document, target.model, target.scene, Report(), settings, levels=levels, outputs=more
-                )
-                network = second or network
+                network = read(report=Report(), outputs=more) or network
             network = replace(unwatched(network), statics=(), expectations=(), goldens=())
             network = _with_rates(network, moves)
             prepared = prepare(network, inner, formulation=request.formulation, backend=request.backend, gather=False)
@@ -91,14 +98,20 @@ def compiled(
 
 
 def own_inputs(target: Target, network: Network) -> tuple[str, ...]:
-    """The model's inputs that hold a constant."""
+    """The model's inputs that can be moved: all but arrays that follow formulas."""
     known = {p.name for p in network.parameters}
-    return tuple(s.decl.name for s in target.model.body if isinstance(s, syntax.Input) and s.decl.name in known)
+    return tuple(name for name in _named(target, None) if name in known)
 
 
-def _moving(network: Network, target: Target, inputs: Inputs) -> tuple[str, ...]:
+def _named(target: Target, inputs: Inputs) -> tuple[str, ...]:
+    """Names of the inputs asked for, without indices; the model's own where none is asked for."""
+    if inputs is None:
+        return tuple(s.decl.name for s in target.model.body if isinstance(s, syntax.Input))
+    return tuple(text.partition("[")[0].strip() for text in inputs)
+
+
+def _moving(network: Network, asked: Sequence[str]) -> tuple[str, ...]:
     """The parameters that move with the inputs: these, and those whose values are formulas in them."""
-    asked = own_inputs(target, network) if inputs is None else {text.partition("[")[0].strip() for text in inputs}
     found = following(network, asked)
     return tuple(p.name for p in network.parameters if p.name in found)
 

@@ -78,7 +78,7 @@ def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -
         at = tuple(int(k) for k in match[2].split(",")) if match and match[2] else ()
         if name not in known:
             if name in own:
-                raise UsageError(f"input '{name}' follows a formula in time: --set {name}=... gives it a constant")
+                raise UsageError(f"input '{name}' is an array by a formula: --set {name}=[...] gives it numbers")
             near, element = nearest(name, [*known, *own]), name.partition(".")[0]
             if near is None and element in (s.decl.name for s in target.model.body if isinstance(s, syntax.Instance)):
                 how = f"an input in its formula, 'input u ... = 0' and '{element}: ...( ... + u)', moves it"

@@ -11,6 +11,7 @@ from sysdyn.cli.analysis.asked import Found, compiled, of_nodes
 from sysdyn.cli.analysis.linear import linearised, loose_of
 from sysdyn.cli.analysis.states import at, resting
 from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.targets import still
 from sysdyn.dsl.model.units import Unit, quantity
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy.options import Progress
@@ -119,7 +120,7 @@ def equilibria(
             whole, spent = tried / (tries + 1), now - began
             progress(whole, spent * (1.0 - whole) / whole if spent > 1.0 else None)
 
-    made = compiled(request, report, (), of_nodes, ())
+    made = compiled(request, report, (), of_nodes, (), still)
     if made is None:
         return None
     found, states, why = resting(*made, tries, advance=advance)

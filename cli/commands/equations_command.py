@@ -33,16 +33,17 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
     from sysdyn.cli.equations.forms import content_of
     from sysdyn.cli.equations.sheet import Sheets
     from sysdyn.cli.equations.typeset import page
+    from sysdyn.cli.run.targets import still
     from sysdyn.compiler.equations.matrices import NoSuchEquations
     from sysdyn.dsl.model import expression as ex
 
     with ex.fresh():
         request = Request(index=index, **{**options, "backend": "numpy"})
         inputs = None if form == "linear" else ()
-        made = compiled(request, console.report, inputs=inputs)
+        made = compiled(request, console.report, inputs=inputs, choose=still)
         lagranges = made is not None and made[1].formulation == "lagrangian"
         if form == "canonical" and lagranges and request.formulation in (None, "auto"):  # nobody named them
-            made = compiled(replace(request, formulation="hamiltonian"), console.report, inputs=inputs)
+            made = compiled(replace(request, formulation="hamiltonian"), console.report, inputs=inputs, choose=still)
         if made is None:
             return console.finish(1)
         target, prepared = made

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.page.named import label, opened, quantities
 
 if TYPE_CHECKING:
     from sysdyn.runtime.trace.trace import Trace
@@ -34,9 +34,9 @@ def command(console: Console, trace: str, names: tuple[str, ...], output: str | 
     """
     files = [trace, *(name for name in names if _is_trace(name))]
     wanted = list(dict.fromkeys(name for name in names if not _is_trace(name)))
-    traces = [(_label(file), _open(file)) for file in files]
+    traces = [(label(file), opened(file)) for file in files]
     target = _target(trace, output, console)
-    drawn = _quantities([t for _, t in traces], wanted)
+    drawn = quantities([t for _, t in traces], wanted)
     data = _drawn(traces, drawn, target.suffix.lower())
     if output is None and not console.quiet:
         from sysdyn.cli.page.sparkline import summary
@@ -67,58 +67,14 @@ def _is_trace(name: str) -> bool:
     return name.endswith(".h5") and Path(name).is_file()
 
 
-def _label(file: str) -> str:
-    return "stdin" if file == "-" else Path(file).stem
-
-
 def _target(trace: str, output: str | None, console: Console) -> Path:
     """Where the picture goes; wrong usage where its kind is none that is drawn."""
     if output == "-":
         if console.as_json:
             raise UsageError("-o - and --json both want standard output")
         return Path("-.png")
-    target = Path(output) if output is not None else Path(f"{_label(trace)}.png")
+    target = Path(output) if output is not None else Path(f"{label(trace)}.png")
     kind = target.suffix.lower()
     if kind not in KINDS:
         raise UsageError(f"'{target}': a picture is one of {', '.join(KINDS)}")
     return target
-
-
-def _open(file: str) -> Trace:
-    from sysdyn.runtime.trace.opening import regular
-    from sysdyn.runtime.trace.trace import Trace
-
-    if file != "-":
-        regular(file)  # a plainer message than HDF5's where there is none
-        return Trace.open(file)
-    with tempfile.NamedTemporaryFile(suffix=".h5") as copy:
-        copy.write(sys.stdin.buffer.read())
-        copy.flush()
-        return Trace.open(copy.name)
-
-
-def _quantities(traces: list[Trace], wanted: list[str]) -> list[str]:
-    """Names that are drawn, as the trace spells them."""
-    from sysdyn.cli.page.panels import in_order
-
-    known = in_order(dict.fromkeys(name for trace in traces for name in trace.names))
-    if not wanted:
-        if not known:
-            raise UsageError(f"{traces[0].path} has no quantities: name a meter, audit/energy or audit/constraints")
-        return known
-    from sysdyn.dsl.names.symbols import nearest
-
-    spelled = {name: name for name in known}
-    for trace in traces:
-        for meter in ("audit.energy", "audit.constraints"):
-            if meter in trace:
-                spelled |= {meter: meter, meter.replace(".", "/"): meter, "/" + meter.replace(".", "/"): meter}
-    drawn = []
-    for name in wanted:
-        found = spelled.get(name) or spelled.get(name.replace("/", "\u2215"))
-        if found is None:
-            near = nearest(name, spelled)
-            hint = f"nearest: '{near}'" if near else f"there are: {', '.join(known)}"
-            raise UsageError(f"{traces[0].path} has no quantity '{name}'; {hint}")
-        drawn.append(found)
-    return list(dict.fromkeys(drawn))

@@ -77,7 +77,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     from sysdyn.cli.run.asked import Request
     from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
     from sysdyn.cli.run.scene_numbers import wrong_numbers
-    from sysdyn.cli.run.starting import described, start
+    from sysdyn.cli.run.starting import counted_as, described, start
     from sysdyn.compiler.binding.certificate import certificate
     from sysdyn.compiler.binding.jumps import jumps
 
@@ -100,6 +100,8 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     if started is None:
         return {"ok": False}
     facts = started.facts
+    if prepared.formulation == "kane":  # it leaves out the rows of flow constraints
+        facts = counted_as(prepared, t0, facts)
     judged = certificate(prepared.network, prepared.binding)
     return {
         "ok": not report.failed,
@@ -129,7 +131,9 @@ def _passivity(summary: dict[str, object]) -> str:
 def _line(summary: dict[str, object]) -> str:
     if "index" not in summary:
         return "ok"
-    counts = "coordinates {coordinates}, m1 {m1}, m2 {m2}, dof {dof}, index {index}".format(**summary)
+    counts = "coordinates {coordinates}, m1 {m1}, m2 {m2}, dof {dof}".format(**summary)
+    counts += f", index {summary['index']}" if summary["index"] is not None else ""
+    counts += f", {summary['redundant']} redundant" if summary["redundant"] else ""
     moved = summary["moved"]
     assert isinstance(moved, list)
     from sysdyn.cli.run.starting import shortened

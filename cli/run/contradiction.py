@@ -96,6 +96,10 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             message = f"no start fits: what holds would let go at once, and hold at once where it does not: {names}"
             there = next((s.place for s in prepared.network.switches if s.name in error.names), where)
             report.error("E903", message, there, help="initial values of all that it ties: init ... = ...")
+        case _ if not names:
+            message = "no start was found: wherever it was sought the equations are no numbers"
+            help_ = "a guess of what stands below a division, in a root or a logarithm: init ... ~ ..."
+            report.error("E903", message, where, help=help_)
         case _:
             message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
             sides = {switch.name for switch in prepared.network.switches}  # no guess mends a short circuit

@@ -210,8 +210,7 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
             report.note("N608", text, prepared.network.statics[0].place)
             return
         prepared, (system, state, facts) = written[0], (written[1].system, written[1].state, written[1].facts)
-    if _without_primal_rows(prepared) and prepared.network.statics:
-        facts = replace(_primal(prepared, state.t) or facts, index=facts.index)
+    facts = counted_as(prepared, state.t, facts) if prepared.network.statics else facts
     known = {
         "coordinates": facts.coordinates,
         "m1": facts.m1,
@@ -228,6 +227,11 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
         known |= {"order": counted[0] - watched, "manifold": counted[1]} if counted else {}
     for claim in prepared.network.statics:
         _static(prepared, claim, known, report)
+
+
+def counted_as(prepared: Prepared, t0: float, facts: Structure) -> Structure:
+    """The facts with the counts of the Lagrangian formulation, where the present one leaves rows out (Kane's)."""
+    return replace(_primal(prepared, t0) or facts, index=facts.index) if _without_primal_rows(prepared) else facts
 
 
 def _primal(prepared: Prepared, t0: float) -> Structure | None:

@@ -105,6 +105,12 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
     return whole(document, path, model, None, report)
 
 
+def still(document: Document, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
+    """As `one`, of what needs no scene to run: where there are several and none is named it is the model by itself."""
+    several = [s for s in document.scenes.values() if model is None or s.model.names == (model,)]
+    return (whole if len(several) > 1 else one)(document, path, model, scene, report)
+
+
 def whole(document: Document, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
     """The scene that is named, else a model by itself: the one named, or the only one there is.
 

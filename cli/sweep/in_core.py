@@ -34,6 +34,8 @@ class Cases:
     """Runs of one text in the core.  NotApplicableError where they cannot be made that way, with the reason."""
 
     def __init__(self, loaded: Loaded, names: Sequence[str], keep: str) -> None:
+        if not names:
+            raise NotApplicableError("no number varies")
         self._loaded = loaded
         numbers, texts = loaded._split(dict.fromkeys(names, 0.0))
         if texts:

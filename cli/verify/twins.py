@@ -46,10 +46,10 @@ def twins(prepared: Prepared, started: Started, until: float) -> Twins | None:
     )
     if other is None or other.backend == prepared.backend:
         return None
-    system, twin = started.system, System(other.structure, other.arrays, other.carrier)
-    # what holds at the start, and the senses of friction, were found with the first carrier
+    # what holds at the start, the senses of friction, constants of integrated rows were found with the first carrier
+    system = started.system
+    twin = System(other.structure, {**other.arrays, "p": np.array(system.description.p)}, other.carrier)
     twin.description.switches.set(system.description.switches.active)
-    twin.description.put(system.description.p)
     y, yd = started.state.for_form(system)
     random = np.random.default_rng(1)
     here, there = np.zeros((POINTS, system.rows)), np.zeros((POINTS, system.rows))

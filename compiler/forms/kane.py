@@ -3,10 +3,10 @@
     q' = f;   B^T (M f' + Phi_q^T kappa - Upsilon) = 0;   0 = Phi;   0 = Psi        where Psi_f B = 0
 
 (book, afterword; Kane, Levinson: Dynamics, 1985, 4.6).  Psi needs no multipliers: its reactions do no work along the
-columns of B.  B is found by elimination without division, so that it is regular wherever a pivot is; one that is a
-number comes first.  A flow constraint whose reaction something reads (that of an inequality its condition does) keeps
-its multiplier, as does one that joins flows of several elements of a family, with all that share flows with it: there
-is nothing left out, and the balances are Lagrange's own.
+columns of B.  B is found by division where a pivot is a number, else by minors, so that it is regular wherever the
+columns of the bound flows are.  A flow constraint whose reaction something reads (that of an inequality its condition
+does) keeps its multiplier, as does one that joins flows of several elements of a family, with all that share flows
+with it: there is nothing left out, and the balances are Lagrange's own.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import HOME, DescriptorForm, Equations, Pin, Unknowns
 from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.lowering import total_rate
-from sysdyn.compiler.forms.speeds import Speeds, definition, kinematics, speeds_of
+from sysdyn.compiler.forms.minors import determinant
+from sysdyn.compiler.forms.speeds import LARGEST, Speeds, definition, kinematics, speeds_of
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.calculus import derivative, signals_held
@@ -88,16 +89,71 @@ def constraints(model: EnergyModel) -> tuple[dict[str, Entries], frozenset[str]]
 
 
 def projection(model: EnergyModel, rows: Mapping[str, Entries]) -> Projection:
-    """B of these flow constraints."""
+    """B of these flow constraints: pivots that are numbers first, by division; of the others by minors."""
     reduced = {name: dict(entries) for name, entries in rows.items()}
     pivots: dict[str, str] = {}
-    for _ in rows:
+    while len(pivots) < len(rows):
+        name, column = _pivot(reduced, pivots, model)
+        if not is_const(reduced[name][column]):
+            break
+        pivots[name] = column
+        _eliminate(reduced, name, column)
+    free: dict[str, Entries] = {}
+    bound = set(pivots.values())
+    for part in _parts({name: entries for name, entries in reduced.items() if name not in pivots}):
+        own, columns = _free(part, model)
+        bound |= own
+        free |= columns
+    free = {c.name: free.get(c.name, {c.name: const(1.0)}) for c in model.coordinates if c.name not in bound}
+    for name, column in pivots.items():
+        entries = reduced[name]
+        for motion in free.values():
+            moved = add(*(mul(value, motion[c]) for c, value in entries.items() if c != column and c in motion))
+            if not is_const(moved, 0.0):
+                motion[column] = mul(const(-1.0 / entries[column].data), moved)
+    return Projection(free, frozenset(bound))
+
+
+def _parts(rows: Mapping[str, Entries]) -> list[dict[str, Entries]]:
+    """Rows that share flows."""
+    found: list[tuple[set[str], dict[str, Entries]]] = []
+    for name, entries in rows.items():
+        apart, flows, own = [], set(entries), {name: entries}
+        for part in found:
+            if part[0] & flows:
+                flows, own = part[0] | flows, part[1] | own
+            else:
+                apart.append(part)
+        found = [*apart, (flows, own)]
+    return [part for _, part in found]
+
+
+def _free(part: Mapping[str, Entries], model: EnergyModel) -> tuple[set[str], dict[str, Entries]]:
+    """Bound coordinates of rows that share flows, and the motion with each other flow: the determinant of the bound
+    columns on it, on each of these that with the column in its place (Cramer): no factor vanishes but that one.
+    """
+    reduced = {name: dict(entries) for name, entries in part.items()}
+    pivots: dict[str, str] = {}
+    for _ in part:
         name, column = _pivot(reduced, pivots, model)
         pivots[name] = column
         _eliminate(reduced, name, column)
-    bound = frozenset(pivots.values())
-    free = {c.name: _column(c.name, reduced, pivots) for c in model.coordinates if c.name not in bound}
-    return Projection(free, bound)
+    bound, free = list(pivots.values()), dict.fromkeys(c for e in part.values() for c in e if c not in pivots.values())
+    if len(part) > LARGEST:
+        return set(bound), {name: _column(name, reduced, pivots) for name in free}
+    columns = {c: [entries.get(c, const(0.0)) for entries in part.values()] for c in (*bound, *free)}
+
+    def whole(columns: list[list[Node]]) -> Node:
+        return determinant([list(row) for row in zip(*columns, strict=True)])
+
+    motions: dict[str, Entries] = {}
+    for name in free:
+        motions[name] = {name: whole([columns[c] for c in bound])}
+        for k, other in enumerate(bound):
+            value = neg(whole([columns[c if j != k else name] for j, c in enumerate(bound)]))
+            if not is_const(value, 0.0):
+                motions[name][other] = value
+    return set(bound), motions
 
 
 def _impossible(row: Row, why: str) -> ModelError:

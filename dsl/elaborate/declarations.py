@@ -11,9 +11,8 @@ from sysdyn.dsl.elaborate.parameters import Parameters
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Coordinate, Initial, Loop, NodeFamily, Parameter, State, Unknown
+from sysdyn.dsl.model.network import Coordinate, Initial, Loop, NodeFamily, State, Unknown
 from sysdyn.dsl.model.units import NONE, Dimension, si
-from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.context import Use
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.symbols import (
@@ -24,7 +23,6 @@ from sysdyn.dsl.names.symbols import (
     DomainSymbol,
     Family,
     NodeSymbol,
-    ParameterSymbol,
     PortSymbol,
     UnknownSymbol,
     Vector,
@@ -226,66 +224,6 @@ class Declarations(Parameters):
         if kind == "quasi":
             self.parts.quasis.append(self.current.family(decl.name).name)
         self.enter(Definition(decl.name, kind, statement.value, at, dimension, self.current, place, decl.span, implied))
-
-    def model_input(self, statement: syntax.Input) -> None:
-        """An input of the model itself: a scene may set it."""
-        decl = statement.decl
-        unit = self.unit(statement.unit)
-        place = self.place(decl.span)
-        shape = self.shape(decl)
-        self.parts.inputs[decl.name] = (unit, place)
-        self.resolver.inputs.add(decl.name)
-        if statement.value is None:
-            self.enter(ParameterSymbol(decl.name, self.current.family(decl.name, shape), unit.dimension, False, place))
-            self.parts.parameters[decl.name] = Parameter(decl.name, shape, unit, (), (), place)
-        else:
-            definition = Definition(
-                decl.name, "input", statement.value, (), unit.dimension, self.current, place, decl.span, shape=shape
-            )
-            self.enter(definition)
-            self.define_input(definition)
-
-    def define_input(self, definition: Definition) -> None:
-        """Give an input its value; one that holds a constant is a run-time value: setting it compiles nothing."""
-        name, shape = definition.name, definition.shape
-        self.scope.symbols[name] = definition
-        if not self._is_constant(definition.expression):
-            return
-        unit = self.parts.inputs[name][0]
-        try:
-            with self.resolver.space(definition.space):
-                message = f"input '{name}' is declared {dim.show(unit.dimension)} but set to {{}}"
-                found = self.resolver.resolve(definition.expression) if shape else None
-                written = definition.expression
-                items = found.items if isinstance(found, Vector) else (self.resolver.scalar(written),)
-                if not self.fills(found, shape):
-                    what = f"input '{name}' has {len(items)} values, which do not fit its shape"
-                    raise self.resolver.fail("E805", what, written.span)
-                values = tuple(self.resolver.fitting(i, written, unit.dimension, "E207", message) for i in items)
-        except Failed:
-            return
-        family = self.current.family(name, shape)
-        self.scope.symbols[name] = ParameterSymbol(name, family, unit.dimension, False, definition.place)
-        self.parts.parameters[name] = Parameter(name, shape, unit, values, (), definition.place)
-
-    def _is_constant(self, expression: syntax.Expr) -> bool:
-        """Whether an expression is made of numbers, parameters and constants only."""
-        seen: set[str] = set()
-        stack: list[syntax.Expr] = [expression]
-        while stack:
-            for node in walk(stack.pop()):
-                if isinstance(node, (syntax.Prime, syntax.Member, syntax.Reduction)):
-                    return False
-                if isinstance(node, syntax.Name) and node.name not in seen:
-                    seen.add(node.name)
-                    symbol = self.scope.find(node.name)
-                    if symbol is None and node.name in ("pi", "inf"):
-                        continue
-                    if isinstance(symbol, Definition) and symbol.kind == "const":
-                        stack.append(symbol.expression)
-                    elif not isinstance(symbol, ParameterSymbol):
-                        return False
-        return True
 
     def domain(self, word: syntax.Word) -> DomainSymbol:
         """The domain of that name; E202."""

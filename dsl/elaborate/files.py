@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -15,6 +15,7 @@ from sysdyn.dsl.elaborate.tables import read_table
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.network import Table
 from sysdyn.dsl.model.units import NONE, Unit, multiply, si
+from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import (
@@ -36,6 +37,15 @@ from sysdyn.dsl.tree import syntax
 LIBRARY = Path(__file__).parents[1] / "std"
 MODULES = 8
 """Names of modules that a message lists."""
+
+
+_Declared = syntax.UnitAlias | syntax.UnitBase
+
+
+def _written_in(unit: _Declared) -> list[str]:
+    """The names of the units in which an alias is written."""
+    quantities = walk(unit.value) if isinstance(unit, syntax.UnitAlias) else ()
+    return [f.name for q in quantities if isinstance(q, syntax.Quantity) for f in q.unit.factors]
 
 
 @cache
@@ -91,9 +101,9 @@ class FileScope:
                 scope.broken |= item.names
                 if "std" in item.names:  # an import that could not be read: what hangs on it is not reported again
                     scope.broken |= {name for name, module in exported().items() if module in item.names}
-        for item in file.items:  # units first: everything else is written in them
-            if isinstance(item, (syntax.UnitAlias, syntax.UnitBase)):
-                self._unit(item, scope, file.source)
+        units = [item for item in file.items if isinstance(item, (syntax.UnitAlias, syntax.UnitBase))]
+        for unit in self._ordered(units, scope, file.source):  # units first: everything else is written in them
+            self._unit(unit, scope, file.source)
         for item in file.items:
             for symbol in self._symbols(item, scope, file.source):
                 self._enter(symbol, scope)
@@ -110,6 +120,31 @@ class FileScope:
             return
         scope.symbols[symbol.name] = symbol
 
+    def _ordered(self, units: Sequence[_Declared], scope: Scope, source: SourceText) -> Iterator[_Declared]:
+        """The units of a text, each behind those that it is written in; E105 of one that needs itself."""
+        first = {unit.name.name: unit for unit in reversed(units)}
+        begun: set[str] = set()
+        done: set[int] = set()
+        for unit in units:
+            way = [unit]
+            while way:
+                last = way[-1]
+                begun.add(last.name.name)
+                left = [n for n in _written_in(last) if n in first and id(first[n]) not in done and n not in begun]
+                if left:
+                    way.append(first[left[0]])
+                    continue
+                way.pop()
+                names = [u.name.name for u in way] + [last.name.name]
+                circle = next((n for n in _written_in(last) if n in names), None)
+                if circle is not None:
+                    around = " -> ".join((*names[names.index(circle) :], circle))
+                    self.report.error("E105", f"circular definition: {around}", Place(source, last.span))
+                    scope.broken |= set(names[names.index(circle) :])
+                elif id(last) not in done:
+                    yield last
+                done.add(id(last))
+
     def _unit(self, item: syntax.UnitAlias | syntax.UnitBase, scope: Scope, source: SourceText) -> None:
         """A unit of the text: a new base, or an alias of others."""
         name = item.name.name
@@ -123,10 +158,12 @@ class FileScope:
                 with resolver.within(scope, source):
                     value = resolver.scalar(item.value)
             except Failed:
+                scope.broken.add(name)
                 return
             if value.node.op != "const" or not 0.0 < value.node.data < float("inf"):
                 message = f"unit '{name}' is not a positive constant"
                 self.report.error("E201", message, Place(source, item.value.span))
+                scope.broken.add(name)
                 return
             scope.units[name] = Unit(value.dimension or NONE, Fraction(value.node.data), name)
 

@@ -13,9 +13,9 @@ from itertools import pairwise
 
 from sysdyn.dsl.elaborate import bundles
 from sysdyn.dsl.elaborate.declarations import DECLARED
-from sysdyn.dsl.elaborate.elements import Elements
 from sysdyn.dsl.elaborate.files import FileScope, exported
 from sysdyn.dsl.elaborate.head import Body, Interface
+from sysdyn.dsl.elaborate.inputs import Inputs
 from sysdyn.dsl.elaborate.levels import choose_level, elsewhere
 from sysdyn.dsl.elaborate.moulds import Moulds, charge
 from sysdyn.dsl.elaborate.parameters import Argument
@@ -32,7 +32,6 @@ from sysdyn.dsl.names.symbols import (
     BundleNode,
     BundleSymbol,
     ComponentSymbol,
-    Definition,
     DomainSymbol,
     End,
     Family,
@@ -59,7 +58,7 @@ def _range_text(bounds: tuple[Node, Node]) -> str:
     return first if first == last else f"{first}..{last}"
 
 
-class Instances(Elements):
+class Instances(Inputs):
     """Elaborates instances."""
 
     def __init__(self, report: Report) -> None:
@@ -209,7 +208,7 @@ class Instances(Elements):
             self._port_shapes(s, head)
             self._required(s, component, head, arguments)
         if head.inputs:
-            self._bind_inputs(s, space, head, inputs)
+            self.bind_inputs(s, space, head, inputs)
         declared, instances = body.with_loops(DECLARED), body.of(syntax.Instance)
         with self.entering(space) if declared or instances else nullcontext():
             self.each(declared, self.declare)
@@ -488,22 +487,6 @@ class Instances(Elements):
         if not name:
             space.bound.update(own_variables(symbol, space.prefix))
         bound.add(name)
-
-    def _bind_inputs(self, s: syntax.Instance, space: Space, head: Interface, inputs: dict[str, syntax.Expr]) -> None:
-        sight = self.resolver.sight()
-        for name, statement in head.inputs.items():
-            with self.entering(space):
-                dimension = self.unit(statement.unit).dimension
-                shape = tuple((self.given(a), self.given(b)) for a, b in self.shape(statement.decl))
-            place = self.place(s.span)
-            if name in inputs:
-                value, here, bound = inputs[name], self.current, tuple(sight.items())
-            else:
-                assert statement.value is not None
-                value, here, bound = statement.value, space, ()
-            space.scope.symbols[name] = Definition(
-                name, "input", value, (), dimension, here, place, value.span, bound=bound, shape=shape
-            )
 
 
 def _column(text: str, statement: syntax.Statement) -> int:

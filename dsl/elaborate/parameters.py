@@ -65,7 +65,7 @@ class Parameters(ElaborationContext):
 
     def _by_dependence(self, found: dict[str, Stated]) -> tuple[Stated, ...]:
         """The parameters, those that others name before these; E105."""
-        needs = {name: _names_in(statement) & found.keys() for name, (statement, _) in found.items()}
+        needs = {name: _names_in(*stated) & found.keys() for name, stated in found.items()}
         order: list[str] = []
         state: dict[str, int] = {}
         for start in found:
@@ -86,7 +86,8 @@ class Parameters(ElaborationContext):
                                 if other != name
                                 else f"circular definition: {name} -> {name}"
                             )
-                            help_ = f"a value of its own for '{other}' or '{name}'"
+                            names = f"'{other}' or '{name}'" if other != name else f"'{name}'"
+                            help_ = f"a value of its own for {names}"
                             self.report.error("E105", message, self.place(span), help=help_)
                             self.scope.broken |= {name, other}
                         elif other not in state:
@@ -196,6 +197,7 @@ class Parameters(ElaborationContext):
         return self.resolver.fail(code, message, given.place, help=help, related=(where,))
 
 
-def _names_in(statement: syntax.Param) -> set[str]:
-    roots: list[object] = [statement.value, *statement.decl.indices]
+def _names_in(statement: syntax.Param, loops: tuple[syntax.For, ...]) -> set[str]:
+    bounds = [bound for loop in loops for bound in (loop.lower, loop.upper)]
+    roots: list[object] = [statement.value, *statement.decl.indices, *bounds]
     return {n.name for r in roots if r is not None for n in walk(r) if isinstance(n, syntax.Name)}  # type: ignore[arg-type]

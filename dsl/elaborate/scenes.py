@@ -23,7 +23,7 @@ from sysdyn.dsl.names.failures import Failed, SeveralError
 from sysdyn.dsl.names.habits import blamed
 from sysdyn.dsl.names.symbols import Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
-from sysdyn.dsl.text.diagnostics import Place, SourceText
+from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 
 _Said = TypeVar("_Said", syntax.Set, syntax.Trace)
@@ -108,10 +108,12 @@ class SceneReader:
             raise self.resolver.fail("E106", f"the scene gives '{said[1]}' twice", target.span, help="one of the two")
         self._targets.add(said)
 
-    def _once(self, key: str, value: object, span: syntax.Span, word: str | None = None) -> None:
+    def _once(
+        self, key: str, value: object, span: syntax.Span, word: str | None = None, help: str | None = None
+    ) -> None:
         """What the scene may say once; word: the author's, where it is not the key."""
         if key in self._found:
-            raise self.resolver.fail("E106", f"the scene says '{word or key}' twice", span)
+            raise self.resolver.fail("E106", f"the scene says '{word or key}' twice", span, help=help)
         self._found[key] = value
 
     # -- span and numbers ----------------------------------------------------------------------------------
@@ -279,12 +281,15 @@ class SceneReader:
     def _accuracy(self, s: syntax.Accuracy) -> None:
         """What a run promises, and of which quantities."""
         value = self._constant(s.value, NONE, "the accuracy")
-        self._once("accuracy", value, s.span)
+        self._once("accuracy", value, s.span, help="one accuracy for all that are named: accuracy 1e-6 on x, y")
         if value.op == "const" and not FINEST_ACCURACY <= value.data < 1.0:
             text = f"accuracy {value.data:g}: from {FINEST_ACCURACY:g} to less than 1, what doubles can tell"
             raise self.resolver.fail("E906", text, s.value.span, help="accuracy 1e-6")
         names = []
         for target in (element for written in s.on for element, _ in each_of(self.model, written)):
+            if (named := self._traced_as(target)) is not None:
+                names.append(named)
+                continue
             try:
                 with self.resolver.leniently():
                     node = self.resolver.scalar(target).node
@@ -303,6 +308,20 @@ class SceneReader:
                 )
             names.append(self._raw[node])
         self._found["accuracy_on"] = tuple(names)
+
+    def _traced_as(self, target: syntax.Expr) -> str | None:
+        """The name that `as` gave to a quantity, where what it says in the model itself is not traced."""
+        name, kept = format_expression(target), self.resolver.report
+        if name not in self._raw.values():
+            return None
+        self.resolver.report = Report()
+        try:
+            with self.resolver.leniently():
+                return None if self.resolver.scalar(target).node in self._raw else name
+        except Failed:
+            return name
+        finally:
+            self.resolver.report = kept
 
     # -- the rest ------------------------------------------------------------------------------------------
 

@@ -10,12 +10,13 @@ import itertools
 from dataclasses import replace
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
+from sysdyn.dsl.elaborate.inputs import Given, bare, path_of
 from sysdyn.dsl.elaborate.slices import bound_of, each_of, ranges_of
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import ElementSetting, Parameter
-from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
+from sysdyn.dsl.model.units import NONE, Unit
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.paths import Located
 from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Space, Typed, Unsupported, Vector, nearest
@@ -32,9 +33,11 @@ class Settings:
         self.elements: list[ElementSetting] = []
 
     def input(self, s: syntax.Set) -> None:
-        """A `set` of an input of the model."""
+        """A `set` of an input of the model, or of a component's by its path: the last one counts."""
         if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
             self._input(s.target.name, *self.model.parts.inputs[s.target.name], s)
+        elif (path := path_of(s.target)) is not None:
+            self.model.given_inputs[path] = Given(s, self.resolver.source)
 
     def size(self, s: syntax.Set) -> None:
         """A `set` of a parameter of the model to a number, which may be a size that instances ask for."""
@@ -45,6 +48,8 @@ class Settings:
     def parameter(self, s: syntax.Set) -> None:
         """`set ref = value` of a parameter or an element of one, no input; paths lead into instances."""
         if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
+            return
+        if path_of(s.target) in self.model.taken_inputs:
             return
         path = s.target.base if isinstance(s.target, syntax.Item) else s.target
         if ranges_of(path):  # a range of components
@@ -78,10 +83,13 @@ class Settings:
         help_ = f"nearest: '{near}'" if near else started
         if name in self.model.parts.inputs:
             help_ = f"the whole: set {name} = [a, b, ...]"
+        if isinstance(symbol, Definition) and symbol.kind == "input":
+            message = f"'{shown}' is an input in an array of components: each is given where they stand"
+            help_ = f"an input of the model there: input u: ..., and {symbol.name} = u"
         raise self.resolver.fail("E910", message, s.target.span, help=help_)
 
     def _input(self, name: str, unit: Unit, place: Place, s: syntax.Set) -> None:
-        value = self._bare(s.value, unit.dimension)
+        value = bare(self.model, s.value, unit.dimension)
         self.model.parts.parameters.pop(name, None)
         space = self.model.space
         shape = getattr(space.scope.symbols[name], "shape", ())
@@ -89,21 +97,10 @@ class Settings:
             space = Space("", space.scope, space.file_scope, self.resolver.source)
         self.model.define_input(Definition(name, "input", value, (), unit.dimension, space, place, s.span, shape=shape))
 
-    def _bare(self, value: syntax.Expr, dimension: Dimension) -> syntax.Expr:
-        """On the command line a bare number is in SI units, each of an array too."""
-        if isinstance(value, syntax.Array):
-            return replace(value, items=tuple(self._bare(item, dimension) for item in value.items))
-        inner = value.operand if isinstance(value, syntax.Negative) else value
-        if self.resolver.source is self.model.source or not isinstance(inner, syntax.Number) or not dimension:
-            return value
-        number = syntax.Quantity(inner.value, inner.text, _si_unit(dimension, inner.span), inner.span)
-        self.model.files.scope.units.update({f"SI {dim.show(dimension)}": si(dimension)})
-        return syntax.Negative(number, value.span) if isinstance(value, syntax.Negative) else number
-
     def _parameter(self, symbol: ParameterSymbol, found: Located, s: syntax.Set) -> None:
         """A parameter, or elements of one, with its new value."""
         parameter = self.model.parts.parameters[symbol.family.name]
-        value = self.resolver.resolve(self._bare(s.value, symbol.dimension or NONE))
+        value = self.resolver.resolve(bare(self.model, s.value, symbol.dimension or NONE))
         items = value.items if isinstance(value, Vector) else (value,)
         for item in items:
             self._check_setting(symbol, item, s)
@@ -173,8 +170,3 @@ class Settings:
                 raise self.resolver.fail(
                     "E807", message, s.value.span, help=help_ or "a parameter is a constant; an input may vary"
                 )
-
-
-def _si_unit(dimension: Dimension, span: syntax.Span) -> syntax.Unit:
-    name = f"SI {dim.show(dimension)}"
-    return syntax.Unit((syntax.UnitFactor(name, 1, ".", span),), name, span)

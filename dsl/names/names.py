@@ -280,6 +280,8 @@ class Names(Context):
             with around[0], around[1], around[2] as self._derived[key]:
                 value = self.resolve(symbol.expression)
                 value = self._declared(symbol, value)
+                if symbol.beside is not None and isinstance(value, Typed):
+                    value = Typed(ex.add(value.node, symbol.beside), value.dimension, value.truth)
                 if self.virtual and symbol.kind in ("output", "input"):
                     value = _signal(value)
         except SeveralError as several:

@@ -253,6 +253,7 @@ class Definition:
     implied: bool = False
     bound: tuple[tuple[str, Typed | Vector], ...] = ()  # loop variables in sight where it is read
     shape: Shape = ()  # of an input that is an array
+    beside: Node | None = None  # added to an input: a parameter that an analysis moves
 
 
 @dataclass(frozen=True, slots=True)

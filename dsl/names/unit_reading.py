@@ -39,6 +39,8 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, b
             return DEGREE_CELSIUS
         declared = scope.unit(factor.name)
         found = (declared.dimension, declared.scale) if declared else known(factor.name)
+        if found is None and scope.is_broken(factor.name):
+            return None
         if found is None:
             if source.text[unit.span.start - 1 : unit.span.start].isalnum():
                 scope.miss()  # grown to its number, as in 10k: that has been said (E114)

@@ -200,9 +200,12 @@ class Trace:
         """Traced quantities (without the audit)."""
         return tuple(name for name in self._data if not name.startswith("audit."))
 
-    @staticmethod
-    def _key(name: str) -> str:
-        return name.removeprefix("/").replace("audit/", "audit.") if "audit" in name else name
+    def _key(self, name: str) -> str:
+        """The name as it stands in the file: '/' in a quotient is U+2215 there."""
+        if "audit" in name:
+            name = name.removeprefix("/").replace("audit/", "audit.")
+        spelled = name.replace("/", "\u2215")
+        return spelled if name not in self._data and spelled in self._data else name
 
     def __getitem__(self, name: str) -> Quantity:
         return self._data[self._key(name)]

@@ -51,7 +51,7 @@ def test_without_arguments_the_help_is_shown(capsys):
     ("arguments", "said"),
     [
         (["simulat"], "Did you mean 'simulate'?"),
-        (["frobnicate"], "There are check, compile"),
+        (["frobnicate"], "There are animate, check, compile"),
         (["simulate"], "Missing argument 'FILE'"),
         (["simulate", "two.sd", "--wrong"], "No such option"),
         (["simulate", "two.sd"], "--scene swing | again"),

@@ -682,3 +682,17 @@ def test_canonical_equations_choose_hamiltons_formulation(asked, tmp_path, capsy
     found = json.loads(capsys.readouterr().out)
     assert found["result"]["formulation"] == "hamiltonian"
     assert run(["equations", model, "--form", "canonical", "--formulation", "lagrangian"]) == 1
+
+
+def test_a_model_with_several_scenes_has_its_own_equations(tmp_path, capsys):
+    path = tmp_path / "m.sd"
+    path.write_text(
+        "model m { coord x: translation = 1 m; energy T* = 1/2*(2 kg)*x'^2; energy V = 1/2*(8 N/m)*x^2 }\n"
+        "scene a of m { time 0 s to 1 s; trace x }\nscene b of m { time 0 s to 2 s; trace x }\n"
+    )
+    assert run(["equations", str(path)]) == 0
+    several = capsys.readouterr().out
+    assert run(["equations", str(path), "--scene", "a"]) == 0
+    assert several == capsys.readouterr().out
+    assert run(["equilibrium", str(path)]) == 0
+    assert "x = 0 m" in capsys.readouterr().out

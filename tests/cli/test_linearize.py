@@ -500,11 +500,42 @@ def test_wrong_usage(options, message, tmp_path, capsys):
     assert message in found["diagnostics"][0]["message"]
 
 
-def test_an_input_that_follows_a_formula_is_refused(tmp_path, capsys):
-    text = RLC.replace("time 0 s to 1 s;", "time 0 s to 1 s; set u = 2 V*sin(3 rad/s*t);")
-    code, found = run_json(capsys, "linearize", str(write(tmp_path, text)), "--inputs", "u", "--backend", "numpy")
-    assert code == 2
-    assert "--set u=... gives it a constant" in found["diagnostics"][0]["message"]
+@pytest.mark.parametrize(
+    ("inputs", "label"), [((), "u"), (("--inputs", "u"), "u"), (("--inputs", "supply.v"), "supply.v")]
+)
+def test_an_input_that_follows_a_formula_is_moved_about_it(inputs, label, tmp_path, capsys):
+    """Of a linear circuit the transfer function is that of an input that holds a constant."""
+    circuit = "from std.electrical import voltage\n" + RLC.replace("effort(e = u)", "voltage(v = u)")
+    path = str(write(tmp_path, circuit))
+    _, plain = run_json(capsys, "linearize", path, "--outputs", "v", "--inputs", "u", "--backend", "numpy")
+    text = circuit.replace("time 0 s to 1 s;", "time 0 s to 1 s; set u = 2 V*sin(3 rad/s*t);")
+    path = str(write(tmp_path, text))
+    code, found = run_json(capsys, "linearize", path, "--outputs", "v", *inputs, "--at", "0.3", "--backend", "numpy")
+    assert code == 0
+    ours, theirs = (dict(r["result"]["transfer"][0]) for r in (found, plain))
+    assert (ours.pop("input"), theirs.pop("input")) == (label, "u")
+    for key in ("gain", "poles", "zeros"):
+        assert np.allclose(ours[key], theirs[key], rtol=1e-9)
+
+
+SQUARE = """model valve {
+  input u: 1 = 0
+  state x: 1 = 0
+  dynamic x' = ((2 + sin(3 rad/s*t) + u)^2 - x)/(1 s)
+}
+scene s of valve {
+  time 0 s to 1 s
+  set u = cos(2 rad/s*t)
+  trace x
+}
+"""
+
+
+def test_a_formula_is_where_the_slope_is_taken(tmp_path, capsys):
+    t = 0.7
+    code, found = run_json(capsys, "linearize", str(write(tmp_path, SQUARE)), "--at", str(t), "--backend", "numpy")
+    assert code == 0
+    assert found["result"]["reduced"]["B"][0][0] == pytest.approx(2 * (2 + np.sin(3 * t) + np.cos(2 * t)), rel=1e-9)
 
 
 def test_an_output_that_does_not_exist(tmp_path, capsys):

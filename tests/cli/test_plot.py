@@ -54,6 +54,14 @@ def test_a_summary_without_a_file(capsys):
     assert capsys.readouterr().out == ""
 
 
+def test_a_quotient_is_found_as_it_is_written():
+    trace = made([("v\u2215(2 V)", "1", lambda t: t), ("v", "V", lambda t: 2.0 * t)])
+    assert trace["v/(2 V)"].values[-1] == 1.0
+    assert "v/(2 V)" in trace
+    with pytest.raises(KeyError, match="v/w"):
+        trace["v/w"]
+
+
 def test_sparklines():
     time = np.linspace(0.0, 1.0, 5)
     assert sparkline(time, time, 0.0, 1.0, 8) == "▁▂▃▄▅▆▇█"

@@ -8,22 +8,27 @@ import sys
 
 import numpy as np
 import pytest
+from sysdyn.api import load
 from sysdyn.cli.equations.letters import Letter, is_letter, named
 from sysdyn.cli.golden.structures import changed
+from sysdyn.cli.main import run
 from sysdyn.cli.page import curves
 from sysdyn.cli.page.source_text import block, highlighted
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.report.text import section
 from sysdyn.cli.run import memory, module_check
+from sysdyn.cli.run.contradiction import inconsistent
 from sysdyn.cli.spice import sources
 from sysdyn.cli.spice.writing import Unreadable
 from sysdyn.cli.streams import Closed, standing_streams
 from sysdyn.cli.trade import work
 from sysdyn.cli.trade.errors import error_of
 from sysdyn.compiler.binding.sampled import Points, Sample
+from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.events.plan import Happened
+from sysdyn.runtime.model.failures import InconsistentStart
 from sysdyn.runtime.trace.trace import Quantity, Trace
 from sysdyn.values import dataclass
 
@@ -290,3 +295,27 @@ def test_numbers_of_a_few_digits_are_no_fault_of_a_module():
     sample = Sample(rows, said, np.abs(said))
     assert module_check._apart(found, sample, still).tolist() == [[False, True, True, False]]
     assert module_check._apart(found, sample, fast).tolist() == [[False, True, False, False]]
+
+
+def test_a_start_that_no_point_gives_numbers_for_says_what_helps(tmp_path):
+    """It was told as '0 of the terms is left over in ', of nothing (entropy by H/a.e of a node at 0 K)."""
+    path = tmp_path / "m.sd"
+    text = "model m { coord x: translation = 1 m; energy T* = 1/2*(1 kg)*x'^2 }\n"
+    path.write_text(f"{text}scene s of m {{ time 0 s to 1 s }}\n")
+    report = Report()
+    inconsistent(load(path)._loaded.first.prepared, 0.0, InconsistentStart("stuck", 0.0), report)
+    (found,) = report
+    assert (found.code, found.message) == (
+        "E903", "no start was found: wherever it was sought the equations are no numbers",
+    )  # fmt: skip
+    assert "below a division" in found.help
+
+
+def test_where_constraints_are_redundant_check_says_how_many(tmp_path, capsys):
+    """It said 'index None': the form as written has none."""
+    path = tmp_path / "m.sd"
+    text = "model m { coord x, y: translation = 0 m; energy T* = 1/2*(1 kg)*(x'^2 + y'^2); phi a: x = y\n"
+    text += "phi b: 2*x = 2*y }\n"
+    path.write_text(f"{text}scene s of m {{ time 0 s to 1 s; redundancy drop; trace x }}\n")
+    assert run(["check", str(path)]) == 0
+    assert capsys.readouterr().err.endswith("ok: coordinates 2, m1 2, m2 0, dof 1, 1 redundant\n")

@@ -143,6 +143,15 @@ def test_it_opens_in_xarray(spring, capsys):
         assert float(data["end.x"].isel(run=1)) == pytest.approx(np.cos(4.0), abs=1e-6)
 
 
+def test_formulations_alone(spring, capsys):
+    """What varies is no number: the command ended in a fault (a worker in a traceback)."""
+    over = ["--over", "formulation=lagrangian,hamiltonian", "--jobs", "1"]
+    assert run(["sweep", spring, *over, "-o", "alone.h5", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)["result"]
+    assert (result["runs"], result["failed"]) == (2, [])
+    assert all(found["largest"] == pytest.approx(found["least"], rel=1e-3) for found in result["end"].values())
+
+
 def test_formulations_inputs_and_what_fails(spring, capsys):
     """A run that cannot be made, and one whose expectation fails, are named and kept; the others stand."""
     over = ["--over", "formulation=lagrangian,hamiltonian", "--over", "k=4 N/m,-1 N/m"]

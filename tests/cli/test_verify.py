@@ -278,6 +278,29 @@ def test_carriers_that_differ_are_found(tmp_path, capsys, monkeypatch):
     assert "c and numpy disagree in hamiltonian: row" in found["diagnostics"][-1]["message"]
 
 
+CHARGED = """model charged {
+  node a, d: electrical
+  V: effort(e = 3 V*cos(200 rad/s*t)) a -> ground
+  R: dissipator(e = 20 ohm*f) a -> d
+  C1: potential(q = 100 uF*e) d -> ground
+  C2: potential(e = q/(50 uF)) d -> ground
+  C3: potential(q = 10 uF*e) a -> d
+  init C1.e = 1 V
+}
+scene s of charged {
+  time 0 s to 10 ms
+  trace d.e
+}
+"""
+
+
+def test_constants_of_integrated_rows_that_the_start_finds_are_those_of_both_carriers(tmp_path, capsys):
+    """'c and numpy disagree in lagrangian: row a by 1.4e-02 of itself', of a right model."""
+    code, found = run_json(capsys, "verify", write(tmp_path, CHARGED))
+    assert (code, found["result"]["disagreements"]) == (0, [])
+    assert all(b["ok"] for b in found["result"]["backends"])
+
+
 def test_an_expectation_that_fails_is_listed_and_never_decides(tmp_path, capsys):
     code, found = run_json(capsys, "verify", write(tmp_path, FAILING))
     assert code == 0

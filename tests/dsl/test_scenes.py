@@ -53,6 +53,19 @@ def test_instants_and_steps_are_in_seconds():
     )  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("body", "names"),
+    [
+        ("trace x.q in mm as far, x.f\naccuracy 1e-6 on far, x.f", ("far", "x.f")),
+        ("trace x.q as k, k as q\naccuracy 1e-6 on k", ("q",)),  # what the model itself calls so goes first
+        ("trace c[1..2] as cs\naccuracy 1e-6 on cs[2]", ("cs[2]",)),
+    ],
+)
+def test_an_accuracy_is_of_what_the_trace_calls_so(body, names):
+    scene, _, said = read(body)
+    assert (said, scene.accuracy_on) == ([], names)
+
+
 def test_what_is_said_of_a_run():
     body = "formulation kane\nredundancy minimum_norm\nlimit steps 100\nlimit events 5\nsolver radau(keep_flow = true)"
     scene, _, said = read(f"{body}\ntrace x.q, x.f every 1 s\naccuracy 1e-6 on x.f")

@@ -388,3 +388,52 @@ def test_rows_that_hold_by_turns_may_follow_from_each_other(tmp_path):
     trace = simulate(tmp_path / "sleds.sd", output=tmp_path / "o.h5")
     assert trace["a"][-1] == pytest.approx(2 / 15, rel=1e-9)
     assert trace["b"][-1] == pytest.approx(4 / 15, rel=1e-9)
+
+
+BICYCLE = """
+model bicycle {
+  param a = 0.5 m
+  param b = 1.2 m
+  coord x, y: translation = 0 m
+  coord th: rotation = 0
+  input delta: 1 = 0.3*sin(1.5 rad/s*t)
+  energy T* = 1/2*(90 kg)*(x'^2 + y'^2) + 1/2*(12 kg.m^2)*th'^2
+  psi rear: -x'*sin(th) + y'*cos(th) - a*th' = 0 m/s
+  psi front: -x'*sin(th + delta) + y'*cos(th + delta) + (b - a)*th'*cos(delta) = 0 m/s
+  work 20 N*cos(th) on x
+  work 20 N*sin(th) on y
+  init x' = 2 m/s
+}
+scene s of bicycle {
+  time 0 s to 4 s
+  trace x, y, th every 50 ms
+}
+"""
+
+
+def test_two_edges_of_one_body_leave_a_motion_without_further_factors(tmp_path):
+    """The motion that both leave was multiplied by a coefficient that is zero at the start: E516."""
+
+    def rates(t, s):
+        th, u = s[2:]
+        d, bend = 0.3 * np.sin(1.5 * t), np.tan(0.3 * np.sin(1.5 * t)) / 1.2
+        inertia = 90 * (1 + (0.5 * bend) ** 2) + 12 * bend**2
+        change = 2 * (90 * 0.25 + 12) * bend * 0.45 * np.cos(1.5 * t) / np.cos(d) ** 2 / 1.2
+        side = 0.5 * bend * u
+        forward = [u * np.cos(th) - side * np.sin(th), u * np.sin(th) + side * np.cos(th)]
+        return [*forward, bend * u, (20 - 0.5 * change * u) / inertia]
+
+    path = tmp_path / "m.sd"
+    path.write_text(BICYCLE)
+    trace = simulate(path, formulation="kane", accuracy=1e-7, output=tmp_path / "t.h5")
+    found = solve_ivp(rates, (0.0, 4.0), [0.0, 0.0, 0.0, 2.0], "DOP853", trace.time, rtol=1e-11, atol=1e-12)
+    for name, true in zip(("x", "y", "th"), found.y, strict=False):
+        assert np.abs(trace[name].values - true).max() < 1e-6 * np.abs(true).max()
+
+
+def test_check_counts_the_flow_constraints_whose_reactions_are_left_out(tmp_path, capsys):
+    """It said 'm2 0, dof 3' beside a claim dof == 1 that held."""
+    path = tmp_path / "m.sd"
+    path.write_text(BICYCLE.replace("  time 0 s", "  formulation kane\n  expect static: dof == 1\n  time 0 s"))
+    assert main(["check", str(path)]) == 0
+    assert "coordinates 3, m1 0, m2 2, dof 1, index 1" in capsys.readouterr().err

@@ -1,0 +1,58 @@
+"""Declarations before use are not required: units in which others are written, sizes of loops around parameters."""
+
+import numpy as np
+import pytest
+from sysdyn.api import check, load
+
+UNITS = """unit gpd = 24 lph
+unit lph = 1 l/h
+model m {
+  param Q = 3 gpd
+  coord x: translation = 1 m
+  energy T* = 1/2*(1 kg)*x'^2
+}
+"""
+LOOPS = """model m {
+  energy V = sum(i in 1..n: sum(j in 1..n: 1/2*K[i, j]*x[i]*x[j]))
+  for i in first..n { for j in 1..m { param K[i, j] = (1 N/m)*(i + 10*j) } }
+  param first = 1
+  energy T* = sum(i in 1..n: 1/2*(1 kg)*x[i]'^2)
+  coord x[1..n]: translation = 0 m
+  param n = m
+  param m = 2
+}
+scene s of m { time 0 s to 1 s; trace x[1] }
+"""
+
+
+def test_a_unit_may_be_written_in_one_that_follows(tmp_path):
+    path = tmp_path / "m.sd"
+    path.write_text(f"{UNITS}scene s of m {{ time 0 s to 1 s; trace x }}\n")
+    assert load(path).parameters["Q"] == pytest.approx(72.0 * 1e-3 / 3600, rel=1e-14)
+
+
+def test_a_loop_around_parameters_may_run_to_one_that_follows(tmp_path):
+    path = tmp_path / "m.sd"
+    path.write_text(LOOPS)
+    assert np.array_equal(load(path).parameters["K"], [[11.0, 21.0], [12.0, 22.0]])
+
+
+@pytest.mark.parametrize(
+    ("units", "said"),
+    [
+        ("unit a = 2 b\nunit b = 3 c\nunit c = 4 a\nunit d = 5 b\n", ["circular definition: a -> b -> c -> a"]),
+        ("unit a = 2 a\n", ["circular definition: a -> a"]),
+        ("unit a = Pa.s/m\n", ["unknown name 'Pa'"]),
+        ("unit a = -1 m\n", ["unit 'a' is not a positive constant"]),
+        ("unit a = 1 m\nunit a = 2 m\n", ["unit 'a' is declared twice"]),
+    ],
+)
+def test_a_unit_that_is_none_is_told_once(units, said):
+    found = check(f"{units}model m {{ param k = 3 a; coord x: translation = 1 m; energy T* = 1/2*(1 kg)*x'^2 }}\n")
+    assert [d.message for d in found if d.severity == "error"] == said
+
+
+def test_many_units_in_turn():
+    units = "".join(f"unit u{i} = 1 u{i + 1}\n" for i in range(1500))
+    text = "unit u1500 = 1 m\nmodel m { coord x: translation = 1 u0; energy T* = 1/2*(1 kg)*x'^2 }\n"
+    assert check(units + text) == []
