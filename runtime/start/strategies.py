@@ -17,6 +17,7 @@ from sysdyn.runtime.model.slopes import rows_without_slope
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.start.equations import HIDDEN
+from sysdyn.runtime.start.flat import OWN, flat_at, off_the_flat, unasked, without_rates
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
@@ -27,7 +28,6 @@ _RESCALINGS, _DOUBTED = 6, 3
 sets, which may contradict it.
 """
 EXACT = 1e-9
-OWN = 1e-6
 CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
 WALKED = 0.2
@@ -143,40 +143,6 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         yield found, True
 
 
-def _beside(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats:
-    """X with what follows moved by its magnitude."""
-    return x + np.where(follows, starter.scale(t, x), 0.0)
-
-
-def flat_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
-    """Entries [entries] of rows that have no slope in what follows from the state at x, but beside it."""
-    beside = _beside(starter, t, x, follows)
-    flat = (starter.jacobian(t, x) == 0.0) & (starter.jacobian(t, beside) != 0.0) & follows[starter.columns]
-    return np.asarray(flat & ~starter.groups(*HIDDEN)[starter.rows])
-
-
-def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterator[tuple[Floats, Mask]]:
-    """X with what follows from the state beside its guess where rows have no slope in it there, and what is free: those
-    that are missed where the other rows hold, the rest as guessed, then all.  A turbulent valve at rest under pressure
-    would have the vessel behind it filled rather than pass anything; under none it is at rest, which Newton's steps
-    only approach.
-    """
-    beside = _beside(starter, t, x, follows)
-    flat = flat_at(starter, t, x, follows)
-    if not flat.any():
-        return
-    flat_rows = np.bincount(starter.rows, flat, starter.settled.rows) > 0.0
-    flat_here = np.bincount(starter.columns, flat, x.size) > 0.0
-    rows = without_rates(starter) & ~flat_rows
-    at = solve(problem_of(starter, t, x, x, rows=rows, free=follows & ~flat_here), x).x
-    at = starter.without_noise(at, starter.scale(t, x))
-    missed = np.abs(starter.residual(t, at)) * starter.row_scale(t, at, starter.scale(t, at)) > OWN
-    some = np.bincount(starter.columns, flat & missed[starter.rows], x.size) > 0.0
-    yield np.where(some, beside, x) if some.any() else x, follows & (some | ~flat_here)
-    if some.any() and (some != flat_here).any():
-        yield np.where(flat_here, beside, x), follows
-
-
 def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """From x, in what follows from the state, where rates of laws that are flat at rest are not asked for; these are
     asked for again where that does not hold.
@@ -192,12 +158,6 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     if not holds:
         starter.every[:], starter.resting[:] = before
     return found, holds
-
-
-def at_rest(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
-    """Of what follows what stays as it is at x: flows of laws without a slope there whose rates are not asked for."""
-    flat = flat_at(starter, t, x, follows) & starter.resting[starter.rows]
-    return np.asarray(np.bincount(starter.columns, flat, x.size) > 0.0)
 
 
 def unmoved(starter: Starter, t: float, found: Solution, guess: Floats, free: Mask) -> Solution | None:
@@ -222,28 +182,6 @@ def unmoved(starter: Starter, t: float, found: Solution, guess: Floats, free: Ma
             if holds:
                 return again
     return None
-
-
-def unasked(starter: Starter, flat: Ints) -> bool:
-    """Asks for no rates of these rows of the system; whether any were asked for.
-
-    Where a law is flat, or infinitely steep, the flow that it determines grows as a root of time: the equations hold,
-    and a rate of it there is none.
-    """
-    before = int(starter.every.sum())
-    first = {(group, family): row for group, family, row in starter.settled.form.groups}
-    for group, family, row in starter.system.form.groups:
-        own = flat[(flat >= row) & (flat < row + starter.system.description.rows[family].size)]
-        rates = first.get((f"{group}_rate", family))
-        if rates is not None:
-            starter.every[rates + own - row] = False
-            starter.resting[first[group, family] + own - row] = True
-    return int(starter.every.sum()) < before
-
-
-def without_rates(starter: Starter) -> Mask:
-    """Rows in which no rate is [rows]."""
-    return starter.every & ~starter.groups(*(group for group in HIDDEN if group != "phi_rate"))
 
 
 def _as_written(starter: Starter, t: float, x: Floats) -> Mask:
