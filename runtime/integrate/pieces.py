@@ -18,7 +18,8 @@ from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.crossing import go_on
 from sysdyn.runtime.integrate.driver import Sink
-from sysdyn.runtime.integrate.modes import AT_ONCE, EARLY, UNSEEN, Modes, serves
+from sysdyn.runtime.integrate.first_step import FirstStep
+from sysdyn.runtime.integrate.modes import UNSEEN, Modes, serves
 from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.integrate.round_off import left_open
 from sysdyn.runtime.integrate.segments import Segment
@@ -36,10 +37,6 @@ FOLLOWED = 16.0
 """Times a signal that events read may turn within a step: each way has SD_FINEST / FOLLOWED parts (core/run/run.h)."""
 WIDER = 3.0
 """Times the stretch in which a change was seen, and was none once settled: the next one behind it that is searched."""
-NARROW = 1e3
-"""Spacings of t: a step that is no longer is not parted again."""
-LOOKS = 4
-"""Parts of a step at whose ends what falls within it is looked at."""
 HALT = 1e-5
 """Of a step, before friction in the plane comes to rest: there a slip still has a direction."""
 FAINT = 1e3
@@ -71,6 +68,7 @@ class Pieces:
             run.driver.note(start.t, *before)
         self._first(self.handler.begin(start.t, *before))
         self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
+        self._first_step = FirstStep(run, self.handler, self._values)
         self._mode, self._open, self._begun = -1, np.full(run.driver.observed, np.inf), start.t
         self._watch()
 
@@ -204,7 +202,7 @@ class Pieces:
             t, which = found
             if self._by_round_off(which):
                 continue
-            step = self._shorter(which, (core.t_from, t, end)) if begun else 0.0
+            step = self._first_step.shorter(which, (core.t_from, t, end)) if begun else 0.0
             if step:
                 self._again(core.t_from, step, sink)
                 return time.process_time() - began
@@ -214,36 +212,12 @@ class Pieces:
                 point = self._fire(t, before, [], which)
             if point is not None:
                 self._accept(t, TRACE, sink, which)
-                self._go_on(t, point, before, misled=(end - core.t_from) * self.handler.stands(which))
+                misled = self.handler.stands(which) or (
+                    begun and self._first_step.at_once(which, (core.t_from, t, end))
+                )
+                self._go_on(t, point, before, misled=end - core.t_from if misled else 0.0)
                 return time.process_time() - began
             begin = t
-
-    def _shorter(self, which: Sequence[Watched], step: tuple[float, float, float]) -> float:
-        """The length (s) of the first step behind an event that would do where what falls within it, at the second of
-        three instants (the others: begin, end), is of its dense output; 0 where it is of the motion.
-        """
-        begin, t, end = step
-        if end - begin <= NARROW * float(np.spacing(end)):
-            return 0.0
-        early = EARLY.get(self.run.request.method, 0.0) * (end - begin)
-        if AT_ONCE * self.handler.nothing < t - begin < early and not all(self._flies(w) for w in which):
-            return t - begin
-        return (end - begin) / PARTS if self._overshoots(which, begin, end) else 0.0
-
-    def _flies(self, watched: Watched) -> bool:
-        """Whether it is a gap, which inertia leads."""
-        k, contacts = watched.contact, self.handler.contacts
-        return k >= 0 and contacts.contacts[k].kind == "phi" and not contacts.active[k]
-
-    def _overshoots(self, which: Sequence[Watched], begin: float, end: float) -> bool:
-        """Whether what falls within the first step behind an event lies further below zero there than it has ever been
-        large, at either end of the step too: a transient too short for such a step, which a stiff law settles, bends
-        the polynomial of its stages.
-        """
-        largest = [self.handler.observer.largest[w.row] for w in which]
-        looks = [self._values(begin + (end - begin) * k / LOOKS) for k in range(LOOKS + 1)]
-        ends = [max(most, *(abs(looks[k][w.row]) for k in (0, -1))) for w, most in zip(which, largest, strict=True)]
-        return any(-w.side * v[w.row] > most for v in looks[1:-1] for w, most in zip(which, ends, strict=True))
 
     def _again(self, begin: float, step: float, sink: Sink) -> None:
         """The last step counts for nothing; steps of so many s from where it began, which has its rows."""
