@@ -43,6 +43,10 @@ class FirstStep:
     ) -> None:
         self.run, self.handler, self._values = run, handler, values
         self._part = EARLY.get(run.request.method, 0.0)
+        self._begin = self._until = -np.inf
+        """Begin and end (s) of the last first step that was too long: within it others that follow are not taken again,
+        for what is less than a run resolves turns to and fro for ever.
+        """
 
     def shorter(self, which: Sequence[Watched], step: Step) -> float:
         """The length (s) of a step that would do where what changes is of the dense output; 0 where it is of the
@@ -51,7 +55,9 @@ class FirstStep:
         begin, t, end = step
         if end - begin <= NARROW * float(np.spacing(end)):
             return 0.0
-        if AT_ONCE * self.handler.nothing < t - begin < self._unknown(which, step):
+        known = begin != self._begin and begin < self._until
+        if not known and AT_ONCE * self.handler.nothing < t - begin < self._unknown(which, step):
+            self._begin, self._until = begin, end if begin != self._begin else self._until
             return WIDER * (t - begin)
         return (end - begin) / PARTS if self._overshoots(which, begin, end) else 0.0
 
