@@ -23,6 +23,10 @@ SOON = 0.1
 """Of what the dense output does not know: where another event is at once the next steps are shorter."""
 WIDER = 2.0
 """Times the time of a change from the begin: a step within which it is seen again, where it is of the motion."""
+FEW = 60
+"""First steps behind others within one that was too long, which are taken again: what is less than a run resolves turns
+to and fro for ever.
+"""
 NARROW = 1e3
 """Spacings of t: a step that is no longer is not parted again."""
 LOOKS = 4
@@ -43,10 +47,8 @@ class FirstStep:
     ) -> None:
         self.run, self.handler, self._values = run, handler, values
         self._part = EARLY.get(run.request.method, 0.0)
-        self._begin = self._until = -np.inf
-        """Begin and end (s) of the last first step that was too long: within it others that follow are not taken again,
-        for what is less than a run resolves turns to and fro for ever.
-        """
+        self._begin, self._until, self._others = -np.inf, -np.inf, 0
+        """The begin (s) of the last first step that was too long, where the one about it ends, how many there are."""
 
     def shorter(self, which: Sequence[Watched], step: Step) -> float:
         """The length (s) of a step that would do where what changes is of the dense output; 0 where it is of the
@@ -55,9 +57,11 @@ class FirstStep:
         begin, t, end = step
         if end - begin <= NARROW * float(np.spacing(end)):
             return 0.0
-        known = begin != self._begin and begin < self._until
-        if not known and AT_ONCE * self.handler.nothing < t - begin < self._unknown(which, step):
-            self._begin, self._until = begin, end if begin != self._begin else self._until
+        if begin >= self._until:
+            self._begin, self._until, self._others = begin, -np.inf, 0
+        if self._others <= FEW and AT_ONCE * self.handler.nothing < t - begin < self._unknown(which, step):
+            self._others += int(begin != self._begin)
+            self._begin, self._until = begin, self._until if self._until > begin else end
             return WIDER * (t - begin)
         return (end - begin) / PARTS if self._overshoots(which, begin, end) else 0.0
 
