@@ -113,11 +113,14 @@ Run = Callable[[float, float], Sampled]
 """Integrates with a tolerance and a longest step as part of the span."""
 
 
-def _shrink(law: Law, power: float, step: float, longer: float) -> float:
+def _shrink(law: Law, power: float, step: float, longer: float, *, jumps: bool) -> float:
     """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step and whose steps are
-    `longer` times larger; beyond law.far nothing more is credited.
+    `longer` times larger; beyond law.far nothing more is credited.  jumps: events happen, which may hold the steps: of
+    no shorter ones the tolerance says nothing.
     """
     ratio = max(10.0 ** (-power * step), law.far**law.credit)
+    if jumps and longer <= 1.0:
+        ratio = max(ratio, UNSEEN)
     if law.order:
         ratio = max(ratio, min(max(longer, 1.0) ** -law.order, UNSEEN))
     return float(law.safety * ratio / (1.0 - ratio))
@@ -207,7 +210,8 @@ class _Estimate:
                     luck = 10.0 ** ((power - credit) * step_before)
         if shrink is None:
             longer = fine.steps / max(coarse.steps, 1)
-            shrink = _shrink(self.law, credit if self._power is None else min(self._power, credit), step, longer)
+            power = credit if self._power is None else min(self._power, credit)
+            shrink = _shrink(self.law, power, step, longer, jumps=fine.jumps)
         self._before = (over, step) if shorter is None and not lost else None  # what is lost has no power
         least = self.law.least * fine.tolerance
         shrink *= luck

@@ -17,6 +17,7 @@ from sysdyn.runtime.events.mates import mates
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Contact, Plan
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.system import System
 
 FAINT = 1e-3
@@ -83,18 +84,32 @@ class Contacts:
         return np.array([families[k].unit if k >= 0 else "" for k in self.system.family_of])
 
     @cached_property
+    def _one_way(self) -> tuple[int, ...]:
+        """The inequalities of a flow that can hold."""
+        return tuple(k for k, c in enumerate(self.contacts) if c.kind == "psi" and self.multiplier[k] >= 0)
+
+    @cached_property
     def _flows(self) -> dict[int, NDArray[np.bool_]]:
-        """Of each inequality of a flow that can hold: the flows [unknowns as written] of its unit."""
-        flows, number = self.system.are("f", "s"), self.system.form.written
-        kept = (k for k, c in enumerate(self.contacts) if c.kind == "psi" and self.multiplier[k] >= 0)
-        return {k: (flows & (self._units == self.observer.unit(self.contacts[k].value)))[:number] for k in kept}
+        """Of each of these: the flows [unknowns as written] of the units of those in its row.  (The dual of a flow that
+        the text names is an effort, and 1/s is rad/s.)
+        """
+        rows, _, numbers, _ = switch_rows(self.system.description, self.system.form)
+        column, row, flows = self.system.pattern.columns_of(), self.system.pattern.row, self.system.are("f", "s")
+        found = {}
+        for k in self._one_way:
+            own = np.zeros(self.system.rows, dtype=bool)
+            own[rows[numbers == self.contacts[k].number]] = True
+            units = {str(self._units[at]) for at in column[own[row]].tolist() if flows[at]}
+            alike = np.array([unit in units for unit in self._units.tolist()])
+            found[k] = (flows & alike)[: self.system.form.written]
+        return found
 
     def impulses(self, y: Floats, found: tuple[Floats, Floats, Floats]) -> Floats:
         """Those that took y to what was found [unknowns as written], zero of inequalities of flows where these moved by
         no more than what is zero of one: located at its edge, a current may be stopped that is none.
         """
         struck = found[2]
-        holding = [k for k in self._flows if self.active[k] and struck[self.multiplier[k]] < 0.0]
+        holding = [k for k in self._one_way if self.active[k] and struck[self.multiplier[k]] < 0.0]
         if not holding:
             return struck
         struck, moved = struck.copy(), np.abs(found[0] - y)

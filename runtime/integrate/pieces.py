@@ -18,6 +18,7 @@ from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.crossing import go_on
 from sysdyn.runtime.integrate.driver import Sink
+from sysdyn.runtime.integrate.first_step import FirstStep
 from sysdyn.runtime.integrate.modes import UNSEEN, Modes, serves
 from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.integrate.round_off import left_open
@@ -36,12 +37,6 @@ FOLLOWED = 16.0
 """Times a signal that events read may turn within a step: each way has SD_FINEST / FOLLOWED parts (core/run/run.h)."""
 WIDER = 3.0
 """Times the stretch in which a change was seen, and was none once settled: the next one behind it that is searched."""
-SOON = 1e-2
-"""Of the first step behind an event: another one before that is of a dense output which knows nothing so near."""
-NARROW = 1e3
-"""Spacings of t: a step that is no longer is not parted again."""
-LOOKS = 4
-"""Parts of a step at whose ends what falls within it is looked at."""
 HALT = 1e-5
 """Of a step, before friction in the plane comes to rest: there a slip still has a direction."""
 FAINT = 1e3
@@ -73,6 +68,7 @@ class Pieces:
             run.driver.note(start.t, *before)
         self._first(self.handler.begin(start.t, *before))
         self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
+        self._first_step = FirstStep(run, self.handler, self._values)
         self._mode, self._open, self._begun = -1, np.full(run.driver.observed, np.inf), start.t
         self._watch()
 
@@ -206,8 +202,9 @@ class Pieces:
             t, which = found
             if self._by_round_off(which):
                 continue
-            if begun and self._overshoots(which, core.t_from, end):
-                self._again(core.t_from, end, sink)
+            step = self._first_step.shorter(which, (core.t_from, t, end)) if begun else 0.0
+            if step:
+                self._again(core.t_from, step, sink)
                 return time.process_time() - began
             with run.settler.exactly():
                 before = self._point(t)
@@ -215,28 +212,23 @@ class Pieces:
                 point = self._fire(t, before, [], which)
             if point is not None:
                 self._accept(t, TRACE, sink, which)
-                misled = self.handler.stands(which) or (begun and t - core.t_from < SOON * (end - core.t_from))
+                misled = self.handler.stands(which) or (
+                    begun and self._first_step.at_once(which, (core.t_from, t, end))
+                )
                 self._go_on(t, point, before, misled=end - core.t_from if misled else 0.0)
                 return time.process_time() - began
             begin = t
 
-    def _overshoots(self, which: Sequence[Watched], begin: float, end: float) -> bool:
-        """Whether what falls within the first step behind an event lies further below zero there than it has ever been
-        large, at either end of the step too: a transient too short for such a step, which a stiff law settles, bends
-        the polynomial of its stages.
-        """
-        if end - begin <= NARROW * float(np.spacing(end)):
-            return False
-        largest = [self.handler.observer.largest[w.row] for w in which]
-        looks = [self._values(begin + (end - begin) * k / LOOKS) for k in range(LOOKS + 1)]
-        ends = [max(most, *(abs(looks[k][w.row]) for k in (0, -1))) for w, most in zip(which, largest, strict=True)]
-        return any(-w.side * v[w.row] > most for v in looks[1:-1] for w, most in zip(which, ends, strict=True))
-
-    def _again(self, begin: float, end: float, sink: Sink) -> None:
-        """The last step counts for nothing; steps of an eighth of it from where it began."""
-        point = self._point(begin)
+    def _again(self, begin: float, step: float, sink: Sink) -> None:
+        """The last step counts for nothing; steps of so many s from where it began, which has its rows."""
+        run, core = self.run, self.run.driver.run
+        with run.settler.exactly():
+            y, _ = self._point(begin)
+        point = y, run.start_rate[: y.size].copy()
+        every, core.every_step = core.every_step, 0
         self._accept(begin, 0, sink)
-        self._go_on(begin, point, point, misled=end - begin)
+        self._go_on(begin, point, point, misled=PARTS * step, kind=0)
+        core.every_step = every
 
     @property
     def _from(self) -> float:
@@ -286,11 +278,19 @@ class Pieces:
         self.handler.back(after)
 
     def _go_on(
-        self, t: float, point: tuple[Floats, Floats], before: tuple[Floats, Floats], *, misled: float = 0.0
+        self,
+        t: float,
+        point: tuple[Floats, Floats],
+        before: tuple[Floats, Floats],
+        *,
+        misled: float = 0.0,
+        kind: int = TRACE,
     ) -> None:
-        """From a point behind an event; misled (s): by a step whose dense output crossed what the point does not."""
+        """From a point behind an event; misled (s): by a step whose dense output crossed what the point does not; kind:
+        of its row.
+        """
         core = self.run.driver.run
-        core.start_kind = TRACE
+        core.start_kind = kind
         self._bounce(t)
         self._begun = t
         if self.modes is not None:

@@ -56,6 +56,20 @@ def test_a_set_that_turning_one_after_the_other_does_not_find(seed, accuracy, en
     assert np.abs(voltage(found) - other).max() < 10.0 * float(accuracy) * np.abs(other).max()
 
 
+@pytest.mark.filterwarnings("ignore")
+def test_what_relaxes_at_once_behind_an_event_is_followed(tmp_path):
+    """A diode that conducts 1.9 ns behind one that blocks, on the way of a leak, was found 1500 ns behind it, where the
+    first stage of radau's step lay: 1.4e-4 of the largest voltage, told as 4.5e-5.
+    """
+    file = tmp_path / "m.sd"
+    file.write_text(Circuit(13).text.replace("50 ms", "14 ms"))
+    found = simulate(file, output=tmp_path / "a.h5", rtol=2.5e-6, method="radau")
+    other = simulate(file, output=tmp_path / "b.h5", rtol=1e-8, method="bdf")
+    times = [[e.time for e in one.events if e.element == "E15.one_way"][-1] for one in (found, other)]
+    assert times[0] == pytest.approx(times[1], abs=1e-10)
+    assert np.abs(voltage(found) - voltage(other)).max() < 3e-5 * np.abs(voltage(other)).max()
+
+
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 def test_no_event_of_a_polynomial(tmp_path):

@@ -1,5 +1,7 @@
 """The accuracy control's verdict on runs made up for the purpose."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from sysdyn.runtime.accuracy.control import TAME, Lighter, control
@@ -48,6 +50,20 @@ def test_two_runs_with_the_same_steps_are_no_estimate(moved):
     assert achieved.met is (moved < 1e-4)
     assert achieved.below_round_off is (moved == 0.0)
     assert achieved.error_estimate == pytest.approx(moved, rel=1e-12)
+
+
+@pytest.mark.parametrize(("jumps", "steps"), [(True, 90), (True, 200), (False, 90)])
+def test_steps_that_events_hold_say_nothing_of_the_tolerance(jumps, steps):
+    """Of 60 random rectifiers two were off by more than what was asked, told as met, by runs with as many steps."""
+    errors = []
+
+    def run(tolerance, longest):
+        errors.append(100.0 * tolerance)
+        return replace(sampled(tolerance, [1.0, 0.5 + errors[-1]], steps if len(errors) > 1 else 90), jumps=jumps)
+
+    achieved = control(run, np.array([1.0]), LAW, first=1e-6)
+    held = jumps and steps == 90
+    assert (achieved.error_estimate > errors[0] - errors[1]) is held
 
 
 @pytest.mark.parametrize(("doubted", "runs"), [(False, 2), (True, 3)])

@@ -219,6 +219,18 @@ static int settled(sd_run *run, double t)
     return sd_settle_point(run->settle, t, m->before, m->before_d);
 }
 
+/* Whether what crosses at t does so early in the first step behind an event, and may be of what relaxes at once, which its
+ * dense output does not follow: all but gaps. */
+static int early(const sd_run *run, double t, double end, int32_t crossed)
+{
+    const sd_modes *m = run->modes;
+    double since = t - run->t_from;
+    int32_t gaps = 0;
+    while (gaps < crossed && sd_mode_thrown(m, sd_mode_now(m)->row[m->which[gaps]]) >= 0)
+        gaps++;
+    return gaps < crossed && run->t_from == m->begun && since > m->at_once && since < m->early * (end - run->t_from);
+}
+
 /* What changes within the last step, whose points count to round-off (what is left over of one that holds nearly would be a
  * state that jumps); enough: for rows. */
 static int event(sd_run *run, double enough)
@@ -242,6 +254,8 @@ static int event(sd_run *run, double enough)
             watch(run);
             return SD_RUNNING;
         }
+        if (early(run, t, end, crossed))
+            return SD_EVENT;
         memcpy(m->before, run->point, (size_t)run->written * sizeof(double));
         memcpy(m->before_d, run->point_d, (size_t)run->written * sizeof(double));
         int32_t from = m->now;

@@ -114,7 +114,10 @@ class Modes(c.Structure):
         *[(name, I) for name in ["systems", "samples", "observed", "alikes", "unknowns"]],
         *[(name, P) for name in ["p", "place", "relation_row", "relation_moves", "contact", "kink", "system"]],
         *[(name, P) for name in ["period", "next", "piece"]],
-        *[(name, D) for name in ["first", "segment", "last", "nothing", "begin", "longest", "begun"]],
+        *[
+            (name, D)
+            for name in ["first", "segment", "last", "nothing", "begin", "longest", "begun", "early", "at_once"]
+        ],
         *[(name, P) for name in ["t_end", "h_max", "largest"]],
         *[(name, D) for name in ["small", "still"]],
         *[(name, P) for name in ["alike", "alike_end", "state", "differential", "unnamed"]],
