@@ -117,6 +117,18 @@ def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
 
 
+def _numbered(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
+    """X where rows are no numbers there (a current over a temperature of which nothing is said): what follows from the
+    other rows as written, as long as these become fewer.
+    """
+    before = starter.settled.rows
+    while 0 < (number := np.count_nonzero(~np.isfinite(rows := starter.residual(t, x)))) < before:
+        may, before = free & starter.following(t, x), number
+        answers = np.bincount(starter.rows, may[starter.columns], starter.settled.rows) > 0.0
+        x = _onto(starter, t, x, x, rows=without_rates(starter) & np.isfinite(rows) & answers, free=may)
+    return x
+
+
 def _aimed(starter: Starter, t: float) -> Floats:
     """The guess, with the contents that coupled stores hold together there: of what the text says of each, the others
     at rest.  Where nothing else asks for it none of these moves then, whatever unknowns hold their contents.  Of a
@@ -163,7 +175,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | 
     """The first strategy that holds, of all or as many, from the guess, and its name; the least residual and "" where
     none does.
     """
-    x = _begun(starter, t, guess, free)
+    x = _numbered(starter, t, _begun(starter, t, guess, free), free)
     best = Solution(x, np.inf)
     for name, strategy in itertools.islice(applicable(starter, t, x), most):
         found, holds = first(strategy(starter, t, x, guess, free), x)
