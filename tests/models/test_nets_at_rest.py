@@ -1,6 +1,6 @@
 """Vessels, pipes, turbulent valves: where two vessels have one pressure at the start a valve between them is at rest,
-and its flow grows as the root of time.  Against scipy; the start was refused (E903) in one family or another.  (Of digits
-that are not round differences of pressures leave round-off.)
+and its flow grows as the root of time.  Against scipy; the start was refused (E903) in one family or
+another.  (Of digits that are not round differences of pressures leave round-off.)
 """
 
 import numpy as np
