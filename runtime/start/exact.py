@@ -56,7 +56,7 @@ def sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | 
         return best
     follows, steep = free & starter.following(t, best.x), bool(starter.system.form.scales)
     follows &= ~at_rest(starter, t, best.x, follows)
-    written = starter.every & ~starter.groups(*HIDDEN)
+    written = starter.every & ~starter.groups(*HIDDEN) & starter.reading(follows)
     x, held = _corrected(starter, t, best.x, written, follows & (np.arange(follows.size) < starter.n))
     if not held and steep:
         return None

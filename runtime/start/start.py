@@ -124,8 +124,8 @@ def _numbered(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
     before = starter.settled.rows
     while 0 < (number := np.count_nonzero(~np.isfinite(rows := starter.residual(t, x)))) < before:
         may, before = free & starter.following(t, x), number
-        answers = np.bincount(starter.rows, may[starter.columns], starter.settled.rows) > 0.0
-        x = _onto(starter, t, x, x, rows=without_rates(starter) & np.isfinite(rows) & answers, free=may)
+        told = without_rates(starter) & np.isfinite(rows) & starter.reading(may)
+        x = _onto(starter, t, x, x, rows=told, free=may)
     return x
 
 
@@ -165,7 +165,7 @@ def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
         return x
     told = np.zeros(x.size, dtype=bool)
     told[said] = True
-    rows = starter.groups("gamma") & (np.bincount(starter.rows, told[starter.columns], starter.settled.rows) > 0.0)
+    rows = starter.groups("gamma") & starter.reading(told)
     free = np.zeros(x.size, dtype=bool)
     free[starter.columns[rows[starter.rows]]] = True
     return _onto(starter, t, x, x, rows=rows, free=free & starter.moves("q") & ~starter.written)

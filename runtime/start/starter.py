@@ -196,8 +196,7 @@ class Starter:
         arithmetic leaves of a zero (`sin(pi)`) is one.
         """
         said = np.abs(self.guess) > WRITTEN * self.largest_alike(self.guess)
-        answers = np.bincount(self.rows, self.free[self.columns], self.settled.rows) > 0.0
-        bound = np.bincount(self.columns, ~answers[self.rows], self.free.size) > 0.0
+        bound = np.bincount(self.columns, ~self.reading(self.free)[self.rows], self.free.size) > 0.0
         return ~self.free & ~bound & said
 
     def residual(self, t: float, x: Floats) -> Floats:
@@ -247,6 +246,10 @@ class Starter:
     def summed(self) -> bool:
         """Whether rows hold sums of rows (balances of what floats)."""
         return len(self._sums) > 0
+
+    def reading(self, unknowns: Mask) -> Mask:
+        """Rows [rows] that read some of these unknowns."""
+        return np.asarray(np.bincount(self.rows, unknowns[self.columns], self.settled.rows) > 0.0)
 
     def groups(self, *names: str) -> Mask:
         """Rows of the named groups; read-only."""

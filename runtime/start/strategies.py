@@ -99,8 +99,7 @@ def first(tries: Tries, x: Floats) -> tuple[Solution, bool]:
 
 def _of_the_state(starter: Starter, follows: Mask) -> Mask:
     """Rows that read nothing of what follows from the state: loops of springs, constraints of the state [rows]."""
-    read = np.bincount(starter.rows, follows[starter.columns], starter.settled.rows)
-    return np.asarray(starter.every & (read == 0))
+    return starter.every & ~starter.reading(follows)
 
 
 def _beyond(starter: Starter, t: float, x: Floats, follows: Mask) -> bool:
