@@ -40,7 +40,8 @@ UNLIMITED = 1 << 62
 EARLY = dict.fromkeys(("radau", "dopri"), 0.155)
 """Method -> part of the first step behind an event, where the first of radau's three stages lies: before it the dense
 output knows nothing of what relaxes at once (a leak behind a diode that blocks, in 1e-10 s), on the way to which others
-follow (rosenbrock's follows what twists into a zero).  The first step of the bdf is as short as what its error test sees of that, and shorter ones are of round-off.
+follow.  Rosenbrock's follows what twists into a zero.  The first step of the bdf is as short as what its error test
+sees of that, and shorter ones are of round-off.
 """
 AT_ONCE = 1e3
 """Times what is no time: so soon behind an event another one is at once, as in comparisons (accuracy/pairs.TIMING).
