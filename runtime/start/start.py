@@ -122,7 +122,7 @@ def _numbered(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
     other rows as written, as long as these become fewer.
     """
     before = starter.settled.rows
-    while 0 < (number := np.count_nonzero(~np.isfinite(rows := starter.residual(t, x)))) < before:
+    while 0 < (number := int(np.count_nonzero(~np.isfinite(rows := starter.residual(t, x))))) < before:
         may, before = free & starter.following(t, x), number
         told = without_rates(starter) & np.isfinite(rows) & starter.reading(may)
         x = _onto(starter, t, x, x, rows=told, free=may)
