@@ -3,8 +3,9 @@
 A branch without a law carries no effort but the reaction of its constraint: of `f >= 0` (f = 0 while g) either the flow
 or the effort is zero.  The same is said of the effort: `-e >= 0` (e = 0 while not g), whose reaction is the flow.  What
 holds of the one is free of the other (`Switch.dual`).  Of both on one branch (a thyristor: f = 0 while g, f >= 0
-while h) the effort is free while g holds, else -e >= 0 while h does, and zero where neither holds.  An inequality that
-alone holds at times leaves a wire in between, for which there is no row.
+while h) the effort is free while g holds, else -e >= 0 while h does, and zero where neither holds; `f >= 0` beside
+`f <= 0 while g` is f = 0 while g, f >= 0 while not g.  An inequality that alone holds at times leaves a wire in
+between, for which there is no row.
 """
 
 from __future__ import annotations
@@ -16,12 +17,13 @@ from dataclasses import replace
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Constraint, Network, Switch
+from sysdyn.dsl.model.network import Constraint, Network, Observation, Switch
 from sysdyn.dsl.model.rewriting import expressions, rewritten
 
 
 def complements(network: Network) -> Network:
     """The network with what holds at times of the flow of a branch said of its effort."""
+    network = _by_turns(network)
     found = {row.name: (row, effort) for row, effort in _of_effort(network)}
     if not found:
         return network
@@ -44,21 +46,47 @@ def complements(network: Network) -> Network:
     )
 
 
-def _of_effort(network: Network) -> Iterator[tuple[Constraint, Node]]:
-    """Constraints of an effort for those of a flow of a branch that nothing else holds, and the reactions of these."""
+def _by_turns(network: Network) -> Network:
+    """An inequality of a flow beside its opposite under a guard as rows of which one holds at a time."""
+    guards, known = {o.name: o for o in network.observations}, {(s.label, s.at): s for s in network.switches}
+    changed: dict[Switch, Switch] = {}
+    beside: list[Observation] = []
+    pairs = (rows for rows in _alone(network).values() if len(rows) == 2 and rows[0][1].data * rows[1][1].data < 0.0)
+    for one, other in ((a[0].name, b[0].name) for rows in pairs for a, b in (rows, rows[::-1])):
+        for s in (s for s in network.switches if s.label == one and s.kind == "psi" and s.guard is None):
+            opposite = known.get((other, s.at))
+            if opposite is not None and opposite.kind == "psi" and opposite.guard is not None:
+                guard = guards[opposite.guard]
+                name, lets = f"{guard.name}.not", ex.sub(ex.const(1.0), guard.expression)
+                beside.append(replace(guard, name=name, expression=lets))
+                changed |= {s: replace(s, guard=name), opposite: replace(opposite, kind="guarded")}
+    switches = tuple(changed.get(s, s) for s in network.switches)
+    return replace(network, switches=switches, observations=(*network.observations, *beside)) if changed else network
+
+
+Alone = dict[Node, list[tuple[Constraint, Node]]]
+"""Flows of branches without a law with their own constraints, each with the flow's factor."""
+
+
+def _alone(network: Network) -> Alone:
     free = {b.name for b in network.branches if b.law is None and b.kind == "field"}
-    read = (n for c in network.constraints for n in ex.variables(c.expression) if n.op == "var")
-    held = Counter(n.data[0] for n in read if n.data[1] == "bf")
     said = ex.topological(expressions(network, "energies", "works"))
     stored = {n.data[0] for n in said if n.op == "var" and n.data[1] in ("bf", "bq", "be", "bp")}
-    alone: dict[Node, list[tuple[Constraint, Node]]] = {}
+    alone: Alone = {}
     for c in network.constraints:
         flows = [n for n in ex.variables(c.expression) if n.op == "var" and n.data[1:] == ("bf", 0)]
         if c.kind == "psi" and len(flows) == 1 and flows[0].data[0] in free - stored:
             factor = derivative(c.expression, flows[0])
             if ex.is_const(factor) and c.expression is ex.mul(factor, flows[0]):
                 alone.setdefault(flows[0], []).append((c, factor))
-    for flow, rows in alone.items():
+    return alone
+
+
+def _of_effort(network: Network) -> Iterator[tuple[Constraint, Node]]:
+    """Constraints of an effort for those of a flow of a branch that nothing else holds, and the reactions of these."""
+    read = (n for c in network.constraints for n in ex.variables(c.expression) if n.op == "var")
+    held = Counter(n.data[0] for n in read if n.data[1] == "bf")
+    for flow, rows in _alone(network).items():
         if held[flow.data[0]] == len(rows) and _complete(network, [c for c, _ in rows]):
             effort = ex.var(flow.data[0], "be", *flow.args)
             for c, factor in rows:
