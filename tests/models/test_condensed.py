@@ -180,16 +180,21 @@ scene go of grid {
 """
 
 
+def _grid(n):
+    """Voltages of the grid at 1 s."""
+    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    chain[0, 0] = chain[-1, -1] = 1.0
+    matrix = -(np.kron(chain, np.eye(n)) + np.kron(np.eye(n), chain))
+    matrix[0, 0] -= 10.0
+    return _driven(n * n * matrix, 10.0 * n * n * np.eye(n * n)[0])
+
+
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.one_in(2)
 def test_a_grid_meets_its_exponential(tmp_path, method):
     """One unknown a node; rows pivot with the unknowns they belong to."""
     n = 15
-    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
-    chain[0, 0] = chain[-1, -1] = 1.0
-    matrix = -(np.kron(chain, np.eye(n)) + np.kron(np.eye(n), chain))
-    matrix[0, 0] -= 10.0
-    exact = _driven(n * n * matrix, 10.0 * n * n * np.eye(n * n)[0])
+    exact = _grid(n)
     trace = trace_of(tmp_path, GRID, method=method)
     assert trace["far"].values[-1] == pytest.approx(exact[n * n - 1], abs=3e-7 * trace["far"].nominal)
     assert trace["near"].values[-1] == pytest.approx(exact[0], abs=3e-7)
@@ -338,11 +343,7 @@ def test_no_unknown_leaves_as_the_small_difference_of_large_ones(tmp_path, metho
 def test_factors_of_a_net_serve_at_other_steps(tmp_path, rtol, error):
     """They cost ten solutions: made anew for each length of a step (13 and 20 times) they took half of a run."""
     n = 24
-    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
-    chain[0, 0] = chain[-1, -1] = 1.0
-    matrix = -(np.kron(chain, np.eye(n)) + np.kron(np.eye(n), chain))
-    matrix[0, 0] -= 10.0
-    exact = _driven(n * n * matrix, 10.0 * n * n * np.eye(n * n)[0])
+    exact = _grid(n)
     text = GRID.replace("param n = 15", f"param n = {n}").replace("  accuracy 1e-7\n", "")
     trace = trace_of(tmp_path, text, method="bdf", rtol=rtol)
     statistics = json.loads(trace.attributes["statistics"])
