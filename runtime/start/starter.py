@@ -118,7 +118,6 @@ class Starter:
         self.n, self.rates, self.measured = known.n, known.rates, known.measured
         self._momentum, self._flow = known.momentum, known.flow
         self.every = ~known.unsettled  # rows that must hold
-        self.resting = np.zeros_like(self.every)  # laws whose rates are not asked for
         self.rows, self.columns = known.rows, known.columns
         unsettled = np.flatnonzero(known.unsettled)
         self._sums = Sums(self._floating(unsettled), unsettled, (known.rows, known.columns), known.unknowns)
@@ -246,6 +245,11 @@ class Starter:
     def summed(self) -> bool:
         """Whether rows hold sums of rows (balances of what floats)."""
         return len(self._sums) > 0
+
+    @functools.cached_property
+    def resting(self) -> Mask:
+        """Rows [rows] of laws whose rates are not asked for."""
+        return np.zeros_like(self.every)
 
     def reading(self, unknowns: Mask) -> Mask:
         """Rows [rows] that read some of these unknowns."""

@@ -146,11 +146,10 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     """From x, in what follows from the state, where rates of laws that are flat at rest are not asked for; these are
     asked for again where that does not hold.
     """
-    before = starter.every.copy(), starter.resting.copy()
     at = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x)
     if at.residual >= EXACT or x.size > DENSE:
         return at, False
-    near = starter.without_noise(at.x, starter.scale(t, guess))
+    near, before = starter.without_noise(at.x, starter.scale(t, guess)), (starter.every.copy(), starter.resting.copy())
     if not unasked(starter, rows_without_slope(starter.system, t, *starter.expand(near))):
         return at, False
     found, holds = rescaled(starter, t, near, guess, free, least=False)  # what round-off left is no magnitude
