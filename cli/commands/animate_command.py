@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.page.named import label, opened, quantities
+from sysdyn.cli.page.named import destination, label, opened, quantities
 
 KINDS = (".html", ".svg")
 
@@ -44,7 +43,7 @@ def command(
 
     if speed is not None and not 0.0 < speed < float("inf"):
         raise UsageError(f"--speed {speed:g}: more than 0")
-    target = _target(trace, output, console)
+    target = destination(trace, output, console, KINDS, "what plays")
     found = opened(trace)
     film = animation.film(found, speed)
     joined = animation.links_of(found, links)
@@ -67,15 +66,3 @@ def command(
         "quantities": drawn,
     }
     return console.finish()
-
-
-def _target(trace: str, output: str | None, console: Console) -> Path:
-    """Where the animation goes; wrong usage where its kind is none that plays."""
-    if output == "-":
-        if console.as_json:
-            raise UsageError("-o - and --json both want standard output")
-        return Path("-.html")
-    target = Path(output) if output is not None else Path(f"{label(trace)}.html")
-    if target.suffix.lower() not in KINDS:
-        raise UsageError(f"'{target}': what plays is one of {', '.join(KINDS)}")
-    return target

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.failures import UsageError
-from sysdyn.cli.page.named import label, opened, quantities
+from sysdyn.cli.page.named import destination, label, opened, quantities
 
 if TYPE_CHECKING:
     from sysdyn.runtime.trace.trace import Trace
@@ -35,7 +34,7 @@ def command(console: Console, trace: str, names: tuple[str, ...], output: str | 
     files = [trace, *(name for name in names if _is_trace(name))]
     wanted = list(dict.fromkeys(name for name in names if not _is_trace(name)))
     traces = [(label(file), opened(file)) for file in files]
-    target = _target(trace, output, console)
+    target = destination(trace, output, console, KINDS, "a picture")
     drawn = quantities([t for _, t in traces], wanted)
     data = _drawn(traces, drawn, target.suffix.lower())
     if output is None and not console.quiet:
@@ -65,16 +64,3 @@ def _drawn(traces: list[tuple[str, Trace]], names: list[str], kind: str) -> byte
 
 def _is_trace(name: str) -> bool:
     return name.endswith(".h5") and Path(name).is_file()
-
-
-def _target(trace: str, output: str | None, console: Console) -> Path:
-    """Where the picture goes; wrong usage where its kind is none that is drawn."""
-    if output == "-":
-        if console.as_json:
-            raise UsageError("-o - and --json both want standard output")
-        return Path("-.png")
-    target = Path(output) if output is not None else Path(f"{label(trace)}.png")
-    kind = target.suffix.lower()
-    if kind not in KINDS:
-        raise UsageError(f"'{target}': a picture is one of {', '.join(KINDS)}")
-    return target

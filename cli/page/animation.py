@@ -15,9 +15,9 @@ import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.page.curves import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, axes, framed, ticks
 from sysdyn.cli.page.document import document
+from sysdyn.cli.page.named import no_quantity
 from sysdyn.cli.page.panels import COLOURS, Floats, Panel, curve, panels_of, shortened, time_unit, unit_text
 from sysdyn.cli.page.unit_text import conversion
-from sysdyn.dsl.names.symbols import nearest
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
@@ -106,9 +106,7 @@ def _coordinate(trace: Trace, text: str) -> str:
             return text
     except ValueError:
         pass
-    near = nearest(text, trace.names)
-    listed = f"nearest: '{near}'" if near else f"there are: {', '.join(trace.names)}"
-    raise UsageError(f"--link: {trace.path} has no quantity '{text}'; {listed}")
+    raise UsageError(f"--link: {no_quantity(trace, text, trace.names, trace.names)}")
 
 
 def quantities_of(links: Sequence[Link], trace: Trace) -> set[str]:

@@ -1,21 +1,38 @@
-"""What a picture is drawn of: traces by their files, quantities by their names."""
+"""What a picture is drawn of, traces by their files and quantities by their names, and the file that it goes to."""
 
 from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sysdyn.cli.failures import UsageError
 
 if TYPE_CHECKING:
+    from sysdyn.cli.console import Console
     from sysdyn.runtime.trace.trace import Trace
 
 
 def label(file: str) -> str:
     """How a trace is called beside others."""
     return "stdin" if file == "-" else Path(file).stem
+
+
+def destination(trace: str, output: str | None, console: Console, kinds: tuple[str, ...], what: str) -> Path:
+    """Where it goes, by default to the trace's name with the first kind, here; UsageError of any other kind.
+
+    kinds: ends of names, with the dot; what: this command makes, as a message says.
+    """
+    if output == "-":
+        if console.as_json:
+            raise UsageError("-o - and --json both want standard output")
+        return Path(f"-{kinds[0]}")
+    target = Path(output) if output is not None else Path(f"{label(trace)}{kinds[0]}")
+    if target.suffix.lower() not in kinds:
+        raise UsageError(f"'{target}': {what} is one of {', '.join(kinds)}")
+    return target
 
 
 def opened(file: str) -> Trace:
@@ -32,6 +49,15 @@ def opened(file: str) -> Trace:
         return Trace.open(copy.name)
 
 
+def no_quantity(trace: Trace, name: str, known: Iterable[str], listed: Sequence[str]) -> str:
+    """That a trace has none of that name; known: those that may be meant."""
+    from sysdyn.dsl.names.symbols import nearest
+
+    near = nearest(name, known)
+    hint = f"nearest: '{near}'" if near else f"there are: {', '.join(listed)}"
+    return f"{trace.path} has no quantity '{name}'; {hint}"
+
+
 def quantities(traces: list[Trace], wanted: list[str]) -> list[str]:
     """Names that are drawn, as the trace spells them."""
     from sysdyn.cli.page.panels import in_order
@@ -41,8 +67,6 @@ def quantities(traces: list[Trace], wanted: list[str]) -> list[str]:
         if not known:
             raise UsageError(f"{traces[0].path} has no quantities: name a meter, audit/energy or audit/constraints")
         return known
-    from sysdyn.dsl.names.symbols import nearest
-
     spelled = {name: name for name in known}
     for trace in traces:
         for meter in ("audit.energy", "audit.constraints"):
@@ -52,8 +76,6 @@ def quantities(traces: list[Trace], wanted: list[str]) -> list[str]:
     for name in wanted:
         found = spelled.get(name) or spelled.get(name.replace("/", "\u2215"))
         if found is None:
-            near = nearest(name, spelled)
-            hint = f"nearest: '{near}'" if near else f"there are: {', '.join(known)}"
-            raise UsageError(f"{traces[0].path} has no quantity '{name}'; {hint}")
+            raise UsageError(no_quantity(traces[0], name, spelled, known))
         drawn.append(found)
     return list(dict.fromkeys(drawn))

@@ -24,6 +24,7 @@ from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.calculus import derivative, signals_held
 from sysdyn.dsl.model.expression import Node, add, const, is_const, mul, neg, substitute, topological, var, variables
+from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import loop_ranges
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass
@@ -116,16 +117,14 @@ def projection(model: EnergyModel, rows: Mapping[str, Entries]) -> Projection:
 
 def _parts(rows: Mapping[str, Entries]) -> list[dict[str, Entries]]:
     """Rows that share flows."""
-    found: list[tuple[set[str], dict[str, Entries]]] = []
+    joined, parts = Joined[str](), dict[str, dict[str, Entries]]()
+    firsts = {name: next(iter(entries), "") for name, entries in rows.items()}
     for name, entries in rows.items():
-        apart, flows, own = [], set(entries), {name: entries}
-        for part in found:
-            if part[0] & flows:
-                flows, own = part[0] | flows, part[1] | own
-            else:
-                apart.append(part)
-        found = [*apart, (flows, own)]
-    return [part for _, part in found]
+        for flow in entries:
+            joined.join(firsts[name], flow)
+    for name, entries in rows.items():
+        parts.setdefault(joined.first(firsts[name]), {})[name] = entries
+    return list(parts.values())
 
 
 def _free(part: Mapping[str, Entries], model: EnergyModel) -> tuple[set[str], dict[str, Entries]]:

@@ -23,8 +23,9 @@ from sysdyn.dsl.model.rewriting import expressions, rewritten
 
 def complements(network: Network) -> Network:
     """The network with what holds at times of the flow of a branch said of its effort."""
-    network = _by_turns(network)
-    found = {row.name: (row, effort) for row, effort in _of_effort(network)}
+    alone = _alone(network)
+    network = _by_turns(network, alone)
+    found = {row.name: (row, effort) for row, effort in _of_effort(network, alone)}
     if not found:
         return network
 
@@ -46,26 +47,28 @@ def complements(network: Network) -> Network:
     )
 
 
-def _by_turns(network: Network) -> Network:
+Alone = dict[Node, list[tuple[Constraint, Node]]]
+"""Flows of branches without a law, each with the constraints in it alone, and its factor there."""
+
+
+def _by_turns(network: Network, alone: Alone) -> Network:
     """An inequality of a flow beside its opposite under a guard as rows of which one holds at a time."""
+    pairs = (rows for rows in alone.values() if len(rows) == 2 and rows[0][1].data * rows[1][1].data < 0.0)
+    against = {a[0].name: b[0].name for rows in pairs for a, b in (rows, rows[::-1])}
     guards, known = {o.name: o for o in network.observations}, {(s.label, s.at): s for s in network.switches}
     changed: dict[Switch, Switch] = {}
     beside: list[Observation] = []
-    pairs = (rows for rows in _alone(network).values() if len(rows) == 2 and rows[0][1].data * rows[1][1].data < 0.0)
-    for one, other in ((a[0].name, b[0].name) for rows in pairs for a, b in (rows, rows[::-1])):
-        for s in (s for s in network.switches if s.label == one and s.kind == "psi" and s.guard is None):
-            opposite = known.get((other, s.at))
-            if opposite is not None and opposite.kind == "psi" and opposite.guard is not None:
-                guard = guards[opposite.guard]
-                name, lets = f"{guard.name}.not", ex.sub(ex.const(1.0), guard.expression)
-                beside.append(replace(guard, name=name, expression=lets))
-                changed |= {s: replace(s, guard=name), opposite: replace(opposite, kind="guarded")}
+    for s in network.switches:
+        opposite = known.get((against.get(s.label, ""), s.at))
+        if opposite is None or (s.kind, opposite.kind) != ("psi", "psi"):
+            continue
+        if s.guard is None and opposite.guard is not None:
+            guard = guards[opposite.guard]
+            lets = ex.sub(ex.const(1.0), guard.expression)
+            beside.append(replace(guard, name=f"{guard.name}.not", expression=lets))
+            changed |= {s: replace(s, guard=f"{guard.name}.not"), opposite: replace(opposite, kind="guarded")}
     switches = tuple(changed.get(s, s) for s in network.switches)
     return replace(network, switches=switches, observations=(*network.observations, *beside)) if changed else network
-
-
-Alone = dict[Node, list[tuple[Constraint, Node]]]
-"""Flows of branches without a law with their own constraints, each with the flow's factor."""
 
 
 def _alone(network: Network) -> Alone:
@@ -82,11 +85,11 @@ def _alone(network: Network) -> Alone:
     return alone
 
 
-def _of_effort(network: Network) -> Iterator[tuple[Constraint, Node]]:
+def _of_effort(network: Network, alone: Alone) -> Iterator[tuple[Constraint, Node]]:
     """Constraints of an effort for those of a flow of a branch that nothing else holds, and the reactions of these."""
     read = (n for c in network.constraints for n in ex.variables(c.expression) if n.op == "var")
     held = Counter(n.data[0] for n in read if n.data[1] == "bf")
-    for flow, rows in _alone(network).items():
+    for flow, rows in alone.items():
         if held[flow.data[0]] == len(rows) and _complete(network, [c for c, _ in rows]):
             effort = ex.var(flow.data[0], "be", *flow.args)
             for c, factor in rows:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
 
 PARTS = 8
-"""Steps in the place of one that overshot."""
+"""Steps in the place of one that misled; that a bounce takes at least (radau and dopri follow a parabola in one)."""
 SOON = 0.1
 """Of what the dense output does not know: where another event is at once the next steps are shorter."""
 WIDER = 2.0
@@ -39,12 +39,7 @@ Step = tuple[float, float, float]
 class FirstStep:
     """Of one run.  values: of block observe, settled, at an instant (s) of the last step."""
 
-    def __init__(
-        self,
-        run: Integration,
-        handler: Handler,
-        values: Callable[[float], Floats],
-    ) -> None:
+    def __init__(self, run: Integration, handler: Handler, values: Callable[[float], Floats]) -> None:
         self.run, self.handler, self._values = run, handler, values
         self._part = EARLY.get(run.request.method, 0.0)
         self._begin, self._until, self._others = -np.inf, -np.inf, 0

@@ -18,7 +18,7 @@ from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.crossing import go_on
 from sysdyn.runtime.integrate.driver import Sink
-from sysdyn.runtime.integrate.first_step import FirstStep
+from sysdyn.runtime.integrate.first_step import PARTS, FirstStep
 from sysdyn.runtime.integrate.modes import UNSEEN, Modes, serves
 from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.integrate.round_off import left_open
@@ -30,8 +30,6 @@ from sysdyn.runtime.model.scales import group_maxima
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
 
-PARTS = 8
-"""Steps at least that such a bounce takes (radau and dopri follow a parabola in one), or after one that misled."""
 
 FOLLOWED = 16.0
 """Times a signal that events read may turn within a step: each way has SD_FINEST / FOLLOWED parts (core/run/run.h)."""

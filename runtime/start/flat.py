@@ -54,6 +54,8 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
 
 def at_rest(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Of what follows what stays as it is at x: flows of laws without a slope there whose rates are not asked for."""
+    if not starter.resting.any():
+        return np.zeros_like(follows)
     flat = flat_at(starter, t, x, follows) & starter.resting[starter.rows]
     return np.asarray(np.bincount(starter.columns, flat, x.size) > 0.0)
 

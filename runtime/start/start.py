@@ -117,7 +117,7 @@ def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
 
 
-def _numbered(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
+def _finite(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
     """X where rows are no numbers there (a current over a temperature of which nothing is said): what follows from the
     other rows as written, as long as these become fewer.
     """
@@ -175,7 +175,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | 
     """The first strategy that holds, of all or as many, from the guess, and its name; the least residual and "" where
     none does.
     """
-    x = _numbered(starter, t, _begun(starter, t, guess, free), free)
+    x = _finite(starter, t, _begun(starter, t, guess, free), free)
     best = Solution(x, np.inf)
     for name, strategy in itertools.islice(applicable(starter, t, x), most):
         found, holds = first(strategy(starter, t, x, guess, free), x)

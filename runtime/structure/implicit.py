@@ -23,6 +23,8 @@ def undetermined(system: System, state: ConsistentState, facts: Structure) -> tu
     """Implicit unknowns that a null vector of the pencil moves at the state, and none where these are others; system:
     the form as written.
     """
+    if facts.index is not None and not facts.undetermined:
+        return ()
     implicit = np.flatnonzero(system.are("e"))
     if facts.index is not None:
         laws = {row.label for row in system.description.rows if row.block == "gamma"}

@@ -71,16 +71,24 @@ static void lessen_block(const sd_sparse *lu, int32_t j, int32_t many, int32_t w
     }
 }
 
-/* x less `many` columns of one block from the j-th on; u: what stood in x where they pivot, `at` the first; w: room */
-static void apply_block(const sd_sparse *lu, int32_t j, int32_t many, int32_t at, sd_number *u, sd_number *x, sd_number *w)
+/* w := what these columns touch of x, where the first pivots at `at`, less them; how many numbers are behind that one */
+static inline int32_t lessen_touched(const sd_sparse *lu, int32_t j, int32_t many, int32_t at, const sd_number *x, sd_number *w)
 {
     const int32_t *row = lu->l_row + lu->l_start[j];
     int32_t wide = lu->l_start[j + 1] - lu->l_start[j];
     w[0] = x[at];
-    x[at] = 0.0;
     for (int32_t p = 0; p < wide; p++)
         w[p + 1] = x[row[p]];
     lessen_block(lu, j, many, wide, w);
+    return wide;
+}
+
+/* x less `many` columns of one block from the j-th on; u: what stood in x where they pivot, `at` the first; w: room */
+static void apply_block(const sd_sparse *lu, int32_t j, int32_t many, int32_t at, sd_number *u, sd_number *x, sd_number *w)
+{
+    const int32_t *row = lu->l_row + lu->l_start[j];
+    int32_t wide = lessen_touched(lu, j, many, at, x, w);
+    x[at] = 0.0;
     for (int32_t i = 0; i < many; i++)
         u[i] = w[i];
     for (int32_t p = 0; p < wide; p++)

@@ -3,7 +3,6 @@
 #define SYSDYN_SUBSTITUTE_H
 
 #include "linear/blocks.h"
-#include "linear/chains.h"
 
 #define NARROW 4 /* entries of both factors a column, or rows that it touches, up to which they are a line's */
 
@@ -11,12 +10,8 @@
 static void substitute_block(const sd_sparse *lu, int32_t k, int32_t many, sd_number *work)
 {
     const int32_t *row = lu->l_row + lu->l_start[k];
-    int32_t wide = lu->l_start[k + 1] - lu->l_start[k];
     sd_number *w = lu->room;
-    w[0] = work[k];
-    for (int32_t p = 0; p < wide; p++)
-        w[p + 1] = work[row[p]];
-    lessen_block(lu, k, many, wide, w);
+    int32_t wide = lessen_touched(lu, k, many, k, work, w);
     work[k] = w[0];
     for (int32_t p = 0; p < wide; p++)
         work[row[p]] = w[p + 1];

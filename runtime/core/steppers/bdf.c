@@ -165,7 +165,7 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
         bdf->bad_column = bdf->linear->bad_column;
         return failed == 2 ? SD_MEMORY : SD_SINGULAR;
     }
-    bdf->cj_factored = bdf->cj_last = bdf->cj;
+    bdf->cj_factored = bdf->cj;
     bdf->extra = 0;
     bdf->contraction = 20.0;
     bdf->ready = 1;
