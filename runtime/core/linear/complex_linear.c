@@ -2,6 +2,8 @@
 #define SD_COMPLEX
 #include "linear/sparse.c"
 
+#include "linear/fronts.c"
+
 #include "linear/elimination_order.c"
 
 #include "linear/elimination.c"

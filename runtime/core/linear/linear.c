@@ -515,5 +515,5 @@ void sd_linear_solve(sd_linear *linear, sd_number *x)
 double sd_linear_effort(const sd_linear *linear)
 {
     const sd_sparse *lu = linear->replayed ? NULL : linear->sparse;
-    return lu && lu->products ? (double)lu->products / ((double)lu->l_start[lu->n] + lu->u_start[lu->n] + lu->n) : 0.0;
+    return lu && lu->products ? (double)lu->products / (double)lu->entries : 0.0;
 }

@@ -3,6 +3,7 @@
 #include "linear/blocks.h"
 #include "linear/chains.h"
 #include "linear/dense_rest.h"
+#include "linear/fronts.h"
 #include "linear/substitute.h"
 
 #include <math.h>
@@ -21,6 +22,7 @@ void sd_sparse_free(sd_sparse *lu)
         return;
     leave_chains(lu);
     leave_told(lu);
+    sd_fronts_free(lu->fronts);
     free(lu->pivots);
     free(lu->first);
     free(lu->room);
@@ -177,10 +179,17 @@ void sd_sparse_lend(sd_sparse *lu, sd_number *x)
     lu->lent = 1;
 }
 
-void sd_sparse_rest(sd_sparse *lu)
+static void rest_columns(sd_sparse *lu)
 {
     free(lu->l_value), free(lu->u_value), free(lu->inverse);
     lu->l_value = lu->u_value = lu->inverse = NULL;
+}
+
+void sd_sparse_rest(sd_sparse *lu)
+{
+    rest_columns(lu);
+    if (lu->fronts)
+        sd_fronts_rest(lu->fronts);
 }
 
 /* the numbers of factors that have rested; 0: no memory */
@@ -425,6 +434,7 @@ static void leave_search(sd_sparse *lu)
 static void count_products(sd_sparse *lu)
 {
     lu->products = 0;
+    lu->entries = (int64_t)lu->l_start[lu->n] + lu->u_start[lu->n] + lu->n;
     for (int32_t p = 0; p < lu->u_start[lu->n] && !lu->lowers; p++)
         lu->products += lu->l_start[lu->u_row[p] + 1] - lu->l_start[lu->u_row[p]];
 }
@@ -437,8 +447,40 @@ static int provide_room(sd_sparse *lu)
     return !lu->widest || lu->room;
 }
 
+/* 1: factors by fronts, whose pivots are no less than this part of what is left of their columns */
+static int factor_fronts(sd_sparse *lu, const sd_matrix *matrix, double least)
+{
+    if (!sd_fronts_provide(lu->fronts))
+        return 0;
+    unsigned before = sd_no_subnormals();
+    lu->smallest = sd_fronts_factor(lu->fronts, matrix);
+    sd_subnormals(before);
+    return lu->pivoted = lu->smallest >= least;
+}
+
+/* The same where rows pivot in their own columns, if the factors fill and that is right; if not, never again. */
+static int by_fronts(sd_sparse *lu, const sd_matrix *matrix)
+{
+    if (lu->no_fronts || !lu->paired || lu->idle || lu->null_pivot != 0.0 || lu->dropped != 0.0)
+        return 0;
+    if (!lu->fronts)
+        lu->fronts = sd_fronts_new(lu->n, matrix, lu->order, lu->own, lu->most);
+    if (lu->fronts && factor_fronts(lu, matrix, own_threshold(lu, THRESHOLD))) {
+        lu->rank = lu->n;
+        lu->products = lu->fronts->products;
+        lu->entries = lu->fronts->entries;
+        return 1;
+    }
+    lu->no_fronts = 1;
+    sd_fronts_free(lu->fronts);
+    lu->fronts = NULL;
+    return 0;
+}
+
 int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
 {
+    if (by_fronts(lu, matrix))
+        return 0;
     size_t rows = (size_t)lu->rows;
     lu->stack = calloc(4 * rows + 1, sizeof(int32_t)); /* of a large one the room counts: it is not kept */
     lu->block = malloc((rows + 1) * sizeof(sd_number));
@@ -566,6 +608,8 @@ static int renew_rest(sd_sparse *lu, const sd_matrix *matrix)
 
 int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 {
+    if (lu->fronts)
+        return !factor_fronts(lu, matrix, UNHEALTHY);
     if (!provide_numbers(lu))
         return 1;
     int failed = 0;
@@ -588,6 +632,10 @@ int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
 {
     int32_t n = lu->n;
+    if (lu->fronts) {
+        sd_fronts_solve(lu->fronts, x, work, row_scale, column_scale);
+        return;
+    }
     if (lu->lowers) {
         descend_chains(lu, x, row_scale, work);
         ascend_chains(lu, x, column_scale, work);
