@@ -26,7 +26,7 @@ twelve models of 8 to 150 unknowns: steps of radau by up to 46 %, of the bdf by 
 gained, and full pivoting is the safer one near singular positions."""
 LEAVING = 50
 """The same of matrices whose columns may be left without a pivot, which the dense LU alone does."""
-SMALL = 200
+SMALL = 100
 """Unknowns up to which degrees are exact."""
 
 

@@ -32,7 +32,7 @@ from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.simulate import simulate
 
-TOLERANCES = tuple(10.0 ** (-0.5 * k) for k in range(5, 13))
+TOLERANCES = tuple(10.0 ** (-0.5 * k) for k in range(3, 13))
 TARGETS = (1e-3, 1e-4, 1e-5)
 SIZES = {"rc_ladder": ("ladder", 0.2), "grid": ("grid", 0.05)}
 """Of each model that has one its peer, and the largest voltage of the last node (V): what errors are relative to."""

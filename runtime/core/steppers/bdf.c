@@ -21,7 +21,7 @@
                              * be wrong by orders (within van der Pol's jump), and make whatever is left look small */
 #define SLUGGISH 0.2        /* contraction above which the next step takes a fresh Jacobian */
 #define STEEP_SLUGGISH 0.05 /* the same with steep laws, whose slopes change by themselves: 6 to 20 % fewer residuals */
-#define DEAR 6.0            /* products of factors for each of a solution from which those of another cj serve, ... */
+#define DEAR 4.0            /* products of factors for each of a solution from which those of another cj serve, ... */
 #define APART 2.0           /* ... up to this ratio of both: a third is left of a correction at most */
 #define SPENT 0.5           /* of what factors cost, in solutions: what iterations more may cost before they are made anew */
 #define OTHERS 0.03         /* the tolerance of their iteration: what is left is no noise, 0.1 made a fourth more steps at 1e-5 */
