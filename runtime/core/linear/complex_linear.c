@@ -1,6 +1,8 @@
-/* The factorisation of linear.c, elimination.c and sparse.c for complex matrices. */
+/* The factorisation of linear.c, elimination.c, sparse.c and fronts.c for complex matrices. */
 #define SD_COMPLEX
 #include "linear/sparse.c"
+
+#include "linear/front_pattern.c"
 
 #include "linear/fronts.c"
 

@@ -2,8 +2,8 @@
 #ifndef SYSDYN_FRONT_LANES_H
 #define SYSDYN_FRONT_LANES_H
 
+#include "linear/fronts.h"
 #include "linear/lanes.h"
-#include "linear/number.h"
 
 #include <math.h>
 
@@ -59,6 +59,18 @@ static inline int32_t whole_line(int32_t n)
     return (n + IN_LANES - 1) / IN_LANES * IN_LANES;
 }
 
+/* lines of a front's panels */
+static inline int32_t lines_of(const sd_front *front)
+{
+    return whole_line(front->many) + whole_line(front->wide);
+}
+
+/* numbers that it leaves */
+static inline int64_t left_by(const sd_front *front)
+{
+    return (int64_t)front->wide * whole_line(front->wide);
+}
+
 /* the largest size among whole lanes of numbers; not finite where one is not */
 static inline __attribute__((always_inline)) double largest_of(int32_t lines, const sd_number *x)
 {
@@ -78,9 +90,9 @@ static inline __attribute__((always_inline)) double largest_of(int32_t lines, co
 enum sd_sum_into { SUM, MINUS, LESS }; /* what is there becomes the sum, its negative, or less by it */
 
 /* `chunks` lanes of a sum of columns of a panel, each times a number of x: of those `places`, or so far apart */
-static inline __attribute__((always_inline)) void sum_some_lines(enum sd_sum_into how, int chunks, int32_t many, const sd_number *panel,
-                                                                 int32_t step, const sd_number *x, int32_t apart,
-                                                                 const int32_t *places, sd_number *to)
+static inline __attribute__((always_inline)) void sum_some_lines(enum sd_sum_into how, int chunks, int32_t many,
+                                                                 const sd_number *panel, int32_t step, const sd_number *x,
+                                                                 int32_t apart, const int32_t *places, sd_number *to)
 {
     sd_lanes sum[4] = {{0.0}};
     for (int32_t k = 0; k < many; k++, panel += step) {
@@ -98,9 +110,9 @@ static inline __attribute__((always_inline)) void sum_some_lines(enum sd_sum_int
 }
 
 /* the same of whole lines */
-static inline __attribute__((always_inline)) void sum_columns(enum sd_sum_into how, int32_t lines, int32_t many, const sd_number *panel,
-                                                              int32_t step, const sd_number *x, int32_t apart,
-                                                              const int32_t *places, sd_number *to)
+static inline __attribute__((always_inline)) void sum_columns(enum sd_sum_into how, int32_t lines, int32_t many,
+                                                              const sd_number *panel, int32_t step, const sd_number *x,
+                                                              int32_t apart, const int32_t *places, sd_number *to)
 {
     int32_t i = 0;
     for (; i + 4 * IN_LANES <= lines; i += 4 * IN_LANES)

@@ -1,10 +1,11 @@
 /* Sparse factors by fronts (Duff & Reid, ACM Trans. Math. Software 9, 1983; Liu, SIAM Review 34, 1992): where an elimination
  * fills, as a grid's does, columns that touch the same rows pivot together in one small dense matrix.
  *
- * Every row pivots in its own column, by an order of A + A^T: the pattern is known before any number, and symmetric.  Columns that
- * differ in few rows share a front, zeros among them (Ashcraft & Grimes, ACM Trans. Math. Software 15, 1989), for a front costs
- * more besides its numbers.  A front holds some columns of L and rows of U in two panels, whose triangles are inverted when they
- * are done (Alvarado & Schreiber, SIAM J. Sci. Comput. 14, 1993), and hands what is left on to the one above. */
+ * Every row pivots in its own column, by an order of A + A^T: the pattern is known before any number, and symmetric.  Columns
+ * that differ in few rows share a front, zeros among them (Ashcraft & Grimes, ACM Trans. Math. Software 15, 1989), for a front
+ * costs more besides its numbers.  A front holds some columns of L and rows of U in two panels, whose triangles are inverted
+ * when they are done (Alvarado & Schreiber, SIAM J. Sci. Comput. 14, 1993), and hands what is left on to the one above.
+ */
 #ifndef SYSDYN_FRONTS_H
 #define SYSDYN_FRONTS_H
 
@@ -12,8 +13,8 @@
 
 typedef struct sd_front {
     int32_t first, many, wide;  /* positions [first, first + many) pivot here and touch `wide` behind them */
-    int32_t up, child, sibling; /* the front that takes what is left of this one, the last that it takes from, and the one that it
-                                   has before this one; -1: none */
+    int32_t up, child, sibling; /* the front that takes what is left of this one; the last that it takes from itself; the one
+                                   before this one that `up` takes from; -1: none */
     int32_t side;               /* on which stack its rest waits */
     int32_t behind, at;         /* where its lists, its panels begin */
     int32_t entries;            /* where those of the matrix that stand here end */
@@ -45,6 +46,7 @@ void sd_fronts_rest(sd_fronts *fronts);
 /* new values; the least pivot as part of what is left of its column, 0: one is no number */
 double sd_fronts_factor(sd_fronts *fronts, const sd_matrix *matrix);
 /* as sd_sparse_solve */
-void sd_fronts_solve(const sd_fronts *fronts, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale);
+void sd_fronts_solve(const sd_fronts *fronts, sd_number *x, sd_number *work, const double *row_scale,
+                     const double *column_scale);
 
 #endif

@@ -28,7 +28,9 @@ static inline sd_number sd_entry_of_sum(const sd_matrix *matrix, int32_t e, doub
 /* entry e, which stands in column c */
 static inline sd_number sd_entry_of(const sd_matrix *matrix, int32_t e, int32_t c)
 {
-    return matrix->value ? matrix->value[e] : sd_entry_of_sum(matrix, e, matrix->column_scale[c]) * matrix->row_scale[matrix->row[e]];
+    if (matrix->value)
+        return matrix->value[e];
+    return sd_entry_of_sum(matrix, e, matrix->column_scale[c]) * matrix->row_scale[matrix->row[e]];
 }
 
 /* the entries of column c from its first one on, until the next column is asked for */
