@@ -33,7 +33,7 @@ class Factors:
         self.pattern = Pattern(n, n, matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
         self.order = symmetric_order(self.pattern)
         self.indices, self.indptr, self.kind = matrix.indices, matrix.indptr, matrix.dtype
-        letter = "z_" if self.kind == complex else ""
+        letter = "z_" if np.issubdtype(self.kind, complex) else ""
         self.linear = (self.order.complex_linear if letter else self.order.linear)(self.pattern)
         self.factor, self.solve, self.free = (
             getattr(lib.core, f"sd_linear_{letter}{name}") for name in ("factor", "solve", "free")
