@@ -243,13 +243,21 @@ def timeless(prepared: Prepared) -> bool:
 
 
 def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float | None, tuple[tuple[str, float], ...]]:
-    """Accuracy of all traced quantities, or of those that the scene names."""
+    """Accuracy of all traced quantities (None: of those alone that the scene names), and of those that it names."""
     if request.accuracy is not None:
         return request.accuracy, ()
-    if scene.accuracy is None:
-        return ACCURACY, ()
-    wanted = prepared.binding.evaluate(scene.accuracy)
-    return (None, tuple((name, wanted) for name in scene.accuracy_on)) if scene.accuracy_on else (wanted, ())
+    value = prepared.binding.evaluate
+    on = tuple((name, value(wanted)) for name, wanted in scene.accuracy_on)
+    rest = None if scene.accuracy is None else value(scene.accuracy)
+    return (rest if on or rest is not None else ACCURACY), on
+
+
+def of_these_alone(options: Options, names: Sequence[str]) -> Options:
+    """Options that ask of these quantities, each by its name, what they ask of all; of others nothing."""
+    if options.accuracy is None or not names:
+        return options
+    on = dict.fromkeys(names, options.accuracy) | dict(options.accuracy_on)
+    return replace(options, accuracy=None, accuracy_on=tuple(on.items()))
 
 
 def separate(text: str) -> list[str]:
