@@ -1,0 +1,35 @@
+"""Starts that linear rows exclude, beside laws that bend: refused by these rows, without a search."""
+
+import pytest
+from sysdyn import api
+from sysdyn.runtime.start import strategies
+
+LOOP = """
+model m {
+  node a, b, c: electrical
+  C1: potential(q = 1 uF*e) a -> ground
+  C2: potential(q = 2 uF*e) a -> b
+  C3: potential(q = 3 uF*e) b -> c
+  C4: potential(q = 3 uF*e) c -> ground
+  D: dissipator(f = 1 nA*(exp(e/(25 mV)) - 1)) b -> c
+  R: dissipator(e = 1 kohm*f) a -> c
+  init C1.e = 9 V
+  init C2.e = 2 V
+  init C3.e = 3 V
+  init C4.e = 4 V
+}
+scene s of m { time 0 s to 5 us; trace a.e }
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+def test_voltages_around_a_loop(tmp_path, monkeypatch, formulation):
+    """And a junction at 3 V, whose current of 1e43 A is nothing to search by."""
+    searched = []
+    followed = strategies._at_the_end
+    monkeypatch.setattr(strategies, "_at_the_end", lambda *a: searched.append(a) or followed(*a))
+    path = tmp_path / "m.sd"
+    path.write_text(LOOP.replace("C1.e = 9 V", "C1.e = 1 V"))
+    with pytest.raises(api.ModelError, match="E903: fixed initial values of .*'C1.e'.* contradict"):
+        api.simulate(path, formulation=formulation, output=tmp_path / "t.h5")
+    assert not searched
