@@ -30,6 +30,6 @@ def test_voltages_around_a_loop(tmp_path, monkeypatch, formulation):
     monkeypatch.setattr(strategies, "_at_the_end", lambda *a: searched.append(a) or followed(*a))
     path = tmp_path / "m.sd"
     path.write_text(LOOP.replace("C1.e = 9 V", "C1.e = 1 V"))
-    with pytest.raises(api.ModelError, match="E903: fixed initial values of .*'C1.e'.* contradict"):
+    with pytest.raises(api.ModelError, match=r"E903: fixed initial values of .*'C1.e'.* contradict"):
         api.simulate(path, formulation=formulation, output=tmp_path / "t.h5")
     assert not searched
