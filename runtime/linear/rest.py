@@ -23,7 +23,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.gauss_newton import Problem, solve
+from sysdyn.runtime.numerics.gauss_newton import Problem, missed, solve
 from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.numerics.rank import least_squares, null_space
 from sysdyn.runtime.numerics.work import Work
@@ -36,6 +36,8 @@ MET = 1e-9
 """Largest row, relative to its terms, of a state of rest."""
 SAME = 1e-6
 """Distance of two states of rest, in magnitudes, below which they are one."""
+PIECES, PIECE = 60, 0.2
+"""Steps from one state of rest to another along those between, and the longest of them in magnitudes."""
 NEAR = 1e-9
 """Part of a magnitude that is tried as zero."""
 FAR = 1e9
@@ -211,7 +213,7 @@ class Resting:
         return Rest(state, own.residual, free, open_, self.along.shape[1])
 
     def _met(self, y: Floats) -> bool:
-        return solve(self.problem(y), y, 1).residual < MET
+        return missed(self.problem(y), y) < MET
 
     def _clean(self, y: Floats, problem: Problem) -> Floats:
         """Without what is near zero in its magnitude, where that is as good."""
@@ -253,7 +255,7 @@ class Resting:
         return found
 
     def apart(self, one: Rest, other: Rest) -> bool:
-        """Whether two states differ by more than what the first leaves open."""
+        """Whether two states differ by more than what the first leaves open, and no states of rest lie between them."""
         problem = self.problem(one.state.y)
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu")) & ~self.loose
         size = np.maximum(np.abs(one.state.y), np.abs(other.state.y))
@@ -262,7 +264,32 @@ class Resting:
         if one.free:
             null = (self._null(one.state.y, problem) / size[:, None])[told]
             move = move - null @ least_squares(null, move)
-        return bool(np.abs(move).max(initial=0.0) > SAME)
+        differ = bool(np.abs(move).max(initial=0.0) > SAME)
+        return differ and not (one.free and other.free and self._between(one.state.y, other.state.y, told))
+
+    def _between(self, one: Floats, other: Floats, told: Mask) -> bool:
+        """Whether states of rest lead from one to another: by steps along what they leave open, and back onto them."""
+        y, turned = one, False
+        size = np.maximum(np.abs(one), np.abs(other))
+        size = np.maximum(size, group_maximum(self.system, self.problem(one).scale))
+        for _ in range(PIECES):
+            away = ((other - y) / size)[told]
+            if np.abs(away).max(initial=0.0) <= SAME:
+                return True
+            null = self._null(y, self.problem(y)) / size[:, None]
+            along = null @ least_squares(null[told], away) if null.size else np.zeros(y.size)
+            longest = float(np.abs(along).max())
+            if longest < SAME:  # nothing leads nearer: a way around, once
+                if turned or not null.size:
+                    return False
+                turned, along = True, null[:, 0]
+                longest = float(np.abs(along).max())
+            begun = y + size * along * min(1.0, PIECE / longest)
+            found = solve(replace(self.problem(begun), guess=begun), begun)
+            if not found.residual < MET or np.abs((found.x - begun) / size)[told].max() > PIECE:
+                return False
+            y = found.x
+        return False
 
 
 class Equations(Protocol):
