@@ -96,7 +96,7 @@ def _solver(target: Target, scene: Scene, value: Value, request: Request) -> Ite
         yield Diagnostic("E607", text, place, "bdf(order = 1 .. 5): at most; radau(order = 5), 9 or 13: that one")
     method = request.method or scene.solver or "auto"
     if method == "euler":
-        if request.method is None and "step" not in said:
+        if request.method is None and request.step is None and "step" not in said:
             yield Diagnostic("E607", "method euler needs a step", place, "solver euler(step = 1 ms)")
         if said.get("step", 0.0) > said.get("longest", math.inf):
             text = f"step = {said['step']:g} s of the solver is longer than longest = {said['longest']:g} s"
