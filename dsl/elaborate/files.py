@@ -123,7 +123,9 @@ class FileScope:
 
     def _ordered(self, units: Sequence[_Declared], scope: Scope, source: SourceText) -> Iterator[_Declared]:
         """The units of a text, each behind those that it is written in; E105 of one that needs itself."""
-        first = {unit.name.name: unit for unit in reversed(units)}
+        first: dict[str, _Declared] = {}
+        for unit in units:
+            first.setdefault(unit.name.name, unit)
         order, circles = in_order(first, lambda name: [n for n in _written_in(first[name]) if n in first])
         for circle in circles:
             text = f"circular definition: {' -> '.join(circle)}"
