@@ -134,7 +134,13 @@ def _listed(prepared: Prepared, error: InconsistentStart) -> str:
         if written and ".." not in written[1] and places.count(place) == 1:
             shown.append(written[1])
             continue
-        shown.append(f"{name}.f" if name != c.label and re.sub(r"\[.*", "", name) in elements else c.label)
+        held = c.label.removesuffix(".multiplier")  # the effort of a node
+        for owner, kind in ((held, "e"), (name, "f")):
+            if owner != c.label and re.sub(r"\[.*", "", owner) in elements:
+                shown.append(f"{owner}.{kind}")
+                break
+        else:
+            shown.append(c.label)
     return ", ".join(f"'{name}'" for name in dict.fromkeys(shown))
 
 

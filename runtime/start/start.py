@@ -42,6 +42,8 @@ NOTHING = 1e-100
 """Of any unit: what an iteration down a steep law leaves of zero."""
 HELD = "#held "
 """Before the name of a coordinate: what its flow and others hold together (compiler/forms/lowering.py)."""
+MOVED = 1e-6
+"""Of its magnitude: what a fixed value that is in the way has to move by, at least."""
 EXPLAINED = 0.1
 """Share of the work of a search that explaining what was not found may take."""
 
@@ -214,9 +216,9 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     # rows that hold to round-off at some point contradict nothing: it was the search that failed
     contradict = bool(scaled[order[0]] > OWN)
     if found and contradict:
-        scale = starter.scale(t, freed.x)
+        scale = np.maximum(starter.scale(t, freed.x), starter.scale(t, guess))
         change = np.where(starter.free, 0.0, np.abs(freed.x - guess) / scale)
-        places = [int(k) for k in np.argsort(-change)[:5] if change[k] > 1e-9]
+        places = [int(k) for k in np.argsort(-change)[:5] if change[k] > MOVED]
         candidates = tuple(dict.fromkeys(starter.given.label(k) for k in places))
     kind = "fixed"
     if not candidates:
