@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -23,7 +24,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.gauss_newton import Problem, missed, solve
+from sysdyn.runtime.numerics.gauss_newton import Problem, solve
 from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.numerics.rank import least_squares, null_space
 from sysdyn.runtime.numerics.work import Work
@@ -36,8 +37,8 @@ MET = 1e-9
 """Largest row, relative to its terms, of a state of rest."""
 SAME = 1e-6
 """Distance of two states of rest, in magnitudes, below which they are one."""
-PIECES, PIECE = 60, 0.2
-"""Steps from one state of rest to another along those between, and the longest of them in magnitudes."""
+PIECES, PIECE, SHORTEST = 60, 0.2, 1e-3
+"""Steps from one state of rest to another along those between; the longest and the shortest of them in magnitudes."""
 NEAR = 1e-9
 """Part of a magnitude that is tried as zero."""
 FAR = 1e9
@@ -213,7 +214,16 @@ class Resting:
         return Rest(state, own.residual, free, open_, self.along.shape[1])
 
     def _met(self, y: Floats) -> bool:
-        return missed(self.problem(y), y) < MET
+        """Whether y is a state of rest, but for what is near zero in its magnitude."""
+        problem = self.problem(y)
+        found = solve(replace(problem, guess=y), y)
+        size = np.maximum(NEAR * group_maximum(self.system, problem.scale), self._nothing)
+        return found.residual < MET and bool((np.abs(found.x - y) <= size).all())
+
+    @cached_property
+    def _nothing(self) -> Floats:
+        """What is near zero beside the first guess [unknowns]: a state at rest has no magnitudes of its own."""
+        return NEAR * group_maximum(self.system, self.problem(self.first).scale)
 
     def _clean(self, y: Floats, problem: Problem) -> Floats:
         """Without what is near zero in its magnitude, where that is as good."""
@@ -260,6 +270,7 @@ class Resting:
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu")) & ~self.loose
         size = np.maximum(np.abs(one.state.y), np.abs(other.state.y))
         size = np.maximum(size, group_maximum(self.system, problem.scale))
+        size = np.maximum(size, self._nothing)
         move = ((other.state.y - one.state.y) / size)[told]
         if one.free:
             null = (self._null(one.state.y, problem) / size[:, None])[told]
@@ -269,9 +280,10 @@ class Resting:
 
     def _between(self, one: Floats, other: Floats, told: Mask) -> bool:
         """Whether states of rest lead from one to another: by steps along what they leave open, and back onto them."""
-        y, turned = one, False
+        y, turned, piece = one, False, PIECE
         size = np.maximum(np.abs(one), np.abs(other))
         size = np.maximum(size, group_maximum(self.system, self.problem(one).scale))
+        size = np.maximum(size, self._nothing)
         for _ in range(PIECES):
             away = ((other - y) / size)[told]
             if np.abs(away).max(initial=0.0) <= SAME:
@@ -284,11 +296,12 @@ class Resting:
                     return False
                 turned, along = True, null[:, 0]
                 longest = float(np.abs(along).max())
-            begun = y + size * along * min(1.0, PIECE / longest)
+            begun = y + size * along * min(1.0, piece / longest)
             found = solve(replace(self.problem(begun), guess=begun), begun)
-            if not found.residual < MET or np.abs((found.x - begun) / size)[told].max() > PIECE:
+            follows = found.residual < MET and np.abs((found.x - begun) / size)[told].max() <= piece
+            y, piece = (found.x, min(2.0 * piece, PIECE)) if follows else (y, 0.25 * piece)
+            if piece < SHORTEST:
                 return False
-            y = found.x
         return False
 
 

@@ -245,14 +245,6 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
         return _solve(problem, x, most)
 
 
-def missed(problem: Problem, x: Floats) -> float:
-    """Largest row at x relative to its terms; infinite where one is no number."""
-    with np.errstate(all="ignore"):
-        linear = _Linear(problem, x)
-        largest = float(np.abs(linear.scaled(problem.residual(x))).max(initial=0.0))
-    return largest if np.isfinite(largest) else np.inf
-
-
 def _in_core(problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, most: int, *, measure: bool) -> Solution:
     """The same of a small problem (core/start/search.h); measure: x as it is, of any."""
     found, scaled = x.copy(), np.zeros(problem.number)
