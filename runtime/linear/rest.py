@@ -215,7 +215,7 @@ class Resting:
     def _met(self, y: Floats) -> bool:
         """Whether y is a state of rest, but for what is near zero in its magnitude."""
         problem = self.problem(y)
-        found = solve(replace(problem, guess=y), y)
+        found = solve(replace(problem, guess=y), y, 1)
         noise = NEAR * group_maximum(self.system, problem.scale), self._nothing, NOISE * self._alike(y)
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
         return found.residual < MET and bool((np.abs(found.x - y) <= np.maximum.reduce(noise))[told].all())
