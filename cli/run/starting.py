@@ -70,7 +70,8 @@ def start(
         _steep(prepared, report)
         return None
     except SolverFailure:
-        return _late(prepared, "while the start is sought", "a higher limit, or guesses nearer to a start", report)
+        _late(prepared, "while the start is sought", "a higher limit, or guesses nearer to a start", report)
+        return None
     _structural(prepared, system, state, facts if not implicit else replace(facts, undetermined=()), policy, report)
     _inertia(prepared, system, state, report)
     for name in implicit:
@@ -80,7 +81,8 @@ def start(
         report.error("E505", f"the gammas do not determine {name} at the start: their slope in it vanishes", place)
     _statics(prepared, system, state, facts, report)
     if until is not None and time.monotonic() > until:
-        return _late(prepared, "before the run begins", "a higher limit", report)
+        _late(prepared, "before the run begins", "a higher limit", report)
+        return None
     return Started(system, state, facts)
 
 

@@ -47,6 +47,7 @@ class SceneReader:
         self.given = Settings(elaborator)
         self._raw: dict[Node, str] = {}  # traced expression before its unit -> name
         self._found: dict[str, object] = {}
+        self._accuracies: dict[str, Node] = {}
         self._targets: set[tuple[str, str]] = set()
 
     def levels(self, scene: syntax.Scene) -> None:
@@ -308,10 +309,11 @@ class SceneReader:
                     help=f"trace {text}",
                 )
             names.append(self._raw[node])
-        said = dict(self._found.get("accuracy_on", ()))
+        said = self._accuracies
         if twice := [name for k, name in enumerate(names) if name in said or name in names[:k]]:
             raise self.resolver.fail("E106", f"the accuracy of '{twice[0]}' is asked for twice", s.span)
-        self._found["accuracy_on"] = (*said.items(), *((name, value) for name in names))
+        said |= dict.fromkeys(names, value)
+        self._found["accuracy_on"] = tuple(said.items())
 
     def _traced_as(self, target: syntax.Expr) -> str | None:
         """The name that `as` gave to a quantity, where what it says in the model itself is not traced."""

@@ -224,7 +224,8 @@ class Resting:
         """In which two states are compared [unknowns]: their magnitudes, none of them nothing beside its like."""
         size = np.maximum(np.abs(one), np.abs(other))
         floors = group_maximum(self.system, self.problem(one).scale), NEAR * self._alike(size), self._nothing
-        return np.maximum.reduce([size, *floors])
+        found: Floats = np.maximum.reduce([size, *floors])
+        return found
 
     def _alike(self, y: Floats) -> Floats:
         """Of each unknown the largest magnitude of its kind and unit."""
