@@ -91,6 +91,7 @@ def solved(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in reversed(
         [
             click.option("--method", type=click.Choice(METHODS)),
+            click.option("--step", metavar="T", help="Length of the steps of --method euler; a bare number in s."),
             click.option("--redundancy", type=click.Choice(["error", "drop", "minimum_norm"])),
             click.option(
                 "--accuracy", type=float, metavar="R", help="Relative accuracy of the traced quantities. Default 1e-4."

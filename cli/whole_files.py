@@ -33,14 +33,15 @@ def write(path: str | Path, data: str | bytes) -> None:
 
 
 def replace(target: Path, data: str | bytes) -> None:
-    """Beside the file, then renamed, or not at all: it is never half written."""
+    """Beside the file, then renamed, or not at all: it is never half written.  OSError names the file."""
     part = target.with_name(f".{os.urandom(8).hex()}.part")
-    try:
-        with part.open("xb") as stream:
-            stream.write(data.encode("utf-8") if isinstance(data, str) else data)
-        if target.exists():
-            part.chmod(target.stat().st_mode)
-        part.replace(target)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    with named(target):
+        try:
+            with part.open("xb") as stream:
+                stream.write(data.encode("utf-8") if isinstance(data, str) else data)
+            if target.exists():
+                part.chmod(target.stat().st_mode)
+            part.replace(target)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise

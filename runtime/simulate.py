@@ -5,7 +5,7 @@ Receives manifest, binding, carrier and options; hands back an `Outcome`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,12 @@ from sysdyn.runtime.accuracy.runs import Runs, Samples
 from sysdyn.runtime.accuracy.second_opinion import confirmed
 from sysdyn.runtime.accuracy.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.integrate.underlying import underlying_form
 from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
-from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
-from sysdyn.runtime.model.slopes import WITH_A_SLOPE, no_slope, without_slope
+from sysdyn.runtime.model.failures import SolverFailure, WrongOption
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.one_underlying import refuse_contacts, refuse_sliding, refuse_undetermined
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
@@ -88,12 +87,6 @@ class Outcome:
     def met(self) -> bool:
         """The run ended as asked and met what it judged itself by."""
         return self.final and self.judgement is not None and self.judgement.met
-
-
-def _listed(names: Sequence[str]) -> str:
-    """The first names and how many more, with their verb."""
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")
 
 
 def _left(runs: Runs, failure: SolverFailure) -> str:
@@ -268,20 +261,8 @@ def formed(
     """The system in the index form of the options, its index, warnings.  Raises NoSuchForm, ValueError."""
     form, index, warnings = choose_index(options.index, facts, options.method)
     system = written if form == "3" else written.another(form)
-    missing = underlying_form(system, start)[1] if form == "0" else ()
-    flat = without_slope(written, start.t, *start.for_form(written)) if missing else ()
-    if flat:
-        remedy = f"{WITH_A_SLOPE}, or index 2 or 3 with bdf or radau"
-        raise NoSuchForm(f"{no_slope(flat)}, and there is no underlying equation: {remedy}", flat)
-    if missing:
-        still = list(dict.fromkeys(name.rstrip("'") for name in missing if name.endswith("'")))[:3]
-        remedy = f"inertia on {', '.join(still)}, constraints that hold it, or " if still else ""
-        raise NoSuchForm(
-            f"there is no underlying equation: {_listed(missing)} not determined by the balances of efforts, the "
-            "constraints and the gammas (coordinates without inertia; a balance without it would have to be "
-            "differentiated too): "
-            f"{remedy}index 2 or 3 with bdf or radau"
-        )
+    if form == "0":
+        refuse_undetermined(written, system, start)
     return system, index, warnings
 
 
@@ -314,9 +295,8 @@ def simulate(
     facts = facts or structure(written, start)
     written, start, facts = counted(written, start, facts, options)
     system, index, warnings = formed(written, start, facts, options)
-    if system.form.name == "0" and options.events and options.events.contacts:
-        name = options.events.contacts[0].name
-        raise NoSuchForm(f"'{name}' holds at times: there is no one underlying equation; index 2 with bdf or radau")
+    if system.form.name == "0":
+        refuse_contacts(options.events)
     way = Way(method, system, index, form_name(system, facts))
     ways = (way,) if options.method != "auto" else alternatives(way, written, start, options)
     runs = Runs(start, options, ways[0])
@@ -357,6 +337,8 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
         achieved = _controlled(runs, options, others)
     except SolverFailure as failure:
         close(runs, None, None)
+        if runs.system.form.name == "0":
+            refuse_sliding(runs.system, options.events, failure)
         reached = failure.time if runs.done is None else options.t_end
         failure.partial = outcome(False, reached, None, failure)
         raise

@@ -76,7 +76,7 @@ class Equilibrium:
         if self.rest.holding:
             lines.append(f"   {', '.join(f'{name} {how}' for name, how in list(self.rest.holding.items())[:MOST])}")
         if self.rest.free:
-            lines.append(f"   left open: {', '.join(self.rest.free[:6])}")
+            lines.append(f"   one of a continuum; left open: {', '.join(self.rest.free[:6])}")
         if self.judged is not None and self.judged.modes:
             modes = sorted(self.judged.modes, key=lambda m: -m.eigenvalue.real)[:6]
             rest = [f"... {len(self.judged.modes) - 6} more"] if len(self.judged.modes) > 6 else []
@@ -164,5 +164,5 @@ def _judged(found: Found, rest: Rest) -> Equilibrium:
 
 
 def _complex(value: complex) -> str:
-    value = complex(value.real if abs(value.real) > 1e-12 * abs(value) else 0.0, value.imag)
+    value = complex(*(part if abs(part) > 1e-12 * abs(value) else 0.0 for part in (value.real, value.imag)))
     return f"{value.real:.6g}" if value.imag == 0.0 else f"{value.real:.6g}{value.imag:+.6g}i"

@@ -123,7 +123,7 @@ class Model:
     ) -> Trace:
         """One run, in memory: parameters or inputs by name (numbers in SI units, or texts), the end [s], instants [s].
 
-        options: `accuracy`, `rtol`, `atol`, `method`, `index`, `max_steps`, `max_wall`, `output` of the command that
+        options: `accuracy`, `rtol`, `atol`, `method`, `step`, `index`, `max_steps`, `max_wall`, `output` that
         differ from those of `load`.  Raises as `simulate` does.
         """
         _known(unmet)
@@ -173,7 +173,8 @@ def _silent(fraction: float, ahead: float | None) -> None:
     """Progress of a sweep that nobody watches."""
 
 
-_RUN = frozenset(("accuracy", "accuracy_check", "rtol", "atol", "method", "index", "max_steps", "max_wall", "output"))
+_SOLVED = "accuracy", "accuracy_check", "rtol", "atol", "method", "step", "index", "max_steps", "max_wall"
+_RUN = frozenset((*_SOLVED, "output"))
 
 
 def load(path: str | Path, *, model: str | None = None, scene: str | None = None, **options: Any) -> Model:
@@ -246,7 +247,7 @@ def _changes(options: dict[str, Any]) -> dict[str, Any]:
     level = given.pop("level", None)
     if level is not None:
         given["levels"] = tuple(level.items() if isinstance(level, Mapping) else level)
-    for name in ("until", "max_wall"):
+    for name in ("until", "max_wall", "step"):
         if given.get(name) is not None:
             given[name] = text_of(given[name])
     at = given.get("at")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import shlex
 from pathlib import Path
 
 import click
@@ -29,7 +30,7 @@ def command(console: Console, name: Path) -> int:
         return console.finish(FAULT)
     if not console.quiet:
         console.data("\n".join(str(name / p.relative_to(folder)) for p in (*written, *kept)))
-    console.say(f"next: cd {name}; sysdyn simulate {model}.sd --scene {skeleton.GOLDEN_SCENE}")
+    console.say(f"next: cd {shlex.quote(str(name))}; sysdyn simulate {model}.sd --scene {skeleton.GOLDEN_SCENE}")
     return console.finish()
 
 

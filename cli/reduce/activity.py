@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.report.balance import Part, observed, shares
-from sysdyn.cli.run.asked import Request, options_of
+from sysdyn.cli.run.asked import Request, of_these_alone, options_of
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.run.targets import Target
@@ -90,8 +90,7 @@ def activities(
             sampled_at=(),
             max_wall=limit,
         )
-        if options.accuracy is not None and own:  # of the scene's quantities alone
-            options = replace(options, accuracy=None, accuracy_on=tuple((name, options.accuracy) for name in own))
+        options = of_these_alone(options, own)
         inner = Report()
         rich = prepare(network, inner, formulation=prepared.formulation, backend=prepared.backend, traced=True)
         ran = None if rich is None else integrate(target, rich, options, inner)

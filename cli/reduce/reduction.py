@@ -247,7 +247,8 @@ class _Reduction:
                 accuracy_on=on,
                 max_wall=None if self.limit is None else max(self.limit - began, 1e-3),
             )
-            self.judged = tuple(n for n, _ in on) or prepared.network.traced
+            named = tuple(n for n, _ in on) if options.accuracy is None else ()
+            self.judged = named or prepared.network.traced
             try:
                 return integrate(target, prepared, options, report)
             except UsageError as error:

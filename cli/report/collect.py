@@ -13,7 +13,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.report.balance import Share, observed, shares
 from sysdyn.cli.report.study import Study, sources_of
 from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request, check_tolerances, options_of
+from sysdyn.cli.run.asked import Request, check_tolerances, of_these_alone, options_of
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.running import Ran, integrate
 from sysdyn.cli.run.starting import start
@@ -132,9 +132,7 @@ def _energies(
     # what is observed may have no underlying equation
     method = {"dopri": options.method, "energy": "auto"}.get(ran.outcome.method, ran.outcome.method)
     fixed = replace(options, output=str(folder / "energies.h5"), method=method, progress=None)
-    own = prepared.network.traced
-    if options.accuracy is not None and own:  # of the scene's quantities alone
-        fixed = replace(fixed, accuracy=None, accuracy_on=tuple((name, options.accuracy) for name in own))
+    fixed = of_these_alone(fixed, prepared.network.traced)
     with _timed("energies of the elements (a run of their own)", stages):
         try:
             report = Report()

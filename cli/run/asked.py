@@ -55,6 +55,7 @@ class Request:
     accuracy_check: bool = False
     rtol: float | None = None
     atol: float | None = None
+    step: str | None = None
     until: str | None = None
     at: str | None = None
     settings: tuple[tuple[str, str], ...] = ()
@@ -154,8 +155,7 @@ def options_of(
     accuracy, on = _accuracy(request, scene, prepared)
     solver = {name: value(node) for name, node in scene.solver_options}
     method = request.method or scene.solver or "auto"
-    if method == "euler" and "step" not in solver:
-        raise UsageError("method euler needs a step: 'solver euler(step = 1 ms)' in the scene")
+    step = _step(request, target, method, solver.get("step"), report)
     steps = request.max_steps or next((round(value(n)) for name, n in scene.limits if name == "steps"), STEPS)
     claims = tuple(value(e.at) for e in prepared.network.expectations if e.at is not None)
     return Options(
@@ -172,7 +172,7 @@ def options_of(
         atol=request.atol,
         method=method,
         index=request.index or scene.index(value) or "auto",
-        euler_step=solver.get("step"),
+        euler_step=step,
         longest=solver.get("longest"),
         order=int(solver["order"]) if "order" in solver and method == scene.solver else None,
         redundancy=_redundancy(request, prepared.network),
@@ -226,6 +226,20 @@ def _timeless(prepared: Prepared) -> bool:
     return bool(prepared.layouts["timeless"]["so"])
 
 
+def _step(request: Request, target: Target, method: str, said: float | None, report: Report) -> float | None:
+    """Of euler, in s: the request's, else what the scene says."""
+    if request.step is None:
+        if method == "euler" and said is None:
+            raise UsageError("method euler needs a step: --step 1e-3, or 'solver euler(step = 1 ms)' in the scene")
+        return said
+    if method != "euler":
+        raise UsageError(f"--step {request.step}: method {method} chooses its steps; --method euler has one length")
+    step = load.constant(target.document, request.step, dim.TIME, "--step", report)
+    if step is not None and not 0.0 < step < math.inf:
+        raise UsageError(f"--step {step:g} s: it must be positive")
+    return step
+
+
 def turning(prepared: Prepared, options: Options) -> float:
     """The least time (s) in which a signal that an event reads goes from one extreme to the next."""
     if _timeless(prepared):
@@ -243,13 +257,21 @@ def timeless(prepared: Prepared) -> bool:
 
 
 def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float | None, tuple[tuple[str, float], ...]]:
-    """Accuracy of all traced quantities, or of those that the scene names."""
+    """Accuracy of all traced quantities (None: of those alone that the scene names), and of those that it names."""
     if request.accuracy is not None:
         return request.accuracy, ()
-    if scene.accuracy is None:
-        return ACCURACY, ()
-    wanted = prepared.binding.evaluate(scene.accuracy)
-    return (None, tuple((name, wanted) for name in scene.accuracy_on)) if scene.accuracy_on else (wanted, ())
+    value = prepared.binding.evaluate
+    on = tuple((name, value(wanted)) for name, wanted in scene.accuracy_on)
+    rest = None if scene.accuracy is None else value(scene.accuracy)
+    return (rest if on or rest is not None else ACCURACY), on
+
+
+def of_these_alone(options: Options, names: Sequence[str]) -> Options:
+    """Options that ask of these quantities, each by its name, what they ask of all; of others nothing."""
+    if options.accuracy is None or not names:
+        return options
+    on = dict.fromkeys(names, options.accuracy) | dict(options.accuracy_on)
+    return replace(options, accuracy=None, accuracy_on=tuple(on.items()))
 
 
 def separate(text: str) -> list[str]:

@@ -39,7 +39,7 @@ def place_of(prepared: Prepared, label: RowLabel) -> Place:
 def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report: Report) -> None:
     """Report why there is no start."""
     where = place_of(prepared, error.rows[0]) if error.rows else prepared.network.place
-    names = ", ".join(dict.fromkeys(r.label for r in error.rows)) or ", ".join(error.names)
+    names = ", ".join(dict.fromkeys(_shown(r) for r in error.rows)) or ", ".join(error.names)
     fixed_at = dict.fromkeys(place_of(prepared, c) for c in error.candidates)  # a line may fix several
     related = [Related("this value is fixed", place) for place in fixed_at]
     if where.source is not prepared.network.place.source and related:  # the law of an element of a library
@@ -109,6 +109,11 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             report.error("E903", message, where, help=help_ if one is None else f"{given}; else {help_}")
 
 
+def _shown(row: RowLabel) -> str:
+    """A row by its name; what an `init` says of an expression has none."""
+    return f"the value at line {row.line}" if row.label == row.kind == "initial" and row.line else row.label
+
+
 def _without_inertia(prepared: Prepared, name: str) -> bool:
     """Whether a coordinate that the text declares moves nothing that has a kinetic energy."""
     network = prepared.network
@@ -129,7 +134,13 @@ def _listed(prepared: Prepared, error: InconsistentStart) -> str:
         if written and ".." not in written[1] and places.count(place) == 1:
             shown.append(written[1])
             continue
-        shown.append(f"{name}.f" if name != c.label and re.sub(r"\[.*", "", name) in elements else c.label)
+        held = c.label.removesuffix(".multiplier")  # the effort of a node
+        for owner, kind in ((held, "e"), (name, "f")):
+            if owner != c.label and re.sub(r"\[.*", "", owner) in elements:
+                shown.append(f"{owner}.{kind}")
+                break
+        else:
+            shown.append(c.label)
     return ", ".join(f"'{name}'" for name in dict.fromkeys(shown))
 
 

@@ -36,8 +36,8 @@ Value = Callable[[Node], float]
 def wrong_numbers(target: Target, scene: Scene, value: Value, request: Request) -> Iterator[Diagnostic]:
     """What is wrong of what the request leaves to the scene."""
     yield from _span(target, scene, value, until=request.until is not None)
-    if scene.accuracy is not None and request.accuracy is None:
-        wanted = value(scene.accuracy)
+    said = () if request.accuracy is not None else (scene.accuracy, *(node for _, node in scene.accuracy_on))
+    for wanted in dict.fromkeys(value(node) for node in said if node is not None):
         if not FINEST_ACCURACY <= wanted < 1.0:
             text = f"accuracy {wanted:g}: from {FINEST_ACCURACY:g} to less than 1, what double precision can tell"
             yield Diagnostic("E906", text, _place(target, scene, syntax.Accuracy), "accuracy 1e-6")
@@ -96,7 +96,7 @@ def _solver(target: Target, scene: Scene, value: Value, request: Request) -> Ite
         yield Diagnostic("E607", text, place, "bdf(order = 1 .. 5): at most; radau(order = 5), 9 or 13: that one")
     method = request.method or scene.solver or "auto"
     if method == "euler":
-        if request.method is None and "step" not in said:
+        if request.method is None and request.step is None and "step" not in said:
             yield Diagnostic("E607", "method euler needs a step", place, "solver euler(step = 1 ms)")
         if said.get("step", 0.0) > said.get("longest", math.inf):
             text = f"step = {said['step']:g} s of the solver is longer than longest = {said['longest']:g} s"

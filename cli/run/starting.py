@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -69,8 +70,7 @@ def start(
         _steep(prepared, report)
         return None
     except SolverFailure:
-        text = "the limit of wall time is reached while the start is sought: there is no trace"
-        report.error("E934", text, prepared.network.place, help="a higher limit, or guesses nearer to a start")
+        _late(prepared, "while the start is sought", "a higher limit, or guesses nearer to a start", report)
         return None
     _structural(prepared, system, state, facts if not implicit else replace(facts, undetermined=()), policy, report)
     _inertia(prepared, system, state, report)
@@ -80,7 +80,16 @@ def start(
         )
         report.error("E505", f"the gammas do not determine {name} at the start: their slope in it vanishes", place)
     _statics(prepared, system, state, facts, report)
+    if until is not None and time.monotonic() > until:
+        _late(prepared, "before the run begins", "a higher limit", report)
+        return None
     return Started(system, state, facts)
+
+
+def _late(prepared: Prepared, when: str, remedy: str, report: Report) -> None:
+    """Report that nothing is left of the wall time."""
+    text = f"the limit of wall time is reached {when}: there is no trace"
+    report.error("E934", text, prepared.network.place, help=remedy)
 
 
 def _refused(prepared: Prepared, t0: float, error: InconsistentStart, report: Report) -> None:

@@ -169,7 +169,7 @@ class Bench:
     def judged(self, trace: Trace) -> tuple[str, ...]:
         """Quantities whose errors count."""
         on = [name for name, _ in self.options.accuracy_on]
-        return tuple(name for name in trace.names if not on or name in on)
+        return tuple(name for name in trace.names if not on or self.options.accuracy is not None or name in on)
 
     def combinations(self) -> Iterator[Combination]:
         """Every formulation x index x method that exists; forms that are one appear once."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.model.interpret import Value, evaluate, over
 from sysdyn.compiler.model.tables import evaluate as evaluate_table
+from sysdyn.dsl.model.dependence import in_order
 from sysdyn.dsl.model.expression import Node, const, topological
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import ElementSetting, Loop, Network, Parameter, Shape
@@ -62,32 +63,16 @@ class Parameters:
 
     def _ordered(self, overrides: Mapping[Override, Any]) -> list[Parameter]:
         """Parameters after those that their values and shapes use."""
-        order: list[Parameter] = []
-        state: dict[str, int] = {}
-        for root in self._network.parameters:
-            if root.name not in self._given and state.get(root.name) is None and _number(root) is not None:
-                state[root.name] = 2  # uses none
-                order.append(root)
-                continue
-            stack = [root.name]
-            while stack:
-                name = stack[-1]
-                if state.get(name) == 2:
-                    stack.pop()
-                    continue
-                wanted = [n for n in self._uses(self._known[name], name in overrides) if state.get(n) != 2]
-                if wanted and state.get(name) == 1:
-                    place = self._known[name].place
-                    raise ModelError([Diagnostic("E807", f"parameter '{name}' depends on itself", place)])
-                if wanted:
-                    state[name] = 1
-                    stack += reversed(wanted)
-                    continue
-                state[name] = 2
-                order.append(self._known[stack.pop()])
-        return order
+        known = self._known
+        order, circles = in_order(known, lambda name: self._uses(known[name], name in overrides))
+        if circles:
+            name = circles[0][0]
+            raise ModelError([Diagnostic("E807", f"parameter '{name}' depends on itself", known[name].place)])
+        return [known[name] for name in order]
 
     def _uses(self, parameter: Parameter, overridden: bool) -> list[str]:
+        if parameter.name not in self._given and _number(parameter) is not None:
+            return []
         roots = [] if overridden else list(parameter.values)
         roots += [node for pair in parameter.shape for node in pair]
         roots += [node for e in self._settings.get(parameter.name, ()) for node in (*e.at, e.value)]

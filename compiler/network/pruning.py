@@ -93,7 +93,7 @@ def listed(removals: Iterable[Removal], most: int = 8000) -> str:
 def _asked(network: Network) -> frozenset[Quantity]:
     """The quantities that the scene reads; none where everything is to be kept."""
     scene, roots = network.scene, [o.expression for o in network.observations]
-    if scene is None or not network.traced or any(name.startswith("audit.") for name in scene.accuracy_on):
+    if scene is None or not network.traced or any(name.startswith("audit.") for name, _ in scene.accuracy_on):
         return frozenset()
     roots += [n for e in network.expectations for n in (e.left, e.right, e.within, e.at) if n is not None]
     roots += [a.target for e in network.events for a in e.actions]

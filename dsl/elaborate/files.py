@@ -13,6 +13,7 @@ from pathlib import Path
 from sysdyn.dsl.elaborate.bundles import Bundles
 from sysdyn.dsl.elaborate.tables import read_table
 from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model.dependence import in_order
 from sysdyn.dsl.model.network import Table
 from sysdyn.dsl.model.units import NONE, Unit, multiply, si
 from sysdyn.dsl.names.calls import walk
@@ -122,28 +123,17 @@ class FileScope:
 
     def _ordered(self, units: Sequence[_Declared], scope: Scope, source: SourceText) -> Iterator[_Declared]:
         """The units of a text, each behind those that it is written in; E105 of one that needs itself."""
-        first = {unit.name.name: unit for unit in reversed(units)}
-        begun: set[str] = set()
-        done: set[int] = set()
+        first: dict[str, _Declared] = {}
         for unit in units:
-            way = [unit]
-            while way:
-                last = way[-1]
-                begun.add(last.name.name)
-                left = [n for n in _written_in(last) if n in first and id(first[n]) not in done and n not in begun]
-                if left:
-                    way.append(first[left[0]])
-                    continue
-                way.pop()
-                names = [u.name.name for u in way] + [last.name.name]
-                circle = next((n for n in _written_in(last) if n in names), None)
-                if circle is not None:
-                    around = " -> ".join((*names[names.index(circle) :], circle))
-                    self.report.error("E105", f"circular definition: {around}", Place(source, last.span))
-                    scope.broken |= set(names[names.index(circle) :])
-                elif id(last) not in done:
-                    yield last
-                done.add(id(last))
+            first.setdefault(unit.name.name, unit)
+        order, circles = in_order(first, lambda name: [n for n in _written_in(first[name]) if n in first])
+        for circle in circles:
+            text = f"circular definition: {' -> '.join(circle)}"
+            self.report.error("E105", text, Place(source, first[circle[-2]].span))
+            scope.broken |= set(circle)
+        around = {name for circle in circles for name in circle}
+        yield from (first[name] for name in order if name not in around)
+        yield from (unit for unit in units if unit is not first[unit.name.name])
 
     def _unit(self, item: syntax.UnitAlias | syntax.UnitBase, scope: Scope, source: SourceText) -> None:
         """A unit of the text: a new base, or an alias of others."""

@@ -8,6 +8,7 @@ from sysdyn.dsl.elaborate.head import Body
 from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.dependence import in_order
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Parameter, Shape
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
@@ -66,32 +67,12 @@ class Parameters(ElaborationContext):
     def _by_dependence(self, found: dict[str, Stated]) -> tuple[Stated, ...]:
         """The parameters, those that others name before these; E105."""
         needs = {name: _names_in(*stated) & found.keys() for name, stated in found.items()}
-        order: list[str] = []
-        state: dict[str, int] = {}
-        for start in found:
-            stack = [(start, False)]
-            while stack:
-                name, done = stack.pop()
-                if done:
-                    state[name] = 2
-                    order.append(name)
-                elif name not in state:
-                    state[name] = 1
-                    stack.append((name, True))
-                    for other in sorted(needs[name]):
-                        if state.get(other) == 1:
-                            span = found[name][0].span
-                            message = (
-                                f"circular definition: {other} -> {name} -> {other}"
-                                if other != name
-                                else f"circular definition: {name} -> {name}"
-                            )
-                            names = f"'{other}' or '{name}'" if other != name else f"'{name}'"
-                            help_ = f"a value of its own for {names}"
-                            self.report.error("E105", message, self.place(span), help=help_)
-                            self.scope.broken |= {name, other}
-                        elif other not in state:
-                            stack.append((other, False))
+        order, circles = in_order(found, lambda name: sorted(needs[name]))
+        for circle in circles:
+            names = " or ".join(f"'{name}'" for name in circle[:-1])
+            text, span = f"circular definition: {' -> '.join(circle)}", found[circle[-2]][0].span
+            self.report.error("E105", text, self.place(span), help=f"a value of its own for {names}")
+            self.scope.broken |= set(circle)
         return tuple(found[name] for name in order)
 
     def _parameter(self, statement: syntax.Param, given: Argument | None) -> None:

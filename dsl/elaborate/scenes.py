@@ -47,6 +47,7 @@ class SceneReader:
         self.given = Settings(elaborator)
         self._raw: dict[Node, str] = {}  # traced expression before its unit -> name
         self._found: dict[str, object] = {}
+        self._accuracies: dict[str, Node] = {}
         self._targets: set[tuple[str, str]] = set()
 
     def levels(self, scene: syntax.Scene) -> None:
@@ -281,11 +282,12 @@ class SceneReader:
     def _accuracy(self, s: syntax.Accuracy) -> None:
         """What a run promises, and of which quantities."""
         value = self._constant(s.value, NONE, "the accuracy")
-        self._once("accuracy", value, s.span, help="one accuracy for all that are named: accuracy 1e-6 on x, y")
+        if not s.on:
+            self._once("accuracy", value, s.span, help="accuracy 1e-6 on x: another for what is named")
         if value.op == "const" and not FINEST_ACCURACY <= value.data < 1.0:
             text = f"accuracy {value.data:g}: from {FINEST_ACCURACY:g} to less than 1, what doubles can tell"
             raise self.resolver.fail("E906", text, s.value.span, help="accuracy 1e-6")
-        names = []
+        names: list[str] = []
         for target in (element for written in s.on for element, _ in each_of(self.model, written)):
             if (named := self._traced_as(target)) is not None:
                 names.append(named)
@@ -307,7 +309,11 @@ class SceneReader:
                     help=f"trace {text}",
                 )
             names.append(self._raw[node])
-        self._found["accuracy_on"] = tuple(names)
+        said = self._accuracies
+        if twice := [name for k, name in enumerate(names) if name in said or name in names[:k]]:
+            raise self.resolver.fail("E106", f"the accuracy of '{twice[0]}' is asked for twice", s.span)
+        said |= dict.fromkeys(names, value)
+        self._found["accuracy_on"] = tuple(said.items())
 
     def _traced_as(self, target: syntax.Expr) -> str | None:
         """The name that `as` gave to a quantity, where what it says in the model itself is not traced."""

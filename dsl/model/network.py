@@ -389,7 +389,7 @@ class Scene:
     end: Node | None = None
     every: Node | None = None
     accuracy: Node | None = None
-    accuracy_on: tuple[str, ...] = ()
+    accuracy_on: tuple[tuple[str, Node], ...] = ()
     formulation: str | None = None
     formulation_place: Place | None = None
     solver: str | None = None

@@ -98,7 +98,7 @@ class Paths(Names):
                 offset = ex.sub(a, loop)
                 alike = [tuple(s for s in symbol.spaces if _range(s, k, len(at)) == bounds) for bounds in ranges]
                 cut = [Part(s, *(ex.sub(b, offset) for b in bounds)) for s, bounds in zip(alike, ranges, strict=True)]
-                met = cut if len(at) == 1 else [part for part in cut if self._meets(loop, part)]
+                met = [part for part in cut if self._meets(loop, part, sized=len(at) > 1)]
                 raise SeveralError(symbol.name, (id(symbol), k, a), loop.data, tuple(met or cut[:1]))
         inside = [s for s in spaces if self._holds(s, at)]
         if not inside:
@@ -111,16 +111,17 @@ class Paths(Names):
         pairs = itertools.combinations(ranges, 2)
         return not any(self._before(a[1], b[0]) is False and self._before(b[1], a[0]) is False for a, b in pairs)
 
-    def _meets(self, loop: Node, part: Part) -> bool:
-        """Whether a loop may run over a part, with the sizes given."""
+    def _meets(self, loop: Node, part: Part, *, sized: bool) -> bool:
+        """Whether a loop may run over a part, with the sizes given (else with any)."""
         own = next((o for o in self.loops if o.index == loop.data), None)
         if own is None:
             return True
-        return self._before(own.last, part.first) is not True and self._before(part.last, own.first) is not True
+        pairs = (own.last, part.first), (part.last, own.first)
+        return not any(self._before(*pair, sized=sized) for pair in pairs)
 
-    def _before(self, a: Node, b: Node) -> bool | None:
-        """Whether a < b; None where the sizes given do not say."""
-        gap = self.sized(ex.sub(b, a))
+    def _before(self, a: Node, b: Node, *, sized: bool = True) -> bool | None:
+        """Whether a < b; None where the sizes given (or numbers alone) do not say."""
+        gap = self.sized(ex.sub(b, a)) if sized else ex.sub(b, a)
         return bool(gap.data > 0) if ex.is_const(gap) else None
 
     def _holds(self, space: Space, at: tuple[Node, ...]) -> bool | None:

@@ -166,6 +166,7 @@ def character(sign: str) -> Complaint:
     name = unicodedata.name(sign, "a control character").lower()
     shown = f"'{sign}'" if sign.isprintable() and sign != "\u00a0" else "a character"
     unseen = "delete it: editors do not show it" if unicodedata.category(sign) in ("Cc", "Cf") else None
+    unseen = "one character for the letter and its accent (Unicode NFC)" if unicodedata.combining(sign) else unseen
     return "E113", f"{shown} (U+{ord(sign):04X}, {name}) has no meaning here", _SIGNS.get(sign, unseen)
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -36,8 +37,10 @@ MET = 1e-9
 """Largest row, relative to its terms, of a state of rest."""
 SAME = 1e-6
 """Distance of two states of rest, in magnitudes, below which they are one."""
-NEAR = 1e-9
-"""Part of a magnitude that is tried as zero."""
+PIECES, PIECE, SHORTEST = 60, 0.2, 1e-3
+"""Steps from one state of rest to another along those between; the longest and the shortest of them in magnitudes."""
+NEAR, NOISE = 1e-9, 1e-13
+"""Parts of a magnitude, and of the largest of its kind and unit, that are tried as zero."""
 FAR = 1e9
 """Times its magnitude: a displacement that is left open and has wandered off."""
 SHARE = 0.05
@@ -200,33 +203,56 @@ class Resting:
             return None
         y = self._clean(own.x, problem)
         null = self._null(y, again) / again.scale[:, None] if self.n <= DENSE else np.zeros((self.n, 0))
-        y = self._back(y, again, null, near)
+        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
+        open_ = told & (np.abs(null).max(axis=1, initial=0.0) > SAME)
+        y = self._back(y, again, null, open_, near)
         if (np.abs(y) > FAR * problem.scale).any():  # rows hold beside terms that large alone
             return None
         state = ConsistentState(self.t, y, self.rates(y), (), own.residual)
-        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
-        largest = np.abs(null).max(axis=1, initial=0.0)
-        open_ = told & (largest > SAME)
         free = tuple(self.system.name(int(k)) for k in np.flatnonzero(open_))
         return Rest(state, own.residual, free, open_, self.along.shape[1])
 
     def _met(self, y: Floats) -> bool:
-        return solve(self.problem(y), y, 1).residual < MET
+        """Whether y is a state of rest, but for what is near zero in its magnitude."""
+        problem = self.problem(y)
+        found = solve(replace(problem, guess=y), y, 1)
+        noise = NEAR * group_maximum(self.system, problem.scale), self._nothing, NOISE * self._alike(y)
+        told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
+        return found.residual < MET and bool((np.abs(found.x - y) <= np.maximum.reduce(noise))[told].all())
+
+    def _sizes(self, one: Floats, other: Floats) -> Floats:
+        """In which two states are compared [unknowns]: their magnitudes, none of them nothing beside its like."""
+        size = np.maximum(np.abs(one), np.abs(other))
+        floors = group_maximum(self.system, self.problem(one).scale), NEAR * self._alike(size), self._nothing
+        found: Floats = np.maximum.reduce([size, *floors])
+        return found
+
+    def _alike(self, y: Floats) -> Floats:
+        """Of each unknown the largest magnitude of its kind and unit."""
+        return self.starter.largest_alike(self.starter.unknowns(self.t, y, np.zeros(self.n)))[: self.n]
+
+    @cached_property
+    def _nothing(self) -> Floats:
+        """What is near zero beside the first guess [unknowns]: a state at rest has no magnitudes of its own."""
+        return NEAR * group_maximum(self.system, self.problem(self.first).scale)
 
     def _clean(self, y: Floats, problem: Problem) -> Floats:
-        """Without what is near zero in its magnitude, where that is as good."""
-        clean = np.where(np.abs(y) > NEAR * group_maximum(self.system, problem.scale), y, 0.0)
-        return clean if (clean != y).any() and self._met(clean) else y
+        """Without flows, and what is near zero in its magnitude, where that is as good."""
+        noise = np.maximum(NEAR * group_maximum(self.system, problem.scale), NOISE * self._alike(y))
+        clean = np.where(np.abs(y) > noise, y, 0.0)
+        tried = np.where(self.still, 0.0, clean), clean
+        return next((z for z in tried if (z != y).any() and self._met(z)), y)
 
-    def _back(self, y: Floats, problem: Problem, null: Floats, near: Floats) -> Floats:
-        """What the rows leave open as it is in `near`."""
+    def _back(self, y: Floats, problem: Problem, null: Floats, open_: Mask, near: Floats) -> Floats:
+        """What the rows leave open as it is in `near`; open_: which of what has a magnitude that is."""
         if self.n > DENSE:  # what nothing depends on is known without
             back = np.where(self.loose, near, y)
             return back if (back != y).any() and self._met(back) else y
-        if not null.size:
+        if not open_.any():
             return y
         away = (y - near) / problem.scale
-        back = y - problem.scale * (null @ least_squares(null, away))
+        moves = open_ | np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
+        back = np.where(moves, y - problem.scale * (null @ least_squares(null, away)), y)
         if self._met(back):
             return back
         found = solve(self.problem(back), back)  # along what bends, or from where its rows hold by round-off alone
@@ -253,16 +279,40 @@ class Resting:
         return found
 
     def apart(self, one: Rest, other: Rest) -> bool:
-        """Whether two states differ by more than what the first leaves open."""
+        """Whether two states differ by more than what the first leaves open, and no states of rest lie between them."""
         problem = self.problem(one.state.y)
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu")) & ~self.loose
-        size = np.maximum(np.abs(one.state.y), np.abs(other.state.y))
-        size = np.maximum(size, group_maximum(self.system, problem.scale))
+        size = self._sizes(one.state.y, other.state.y)
         move = ((other.state.y - one.state.y) / size)[told]
         if one.free:
             null = (self._null(one.state.y, problem) / size[:, None])[told]
             move = move - null @ least_squares(null, move)
-        return bool(np.abs(move).max(initial=0.0) > SAME)
+        differ = bool(np.abs(move).max(initial=0.0) > SAME)
+        return differ and not (one.free and other.free and self._between(one.state.y, other.state.y, told))
+
+    def _between(self, one: Floats, other: Floats, told: Mask) -> bool:
+        """Whether states of rest lead from one to another: by steps along what they leave open, and back onto them."""
+        y, turned, piece = one, False, PIECE
+        size = self._sizes(one, other)
+        for _ in range(PIECES):
+            away = ((other - y) / size)[told]
+            if np.abs(away).max(initial=0.0) <= SAME:
+                return True
+            null = self._null(y, self.problem(y)) / size[:, None]
+            along = null @ least_squares(null[told], away) if null.size else np.zeros(y.size)
+            longest = float(np.abs(along).max())
+            if longest < SAME:  # nothing leads nearer: a way around, once
+                if turned or not null.size:
+                    return False
+                turned, along = True, null[:, 0]
+                longest = float(np.abs(along).max())
+            begun = y + size * along * min(1.0, piece / longest)
+            found = solve(replace(self.problem(begun), guess=begun), begun)
+            follows = found.residual < MET and np.abs((found.x - begun) / size)[told].max() <= piece
+            y, piece = (found.x, min(2.0 * piece, PIECE)) if follows else (y, 0.25 * piece)
+            if piece < SHORTEST:
+                return False
+        return False
 
 
 class Equations(Protocol):

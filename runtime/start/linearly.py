@@ -23,6 +23,8 @@ DENSE = 300
 """Unknowns up to which matrices are full; of more nothing is said."""
 ALIKE = 1e-9
 """Of a slope: what it differs by elsewhere and is constant."""
+AROUND = (1.0, -1.0, 1e3, -1e3)
+"""Magnitudes from a point where the slopes of a linear row are the same."""
 MISSES, REFINED = 1e-4, 2
 """Of the terms of a row: what is left of it that is no round-off; solutions, each of what the one before left over."""
 ROUND_OFF = 1e-13
@@ -56,10 +58,28 @@ class Rows:
         a, b = here[free], self.slopes(np.where(self.free, x + aside, x))[free]
         if not (np.abs(a - b) <= ALIKE * np.maximum(np.abs(a), np.abs(b))).all():
             return False
-        matrix = np.zeros((self.asked.size, x.size))
-        np.add.at(matrix, (self.rows[free], self.columns[free]), a)
-        matrix[~self.asked] = 0.0
-        residual = np.where(self.asked, self.residual(x), 0.0)
+        return self._unmet(x, here, self.asked)
+
+    def contradicting(self, x: Floats) -> Mask | None:
+        """Of these rows the ones that are linear, where they leave one of them unmet; None where they do not."""
+        if x.size > DENSE:
+            return None
+        here, free = self.slopes(x), self.free[self.columns]
+        step = self.size * np.random.default_rng(1).uniform(0.5, 1.5, x.size)
+        linear = self.asked.copy()
+        for part in AROUND:
+            there = self.slopes(np.where(self.free, x + part * step, x))
+            alike = np.abs(there - here) <= ALIKE * np.maximum(np.abs(there), np.abs(here))
+            linear[self.rows[free & ~alike]] = False
+        return linear if self._unmet(x, np.where(linear[self.rows], here, 0.0), linear) else None
+
+    def _unmet(self, x: Floats, here: Floats, asked: Mask) -> bool:
+        """Whether one least-squares solution leaves one of the rows asked unmet; here: slopes."""
+        free = self.free[self.columns]
+        matrix = np.zeros((asked.size, x.size))
+        np.add.at(matrix, (self.rows[free], self.columns[free]), here[free])
+        matrix[~asked] = 0.0
+        residual = np.where(asked, self.residual(x), 0.0)
         by_row, by_column = factors(matrix)
         even, change = by_row[:, None] * matrix * by_column, np.zeros(x.size)
         for _ in range(REFINED):
@@ -67,7 +87,7 @@ class Rows:
         terms = np.abs(matrix) @ np.abs(change)
         np.add.at(terms, self.rows, np.abs(here) * np.maximum(np.abs(x), NOTHING * self.size)[self.columns])
         left = np.abs(matrix @ change + residual)
-        return bool((left > MISSES * terms)[self.asked].any())
+        return bool((left > MISSES * terms)[asked].any())
 
 
 def unmet(settler: Settler, t: float, y: Floats, yd: Floats, state: Mask) -> bool:
@@ -95,6 +115,16 @@ def unmet(settler: Settler, t: float, y: Floats, yd: Floats, state: Mask) -> boo
 
 def no_start(starter: Starter, t: float, x: Floats, free: Mask) -> bool:
     """The same of a start, from x [unknowns of the start] by what is free."""
+    return _of_a_start(starter, t, x, free).contradict(x)
+
+
+def contradicting(starter: Starter, t: float, x: Floats, free: Mask) -> Mask | None:
+    """Rows of a start that are linear and cannot all be met from x by what is free; None where they can."""
+    with np.errstate(all="ignore"):  # slopes beyond numbers are of rows that are not linear
+        return _of_a_start(starter, t, x, free).contradicting(x)
+
+
+def _of_a_start(starter: Starter, t: float, x: Floats, free: Mask) -> Rows:
     at, size = (starter.rows, starter.columns), starter.scale(t, x)
     residual, slopes = (lambda x: starter.residual(t, x)), (lambda x: starter.jacobian(t, x))
-    return Rows(residual, slopes, *at, starter.every, free, size).contradict(x)
+    return Rows(residual, slopes, *at, starter.every, free, size)

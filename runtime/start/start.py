@@ -25,7 +25,7 @@ from sysdyn.runtime.numerics.work import OutOfTimeError, Work
 from sysdyn.runtime.start.exact import anew, sharp
 from sysdyn.runtime.start.flat import OWN, off_the_flat, unasked, without_rates
 from sysdyn.runtime.start.least import problem_of
-from sysdyn.runtime.start.linearly import no_start
+from sysdyn.runtime.start.linearly import contradicting, no_start
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import STATE, Mask, Starter
 from sysdyn.runtime.start.strategies import (
@@ -33,6 +33,7 @@ from sysdyn.runtime.start.strategies import (
     applicable,
     around,
     first,
+    hopeful,
     unmoved,
 )
 from sysdyn.values import dataclass
@@ -41,6 +42,8 @@ NOTHING = 1e-100
 """Of any unit: what an iteration down a steep law leaves of zero."""
 HELD = "#held "
 """Before the name of a coordinate: what its flow and others hold together (compiler/forms/lowering.py)."""
+MOVED = 1e-6
+"""Of its magnitude: what a fixed value that is in the way has to move by, at least."""
 EXPLAINED = 0.1
 """Share of the work of a search that explaining what was not found may take."""
 
@@ -177,7 +180,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | 
     """
     x = _finite(starter, t, _begun(starter, t, guess, free), free)
     best = Solution(x, np.inf)
-    for name, strategy in itertools.islice(applicable(starter, t, x), most):
+    for name, strategy in hopeful(starter, t, x, free, itertools.islice(applicable(starter, t, x), most)):
         found, holds = first(strategy(starter, t, x, guess, free), x)
         where = unmoved(starter, t, found, guess, free) if holds else None
         again, sure = (where, True) if where is not None else anew(starter, t, found, x, guess, free)
@@ -199,22 +202,23 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
         return InconsistentStart("nonfinite", float("inf"), rows)
     starter.work = Work(EXPLAINED, starter.work.until)
-    x = best.x
+    x, linear = best.x, contradicting(starter, t, guess, free)
+    every = starter.every if linear is None else linear
     if x.size <= DENSE:
-        x = least_residual(problem_of(starter, t, guess, guess, rows=starter.every, free=free), x)
+        x = least_residual(problem_of(starter, t, guess, guess, rows=every, free=free), x)
     scaled = np.abs(starter.residual(t, x)) * starter.row_scale(t, x, starter.scale(t, guess))
-    raw, scaled = (np.where(starter.every, item, 0.0) for item in (np.abs(starter.residual(t, x)), scaled))
+    raw, scaled = (np.where(every, item, 0.0) for item in (np.abs(starter.residual(t, x)), scaled))
     order = np.argsort(-scaled)
     worst = [int(row) for row in order[:5] if scaled[row] > 0.1 * scaled[order[0]]]
     rows = tuple(dict.fromkeys(starter.settled.row_label(row) for row in worst))
-    freed, found = _attempt(starter, t, guess, np.ones_like(free))
+    freed, found = _freed(starter, t, guess, free, linear)
     candidates: tuple[RowLabel, ...] = ()
     # rows that hold to round-off at some point contradict nothing: it was the search that failed
     contradict = bool(scaled[order[0]] > OWN)
     if found and contradict:
-        scale = starter.scale(t, freed.x)
+        scale = np.maximum(starter.scale(t, freed.x), starter.scale(t, guess))
         change = np.where(starter.free, 0.0, np.abs(freed.x - guess) / scale)
-        places = [int(k) for k in np.argsort(-change)[:5] if change[k] > 1e-9]
+        places = [int(k) for k in np.argsort(-change)[:5] if change[k] > MOVED]
         candidates = tuple(dict.fromkeys(starter.given.label(k) for k in places))
     kind = "fixed"
     if not candidates:
@@ -222,6 +226,19 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         if contradict and rows and rows[0].kind.startswith(("phi", "psi", "initial")):
             kind = "fixed"
     return InconsistentStart(kind, float((scaled if kind == "stuck" else raw)[order[0]]), rows, candidates)
+
+
+def _freed(starter: Starter, t: float, guess: Floats, free: Mask, linear: Mask | None) -> tuple[Solution, bool]:
+    """The nearest point at which all rows hold, or those linear ones that contradict, were nothing fixed; whether it is
+    one.
+    """
+    if free.all():
+        return Solution(guess, np.inf), False
+    if linear is None:
+        found, strategy = _attempt(starter, t, guess, np.ones_like(free))
+        return found, bool(strategy)
+    found = solve(problem_of(starter, t, guess, guess, rows=linear, free=np.ones_like(free)), guess)
+    return found, found.residual < EXACT
 
 
 def _flat(starter: Starter, t: float, guess: Floats, free: Mask) -> Ints:

@@ -7,7 +7,7 @@ Magnitudes that prove wrong on the way are taken anew.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.flat import OWN, flat_at, off_the_flat, unasked, without_rates
 from sysdyn.runtime.start.least import problem_of
-from sysdyn.runtime.start.linearly import no_start
+from sysdyn.runtime.start.linearly import contradicting, no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
 
 _AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
@@ -332,6 +332,17 @@ def applicable(starter: Starter, t: float, x: Floats) -> Iterator[tuple[str, Str
     yield STRATEGIES[0]
     bent = bool(starter.settled.form.scales) or bool(_bent(starter, t, x).any())  # slopes of steep laws underflow
     yield from (named for named in STRATEGIES[1:] if bent or named[1] is _in_largest_scales)
+
+
+def hopeful(
+    starter: Starter, t: float, x: Floats, free: Mask, named: Iterable[tuple[str, Strategy]]
+) -> Iterator[tuple[str, Strategy]]:
+    """Of these, where the first has failed, what helps against linear rows that contradict: other magnitudes."""
+    for k, (name, strategy) in enumerate(named):
+        if k == 1 and strategy is not _in_largest_scales and contradicting(starter, t, x, free) is not None:
+            yield STRATEGIES[-1]
+            return
+        yield name, strategy
 
 
 def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:

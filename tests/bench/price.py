@@ -47,7 +47,7 @@ class Row:
     lean: bool
 
     def __str__(self) -> str:
-        believed = self.estimate / max(self.achieved, 1e-300)
+        believed = self.estimate / self.achieved if self.achieved > FLOOR else np.nan
         numbers = f"{self.asked:8.0e} {self.achieved:9.1e} {self.achieved / self.asked:8.3f} {self.estimate:9.1e}"
         verdict = "met" if self.met else "NOT"
         methods = f"{self.method} ({self.best})"

@@ -5,6 +5,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from sysdyn import api
 from sysdyn.cli.main import run
 from sysdyn.runtime.integrate import creeping
 from sysdyn.runtime.trace.trace import Trace
@@ -326,3 +327,22 @@ def test_bare_numbers_of_an_array_are_in_si_units(tmp_path):
     at = trace.time[-1]
     assert trace["x[1]"][-1] == pytest.approx(0.01 * np.cos(np.sqrt(2.0) * at), abs=1e-9)
     assert trace["last"][-1] == pytest.approx(0.03 * np.cos(np.sqrt(2.0 / 3.0) * at), abs=1e-9)
+
+
+def test_steps_of_euler(tmp_path, capsys):
+    """x' = v, m v' = -k x by the implicit Euler: |x + i v/w| shrinks by sqrt(1 + (w h)^2) a step."""
+    path = write(tmp_path, "model m { coord x: translation = 1 m\ninit x' = 0 m/s\nenergy T* = 1/2*(1 kg)*x'^2\n"
+                           "energy V = 1/2*(4 N/m)*x^2 }\nscene s of m { time 0 s to 1 s; trace x, x' }")  # fmt: skip
+    for h, said in ((1e-3, 1e-3), (1e-2, "10 ms")):
+        trace = api.simulate(path, method="euler", step=said, output=tmp_path / "t.h5")
+        size = np.hypot(trace["x"].values[-1], trace["x'"].values[-1] / 2.0)
+        assert abs(size - (1.0 + (2.0 * h) ** 2) ** (-0.5 / h)) < 1e-6
+    for options in (["--method", "euler"], ["--step", "1"], ["--method", "euler", "--step", "0"]):
+        assert run(["simulate", path, *options, "-o", str(tmp_path / "t.h5")]) == 2
+        assert "--step" in capsys.readouterr().err
+
+
+def test_a_limit_of_wall_time_that_is_over_before_the_run(tmp_path, capsys):
+    path = write(tmp_path, "model m { state x: 1 = 1\ndynamic x' = -x/(1 s) }\nscene s of m { time 0 s to 1 s }")
+    assert run(["simulate", path, "--max-wall", "1 ns", "-o", str(tmp_path / "t.h5")]) == 3
+    assert "E934" in capsys.readouterr().err

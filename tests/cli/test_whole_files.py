@@ -60,3 +60,11 @@ def test_whole_or_not_at_all(tmp_path, small):
     assert caught.value.errno == errno.EFBIG
     assert target.read_text() == "behind"
     assert _names(tmp_path) == {"link.html", "page.html"}
+
+
+def test_a_text_beside_which_no_file_can_be_made_is_named(tmp_path):
+    """Not the name of what would have been renamed to it."""
+    target = tmp_path / "no_folder" / "m.lock"
+    with pytest.raises(FileNotFoundError) as caught:
+        whole_files.replace(target, "text")
+    assert caught.value.filename == str(target)

@@ -156,6 +156,21 @@ def floating_bus():
     return net
 
 
+def parallel_cells():
+    """A chain whose links are many cells side by side, each with a node of its own (a pack of batteries)."""
+    net = Net()
+    net.node("v", ELECTRICAL, (0, n()))
+    net.node("b", ELECTRICAL, (1, n()), (1, x.param("m")))
+    loops = (*each(), ("j", 1, x.param("m")))
+    j = x.index("j")
+    net.R("R", x.linear(1.0, ((0.2, x.index("i")), (0.3, j))), ("v", i()), ("b", i(), j), loops=loops)
+    net.R("P", 1.1, ("b", i(), j), ("v", i(-1)), loops=loops)
+    net.C("C", 0.7, ("b", i(), j), ("v", i(-1)), loops=loops)
+    net.C("D", 0.4, ("v", i()), ("v", i(-1)), loops=each())
+    net.R("Rt", 1.3, ("v", n()), ("v", 0))
+    return net
+
+
 def springs():
     """A chain of masses with a damper to a wall at one end."""
     net = Net()
@@ -190,6 +205,7 @@ CASES = (
     plain_islands,
     bus,
     floating_bus,
+    parallel_cells,
     springs,
     transformers,
 )

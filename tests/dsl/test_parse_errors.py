@@ -88,6 +88,7 @@ CASES = [
     ("let y = a && b", "E113", 13, "'&' (U+0026, ampersand)", "and"),
     ("let y = a\u00a0+ b", "E113", 12, "U+00A0, no-break space", "an ordinary space"),
     ("let y = 3 \u2212 2", "E113", 13, "U+2212", "hyphen"),
+    ("let e\u0301 = 3", "E113", 8, "U+0301", "one character for the letter and its accent (Unicode NFC)"),
     ("work 3 N", "E113", 11, "expected 'on', found the end of the line", None),
     ("param a: = 3", "E113", 12, "expected a unit, found '='", None),
     ("coord x", "E113", 10, "expected", None),

@@ -63,16 +63,32 @@ def test_instants_and_steps_are_in_seconds():
 )
 def test_an_accuracy_is_of_what_the_trace_calls_so(body, names):
     scene, _, said = read(body)
-    assert (said, scene.accuracy_on) == ([], names)
+    assert (said, tuple(name for name, _ in scene.accuracy_on)) == ([], names)
+
+
+@pytest.mark.parametrize(
+    ("body", "rest", "on", "codes"),
+    [
+        ("accuracy 1e-3\naccuracy 1e-6 on x.f", 1e-3, {"x.f": 1e-6}, []),
+        ("accuracy 1e-6 on x.f\naccuracy 1e-5 on x.q", None, {"x.f": 1e-6, "x.q": 1e-5}, []),
+        ("accuracy 1e-3\naccuracy 1e-4", 1e-3, {}, ["E106"]),
+        ("accuracy 1e-3 on x.q\naccuracy 1e-4 on x.f, x.q", None, {"x.q": 1e-3}, ["E106"]),
+    ],
+)
+def test_accuracies_of_all_and_of_some(body, rest, on, codes):
+    scene, _, said = read(f"trace x.q, x.f\n{body}")
+    assert ([code for code, *_ in said], {n: w.data for n, w in scene.accuracy_on}) == (codes, on)
+    assert (scene.accuracy and scene.accuracy.data) == rest
 
 
 def test_what_is_said_of_a_run():
     body = "formulation kane\nredundancy minimum_norm\nlimit steps 100\nlimit events 5\nsolver radau(keep_flow = true)"
     scene, _, said = read(f"{body}\ntrace x.q, x.f every 1 s\naccuracy 1e-6 on x.f")
     assert said == []
-    assert (scene.formulation, scene.redundancy, scene.accuracy_on) == ("kane", "minimum_norm", ("x.f",))
+    assert (scene.formulation, scene.redundancy, scene.accuracy) == ("kane", "minimum_norm", None)
     assert [(name, n.data) for name, n in scene.limits] == [("steps", 100.0), ("events", 5.0)]
-    assert (scene.accuracy.data, scene.keeps("keep_flow"), scene.keeps("keep_implicit")) == (1e-6, True, False)
+    assert [(name, n.data) for name, n in scene.accuracy_on] == [("x.f", 1e-6)]
+    assert (scene.keeps("keep_flow"), scene.keeps("keep_implicit")) == (True, False)
 
 
 def test_a_quantity_is_traced_in_its_unit_under_its_name():

@@ -4,7 +4,7 @@ import math
 
 import pytest
 from model_runs import FOUR
-from sysdyn.api import ModelError, check, load
+from sysdyn.api import ModelError, check, load, simulate
 
 CHAIN = """
 component seg {
@@ -329,3 +329,39 @@ def test_events_of_an_element_that_is_declared_by_itself(tmp_path, n):
     trace = load(tmp_path / "m.sd").run(set={"n": n})
     assert [trace[f"k[{i}]"].values[-1] for i in range(1, n + 1)] == [1.0] * n
     assert trace["total"].values[-1] == n * (n + 1) / 2
+
+
+PACK = """
+component cell {{
+  param k: 1
+  port a, b: electrical
+  node m: electrical
+  C: potential(q = 1 F*e) a -> m
+  Q: dissipator(e = 1 ohm*k*f) m -> b
+  init C.e = 1 V
+}}
+model m {{
+  param n = 4
+  node h: electrical
+  S: dissipator(e = 1 ohm*f) h -> ground
+{body}
+}}
+scene s of m {{ time 0 s to 3 s; trace h.e }}
+"""
+WRITTEN = "\n".join(f"  c{i}: cell(k = {i}) a = h, b = ground" for i in range(1, 5))
+LOOPED = "  c[1]: cell(k = 1) a = h, b = ground\n  for i in 2..n { c[i]: cell(k = i) a = h, b = ground }"
+
+
+@pytest.mark.parametrize("other", ["i - 1", "1"])
+def test_elements_of_two_statements_side_by_side(tmp_path, other):
+    """A loop that begins behind the first statement has no part there, which had both ends at one node (E413)."""
+    looped = f"{LOOPED}\n  for i in 2..n {{ W[i]: dissipator(e = 1 ohm*f) c[i].m -> c[{other}].m }}"
+    ends = [(i, i - 1 if "i" in other else 1) for i in (2, 3, 4)]
+    written = "\n".join([WRITTEN, *(f"  W{i}: dissipator(e = 1 ohm*f) c{i}.m -> c{j}.m" for i, j in ends)])
+    found = []
+    for k, body in enumerate((looped, written)):
+        path = tmp_path / f"m{k}.sd"
+        path.write_text(PACK.format(body=body))
+        trace = simulate(path, accuracy=1e-7, output=tmp_path / f"t{k}.h5")
+        found.append(trace["h.e"].values[[0, -1]])
+    assert abs(found[0] - found[1]).max() < 1e-6 * abs(found[1]).max()

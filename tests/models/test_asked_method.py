@@ -1,8 +1,11 @@
 """A method that was asked for goes on where `auto` would leave the motion to the next one."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from sysdyn import api
 
 SLED = """\
@@ -50,3 +53,25 @@ def test_a_sled_slides(method, accuracy, tmp_path):
     known["k"] = np.array([_slopes(t, s)[1] for t, s in zip(exact.t, exact.y.T, strict=True)])
     for name, values in known.items():
         assert np.abs(trace[name].values - values).max() <= accuracy * np.abs(values).max()
+
+
+BLOCK = """
+model m {
+  coord x: translation = 0 m
+  energy T* = 1/2*(1 kg)*x'^2
+  work -3 N*sign(x') + 2 N*sin(t/(1 s)) on x
+  init x' = 1 m/s
+}
+scene s of m { time 0 s to 2 s; trace x, x' }
+"""
+
+
+@pytest.mark.parametrize("method", ["dopri", "energy"])
+def test_no_underlying_equation_holds_what_slides(method, tmp_path):
+    """The velocity 1 - 3 t + 2 (1 - cos t) is zero at 0.381183 s and stays there."""
+    path = tmp_path / "m.sd"
+    path.write_text(BLOCK)
+    rest = brentq(lambda t: 1.0 - 3.0 * t + 2.0 * (1.0 - math.cos(t)), 0.0, 1.0)
+    with pytest.raises(api.ModelError, match=f"E607: from t = {rest:.6f}.* s on x' is held at zero, where a law jumps"):
+        api.simulate(path, method=method, output=tmp_path / "t.h5")
+    assert abs(api.simulate(path, method="radau", output=tmp_path / "t.h5")["x'"].values[-1]) < 1e-9

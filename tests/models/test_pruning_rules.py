@@ -112,7 +112,7 @@ MUTANTS = {
     "pruning": [
         ("roots += [n for e in network.expectations", "roots = roots + [n for e in ()"),
         ("return frozenset() if EVERYTHING in found else found", "return found - {EVERYTHING}"),
-        ('any(name.startswith("audit.") for name in scene.accuracy_on)', "False"),
+        ('any(name.startswith("audit.") for name, _ in scene.accuracy_on)', "False"),
         ("or not network.traced", ""),
         ("roots += [a.target for e in network.events", "roots = roots + [a.target for e in ()"),
         ("if len(left) == len(own):", "if left:"),

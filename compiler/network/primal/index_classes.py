@@ -221,10 +221,10 @@ class IndexClasses:
                 self._collapsed = {(left if root == right else root, axis, k) for root, axis, k in self._collapsed}
 
     def _unite(self, links: Sequence[Link]) -> None:
-        """Equals first, then runs inside cells, then what reaches from cell to cell."""
+        """Equals first, one with many too, then runs inside cells, then what reaches from cell to cell."""
         applied = [(link, choice) for link in links for choice in self._choices(link)]
         for link, choice in applied:
-            if foremost_way(choice) == "zero":
+            if all(o.how in ("zero", "free") for o in choice):
                 self._join(*self._ends(link, choice), link.sign)
         for link, choice in applied:
             a, b = self._ends(link, choice)
