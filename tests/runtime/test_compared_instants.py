@@ -44,8 +44,9 @@ def test_instants_are_known_where_the_trace_has_an_interval():
     assert np.array_equal(known(asked, options, 1), asked)
     many = known(asked, options, 4000)
     assert many.size == 401  # every third, the last among them
-    few = known(np.array([0.0, 1.0]), Options(None, 2.0, 4.0, every=2.0), 1)
-    assert few.size == MOST + 1
+    few = known(np.array([2.0, 3.1, 4.0]), Options(None, 2.0, 4.0, every=2.0, at=(3.1,)), 1)
+    assert few.size == MOST + 2
+    assert 3.1 in few  # what is asked for is compared
     assert few[-1] == 4.0
     assert ((few > 2.0) & (few <= 4.0)).all()
 
