@@ -173,8 +173,8 @@ model h {
   node p, a, b, m: electrical
   V: voltage(v = 48 V) p -> ground
   S1: switch(gate = if on then 1 else 0) p -> a
-  S2: switch(gate = 0) a -> ground
-  S3: switch(gate = 0) p -> b
+  S2: switch(gate = if rev then 1 else 0) a -> ground
+  S3: switch(gate = if rev then 1 else 0) p -> b
   S4: switch(gate = if on then 1 else 0) b -> ground
   D1: diode.complementary() a -> p
   D2: diode.complementary() ground -> a
@@ -183,7 +183,9 @@ model h {
   L: inductor(L = 2 mH) a -> m
   R: resistor(R = 1.5 ohm) m -> b
   discrete on = true
+  discrete rev = false
   when t >= 0.25 ms { on := false }
+  when t >= 1 ms { rev := true }
   init L.f = 3 A
 }
 scene s of h { time 0 s to 0.4 ms; trace L.f as i, a.e - b.e as v every 10 us }
