@@ -91,7 +91,8 @@ def known(times: Floats, options: Options, quantities: int) -> Floats | None:
         most = min(GRID, max(VALUES // max(quantities, 1), FEW))
         return distinct(np.append(times[:: -(-times.size // most)], times[-1]))
     span = options.t_end - options.t_start
-    return distinct(np.append(options.t_start + span * (np.arange(1, MOST + 1) * GOLDEN % 1.0), options.t_end))
+    spread = options.t_start + span * (np.arange(1, MOST + 1) * GOLDEN % 1.0)
+    return distinct(np.concatenate([spread, times[times > options.t_start], [options.t_end]]))
 
 
 def common(stored: Floats, options: Options) -> Floats:

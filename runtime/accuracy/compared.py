@@ -14,7 +14,7 @@ from sysdyn.runtime.accuracy.common_instants import MANY, MOST, VALUES, Instants
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.accuracy.pairs import Sampled
 from sysdyn.runtime.accuracy.quantities import Quantities
-from sysdyn.runtime.integrate.request import COMPARED, TRACE, Finished
+from sysdyn.runtime.integrate.request import COMPARED, RELAXING, TRACE, Finished
 from sysdyn.runtime.integrate.round_off import LeftOpen, left_open
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
@@ -72,8 +72,9 @@ class Compared:
         open_ = partial(self._open_quantities, finished, quantities)
         sizes, steps = quantities.of_run(finished), finished.statistics.steps
         between = self._between(rows, finished, quantities)
+        passed = rows[:, 2:4] * ((rows[:, 1:2].astype(np.int32) & RELAXING) > 0)
         found = Sampled(
-            tolerance, values, sizes, steps, noise, open_, between, late, there, jumps=bool(finished.events)
+            tolerance, values, sizes, steps, noise, open_, between, late, there, bool(finished.events), passed
         )
         self.samplings = (*self.samplings[-1:], found)
         return found

@@ -18,7 +18,7 @@ from collections.abc import Callable
 
 import numpy as np
 from sysdyn.runtime.accuracy.laws import Law
-from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, left_at_rest, parted
+from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, left_at_rest, parted, passed_over
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -217,6 +217,8 @@ class _Estimate:
         shrink *= luck
         self.apart, self.over = max(apart * shrink, least), max(over * shrink, least / float(np.min(self.target)))
         self.apart, self.over = max(self.apart, left), max(self.over, left_over)
+        off, off_over = passed_over(coarse, fine, self.target, self.law.safety * UNSEEN / (1.0 - UNSEEN))
+        self.apart, self.over = max(self.apart, off), max(self.over, off_over)
         return apart
 
     def shorter(self) -> float:

@@ -19,6 +19,8 @@ from sysdyn.values import dataclass
 
 METHODS = ("bdf", "radau", "rosenbrock", "dopri", "energy", "euler")
 """What may be named instead of auto."""
+ROUNDED = 4.0 * float(np.finfo(np.float64).eps)
+"""Of the larger end of the span: an instant beyond it by no more is that end."""
 
 Progress = Callable[[float, float | None], None]
 """Fraction of the span done, seconds left (None: not known yet)."""
@@ -135,10 +137,11 @@ def choose_method(options: Options) -> str:
 def instants(options: Options) -> tuple[Floats, Ints]:
     """Instants and kinds of rows: grid, --at, samples.  Raises WrongOption for instants outside the span."""
     t0, t1 = options.t_start, options.t_end
-    outside = [t for t in options.at if not t0 <= t <= t1]
+    beyond = ROUNDED * max(abs(t0), abs(t1))  # 400*1e-9 is more than 400 ns
+    outside = [t for t in options.at if not t0 - beyond <= t <= t1 + beyond]
     if outside:
         raise WrongOption(f"instant {outside[0]:g} s lies outside {t0:g} .. {t1:g} s")
-    wanted = np.asarray(options.at, dtype=np.float64)
+    wanted = np.clip(np.asarray(options.at, dtype=np.float64), t0, t1)
     if options.every is not None:
         number = int(np.floor((t1 - t0) / options.every * (1.0 + 1e-12)))
         grid = np.minimum(t0 + options.every * np.arange(number + 1), t1)

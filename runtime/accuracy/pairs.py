@@ -47,7 +47,8 @@ class Sampled:
     (None: no instant is); late [instants, quantities]: what the dense
     output of each value moves by within the time tolerance (TIMING): on a steep front no more is asked; there: values
     and late at instants of its own, for the run behind it (None: those are the same); jumps:
-    events happened.
+    events happened; passed [instants, 2]: where a first step behind a restart passes over
+    what relaxes at once, how many times as long it is, and the most that this may be, of its largest; zeros elsewhere.
     """
 
     tolerance: float
@@ -60,6 +61,7 @@ class Sampled:
     late: Floats | float = 0.0
     there: tuple[Floats, Floats | float] | None = None
     jumps: bool = False
+    passed: Floats | None = None
 
     @property
     def own(self) -> tuple[Floats, Floats | float]:
@@ -143,6 +145,28 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
         relative = apart(coarse, fine)[:, use].max(axis=0, initial=0.0) / size[use]
     relative = np.where(np.isfinite(relative) & ~unlike, relative, np.inf)
     return float(relative.max()), float((relative / target[use]).max())
+
+
+def passed_over(coarse: Sampled, fine: Sampled, target: Floats, credit: float) -> tuple[float, float]:
+    """The error of the finer run, relative, and that over the accuracy wanted, where a first step passes over what
+    relaxes at once; zeros elsewhere.  There two runs begin alike, however far both are off: what they differ by grows
+    with the time since then, and with what their steps differ by.  The error is credit times what that makes of a whole
+    step, but no more than the equations and the dense output are from each other since its begin.
+    """
+    if fine.passed is None or not fine.passed.any() or coarse.own[0].shape != fine.values.shape:
+        return 0.0, 0.0
+    at = fine.passed[:, 0] > 0.0
+    use = (fine.largest != 0.0) & np.isfinite(target) & ~zero(coarse, fine, target)
+    if not use.any():
+        return 0.0, 0.0
+    longer, most = fine.passed[at].T
+    before = coarse.passed
+    beside = before[at, 0] if before is not None and len(before) == len(at) else np.zeros(longer.size)
+    with np.errstate(all="ignore"):  # steps of one length, of a run that does not pass over it: 0, infinite
+        longer = longer / np.fmin(np.abs(1.0 - longer / beside), 1.0)
+        relative = (np.abs(coarse.own[0] - fine.values) / fine.largest)[at][:, use]
+        off = np.fmin(credit * longer[:, None] * relative, most[:, None])
+    return float(off.max()), float((off / target[use]).max())
 
 
 def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats, *, known: bool = False) -> tuple[float, float]:

@@ -6,11 +6,15 @@ conducts for all, and the others block for good.  (Not so where a source is betw
 of unknowns.)  What is left is looked at again, so that strings in parallel and parallels in series become one: a bridge
 of 64 diodes is one of four.
 
+What else holds at times may do so or not: what is alike, is so in each of its states.
+
 Received: the contacts of a model; returned: those whose state never changes, and which it is.  That two rows depend on
 each other, and that their multipliers may be shared out at will, is read from the null spaces of the pencil.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,14 +74,16 @@ class _Search:
 
     def _freeze(self, *, blocks: bool) -> bool:
         """What is alike where the others all block, or conduct, is frozen in the other state; whether there was any."""
-        active = np.zeros(len(self.system.description.switches.places), dtype=bool)
-        for k in self.asked:
-            active[self.contacts[k].number] = self.frozen.get(k, blocks)
-        self.system.description.switches.set(active)
         free = np.array([k not in self.frozen for k in self.asked])
         alike = np.ones((int(free.sum()),) * 2, dtype=bool)
-        for seed in (0, 1):
-            alike &= self._alike(seed, free, blocks=blocks)
+        for active in self._states():
+            for k in self.asked:
+                active[self.contacts[k].number] = self.frozen.get(k, blocks)
+            self.system.description.switches.set(active)
+            for seed in (0, 1):
+                alike &= self._alike(seed, free, blocks=blocks)
+            if not np.triu(alike, 1).any():
+                return False
         number = np.flatnonzero(free)
         done = np.zeros(number.size, dtype=bool)
         for i in range(number.size):
@@ -86,6 +92,22 @@ class _Search:
                     done[j] = True
                     self.frozen[self.asked[number[j]]] = not blocks
         return bool(done.any())
+
+    def _states(self) -> Iterator[Mask]:
+        """Active sets in which the same must be alike: of what else holds at times (a switch beside a diode, a wire in
+        one of its states) nothing, all, and each by itself.
+        """
+        asked = [self.contacts[k].number for k in self.asked]
+        none = np.zeros(len(self.system.description.switches.places), dtype=bool)
+        other = ~none
+        other[asked] = False
+        yield none.copy()
+        if other.any():
+            yield other.copy()
+            for k in np.flatnonzero(other):
+                none[k] = True
+                yield none.copy()
+                none[k] = False
 
     def _alike(self, seed: int, free: Mask, *, blocks: bool) -> NDArray[np.bool_]:
         """Which pairs of the free ones say the same, and share at will, at a point of random numbers [free, free]."""

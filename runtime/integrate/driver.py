@@ -25,6 +25,10 @@ ROOM = 4096
 """Rows of the ring (blocks of at least 1024 rows are written at once)."""
 
 Sink = Callable[[Floats], None]
+SWIFT = 100.0
+"""Of the tolerance: what is observed would move by more of its largest in a step, by the equations beside the dense
+output, where it relaxes at once (smooth motions: up to ten).
+"""
 CREDIT = 16
 """Rows that are looked at before it shows that few of them meet their sums."""
 
@@ -83,6 +87,7 @@ class Driver:
         self._asked(request)
         self._extrema(request)
         run.rough = request.settled_to
+        run.swift = SWIFT * request.rtol
         run.bare = int(not request.audited and shows(system, keeps))
         run.told = CREDIT if not request.audited and self._follows_sums(settler, keeps) else 0
         unread = not request.audited and request.events is None and self._unread

@@ -21,8 +21,9 @@ ON_UNDERLYING = ("dopri", "energy")
 OF_INDEX_ONE = ("rosenbrock",)
 """Methods that integrate equations of index 1 alone, as written or with constraints differentiated twice (form 1)."""
 
-TRACE, STEP, COMPARED = 1, 2, 4
-"""Kinds of rows (their second column, a sum)."""
+TRACE, STEP, COMPARED, RELAXING = 1, 2, 4, 8
+"""Kinds of rows (their second column, a sum); RELAXING: compared, where something relaxes at once behind a
+restart; in the place of energies these have what core/run/run.c (`relaxes`) tells."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sysdyn.api import simulate
+from sysdyn.api import load, simulate
 from sysdyn.runtime.start.restart import Restart
 
 HEAD = """from std.electrical import resistor, capacitor, voltage
@@ -166,3 +166,42 @@ def test_a_capacitor_at_a_source_that_falls_begins_at_it(tmp_path, formulation):
     source = np.abs(268.0 * np.sin(2.0 * np.pi * 60.0 * trace.time - 0.718))
     assert (source[1:] < exact[1:]).all()
     assert np.abs(trace["v"].values - exact).max() < 2e-4
+
+
+H_BRIDGE = """from std.electrical import diode, switch, resistor, inductor, voltage
+model h {
+  node p, a, b, m: electrical
+  V: voltage(v = 48 V) p -> ground
+  S1: switch(gate = if on then 1 else 0) p -> a
+  S2: switch(gate = if rev then 1 else 0) a -> ground
+  S3: switch(gate = if rev then 1 else 0) p -> b
+  S4: switch(gate = if on then 1 else 0) b -> ground
+  D1: diode.complementary() a -> p
+  D2: diode.complementary() ground -> a
+  D3: diode.complementary() b -> p
+  D4: diode.complementary() ground -> b
+  L: inductor(L = 2 mH) a -> m
+  R: resistor(R = 1.5 ohm) m -> b
+  discrete on = true
+  discrete rev = false
+  when t >= 0.25 ms { on := false }
+  when t >= 1 ms { rev := true }
+  init L.f = 3 A
+}
+scene s of h { time 0 s to 0.4 ms; trace L.f as i, a.e - b.e as v every 10 us }
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_the_current_of_an_h_bridge_that_lets_go_flows_on_in_its_diodes(tmp_path, formulation):
+    """Two of its four diodes were taken for parallels of others, for the switches beside them were wires where that
+    was asked: they never conducted, and the current stopped at once, told as met.
+    """
+    (tmp_path / "h.sd").write_text(H_BRIDGE)
+    trace = load(tmp_path / "h.sd", formulation=formulation).run()
+    t, off, tau = np.array(trace.time), 0.25e-3, 2e-3 / 1.5
+    last = 32.0 - 29.0 * np.exp(-off / tau)
+    behind = -32.0 + (last + 32.0) * np.exp(-(t - off) / tau)
+    exact = np.where(t <= off, 32.0 - 29.0 * np.exp(-t / tau), behind)
+    assert np.abs(trace["i"].values - exact).max() <= 1e-4 * last
+    assert np.abs(trace["v"].values[t > 1.01 * off] + 48.0).max() <= 1e-3

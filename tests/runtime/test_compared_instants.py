@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from sysdyn.runtime.accuracy.common_instants import MANY, MOST, Thinned, common, joined, known, late_by
-from sysdyn.runtime.accuracy.options import Options
+from sysdyn.runtime.accuracy.options import Options, WrongOption, instants
 from sysdyn.runtime.accuracy.pairs import Sampled, apart, difference
 from sysdyn.runtime.integrate.ledgers import Balance
 from sysdyn.runtime.integrate.request import COMPARED, TRACE
@@ -44,8 +44,9 @@ def test_instants_are_known_where_the_trace_has_an_interval():
     assert np.array_equal(known(asked, options, 1), asked)
     many = known(asked, options, 4000)
     assert many.size == 401  # every third, the last among them
-    few = known(np.array([0.0, 1.0]), Options(None, 2.0, 4.0, every=2.0), 1)
-    assert few.size == MOST + 1
+    few = known(np.array([2.0, 3.1, 4.0]), Options(None, 2.0, 4.0, every=2.0, at=(3.1,)), 1)
+    assert few.size == MOST + 2
+    assert 3.1 in few  # what is asked for is compared
     assert few[-1] == 4.0
     assert ((few > 2.0) & (few <= 4.0)).all()
 
@@ -176,3 +177,12 @@ def test_what_an_event_is_late_by_counts_where_values_move():
     fine = Sampled(1e-6, np.array([[0.0, 0.0], [1.0009, 1.0], [3.0, 1.0]]), np.ones(2), 20, between=moved)
     assert apart(coarse, fine)[1] == pytest.approx([9e-4, 0.0])
     assert difference(coarse, fine, np.full(2, 1e-3)) == pytest.approx((9e-4, 0.9))
+
+
+def test_an_instant_that_rounds_beyond_the_end_is_the_end():
+    end = 4e-7
+    assert end < 400 * 1e-9
+    times, _ = instants(Options(None, 0.0, end, at=(400 * 1e-9,)))
+    assert times.tolist() == [0.0, end]
+    with pytest.raises(WrongOption, match="lies outside"):
+        instants(Options(None, 0.0, end, at=(1.0001 * end,)))

@@ -101,9 +101,27 @@ static void note_beyond(sd_run *run)
             run->beyond = fabs(run->point[j]) / run->magnitude[j];
 }
 
+/* Whether something observed relaxes at t within a small part of the last step, which began with it: by the equations,
+ * whose rates `row` has, it is under way to where the dense output is not.  Then the row is for the comparison alone, and
+ * has in the place of its energies how many times as long the step is, and the largest part of its largest that something
+ * moves by since then as fast as the equations and the dense output differ. */
+static int relaxes(const sd_run *run, double t, double *row)
+{
+    const double *rate = row + SD_ROW_HEAD + run->observed;
+    double h = run->t_to - run->t_from, since = t - run->t_from, most = 0.0;
+    for (int32_t i = 0; i < run->observed; i++)
+        if (fabs(rate[i] - run->slope[i]) > most * run->largest[i])
+            most = fabs(rate[i] - run->slope[i]) / run->largest[i];
+    if (!(most * h > run->swift))
+        return 0;
+    row[2] = h / since;
+    row[3] = most * since;
+    return 1;
+}
+
 /* The row just written once more for the comparison alone, with the slopes of the dense output.  The rates of a settled
  * point are those of the equations: a motion that relaxes at once makes of any error a rate without bound. */
-static void emit_compared(sd_run *run, double *row)
+static void emit_compared(sd_run *run, double t, double *row, int begun)
 {
     size_t width = (size_t)(SD_ROW_HEAD + 2 * run->observed);
     int32_t others = (int32_t)row[1] & ~SD_COMPARED;
@@ -111,9 +129,9 @@ static void emit_compared(sd_run *run, double *row)
         memcpy(row + width, row, width * sizeof *row);
         row[1] = (double)others;
         row += width;
-        row[1] = SD_COMPARED;
         run->rows++;
     }
+    row[1] = SD_COMPARED | (begun && relaxes(run, t, row) ? SD_RELAXING : 0);
     memcpy(row + SD_ROW_HEAD + run->observed, run->slope, (size_t)run->observed * sizeof *row);
 }
 
@@ -128,10 +146,11 @@ static int meets(sd_run *run, double t)
     return 0;
 }
 
-/* The point of a row moved there; where only runs are compared by it, roughly, or not where states alone are seen. */
-static void settle_row(sd_run *run, double t, int32_t kind)
+/* The point of a row moved there; where only runs are compared by it, roughly, or not where states alone are seen.  rated:
+ * its rates are wanted too */
+static void settle_row(sd_run *run, double t, int32_t kind, int rated)
 {
-    if (run->settle && !(kind == SD_COMPARED && run->bare) && !meets(run, t)) {
+    if (run->settle && (rated || (!(kind == SD_COMPARED && run->bare) && !meets(run, t)))) {
         double enough = run->settle->enough;
         if (kind == SD_COMPARED)
             run->settle->enough = fmax(enough, run->rough);
@@ -203,7 +222,7 @@ static void note_step(sd_run *run, double t)
     for (int32_t i = 0; i < run->observed && !grown && !run->bare; i++)
         grown = run->values[i] > GROWN * run->largest[i];
     if (grown) {
-        settle_row(run, t, 0);
+        settle_row(run, t, 0, 0);
         find_own_sizes(run, t);
     }
     note_sizes(run);
@@ -231,7 +250,8 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         memset(run->slope, 0, (size_t)run->observed * sizeof(double));
         run->observe_rate->rows(&run->observe_rate->frame, t, run->point, run->point_d, run->slope);
     }
-    settle_row(run, t, (int32_t)kind);
+    int begun = compared && run->t_from == run->t_begun;
+    settle_row(run, t, (int32_t)kind, begun);
     if (run->magnitude && !at_step)
         note_beyond(run);
     double dissipated = at_step ? run->dissipated : run->step_dissipated + sum[0];
@@ -258,7 +278,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     memset(row + SD_ROW_HEAD, 0, 2 * (size_t)run->observed * sizeof *row);
     if (run->observe)
         run->observe->rows(&run->observe->frame, t, run->point, run->point_d, row + SD_ROW_HEAD);
-    if (run->observe_rate && !(compared && alone))
+    if (run->observe_rate && !(compared && alone && !begun))
         run->observe_rate->rows(&run->observe_rate->frame, t, run->point, run->point_d,
                                 row + SD_ROW_HEAD + run->observed);
     find_sizes(run, t, row + SD_ROW_HEAD);
@@ -268,7 +288,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     run->rows++;
     run->rows_written++;
     if (compared)
-        emit_compared(run, row);
+        emit_compared(run, t, row, begun);
     for (int k = 0; k < 7; k++) /* what is watched at other points does not see this row's */
         if (run->audit_at[k] >= 0)
             run->point[run->audit_at[k]] = 0.0;
@@ -289,11 +309,14 @@ static double kind_here(const sd_run *run, int asked)
 }
 
 /* Whether the next instant, within a step that ends at t, is nearer to the row before than rows are to be.  The last one
- * before an event is written: in a run behind this one it may stand behind the event. */
+ * before an event is written: in a run behind this one it may stand behind the event; and the first one behind a restart,
+ * where what relaxes at once has not done so yet. */
 static int passes_over(const sd_run *run, double t)
 {
     int32_t next = run->next;
     int last = next + 1 == run->instants || run->instant[next + 1] >= t;
+    if (run->t_from == run->t_begun && run->t_row <= run->t_begun)
+        return 0;
     return run->instant[next] < run->t_row + run->apart * (t - run->t_from) && !(last && t < *run->stepper->t);
 }
 
@@ -369,7 +392,7 @@ static void rows_of_start(sd_run *run, double label)
     sd_run_audit(run, t, run->point, run->point_d, run->after);
     if (run->ledgers)
         sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after, room_of_contents(run));
-    run->t_from = run->t_to = t;
+    run->t_from = run->t_to = run->t_begun = t;
     run->fresh = 0;
     if (run->extrema)
         run->extrema->number = 0; /* what jumps has no crest */
@@ -381,6 +404,7 @@ static int begin(sd_run *run)
     if (run->rows >= run->room)
         return 1;
     run->fresh = 1;
+    run->t_row = *run->stepper->t;
     rows_of_start(run, *run->stepper->t);
     run->started = 1;
     return 0;

@@ -2,8 +2,9 @@
  *
  * An output row is [t, kind, kinetic, potential, dissipated, supplied, energy, constraints,
  *                   observe [observed], observe_rate [observed]]   (SI units; kind, a sum: 1 row of the
- * trace, 2 accepted step, 4 instant at which runs are compared).  At the instants the dense output is moved onto the
- * constraints and their hidden derivatives (settle.h), so multipliers and accelerations are as exact as positions.
+ * trace, 2 accepted step, 4 instant at which runs are compared, 8 see SD_RELAXING).
+ * At the instants the dense output is moved onto the constraints and their hidden derivatives (settle.h), so multipliers
+ * and accelerations are as exact as positions.
  * Energy balance: [T + V](t) - [T + V](t0) + int dissipated dt - int supplied dt.  The integrals of each accepted step:
  * where laws are steep by the method's stages, at which they hold, else by the 4-point Gauss-Lobatto rule (exact to
  * degree 5) on the dense output.
@@ -23,6 +24,7 @@
 #define SD_TRACE 1    /* kinds of a row (integrate/request.py): of the trace, */
 #define SD_SAMPLE 2   /* of a step, which is watched alone, */
 #define SD_COMPARED 4 /* that runs are compared by */
+#define SD_RELAXING 8 /* of these: where something relaxes at once within the first step behind a restart */
 #define SD_PARTS 4    /* of a step, at whose ends what is watched is looked at */
 #define SD_FINEST 1024 /* parts of a step that what is watched does not follow in fewer */
 
@@ -54,6 +56,8 @@ typedef struct sd_run {
     int32_t unsummed;                 /* nothing observed reads the audit: rows for comparison alone are without it (1), a draft
                                        * without integrals of powers (2); they are no numbers */
     double rough;                     /* scaled residual that will do for rows by which runs are compared and nothing else */
+    double swift;                     /* of its largest: what by the equations moves by more beside the dense output, as fast
+                                       * as there for a step, relaxes at once */
     double apart;                     /* part of a step: instants within it that are nearer to the row before are passed
                                        * over; 0: none is */
     const double *start_rate;         /* [unknowns] yd at the (re)start, also of what the stepper does not differentiate */
@@ -64,7 +68,8 @@ typedef struct sd_run {
     int32_t sampled;                               /* point and sample are of the end of the last step */
     double stored, dissipated, supplied;           /* T + V at the start; integrals up to the last accepted step */
     double step_dissipated, step_supplied;         /* integrals up to the start of the last step */
-    double t_from, t_row;                          /* t_row: instant of the last row that is compared */
+    double t_from, t_row, t_begun;                 /* t_row: instant of the last row that is compared; t_begun: of the last
+                                                    * restart */
     double *power, *after, *sample, *integral, *end;   /* [audited] at the start and the end of the last step; of one
                                                         * sample; integrals over the step; of a row */
     double *point, *point_d, *values, *largest, *slope, *memory; /* point: of a sample or a row; largest [observed]: of observe_scale;
