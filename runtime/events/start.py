@@ -33,17 +33,22 @@ def eventful_start(system: System, t0: float, plan: Plan, until: float | None = 
     in loops), they are what follows: the constraint is its own integral, whatever it is at the start.
     until: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
     """
+    none: InconsistentStart | None = None
     if system.description.constants:
-        with suppress(InconsistentStart):
+        try:
             found = _fitting(system, t0, plan, until, constants=False)
             if not found.displaced:
                 return found
+        except InconsistentStart as error:
+            none = error
         system.own_numbers()  # the constants are written there
         p = system.description.p
         stood = p.copy()
         with suppress(InconsistentStart):
             return _fitting(system, t0, plan, until, constants=True)
         p[:] = stood  # sets that were tried have left theirs
+    if none is not None:
+        raise none
     return _fitting(system, t0, plan, until, constants=False)
 
 
