@@ -13,6 +13,7 @@ import random
 import re
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -115,7 +116,7 @@ class Bench:
         prepared = ready(request, target, report)
         if prepared is None:
             raise ModelError(report.diagnostics)
-        options = options_of(request, target, prepared, report, 0.0, None)
+        options = options_of(request, target, prepared, report, time.monotonic(), None)
         assert options is not None
         self.target: Target = target
         self.prepared: Prepared = prepared

@@ -13,20 +13,21 @@
 
 #ifdef SD_COMPLEX
 #define IN_LANES (SD_LANES / 2)
-/* what a lane's numbers are multiplied by: real parts twice, imaginary parts with the signs of their products */
-typedef struct sd_multiplier {
+/* a sum of lanes, each times a number: with its real parts, with its imaginary parts */
+typedef struct sd_lane_sum {
     sd_lanes real, imaginary;
-} sd_multiplier;
+} sd_lane_sum;
 
-static inline __attribute__((always_inline)) sd_multiplier every(sd_number x)
+static inline __attribute__((always_inline)) void add_times(sd_lane_sum *sum, sd_lanes x, sd_number by)
 {
-    double re = creal(x), im = cimag(x);
-    return (sd_multiplier){{re, re, re, re}, {-im, im, -im, im}};
+    sum->real += x * creal(by);
+    sum->imaginary += x * cimag(by);
 }
 
-static inline __attribute__((always_inline)) sd_lanes times(sd_lanes x, sd_multiplier by)
+static inline __attribute__((always_inline)) sd_lanes summed(sd_lane_sum sum)
 {
-    return x * by.real + (sd_lanes){x[1], x[0], x[3], x[2]} * by.imaginary;
+    const sd_lanes i = sum.imaginary;
+    return sum.real + (sd_lanes){-i[1], i[0], -i[3], i[2]};
 }
 
 static inline __attribute__((always_inline)) sd_lanes sizes(sd_lanes x)
@@ -36,16 +37,16 @@ static inline __attribute__((always_inline)) sd_lanes sizes(sd_lanes x)
 }
 #else
 #define IN_LANES SD_LANES
-typedef sd_lanes sd_multiplier;
+typedef sd_lanes sd_lane_sum;
 
-static inline __attribute__((always_inline)) sd_multiplier every(sd_number x)
+static inline __attribute__((always_inline)) void add_times(sd_lane_sum *sum, sd_lanes x, sd_number by)
 {
-    return (sd_multiplier){x, x, x, x};
+    *sum += x * by;
 }
 
-static inline __attribute__((always_inline)) sd_lanes times(sd_lanes x, sd_multiplier by)
+static inline __attribute__((always_inline)) sd_lanes summed(sd_lane_sum sum)
 {
-    return x * by;
+    return sum;
 }
 
 static inline __attribute__((always_inline)) sd_lanes sizes(sd_lanes x)
@@ -57,6 +58,16 @@ static inline __attribute__((always_inline)) sd_lanes sizes(sd_lanes x)
 static inline int32_t whole_line(int32_t n)
 {
     return (n + IN_LANES - 1) / IN_LANES * IN_LANES;
+}
+
+/* whole lanes times a number */
+static inline __attribute__((always_inline)) void scale_lines(int32_t lines, sd_number by, sd_number *x)
+{
+    for (int32_t i = 0; i < lines; i += IN_LANES) {
+        sd_lane_sum scaled = {0};
+        add_times(&scaled, SD_FROM(x, i), by);
+        SD_AT(x, i) = summed(scaled);
+    }
 }
 
 /* lines of a front's panels */
@@ -94,19 +105,19 @@ static inline __attribute__((always_inline)) void sum_some_lines(enum sd_sum_int
                                                                  const sd_number *panel, int32_t step, const sd_number *x,
                                                                  int32_t apart, const int32_t *places, sd_number *to)
 {
-    sd_lanes sum[4] = {{0.0}};
+    sd_lane_sum sum[4] = {0};
     for (int32_t k = 0; k < many; k++, panel += step) {
-        const sd_multiplier here = every(x[places ? places[k] : (int64_t)k * apart]);
+        const sd_number here = x[places ? places[k] : (int64_t)k * apart];
         for (int c = 0; c < chunks; c++)
-            sum[c] += times(SD_FROM(panel, c * IN_LANES), here);
+            add_times(&sum[c], SD_FROM(panel, c * IN_LANES), here);
     }
     for (int c = 0; c < chunks; c++)
         if (how == SUM)
-            SD_AT(to, c * IN_LANES) = sum[c];
+            SD_AT(to, c * IN_LANES) = summed(sum[c]);
         else if (how == MINUS)
-            SD_AT(to, c * IN_LANES) = -sum[c];
+            SD_AT(to, c * IN_LANES) = -summed(sum[c]);
         else
-            SD_AT(to, c * IN_LANES) -= sum[c];
+            SD_AT(to, c * IN_LANES) -= summed(sum[c]);
 }
 
 /* the same of whole lines */

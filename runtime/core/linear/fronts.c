@@ -70,9 +70,7 @@ static SD_WIDE double eliminate(const sd_front *front, sd_number *l, sd_number *
             return 0.0;
         least = pivot < least * largest ? pivot / largest : least;
         inverse[j] = 1.0 / lj[j];
-        const sd_multiplier scale = every(inverse[j]);
-        for (int32_t i = from; i < lines; i += IN_LANES)
-            SD_AT(lj, i) = times(SD_FROM(lj, i), scale);
+        scale_lines(lines - from, inverse[j], lj + from);
     }
     return least;
 }
@@ -114,9 +112,8 @@ static SD_WIDE void invert_triangle(int32_t many, int32_t lines, sd_number *pane
             column[i] = i == k;
         }
         sum_columns(LESS, own - from, many - next, column + lines + from, lines, by + next, 1, NULL, column + from);
-        const sd_multiplier scale = every(inverse ? inverse[k] : 1.0);
-        for (int32_t i = from; i < own && inverse; i += IN_LANES)
-            SD_AT(column, i) = times(SD_FROM(column, i), scale);
+        if (inverse)
+            scale_lines(own - from, inverse[k], column + from);
     }
 }
 
