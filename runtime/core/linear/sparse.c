@@ -609,7 +609,7 @@ static int renew_rest(sd_sparse *lu, const sd_matrix *matrix)
 int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 {
     if (lu->fronts)
-        return !factor_fronts(lu, matrix, UNHEALTHY);
+        return !factor_fronts(lu, matrix, own_threshold(lu, UNHEALTHY));
     if (!provide_numbers(lu))
         return 1;
     int failed = 0;
