@@ -72,7 +72,7 @@ class Compared:
         open_ = partial(self._open_quantities, finished, quantities)
         sizes, steps = quantities.of_run(finished), finished.statistics.steps
         between = self._between(rows, finished, quantities)
-        passed = rows[:, 2:4] * ((rows[:, 1:2].astype(np.int32) & RELAXING) > 0)
+        passed = np.where(rows[:, 1:2].astype(np.int32) & RELAXING, rows[:, 2:4], 0.0)
         found = Sampled(
             tolerance, values, sizes, steps, noise, open_, between, late, there, bool(finished.events), passed
         )
@@ -160,7 +160,7 @@ class Compared:
         k = int(np.argmax(ratio.max(axis=0)))
         beyond = np.flatnonzero(ratio[:, k] > 1.0)
         name, at = names[k], int(beyond[0]) if beyond.size else None
-        undefined = at is not None and not np.isfinite([one.own[0][at, k], two.values[at, k]]).any()
+        undefined = at is not None and not np.isfinite([one.own[0][at, k], two.values[at, k]]).all()  # or at the edge
         return name, asked[name], None if at is None else float(self._at[at]), undefined
 
 

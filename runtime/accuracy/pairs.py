@@ -166,6 +166,7 @@ def passed_over(coarse: Sampled, fine: Sampled, target: Floats, credit: float) -
         longer = longer / np.fmin(np.abs(1.0 - longer / beside), 1.0)
         relative = (np.abs(coarse.own[0] - fine.values) / fine.largest)[at][:, use]
         off = np.fmin(credit * longer[:, None] * relative, most[:, None])
+        off[~np.isfinite(relative)] = 0.0  # where one is no number that is said
     return float(off.max()), float((off / target[use]).max())
 
 

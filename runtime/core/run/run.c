@@ -109,9 +109,11 @@ static int relaxes(const sd_run *run, double t, double *row)
 {
     const double *rate = row + SD_ROW_HEAD + run->observed;
     double h = run->t_to - run->t_from, since = t - run->t_from, most = 0.0;
-    for (int32_t i = 0; i < run->observed; i++)
-        if (fabs(rate[i] - run->slope[i]) > most * run->largest[i])
-            most = fabs(rate[i] - run->slope[i]) / run->largest[i];
+    for (int32_t i = 0; i < run->observed; i++) {
+        const double apart = fabs(rate[i] - run->slope[i]);
+        if (run->largest[i] > 0.0 && isfinite(apart)) /* what is no number is said elsewhere */
+            most = fmax(most, apart / run->largest[i]);
+    }
     if (!(most * h > run->swift))
         return 0;
     row[2] = h / since;
