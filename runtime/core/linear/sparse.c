@@ -11,6 +11,7 @@
 #include <string.h>
 
 #define THRESHOLD 0.1   /* a sparser row may pivot if its entry is this close to the largest */
+#define WEAK 0.01       /* fronts bear later pivots down to this part: inverses of triangles grow, substitution does not */
 #define FAINT_PIVOT 1e-7 /* and a column's own one of quasi-definite matrices, whose factors any of them has: refined once or
                           * twice their solutions are as good (those of 4650 masses at random: a fifth of the time) */
 #define ROOM 2          /* entries of a factor for each of the matrix: room for them */
@@ -461,11 +462,11 @@ static int factor_fronts(sd_sparse *lu, const sd_matrix *matrix, double least)
 /* The same where rows pivot in their own columns, if the factors fill and that is right; if not, never again. */
 static int by_fronts(sd_sparse *lu, const sd_matrix *matrix)
 {
-    if (lu->no_fronts || !lu->paired || lu->idle || lu->null_pivot != 0.0 || lu->dropped != 0.0)
+    if (lu->no_fronts || lu->paired != 1 || lu->idle || lu->null_pivot != 0.0 || lu->dropped != 0.0)
         return 0;
     if (!lu->fronts)
         lu->fronts = sd_fronts_new(lu->n, matrix, lu->order, lu->own, lu->most);
-    if (lu->fronts && factor_fronts(lu, matrix, own_threshold(lu, THRESHOLD))) {
+    if (lu->fronts && factor_fronts(lu, matrix, THRESHOLD)) {
         lu->rank = lu->n;
         lu->products = lu->fronts->products;
         lu->entries = lu->fronts->entries;
@@ -609,7 +610,7 @@ static int renew_rest(sd_sparse *lu, const sd_matrix *matrix)
 int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 {
     if (lu->fronts)
-        return !factor_fronts(lu, matrix, own_threshold(lu, UNHEALTHY));
+        return !factor_fronts(lu, matrix, WEAK);
     if (!provide_numbers(lu))
         return 1;
     int failed = 0;
