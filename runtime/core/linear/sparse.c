@@ -11,7 +11,7 @@
 #include <string.h>
 
 #define THRESHOLD 0.1   /* a sparser row may pivot if its entry is this close to the largest */
-#define WEAK 0.01       /* fronts bear later pivots down to this part: inverses of triangles grow, substitution does not */
+#define FADED 0.01       /* fronts bear later pivots down to this part: inverses of triangles grow, substitution does not */
 #define FAINT_PIVOT 1e-7 /* and a column's own one of quasi-definite matrices, whose factors any of them has: refined once or
                           * twice their solutions are as good (those of 4650 masses at random: a fifth of the time) */
 #define ROOM 2          /* entries of a factor for each of the matrix: room for them */
@@ -610,7 +610,7 @@ static int renew_rest(sd_sparse *lu, const sd_matrix *matrix)
 int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 {
     if (lu->fronts)
-        return !factor_fronts(lu, matrix, WEAK);
+        return !factor_fronts(lu, matrix, FADED);
     if (!provide_numbers(lu))
         return 1;
     int failed = 0;
