@@ -29,6 +29,25 @@ static void leave_search_of(search *s)
     free(s->start), free(s->touched), free(s->row_at), free(s->entry);
 }
 
+static void sort_entries(search *s, const sd_matrix *matrix)
+{
+    for (int32_t c = 0; c < s->n; c++)
+        for (int32_t e = matrix->column[c]; e < matrix->column[c + 1]; e++) {
+            int32_t p = s->row_at[matrix->row[e]], q = s->column_at[c];
+            s->first[(p < q ? p : q) + 1]++;
+        }
+    for (int32_t k = 0; k < s->n; k++)
+        s->first[k + 1] += s->first[k];
+    memcpy(s->mark, s->first, (size_t)s->n * sizeof *s->mark);
+    for (int32_t c = 0; c < s->n; c++)
+        for (int32_t e = matrix->column[c]; e < matrix->column[c + 1]; e++) {
+            int32_t p = s->row_at[matrix->row[e]], q = s->column_at[c], at = s->mark[p < q ? p : q]++;
+            s->entry[at] = e;
+            s->far[at] = p < q ? ~q : p;
+        }
+    memset(s->mark, 0, (size_t)s->n * sizeof *s->mark);
+}
+
 /* 0: no memory */
 static int begin_search(search *s, int32_t n, const sd_matrix *matrix, const int32_t *order, const int32_t *own)
 {
@@ -51,26 +70,8 @@ static int begin_search(search *s, int32_t n, const sd_matrix *matrix, const int
         s->column_at[order[k]] = k;
         s->row_at[own ? own[order[k]] : order[k]] = k;
     }
+    sort_entries(s, matrix);
     return 1;
-}
-
-static void sort_entries(search *s, const sd_matrix *matrix)
-{
-    for (int32_t c = 0; c < s->n; c++)
-        for (int32_t e = matrix->column[c]; e < matrix->column[c + 1]; e++) {
-            int32_t p = s->row_at[matrix->row[e]], q = s->column_at[c];
-            s->first[(p < q ? p : q) + 1]++;
-        }
-    for (int32_t k = 0; k < s->n; k++)
-        s->first[k + 1] += s->first[k];
-    memcpy(s->mark, s->first, (size_t)s->n * sizeof *s->mark);
-    for (int32_t c = 0; c < s->n; c++)
-        for (int32_t e = matrix->column[c]; e < matrix->column[c + 1]; e++) {
-            int32_t p = s->row_at[matrix->row[e]], q = s->column_at[c], at = s->mark[p < q ? p : q]++;
-            s->entry[at] = e;
-            s->far[at] = p < q ? ~q : p;
-        }
-    memset(s->mark, 0, (size_t)s->n * sizeof *s->mark);
 }
 
 /* the position of a sorted entry that is the later one */
@@ -190,7 +191,7 @@ static int place_fronts(sd_fronts *f, const search *s, int32_t *by)
     for (int32_t p = 0, i = 0; p < f->n; i++) {
         int32_t k = by[p];
         sd_front *front = &f->front[i];
-        *front = (sd_front){.first = p, .many = s->many[k], .wide = wide(s, k)};
+        *front = (sd_front){.first = p, .many = s->many[k], .wide = wide(s, k), .up = -1, .child = -1};
         front->behind = (int32_t)behind;
         front->at = (int32_t)numbers;
         numbers += (int64_t)(front->many + whole_line(front->many)) * lines_of(front);
@@ -224,10 +225,8 @@ static int list_fronts(sd_fronts *f, search *s, const int32_t *by)
     for (int32_t k = 0; k < n; k++)
         for (int64_t p = s->start[k]; p < s->start[k + 1] && s->into[k] == k; p++)
             who[next[s->moved[s->touched[p]]]++] = by[s->moved[k]];
-    for (int32_t i = 0; i < f->fronts; i++) {
+    for (int32_t i = 0; i < f->fronts; i++)
         next[i] = f->front[i].behind;
-        f->front[i].up = -1;
-    }
     for (int32_t p = 0; p < n; p++)
         for (int32_t w = start[p]; w < start[p + 1]; w++) {
             sd_front *front = &f->front[who[w]];
@@ -252,8 +251,6 @@ static int32_t place_entries(sd_fronts *f, const search *s, const sd_front *fron
 /* Who is below whom, and on which of two stacks what a front leaves waits for the one above: on the other one than that's. */
 static void order_fronts(sd_fronts *f)
 {
-    for (int32_t i = 0; i < f->fronts; i++)
-        f->front[i].child = -1;
     for (int32_t i = f->fronts - 1; i >= 0; i--) {
         sd_front *front = &f->front[i];
         front->side = front->up < 0 ? 0 : !f->front[front->up].side;
@@ -344,23 +341,19 @@ sd_fronts *sd_fronts_new(int32_t n, const sd_matrix *matrix, const int32_t *orde
 {
     search s = {0};
     sd_fronts *f = NULL;
-    if (matrix->column[n] <= CROWDED * (int64_t)n)
-        return NULL;
-    if (begin_search(&s, n, matrix, order, own)) {
-        sort_entries(&s, matrix);
-        int64_t products = 0, entries = n;
-        if (close_pattern(&s)) {
-            for (int32_t k = 0; k < n; k++) {
-                products += (int64_t)wide(&s, k) * wide(&s, k);
-                entries += 2 * wide(&s, k);
-            }
-            amalgamate(&s);
-            f = products < FILLS * entries || (most > 0 && entries > most) ? NULL : fronts_of(&s, matrix, order, own);
-        }
-        if (f) {
-            f->products = products;
-            f->entries = entries;
-        }
+    int64_t products = 0, entries = n;
+    int known = matrix->column[n] > CROWDED * (int64_t)n && begin_search(&s, n, matrix, order, own) && close_pattern(&s);
+    for (int32_t k = 0; known && k < n; k++) {
+        products += (int64_t)wide(&s, k) * wide(&s, k);
+        entries += 2 * wide(&s, k);
+    }
+    if (known && products >= FILLS * entries && (most <= 0 || entries <= most)) {
+        amalgamate(&s);
+        f = fronts_of(&s, matrix, order, own);
+    }
+    if (f) {
+        f->products = products;
+        f->entries = entries;
     }
     leave_search_of(&s);
     return f;

@@ -11,7 +11,7 @@
 #include <string.h>
 
 #define THRESHOLD 0.1   /* a sparser row may pivot if its entry is this close to the largest */
-#define FADED 0.01       /* fronts bear later pivots down to this part: inverses of triangles grow, substitution does not */
+#define FADED 0.01      /* fronts bear later pivots down to this part: inverses of triangles grow, substitution does not */
 #define FAINT_PIVOT 1e-7 /* and a column's own one of quasi-definite matrices, whose factors any of them has: refined once or
                           * twice their solutions are as good (those of 4650 masses at random: a fifth of the time) */
 #define ROOM 2          /* entries of a factor for each of the matrix: room for them */
@@ -180,15 +180,10 @@ void sd_sparse_lend(sd_sparse *lu, sd_number *x)
     lu->lent = 1;
 }
 
-static void rest_columns(sd_sparse *lu)
+void sd_sparse_rest(sd_sparse *lu)
 {
     free(lu->l_value), free(lu->u_value), free(lu->inverse);
     lu->l_value = lu->u_value = lu->inverse = NULL;
-}
-
-void sd_sparse_rest(sd_sparse *lu)
-{
-    rest_columns(lu);
     if (lu->fronts)
         sd_fronts_rest(lu->fronts);
 }
@@ -459,7 +454,15 @@ static int factor_fronts(sd_sparse *lu, const sd_matrix *matrix, double least)
     return lu->pivoted = lu->smallest >= least;
 }
 
-/* The same where rows pivot in their own columns, if the factors fill and that is right; if not, never again. */
+/* fronts that do not serve, or are worth nothing, are never made again */
+static void leave_fronts(sd_sparse *lu)
+{
+    sd_fronts_free(lu->fronts);
+    lu->fronts = NULL;
+    lu->no_fronts = 1;
+}
+
+/* factor_fronts where rows pivot in their own columns, if the factors fill and that is right */
 static int by_fronts(sd_sparse *lu, const sd_matrix *matrix)
 {
     if (lu->no_fronts || lu->paired != 1 || lu->idle || lu->null_pivot != 0.0 || lu->dropped != 0.0)
@@ -472,9 +475,7 @@ static int by_fronts(sd_sparse *lu, const sd_matrix *matrix)
         lu->entries = lu->fronts->entries;
         return 1;
     }
-    lu->no_fronts = 1;
-    sd_fronts_free(lu->fronts);
-    lu->fronts = NULL;
+    leave_fronts(lu);
     return 0;
 }
 
@@ -609,8 +610,12 @@ static int renew_rest(sd_sparse *lu, const sd_matrix *matrix)
 
 int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 {
-    if (lu->fronts)
-        return !factor_fronts(lu, matrix, FADED);
+    if (lu->fronts && factor_fronts(lu, matrix, FADED))
+        return 0;
+    if (lu->fronts) {
+        leave_fronts(lu);
+        return 1;
+    }
     if (!provide_numbers(lu))
         return 1;
     int failed = 0;
