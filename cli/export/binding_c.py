@@ -23,13 +23,13 @@ HERE = Path(__file__).parent
 CORE = Path(core.__path__[0])
 ASSEMBLY = ("system/model.h", "linear/lanes.h", "system/assembly.h", "system/assembly.c")
 ALGEBRA = (
-    "linear/number.h", "linear/elimination.h", "linear/machine_code.h", "linear/linear.h", "linear/matrix.h",
-    "linear/sparse.h", "linear/fronts.h", "linear/front_lanes.h",
+    "linear/number.h", "linear/sums.h", "linear/elimination.h", "linear/machine_code.h", "linear/linear.h",
+    "linear/matrix.h", "linear/sparse.h", "linear/fronts.h", "linear/front_lanes.h",
     "system/settle.h", "steppers/stepper.h", "steppers/underlying.h",
-    "linear/machine_code.c", "linear/elimination_order.c", "linear/elimination.c", "linear/linear.c",
+    "linear/sums.c", "linear/machine_code.c", "linear/elimination_order.c", "linear/elimination.c", "linear/linear.c",
     "linear/blocks.h", "linear/dense_rest.h", "linear/told.h", "linear/chains.h",
     "linear/substitute.h", "linear/sparse.c", "linear/front_pattern.c", "linear/fronts.c",
-    "steppers/underlying.c",
+    "steppers/straight_slopes.c", "steppers/underlying.c",
 )  # fmt: skip
 A_LINE = 16
 """Numbers in a line."""

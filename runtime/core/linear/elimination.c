@@ -27,20 +27,13 @@ static int32_t size_of(const sd_elimination *e, int32_t k) { return e->factors +
 static int32_t growth_of(const sd_elimination *e, int32_t k) { return e->factors + 3 * e->n + k; }
 static int32_t constants(const sd_elimination *e) { return e->factors + 4 * e->n; }
 
-static void clear(sd_list *list)
-{
-    free(list->sum);
-    free(list->pair);
-    *list = (sd_list){0};
-}
-
 static void drop_order(sd_elimination *e)
 {
     e->ready = 0;
     sd_code_free(e->code);
     e->code = NULL;
-    clear(&e->factor);
-    clear(&e->solve);
+    sd_list_clear(&e->factor);
+    sd_list_clear(&e->solve);
     free(e->cell);
     e->cell = NULL;
 }
@@ -107,49 +100,15 @@ sd_elimination *sd_elimination_new(int32_t n, const int32_t *column, const int32
 
 /* --- the lists -------------------------------------------------------------------------------------------------- */
 
-/* room for one more, doubled when it is used up.  0; 2: no memory */
-static int widen(void **items, int32_t used, int32_t *room, size_t size)
-{
-    if (used < *room)
-        return 0;
-    int32_t more = *room ? 2 * *room : 64;
-    void *moved = realloc(*items, (size_t)more * size);
-    if (!moved)
-        return 2;
-    *items = moved;
-    *room = more;
-    return 0;
-}
-
-static int add_pair(sd_list *list, int32_t a, int32_t b)
-{
-    if (widen((void **)&list->pair, list->pairs, &list->pair_room, 2 * sizeof(int32_t)))
-        return 2;
-    list->pair[2 * list->pairs] = a;
-    list->pair[2 * list->pairs + 1] = b;
-    list->pairs++;
-    return 0;
-}
-
-/* ends a sum whose pairs are those behind the last one's */
-static int add_sum(sd_list *list, enum sd_sum_kind kind, int32_t target, int32_t source, int32_t by)
-{
-    if (widen((void **)&list->sum, list->sums, &list->room, sizeof(sd_sum)))
-        return 2;
-    int32_t first = list->sums ? list->sum[list->sums - 1].last : 0;
-    list->sum[list->sums++] = (sd_sum){kind, target, source, by, first, list->pairs};
-    return 0;
-}
-
 /* the factor at pivot places (i, k): its entry less products of what is left of it, at places `left`, and above it */
 static int list_factor(sd_elimination *e, const int32_t *cell, const int32_t *source, const int32_t *left, int32_t i, int32_t k)
 {
     int32_t n = e->n, failed = 0;
     for (; *left < i && *left < k; left++)
         if (cell[*left * n + k] >= 0)
-            failed |= add_pair(&e->factor, cell[i * n + *left], cell[*left * n + k]);
+            failed |= sd_list_pair(&e->factor, cell[i * n + *left], cell[*left * n + k]);
     enum sd_sum_kind kind = k < i ? SD_SUM_TIMES : k == i ? SD_SUM_INVERSE : SD_SUM_PLAIN;
-    return failed | add_sum(&e->factor, kind, cell[i * n + k], source[i * n + k], cell[k * n + k]);
+    return failed | sd_list_sum(&e->factor, kind, cell[i * n + k], source[i * n + k], cell[k * n + k]);
 }
 
 /* row i of the factors, its size before and the growth of its multipliers; left [n + 1]: work */
@@ -158,8 +117,8 @@ static int list_row(sd_elimination *e, const int32_t *cell, const int32_t *sourc
     int32_t n = e->n, failed = 0, filled = 0;
     for (int32_t k = 0; k < n; k++)
         if (source[i * n + k] >= 0)
-            failed |= add_pair(&e->factor, source[i * n + k], magnitude(e, k));
-    failed |= add_sum(&e->factor, SD_SUM_LARGEST, size_of(e, i), -1, -1);
+            failed |= sd_list_pair(&e->factor, source[i * n + k], magnitude(e, k));
+    failed |= sd_list_sum(&e->factor, SD_SUM_LARGEST, size_of(e, i), -1, -1);
     for (int32_t k = 0; k < n; k++)
         if (cell[i * n + k] >= 0)
             left[filled++] = k;
@@ -167,8 +126,8 @@ static int list_row(sd_elimination *e, const int32_t *cell, const int32_t *sourc
     for (int32_t f = 0; f < filled; f++)
         failed |= list_factor(e, cell, source, left, i, left[f]);
     for (int32_t f = 0; left[f] < i; f++)
-        failed |= add_pair(&e->factor, cell[i * n + left[f]], size_of(e, left[f]));
-    return failed | add_sum(&e->factor, SD_SUM_LARGEST, growth_of(e, i), -1, -1);
+        failed |= sd_list_pair(&e->factor, cell[i * n + left[f]], size_of(e, left[f]));
+    return failed | sd_list_sum(&e->factor, SD_SUM_LARGEST, growth_of(e, i), -1, -1);
 }
 
 static int list_solution(sd_elimination *e, const int32_t *cell)
@@ -177,14 +136,14 @@ static int list_solution(sd_elimination *e, const int32_t *cell)
     for (int32_t i = 0; i < n; i++) {
         for (int32_t k = 0; k < i; k++)
             if (cell[i * n + k] >= 0)
-                failed |= add_pair(&e->solve, cell[i * n + k], right(e, k));
-        failed |= add_sum(&e->solve, SD_SUM_PLAIN, right(e, i), e->inside + e->pivot_row[i], -1);
+                failed |= sd_list_pair(&e->solve, cell[i * n + k], right(e, k));
+        failed |= sd_list_sum(&e->solve, SD_SUM_PLAIN, right(e, i), e->inside + e->pivot_row[i], -1);
     }
     for (int32_t i = n - 1; i >= 0; i--) {
         for (int32_t k = i + 1; k < n; k++)
             if (cell[i * n + k] >= 0)
-                failed |= add_pair(&e->solve, cell[i * n + k], e->inside + e->pivot_column[k]);
-        failed |= add_sum(&e->solve, SD_SUM_TIMES, e->inside + e->pivot_column[i], right(e, i), cell[i * n + i]);
+                failed |= sd_list_pair(&e->solve, cell[i * n + k], e->inside + e->pivot_column[k]);
+        failed |= sd_list_sum(&e->solve, SD_SUM_TIMES, e->inside + e->pivot_column[i], right(e, i), cell[i * n + i]);
     }
     return failed;
 }
@@ -267,6 +226,7 @@ static void prepare(sd_elimination *e)
         return;
     }
     measure_columns(e);
+    e->prepared++;
     e->ready = e->scaled = 1; /* its magnitudes are still to be written */
     write_constants(e->cell + constants(e));
     e->interpreted = 0;
@@ -279,7 +239,7 @@ static SD_APART void write_code(sd_elimination *e)
     int64_t before = e->interpreted, due = sd_code_early() ? 0 : TWICE * operations;
     e->interpreted += operations;
     if (before <= due && e->interpreted > due)
-        e->code = sd_code_new(&e->factor, &e->solve, e->inside, NUMBERS);
+        e->code = sd_code_new(&e->factor, &e->solve, (const int32_t[]){e->inside, INT32_MAX, INT32_MAX}, NUMBERS);
 }
 
 /* Who learns of a matrix that no order served: one that has none yet, or that served longest ago. */
@@ -350,8 +310,7 @@ static void interpret(sd_elimination *e, const sd_list *list, const sd_number *o
         cell[sum->target] = sum_of(sum, list->pair, cell);
 }
 
-/* multipliers are moderate, and what is left of each pivot's column is more than round-off */
-static int healthy(const sd_elimination *e)
+int sd_elimination_healthy(const sd_elimination *e)
 {
     const sd_number *inverse = e->cell, *size = e->cell + size_of(e, 0), *growth = e->cell + growth_of(e, 0);
     const sd_number *scale = e->cell + magnitude(e, 0);
@@ -390,10 +349,10 @@ static int factor(sd_elimination *e, const sd_number *values, const double *scal
     if (!e->code)
         write_code(e);
     if (e->code)
-        e->code->factor((sd_number *)values, e->cell);
+        e->code->factor((sd_number *)values, e->cell, NULL, NULL);
     else
         interpret(e, &e->factor, values, e->entries);
-    return healthy(e);
+    return sd_elimination_healthy(e);
 }
 
 int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale)
@@ -413,7 +372,7 @@ void sd_elimination_solve(sd_elimination *elimination, sd_number *x)
 {
     sd_elimination *e = elimination->serves;
     if (e->code) {
-        e->code->solve(x, e->cell);
+        e->code->solve(x, e->cell, NULL, NULL);
         return;
     }
     interpret(e, &e->solve, x, e->n);

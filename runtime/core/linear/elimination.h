@@ -11,6 +11,7 @@
 #define SYSDYN_ELIMINATION_H
 
 #include "linear/number.h"
+#include "linear/sums.h"
 
 #include <stdint.h>
 
@@ -19,27 +20,11 @@
 #define SD_SAMPLES 6    /* matrices of which an order is found */
 #define SD_ORDERS 4     /* that are kept, where solutions are corrections that the next ones correct */
 
-/* how the target of a sum is made of S = source - sum over pairs of a b */
-enum sd_sum_kind { SD_SUM_PLAIN, SD_SUM_TIMES, SD_SUM_INVERSE, SD_SUM_LARGEST }; /* S; S times the cell `by`; 1 / S; largest |a b| */
-
-/* one operation; places below `inside` are cells, others those of the caller's array (for the interpreter it stands behind
- * the cells); source -1: 0 */
-typedef struct sd_sum {
-    int32_t kind, target, source, by, first, last; /* its pairs [first, last) */
-} sd_sum;
-
-typedef struct sd_list {
-    int32_t sums, pairs, room, pair_room;
-    sd_sum *sum;
-    int32_t *pair;               /* [pairs][2] places a, b */
-} sd_list;
-
-typedef struct sd_code sd_code;
-
 typedef struct sd_elimination sd_elimination;
 struct sd_elimination {
     int32_t n, entries;
     const int32_t *column, *row; /* pattern, compressed columns, of the caller */
+    int64_t prepared;            /* orders found so far */
     int32_t ready, scaled;       /* an order was found; the magnitudes of its columns are not all one */
     int32_t factors, inside;     /* cells of factors; of all */
     int32_t samples, seen;
@@ -52,7 +37,7 @@ struct sd_elimination {
     double *weak;                /* [n] least size of each pivot, scaled, as its column was when the order was found */
     sd_list factor, solve;
     int64_t interpreted;         /* operations so far */
-    sd_code *code;               /* NULL: interpreted */
+    struct sd_code *code;        /* NULL: interpreted */
     sd_elimination *other;       /* with another order; NULL: there is none */
     int32_t orders;              /* of the first: that it keeps at most, SD_ORDERS or as its owner says */
     sd_elimination *serves;      /* of the first: the one whose factors were the last that served */
@@ -70,6 +55,9 @@ void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled);
 int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale);
 /* x [n]: right side in, solution out */
 void sd_elimination_solve(sd_elimination *elimination, sd_number *x);
+
+/* multipliers of the newest factors are moderate, and what is left of each pivot's column is more than round-off */
+int sd_elimination_healthy(const sd_elimination *elimination);
 
 /* elimination_order.c: pivots of the newest `samples` matrices, and the filled pattern: entry [n][n] by columns, of the
  * caller.  0: found; 1: there is no such order; 2: no memory */

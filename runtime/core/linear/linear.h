@@ -88,6 +88,9 @@ int32_t *sd_linear_pivoted(sd_linear *linear);
 /* small matrices, of which there will be many, are eliminated by a list of operations (elimination.h) where it serves; the
  * pivots of others are chosen as before */
 void sd_linear_replayed(sd_linear *linear);
+/* The cells of `elimination` (which keeps one order) hold new factors, made by who runs its lists himself.  1: they are healthy, and
+ * serve; 0: nothing changes. */
+int sd_linear_in_cells(sd_linear *linear);
 /* as new, but for the lists that served: for another run on matrices of the same kind */
 void sd_linear_again(sd_linear *linear);
 

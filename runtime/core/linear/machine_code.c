@@ -33,7 +33,8 @@ int sd_code_early(void)
 #define NEVER INT32_MAX
 #define REGISTERS 16
 
-enum place_of { CELL = 6, OUTSIDE = 7 }; /* rsi, rdi */
+/* where the arrays stand: rsi, rdi, rdx, rcx */
+static const uint8_t base[SD_ARRAYS] = {6, 7, 2, 1};
 /* registers xmm: three to work in, two constants, and those that keep numbers of places */
 enum place { PRODUCT = 0, OTHER = 1, TURNED = 2, CONSTANT = 3, MASK = 4, KEPT = 5 };
 enum prefix { PACKED = 1, SCALAR = 3 };
@@ -47,7 +48,8 @@ enum operation {
 typedef struct writer {
     uint8_t *at;
     const sd_list *list;
-    int32_t inside, size;                     /* bytes of a number */
+    const int32_t *end;                       /* of the places of each array but the last */
+    int32_t size;                             /* bytes of a number */
     enum sd_numbers numbers;
     int32_t held[REGISTERS], next[REGISTERS]; /* place that a register keeps, -1: none; the sum that uses it next */
     int32_t *where;                           /* of a place: its register, 0: none */
@@ -78,10 +80,12 @@ static inline void registers(writer *w, enum prefix prefix, enum operation opera
 /* target := first operation what is at a place, or its imaginary part; first 0 where there is none */
 static inline void memory(writer *w, enum prefix prefix, enum operation operation, int target, int first, int32_t place, int imaginary)
 {
-    int inside = place < w->inside;
-    int32_t distance = (inside ? place : place - w->inside) * w->size + 8 * imaginary;
+    int array = 0;
+    while (array < SD_ARRAYS - 1 && place >= w->end[array])
+        array++;
+    int32_t distance = (array ? place - w->end[array - 1] : place) * w->size + 8 * imaginary;
     begin(w, prefix, operation, (unsigned)target, (unsigned)first, 0);
-    w->at[4] = (uint8_t)(0x80 | (target & 7) << 3 | (inside ? CELL : OUTSIDE));
+    w->at[4] = (uint8_t)(0x80 | (target & 7) << 3 | base[array]);
     memcpy(w->at + 5, &distance, sizeof distance);
     w->at += 9;
 }
@@ -324,14 +328,15 @@ static size_t room_of(const sd_list *list)
 }
 
 /* 0: both lists are written.  What was executed there before was so long ago: the processor has nothing of it on its way */
-static int write_lists(sd_code *code, const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers)
+static int write_lists(sd_code *code, const sd_list *factor, const sd_list *solve, const int32_t *end, enum sd_numbers numbers)
 {
+    const int32_t inside = end[0];
     int32_t places = places_of(factor, places_of(solve, inside)), pairs = factor->pairs > solve->pairs ? factor->pairs : solve->pairs;
     int32_t sums = factor->sums > solve->sums ? factor->sums : solve->sums;
     int32_t *work = malloc((size_t)(places + 2 * pairs + 3 * sums) * sizeof *work + 1);
     if (!work)
         return 1;
-    writer w = {.at = code->written, .inside = inside, .size = numbers == SD_COMPLEX_NUMBERS ? 16 : 8, .numbers = numbers,
+    writer w = {.at = code->written, .end = end, .size = numbers == SD_COMPLEX_NUMBERS ? 16 : 8, .numbers = numbers,
                 .where = work, .after = work + places};
     write_list(&w, factor, places, inside - 2);
     const uint8_t *start = code->run, *next = code->run + (w.at - code->written);
@@ -410,11 +415,11 @@ static sd_code *pages(size_t size)
     return new_pages(size);
 }
 
-sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers)
+sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, const int32_t *end, enum sd_numbers numbers)
 {
     size_t size = (room_of(factor) + room_of(solve) + 4095) / 4096 * 4096;
     sd_code *code = permitted && __builtin_cpu_supports("avx") ? pages(size > LEAST ? size : LEAST) : NULL;
-    if (code && write_lists(code, factor, solve, inside, numbers)) {
+    if (code && write_lists(code, factor, solve, end, numbers)) {
         sd_code_free(code);
         return NULL;
     }
@@ -432,9 +437,9 @@ void sd_code_free(sd_code *code)
         give_back(code);
 }
 #else
-sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers)
+sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, const int32_t *end, enum sd_numbers numbers)
 {
-    (void)factor, (void)solve, (void)inside, (void)numbers, (void)permitted;
+    (void)factor, (void)solve, (void)end, (void)numbers, (void)permitted;
     return NULL;
 }
 

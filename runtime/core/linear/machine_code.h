@@ -1,4 +1,4 @@
-/* A list of sums (elimination.h) as straight machine code: x86-64 with AVX, the calling convention of Linux; elsewhere
+/* A list of sums (sums.h) as straight machine code: x86-64 with AVX, the calling convention of Linux; elsewhere
  * there is none.
  *
  * What is written are moves, products, differences and quotients of doubles at fixed distances from two pointers, and the
@@ -12,25 +12,28 @@
 #ifndef SYSDYN_MACHINE_CODE_H
 #define SYSDYN_MACHINE_CODE_H
 
-#include "linear/elimination.h"
+#include "linear/sums.h"
 
 #include <stddef.h>
 
 enum sd_numbers { SD_REAL_NUMBERS, SD_COMPLEX_NUMBERS };
 
-/* of the numbers outside and those of the cells */
-typedef void sd_run_code(void *outside, void *cell);
+/* of the numbers outside and those of the cells; others: two more arrays outside, where lists name places there */
+typedef void sd_run_code(void *outside, void *cell, void *other, void *last);
 
-struct sd_code {
-    sd_run_code *factor, *solve;
+typedef struct sd_code {
+    sd_run_code *factor, *solve; /* the first list and the second */
     uint8_t *written, *run; /* the pages [size] at their two addresses */
     size_t size;
     int forks;              /* of the process before they were made */
-};
+} sd_code;
 
-/* inside: as in elimination.h; the last two cells are a constant (real: 1; complex: the sign of an imaginary part) and the
- * bits of magnitudes.  NULL where there is none. */
-sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, int32_t inside, enum sd_numbers numbers);
+#define SD_ARRAYS 4 /* the cells, and those outside in the order of arguments */
+
+/* end [SD_ARRAYS - 1]: places before the first are cells, as in elimination.h, before the next of the first array outside,
+ * and so on (INT32_MAX: there is none behind it); the last two cells are a constant (real: 1; complex: the sign of an imaginary
+ * part) and the bits of magnitudes.  NULL where there is none. */
+sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, const int32_t *end, enum sd_numbers numbers);
 void sd_code_free(sd_code *code);
 /* from now on lists are interpreted (0), written where that pays (1), or at once (2; tests) */
 void sd_code_allow(int allowed);

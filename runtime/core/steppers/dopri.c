@@ -171,37 +171,28 @@ static int slopes(sd_dopri *dopri, int s, int before, double t)
     return cause;
 }
 
-/* where the coefficients behind the first begin: zeros follow it in most formulas */
-static inline int begin_of(int terms, const double *a)
-{
-    int from = 1;
-    while (from < terms && a[from] == 0.0)
-        from++;
-    return from;
-}
-
 /* in whole lanes: behind its unknowns every array has room for them, where nothing but zeros comes to stand */
 SD_WIDE void sd_dopri_add_up(int32_t n, int terms, const double *a, double *const *k, double *sum)
 {
-    const int from = begin_of(terms, a);
     for (int32_t i = 0; i < n; i += SD_LANES) {
         sd_lanes total = {0.0};
         if (terms)
             total = a[0] * SD_FROM(k[0], i);
-        for (int j = from; j < terms; j++)
+        for (int j = SD_DOPRI_NEXT; j < terms; j++)
             total += a[j] * SD_FROM(k[j], i);
         SD_AT(sum, i) = total;
     }
 }
 
-/* y [n] := y0 + h times the sum of a_j k_j: two lanes at a time read the coefficients once */
-static SD_WIDE void lead(int32_t n, int terms, const double *a, double *const *k, double h, const double *y0, double *y)
+/* y [n] := y0 + h times the sum of a_sj k_j: two lanes at a time read the coefficients once */
+static SD_WIDE void lead(int32_t n, int s, double *const *k, double h, const double *y0, double *y)
 {
-    const int from = begin_of(terms, a);
+    const double *a = sd_dopri_a[s];
+    const int from = sd_dopri_next[s];
     for (int32_t i = 0; i < n; i += 2 * SD_LANES) {
         const int32_t i2 = i + SD_LANES < n ? i + SD_LANES : i;
         sd_lanes one = a[0] * SD_FROM(k[0], i), two = a[0] * SD_FROM(k[0], i2);
-        for (int j = from; j < terms; j++) {
+        for (int j = from; j < s; j++) {
             one += a[j] * SD_FROM(k[j], i);
             two += a[j] * SD_FROM(k[j], i2);
         }
@@ -212,7 +203,7 @@ static SD_WIDE void lead(int32_t n, int terms, const double *a, double *const *k
 
 void sd_dopri_combine(sd_dopri *dopri, int s, double h)
 {
-    lead(dopri->n, s, sd_dopri_a[s], dopri->rate, h, dopri->y[0], dopri->y[s]);
+    lead(dopri->n, s, dopri->rate, h, dopri->y[0], dopri->y[s]);
 }
 
 /* local error in the weights, from the embedded formulas of orders 5 and 3 */

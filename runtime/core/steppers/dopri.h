@@ -19,6 +19,8 @@
 extern const double sd_dopri_c[SD_DOPRI_ALL], sd_dopri_a[SD_DOPRI_ALL][SD_DOPRI_ALL];
 extern const double sd_dopri_e3[SD_DOPRI_STAGES], sd_dopri_e5[SD_DOPRI_STAGES];
 extern const double sd_dopri_d[SD_DOPRI_DENSE - 3][SD_DOPRI_ALL];
+extern const int sd_dopri_next[SD_DOPRI_ALL]; /* of each row of a: the first behind the leading one that is not zero */
+#define SD_DOPRI_NEXT 5                       /* the same of e3, e5 and d */
 
 typedef struct sd_dopri {
     sd_system *system;        /* form 0 */
@@ -51,7 +53,7 @@ void sd_dopri_free(sd_dopri *dopri);
 sd_stepper *sd_dopri_stepper(sd_dopri *dopri);
 void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd, double h);
 int sd_dopri_step(sd_dopri *dopri);
-/* sum [n] := of the first `terms` of a_j k_j */
+/* sum [n] := of the first `terms` of a_j k_j, where a is a row of e3, e5 or d */
 void sd_dopri_add_up(int32_t n, int terms, const double *a, double *const *k, double *sum);
 /* point of stage s of a step h: y0 + h sum a_sj k_j */
 void sd_dopri_combine(sd_dopri *dopri, int s, double h);

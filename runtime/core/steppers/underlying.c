@@ -23,7 +23,7 @@ sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
         return NULL;
     size_t nnz = (size_t)system->entries + 1;
     size_t n = (size_t)(system->rows > system->unknowns ? system->rows : system->unknowns) + 1;
-    u->memory = calloc((size_t)linear->entries + 1 + 3 * n, sizeof(double));
+    u->memory = calloc((size_t)linear->entries + 1 + 2 * n, sizeof(double));
     u->place_y = calloc(2 * nnz, sizeof(int32_t));
     if (!u->memory || !u->place_y) {
         sd_underlying_free(u);
@@ -40,8 +40,7 @@ sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
     u->n = system->unknowns;
     u->first = system->kinematics;
     u->solved = linear->n;
-    u->r = u->memory;
-    u->step = u->r + n;
+    u->step = u->memory;
     u->rest = u->step + n;
     u->values = u->rest + n;
     return u;
@@ -52,7 +51,8 @@ void sd_underlying_free(sd_underlying *underlying)
     if (!underlying)
         return;
     free(underlying->place_y);
-    free(underlying->written);
+    sd_straight_free(underlying->straight);
+    free(underlying->r);
     free(underlying->list);
     free(underlying->from);
     free(underlying->memory);
@@ -102,11 +102,13 @@ static int find_places(sd_underlying *u)
 {
     const sd_system *system = u->matrix;
     const int32_t none = written_by(system), entries = u->linear->entries;
-    u->written = calloc((size_t)none + 1, sizeof *u->written);
+    u->r = calloc((size_t)(u->system->rows + 1 + none + 3 + entries), sizeof *u->r);
     u->from = malloc(((size_t)entries + 2 * (size_t)none + 1) * sizeof *u->from);
     u->list = malloc((2 * (size_t)system->calls + 1) * sizeof *u->list);
-    if (!u->written || !u->from || !u->list)
+    if (!u->r || !u->from || !u->list)
         return SD_MEMORY;
+    u->written = u->r + u->system->rows + 1;
+    u->writes = none;
     u->more = u->from + entries;
     for (int32_t e = 0; e < system->entries; e++)
         u->place_y[e] = u->place_yd[e] = entries;
@@ -126,13 +128,18 @@ static int find_places(sd_underlying *u)
     return SD_FINE;
 }
 
+static inline void write_entries(const sd_underlying *u, double t, const double *y, const double *yd)
+{
+    for (const sd_written *list = u->list, *end = list + u->lists; list < end; list++)
+        list->block(list->frame, t, y, yd, list->to);
+}
+
 /* u->values := the matrix at (t, y, yd) */
 static void evaluate_matrix(sd_underlying *u, double t, const double *y, const double *yd)
 {
     const sd_system *system = u->matrix;
     double *const values = u->values, *const written = u->written;
-    for (const sd_written *list = u->list, *end = list + u->lists; list < end; list++)
-        list->block(list->frame, t, y, yd, list->to);
+    write_entries(u, t, y, yd);
     const int32_t *const from = u->from, *const more = u->more, entries = u->linear->entries;
     for (int32_t e = 0; e < entries; e++)
         values[e] = written[from[e]];
@@ -151,8 +158,6 @@ static int factorise(sd_underlying *u, double t, const double *y, const double *
 {
     u->ready = 0;
     u->matrix->jacobian_evaluations++;
-    if (!u->placed && find_places(u))
-        return SD_MEMORY;
     evaluate_matrix(u, t, y, yd);
     if (*u->system->stop)
         return SD_STOPPED;
@@ -213,23 +218,49 @@ static int no_number(sd_underlying *u, double t, const double *y, const double *
     return bad >= 0 || !cause ? SD_NONFINITE : cause;
 }
 
+/* z := 0, and q' = f */
+static void clear(const sd_underlying *u, double *y, double *yd)
+{
+    double *const of[] = {y, yd};
+    for (int32_t j = 0; j < u->solved; j++)
+        of[u->rate[j] > 0][u->unknown[j]] = 0.0;
+    kinematics(u, y, yd);
+}
+
+/* the same as machine code, of which the rows at z = 0 are known.  0: it does not serve here */
+static int straight_on(sd_underlying *u, const sd_straight *straight, double t, double *y, double *yd)
+{
+    u->matrix->jacobian_evaluations++;
+    write_entries(u, t, y, yd);
+    if (!*u->system->stop && sd_straight_solve(straight, u, y, yd))
+        return u->ready = 1;
+    clear(u, y, yd);
+    return 0;
+}
+
 /* slopes where z is linear: of the rows at z = 0 */
 static int at_once(sd_underlying *u, double t, double *y, double *yd)
 {
-    double *const of[] = {y, yd};
-    const int32_t *const rate = u->rate, *const unknown = u->unknown, solved = u->solved;
-    for (int32_t j = 0; j < solved; j++)
-        of[rate[j] > 0][unknown[j]] = 0.0;
-    kinematics(u, y, yd);
-    sd_residual(u->applied, t, y, yd, u->r);
+    const sd_straight *straight = sd_straight_of(u);
+    if (straight) {
+        sd_straight_clear(straight, u, y, yd);
+        u->applied->residual_evaluations++;
+        sd_add_rows(u->applied, t, y, yd, u->r);
+    } else {
+        clear(u, y, yd);
+        sd_residual(u->applied, t, y, yd, u->r);
+    }
     if (*u->system->stop)
         return SD_STOPPED;
+    if (straight && straight_on(u, straight, t, y, yd))
+        return SD_FINE;
     int cause = factorise(u, t, y, yd);
     const double *off = cause ? NULL : solve(u);
     if (!off)
         return no_number(u, t, y, yd, cause);
-    for (int32_t j = 0; j < solved; j++)
-        of[rate[j] > 0][unknown[j]] = -off[j];
+    double *const of[] = {y, yd};
+    for (int32_t j = 0; j < u->solved; j++)
+        of[u->rate[j] > 0][u->unknown[j]] = -off[j];
     return u->flows ? kinematics(u, y, yd) : SD_FINE;
 }
 
@@ -238,6 +269,8 @@ int sd_underlying_slopes(sd_underlying *u, double t, double *y, double *yd)
     const sd_system *system = u->system;
     double before = 0.0;
     u->ready = 0;
+    if (!u->placed && find_places(u))
+        return SD_MEMORY;
     if (u->direct)
         return at_once(u, t, y, yd);
     kinematics(u, y, yd);
@@ -320,6 +353,8 @@ void sd_underlying_constraints(sd_underlying *u, double t, const double *y, doub
 int sd_underlying_project(sd_underlying *u, double t, double *y, const double *yd)
 {
     int cause = SD_FINE;
+    if (!u->placed && find_places(u))
+        return SD_MEMORY;
     for (int fresh = 0; fresh < 2; fresh++) {
         u->drift = 0.0;
         if (!u->ready && (cause = factorise(u, t, y, yd)))
