@@ -192,6 +192,7 @@ def _load() -> Any:
         "sd_settle_widen": (c.c_int, [_P, _P, _I]),
         "sd_settle_pivoted": (_P, [_P]),
         "sd_condensed_bind": (None, [_P, _P]),
+        "sd_condensed_leave": (None, [_P]),
         "sd_condensed_expand": (None, [_P, _P, _P, _I]),
         "sd_expanded_new": (c.POINTER(Expanded), [_P, _P, _I]),
         "sd_expanded_free": (None, [_P]),

@@ -108,6 +108,61 @@ def test_what_is_left_of_a_node(tmp_path, monkeypatch, text, left, formulation):
     _same_rows(forms.stepped, t, y.size, yd.size)
 
 
+LUMPED = """
+from std.electrical import resistor, inductor, capacitor, voltage
+model lumped {
+  node v, %s: electrical
+  source: voltage(v = 1 V*sin(5 rad/s*t)) v -> ground
+%s}
+scene go of lumped {
+  time 0 s to 1 s
+  trace a1.e, a5.e
+}
+"""
+CELL = """
+  R{k}: resistor(R = {k} ohm) {before} -> a{k}
+  S{k}: resistor(R = 2 ohm + {k} ohm) a{k} -> b{k}
+  L{k}: inductor(L = {k} H) a{k} -> c{k}
+  U{k}: resistor(R = 3 ohm*{k}) c{k} -> b{k}
+  C{k}: capacitor(C = 1 F/{k}) b{k} -> ground
+  bend{k}: dissipator(e = 1 V*(f/(1 A))^3) a{k} -> ground
+"""
+
+
+def test_machine_code_around_the_blocks_gives_the_digits_of_the_loops(tmp_path, monkeypatch):
+    """Rows and matrix of a circuit at random points, before and behind a change of its numbers."""
+    met = []
+
+    def watched(system, t, y, yd):
+        met.append(condensing.condensed(system, t, y, yd))
+        return met[-1]
+
+    monkeypatch.setattr(integrate, "condensed", watched)
+    nodes = ", ".join(f"{letter}{k}" for k in range(1, 6) for letter in "abc")
+    cells = "".join(CELL.format(k=k, before=f"b{k - 1}" if k > 1 else "v") for k in range(1, 6))
+    trace_of(tmp_path, LUMPED % (nodes, cells), formulation="lagrangian", method="bdf")
+    forms, random = met[-1], np.random.default_rng(0)
+    left = forms.stepped
+    z, zd = (np.append(random.normal(size=left.unknowns), np.zeros(8)) for _ in range(2))
+    for factor in (1.0, -0.7):
+        left._straights._factors *= factor
+        found = []
+        for machine in (2, 0):
+            lib.core.sd_code_allow(machine)
+            lib.core.sd_condensed_leave(ctypes.byref(left.condensed))
+            forms.bind()
+            r, jy, jyd = np.zeros((3, left.pattern.entries + left.rows + 8))
+            lib.core.sd_residual(ctypes.byref(left.core), 0.3, *map(lib.pointer, (z, zd, r)))
+            point = lib.pointer(z), lib.pointer(zd), None
+            lib.core.sd_jacobian(ctypes.byref(left.core), 0.3, *point, lib.pointer(jy), lib.pointer(jyd))
+            written = ctypes.c_int32.from_address(left.condensed.unrolled).value  # sums of its first list
+            assert bool(written) == bool(machine)
+            found.append((r, jy, jyd))
+        lib.core.sd_code_allow(1)
+        assert np.abs(found[0][0]).max() > 0.1
+        np.testing.assert_array_equal(*found)
+
+
 def _same_rows(left, t, n, _):
     """Residual and matrix at any point of the kept unknowns against those of the whole system there."""
     random = np.random.default_rng(0)

@@ -185,6 +185,8 @@ static int write_lists(sd_elimination *e, const char *entry)
     if (!cell)
         return 2;
     number_cells(e, entry, cell, source, work);
+    sd_list_begin(&e->factor, (const int32_t[SD_ARRAYS - 1]){e->inside});
+    sd_list_begin(&e->solve, (const int32_t[SD_ARRAYS - 1]){e->inside});
     e->cell = calloc((size_t)(e->inside + (e->entries > e->n ? e->entries : e->n)), sizeof(sd_number));
     for (int32_t i = 0; i < e->n && !failed; i++)
         failed = list_row(e, cell, source, work, i);
@@ -239,7 +241,7 @@ static SD_APART void write_code(sd_elimination *e)
     int64_t before = e->interpreted, due = sd_code_early() ? 0 : TWICE * operations;
     e->interpreted += operations;
     if (before <= due && e->interpreted > due)
-        e->code = sd_code_new(&e->factor, &e->solve, (const int32_t[]){e->inside, INT32_MAX, INT32_MAX}, NUMBERS);
+        e->code = sd_code_new(&e->factor, &e->solve, NUMBERS);
 }
 
 /* Who learns of a matrix that no order served: one that has none yet, or that served longest ago. */
@@ -349,7 +351,7 @@ static int factor(sd_elimination *e, const sd_number *values, const double *scal
     if (!e->code)
         write_code(e);
     if (e->code)
-        e->code->factor((sd_number *)values, e->cell, NULL, NULL);
+        e->code->first(e->cell, (sd_number *)values, NULL, NULL, NULL, NULL);
     else
         interpret(e, &e->factor, values, e->entries);
     return sd_elimination_healthy(e);
@@ -372,7 +374,7 @@ void sd_elimination_solve(sd_elimination *elimination, sd_number *x)
 {
     sd_elimination *e = elimination->serves;
     if (e->code) {
-        e->code->solve(x, e->cell, NULL, NULL);
+        e->code->second(e->cell, x, NULL, NULL, NULL, NULL);
         return;
     }
     interpret(e, &e->solve, x, e->n);

@@ -33,14 +33,14 @@ int sd_code_early(void)
 #define NEVER INT32_MAX
 #define REGISTERS 16
 
-/* where the arrays stand: rsi, rdi, rdx, rcx */
-static const uint8_t base[SD_ARRAYS] = {6, 7, 2, 1};
+/* where the arrays stand: rdi, rsi, rdx, rcx, r8, r9 */
+static const uint8_t base[SD_ARRAYS] = {7, 6, 2, 1, 8, 9};
 /* registers xmm: three to work in, two constants, and those that keep numbers of places */
 enum place { PRODUCT = 0, OTHER = 1, TURNED = 2, CONSTANT = 3, MASK = 4, KEPT = 5 };
 enum prefix { PACKED = 1, SCALAR = 3 };
 enum operation {
-    LOAD = 0x10, STORE = 0x11, TWICE = 0x12, UPPER = 0x15, COPY = 0x28, AND = 0x54, XOR = 0x57, TIMES = 0x59, MINUS = 0x5c, OVER = 0x5e,
-    GREATER = 0x5f, ADD_ACROSS = 0x7c, EXCHANGE = 0xc6, MINUS_PLUS = 0xd0
+    LOAD = 0x10, STORE = 0x11, TWICE = 0x12, UPPER = 0x15, COPY = 0x28, AND = 0x54, XOR = 0x57, PLUS = 0x58, TIMES = 0x59, MINUS = 0x5c,
+    OVER = 0x5e, GREATER = 0x5f, ADD_ACROSS = 0x7c, EXCHANGE = 0xc6, MINUS_PLUS = 0xd0
 };
 
 /* A list while it is written.  Which numbers stay in registers: those that are used soonest again (Belady).  after: the
@@ -48,7 +48,6 @@ enum operation {
 typedef struct writer {
     uint8_t *at;
     const sd_list *list;
-    const int32_t *end;                       /* of the places of each array but the last */
     int32_t size;                             /* bytes of a number */
     enum sd_numbers numbers;
     int32_t held[REGISTERS], next[REGISTERS]; /* place that a register keeps, -1: none; the sum that uses it next */
@@ -81,11 +80,11 @@ static inline void registers(writer *w, enum prefix prefix, enum operation opera
 static inline void memory(writer *w, enum prefix prefix, enum operation operation, int target, int first, int32_t place, int imaginary)
 {
     int array = 0;
-    while (array < SD_ARRAYS - 1 && place >= w->end[array])
+    while (array < SD_ARRAYS - 1 && place >= w->list->end[array])
         array++;
-    int32_t distance = (array ? place - w->end[array - 1] : place) * w->size + 8 * imaginary;
-    begin(w, prefix, operation, (unsigned)target, (unsigned)first, 0);
-    w->at[4] = (uint8_t)(0x80 | (target & 7) << 3 | base[array]);
+    int32_t distance = (array ? place - w->list->end[array - 1] : place) * w->size + 8 * imaginary;
+    begin(w, prefix, operation, (unsigned)target, (unsigned)first, base[array]);
+    w->at[4] = (uint8_t)(0x80 | (target & 7) << 3 | (base[array] & 7));
     memcpy(w->at + 5, &distance, sizeof distance);
     w->at += 9;
 }
@@ -95,6 +94,8 @@ static inline void memory(writer *w, enum prefix prefix, enum operation operatio
 static int32_t *after_source(const writer *w, int32_t s) { return w->after + 2 * w->list->pairs + s; }
 static int32_t *after_by(const writer *w, int32_t s) { return w->after + 2 * w->list->pairs + w->list->sums + s; }
 static int32_t *after_target(const writer *w, int32_t s) { return w->after + 2 * w->list->pairs + 2 * w->list->sums + s; }
+
+static inline int uses_by(const sd_sum *sum) { return sum->kind == SD_SUM_TIMES || sum->kind == SD_SUM_LESS; }
 
 /* the next use behind each use; works in `where` */
 static void look_ahead(writer *w, int32_t places)
@@ -107,14 +108,14 @@ static void look_ahead(writer *w, int32_t places)
         const sd_sum *sum = &list->sum[s];
         *after_target(w, s) = soonest[sum->target];
         *after_source(w, s) = sum->source < 0 ? NEVER : soonest[sum->source];
-        *after_by(w, s) = sum->kind == SD_SUM_TIMES ? soonest[sum->by] : NEVER;
+        *after_by(w, s) = uses_by(sum) ? soonest[sum->by] : NEVER;
         for (int32_t p = 2 * sum->first; p < 2 * sum->last; p++)
             w->after[p] = soonest[list->pair[p]];
         for (int32_t p = 2 * sum->first; p < 2 * sum->last; p++)
             soonest[list->pair[p]] = s;
         if (sum->source >= 0)
             soonest[sum->source] = s;
-        if (sum->kind == SD_SUM_TIMES)
+        if (uses_by(sum))
             soonest[sum->by] = s;
     }
     memset(w->where, 0, (size_t)places * sizeof *w->where);
@@ -207,14 +208,14 @@ static void multiply(writer *w, int target, int a, int32_t place)
     registers(w, PACKED, MINUS_PLUS, target, OTHER, TURNED);
 }
 
-/* PRODUCT := the product of pair p */
-static void pair_product(writer *w, int32_t p)
+/* target := the product of pair p */
+static void pair_product(writer *w, int32_t p, int target)
 {
     const int32_t *pair = w->list->pair + 2 * p, *after = w->after + 2 * p;
     /* the one that is used sooner again is worth a register */
     int first = w->where[pair[0]] ? 0 : w->where[pair[1]] ? 1 : after[0] <= after[1] ? 0 : 1;
     int a = fetch(w, pair[first], after[first], PRODUCT);
-    multiply(w, PRODUCT, a, pair[1 - first]);
+    multiply(w, target, a, pair[1 - first]);
     if (w->where[pair[1 - first]])
         w->next[w->where[pair[1 - first]]] = after[1 - first];
 }
@@ -259,12 +260,24 @@ static int begin_sum(writer *w, int32_t s, int value)
     return value;
 }
 
+/* value := first operation the number of a place */
+static void combine(writer *w, enum operation operation, int value, int first, int32_t place)
+{
+    if (w->where[place])
+        registers(w, whole(w), operation, value, first, w->where[place]);
+    else
+        memory(w, whole(w), operation, value, first, place, 0);
+}
+
 /* value := what the sum's kind makes of the sum in `from` */
 static void end_sum(writer *w, int32_t s, int value, int from)
 {
     const sd_sum *sum = &w->list->sum[s];
-    if (sum->kind == SD_SUM_TIMES) {
-        multiply(w, value, from, sum->by);
+    if (uses_by(sum)) {
+        if (sum->kind == SD_SUM_TIMES)
+            multiply(w, value, from, sum->by);
+        else
+            combine(w, MINUS, value, from, sum->by);
         if (w->where[sum->by])
             w->next[w->where[sum->by]] = *after_by(w, s);
     } else if (sum->kind == SD_SUM_INVERSE) {
@@ -274,12 +287,30 @@ static void end_sum(writer *w, int32_t s, int value, int from)
     }
 }
 
-static void write_sum(writer *w, int32_t s)
+/* value := products, then the source */
+static void add_up(writer *w, int32_t s, int value)
 {
     const sd_sum *sum = &w->list->sum[s];
-    int value = take(w), source = begin_sum(w, s, value), from = source;
     for (int32_t p = sum->first; p < sum->last; p++) {
-        pair_product(w, p);
+        int product = p == sum->first ? value : PRODUCT;
+        pair_product(w, p, product);
+        if (product != value)
+            registers(w, whole(w), PLUS, value, value, product);
+    }
+    if (sum->source < 0)
+        return;
+    combine(w, PLUS, value, value, sum->source);
+    if (w->where[sum->source])
+        w->next[w->where[sum->source]] = *after_source(w, s);
+}
+
+/* value := source less products, and what the kind makes of it */
+static void take_off(writer *w, int32_t s, int value)
+{
+    const sd_sum *sum = &w->list->sum[s];
+    int source = begin_sum(w, s, value), from = source;
+    for (int32_t p = sum->first; p < sum->last; p++) {
+        pair_product(w, p, PRODUCT);
         if (sum->kind == SD_SUM_LARGEST)
             enlarge(w, value, p == sum->first);
         else
@@ -289,14 +320,25 @@ static void write_sum(writer *w, int32_t s)
     end_sum(w, s, value, from);
     if (source != value)
         w->next[source] = *after_source(w, s);
+}
+
+static void write_sum(writer *w, int32_t s)
+{
+    const sd_sum *sum = &w->list->sum[s];
+    int value = take(w);
+    if (sum->kind == SD_SUM_PLUS && sum->first < sum->last)
+        add_up(w, s, value);
+    else
+        take_off(w, s, value);
     memory(w, whole(w), STORE, value, 0, sum->target, 0);
     keep(w, value, sum->target, *after_target(w, s));
 }
 
 /* --- code of two lists ---------------------------------------------------------------------------------------------- */
 
-static void write_list(writer *w, const sd_list *list, int32_t places, int32_t constant)
+static void write_list(writer *w, const sd_list *list, int32_t places)
 {
+    const int32_t constant = list->end[0] - 2;
     w->list = list;
     look_ahead(w, places);
     for (int r = 0; r < REGISTERS; r++) {
@@ -313,9 +355,10 @@ static void write_list(writer *w, const sd_list *list, int32_t places, int32_t c
 /* the number of places that a list names */
 static int32_t places_of(const sd_list *list, int32_t least)
 {
-    for (int32_t s = 0; s < list->sums; s++) {
-        least = list->sum[s].target < least ? least : list->sum[s].target + 1;
-        least = list->sum[s].source < least ? least : list->sum[s].source + 1;
+    for (const sd_sum *sum = list->sum, *end = sum + list->sums; sum < end; sum++) {
+        least = sum->target < least ? least : sum->target + 1;
+        least = sum->source < least ? least : sum->source + 1;
+        least = sum->by < least ? least : sum->by + 1;
     }
     for (int32_t p = 0; p < 2 * list->pairs; p++)
         least = list->pair[p] < least ? least : list->pair[p] + 1;
@@ -328,22 +371,22 @@ static size_t room_of(const sd_list *list)
 }
 
 /* 0: both lists are written.  What was executed there before was so long ago: the processor has nothing of it on its way */
-static int write_lists(sd_code *code, const sd_list *factor, const sd_list *solve, const int32_t *end, enum sd_numbers numbers)
+static int write_lists(sd_code *code, const sd_list *first, const sd_list *second, enum sd_numbers numbers)
 {
-    const int32_t inside = end[0];
-    int32_t places = places_of(factor, places_of(solve, inside)), pairs = factor->pairs > solve->pairs ? factor->pairs : solve->pairs;
-    int32_t sums = factor->sums > solve->sums ? factor->sums : solve->sums;
+    int32_t places = places_of(first, places_of(second, 0));
+    int32_t pairs = first->pairs > second->pairs ? first->pairs : second->pairs;
+    int32_t sums = first->sums > second->sums ? first->sums : second->sums;
     int32_t *work = malloc((size_t)(places + 2 * pairs + 3 * sums) * sizeof *work + 1);
     if (!work)
         return 1;
-    writer w = {.at = code->written, .end = end, .size = numbers == SD_COMPLEX_NUMBERS ? 16 : 8, .numbers = numbers,
-                .where = work, .after = work + places};
-    write_list(&w, factor, places, inside - 2);
+    writer w = {.at = code->written, .size = numbers == SD_COMPLEX_NUMBERS ? 16 : 8, .numbers = numbers, .where = work,
+                .after = work + places};
+    write_list(&w, first, places);
     const uint8_t *start = code->run, *next = code->run + (w.at - code->written);
-    write_list(&w, solve, places, inside - 2);
+    write_list(&w, second, places);
     free(work);
-    memcpy(&code->factor, &start, sizeof start); /* a function's address is no object's in C */
-    memcpy(&code->solve, &next, sizeof next);
+    memcpy(&code->first, &start, sizeof start); /* a function's address is no object's in C */
+    memcpy(&code->second, &next, sizeof next);
     return 0;
 }
 
@@ -415,11 +458,11 @@ static sd_code *pages(size_t size)
     return new_pages(size);
 }
 
-sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, const int32_t *end, enum sd_numbers numbers)
+sd_code *sd_code_new(const sd_list *first, const sd_list *second, enum sd_numbers numbers)
 {
-    size_t size = (room_of(factor) + room_of(solve) + 4095) / 4096 * 4096;
+    size_t size = (room_of(first) + room_of(second) + 4095) / 4096 * 4096;
     sd_code *code = permitted && __builtin_cpu_supports("avx") ? pages(size > LEAST ? size : LEAST) : NULL;
-    if (code && write_lists(code, factor, solve, end, numbers)) {
+    if (code && write_lists(code, first, second, numbers)) {
         sd_code_free(code);
         return NULL;
     }
@@ -437,9 +480,9 @@ void sd_code_free(sd_code *code)
         give_back(code);
 }
 #else
-sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, const int32_t *end, enum sd_numbers numbers)
+sd_code *sd_code_new(const sd_list *first, const sd_list *second, enum sd_numbers numbers)
 {
-    (void)factor, (void)solve, (void)end, (void)numbers, (void)permitted;
+    (void)first, (void)second, (void)numbers, (void)permitted;
     return NULL;
 }
 

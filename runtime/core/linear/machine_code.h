@@ -18,22 +18,19 @@
 
 enum sd_numbers { SD_REAL_NUMBERS, SD_COMPLEX_NUMBERS };
 
-/* of the numbers outside and those of the cells; others: two more arrays outside, where lists name places there */
-typedef void sd_run_code(void *outside, void *cell, void *other, void *last);
+/* of the arrays whose places the lists name */
+typedef void sd_run_code(void *, void *, void *, void *, void *, void *);
 
 typedef struct sd_code {
-    sd_run_code *factor, *solve; /* the first list and the second */
+    sd_run_code *first, *second; /* the two lists */
     uint8_t *written, *run; /* the pages [size] at their two addresses */
     size_t size;
     int forks;              /* of the process before they were made */
 } sd_code;
 
-#define SD_ARRAYS 4 /* the cells, and those outside in the order of arguments */
-
-/* end [SD_ARRAYS - 1]: places before the first are cells, as in elimination.h, before the next of the first array outside,
- * and so on (INT32_MAX: there is none behind it); the last two cells are a constant (real: 1; complex: the sign of an imaginary
- * part) and the bits of magnitudes.  NULL where there is none. */
-sd_code *sd_code_new(const sd_list *factor, const sd_list *solve, const int32_t *end, enum sd_numbers numbers);
+/* Of the first array the last two numbers are a constant (real: 1; complex: the sign of an imaginary part) and the bits of
+ * magnitudes, where the lists take inverses or sizes.  NULL where there is none. */
+sd_code *sd_code_new(const sd_list *first, const sd_list *second, enum sd_numbers numbers);
 void sd_code_free(sd_code *code);
 /* from now on lists are interpreted (0), written where that pays (1), or at once (2; tests) */
 void sd_code_allow(int allowed);

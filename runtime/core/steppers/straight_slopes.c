@@ -109,7 +109,7 @@ static int write_lists(const sd_underlying *u, sd_straight *straight)
     sd_list *before = &straight->list[0], *behind = &straight->list[1];
     int failed = 0;
     for (int k = 0; k < 2; k++)
-        straight->list[k].sums = straight->list[k].pairs = 0;
+        sd_list_begin(&straight->list[k], (const int32_t[SD_ARRAYS - 1]){p.rows, p.y - p.rows, u->n, u->n});
     for (int32_t i = 0; i < u->system->rows; i++)
         failed |= sd_list_sum(before, SD_SUM_PLAIN, p.rows + i, -1, -1);
     for (int32_t j = 0; j < u->solved; j++)
@@ -136,11 +136,9 @@ static SD_APART sd_straight *renew(sd_underlying *u)
     sd_code_free(straight->code);
     straight->code = NULL;
     straight->order = e->prepared;
-    if (write_lists(u, straight) == 0) {
-        const places p = places_of(u);
-        u->written[u->writes + 1] = -1.0;
-        straight->code = sd_code_new(&straight->list[0], &straight->list[1], (const int32_t[]){p.rows, p.y, p.yd}, SD_REAL_NUMBERS);
-    }
+    u->written[u->writes + 1] = -1.0;
+    if (write_lists(u, straight) == 0)
+        straight->code = sd_code_new(&straight->list[0], &straight->list[1], SD_REAL_NUMBERS);
     return straight;
 }
 
@@ -171,11 +169,11 @@ const sd_straight *sd_straight_of(sd_underlying *u)
 
 void sd_straight_clear(const sd_straight *straight, const sd_underlying *u, double *y, double *yd)
 {
-    straight->code->factor(u->r, u->linear->elimination->cell, y, yd);
+    straight->code->first(u->linear->elimination->cell, u->r, y, yd, NULL, NULL);
 }
 
 int sd_straight_solve(const sd_straight *straight, const sd_underlying *u, double *y, double *yd)
 {
-    straight->code->solve(u->r, u->linear->elimination->cell, y, yd);
+    straight->code->second(u->linear->elimination->cell, u->r, y, yd, NULL, NULL);
     return u->written[u->writes + 2] == 0.0 && sd_linear_in_cells(u->linear);
 }
