@@ -28,7 +28,7 @@ ALGEBRA = (
     "system/settle.h", "steppers/stepper.h", "steppers/underlying.h",
     "linear/sums.c", "linear/machine_code.c", "linear/elimination_order.c", "linear/elimination.c", "linear/linear.c",
     "linear/blocks.h", "linear/dense_rest.h", "linear/told.h", "linear/chains.h",
-    "linear/substitute.h", "linear/sparse.c", "linear/front_pattern.c", "linear/fronts.c",
+    "linear/substitute.h", "linear/pivots.h", "linear/sparse.c", "linear/front_pattern.c", "linear/fronts.c",
     "steppers/straight_slopes.c", "steppers/underlying.c",
 )  # fmt: skip
 A_LINE = 16

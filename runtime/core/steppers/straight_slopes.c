@@ -40,7 +40,7 @@ static int32_t place_of_z(const sd_underlying *u, const places *p, int32_t colum
 }
 
 /* entries that several wrote are added up; the others are where they were written */
-static int list_entries(const sd_underlying *u, const places *p, int32_t *entry, sd_list *list)
+static int straight_entries(const sd_underlying *u, const places *p, int32_t *entry, sd_list *list)
 {
     const sd_system *system = u->matrix;
     const int32_t entries = u->linear->entries;
@@ -63,7 +63,7 @@ static int list_entries(const sd_underlying *u, const places *p, int32_t *entry,
     return failed;
 }
 
-static int list_factors(const sd_elimination *e, const int32_t *entry, sd_list *list)
+static int straight_factors(const sd_elimination *e, const int32_t *entry, sd_list *list)
 {
     const int32_t inside = e->inside;
     int failed = 0;
@@ -77,7 +77,7 @@ static int list_factors(const sd_elimination *e, const int32_t *entry, sd_list *
 }
 
 /* z := minus the solution of the rows */
-static int list_solution(const sd_underlying *u, const places *p, sd_list *list)
+static int straight_solution(const sd_underlying *u, const places *p, sd_list *list)
 {
     const sd_elimination *e = u->linear->elimination;
     const int32_t inside = e->inside, rows = p->rows + u->first - inside;
@@ -94,7 +94,7 @@ static int list_solution(const sd_underlying *u, const places *p, sd_list *list)
     return failed;
 }
 
-static int list_kinematics(const sd_underlying *u, const places *p, sd_list *list)
+static int straight_kinematics(const sd_underlying *u, const places *p, sd_list *list)
 {
     int failed = 0;
     for (int32_t i = 0; i < u->system->kinematics; i++)
@@ -103,7 +103,7 @@ static int list_kinematics(const sd_underlying *u, const places *p, sd_list *lis
 }
 
 /* both lists.  0; 2: no memory */
-static int write_lists(const sd_underlying *u, sd_straight *straight)
+static int straight_lists(const sd_underlying *u, sd_straight *straight)
 {
     const places p = places_of(u);
     sd_list *before = &straight->list[0], *behind = &straight->list[1];
@@ -114,17 +114,17 @@ static int write_lists(const sd_underlying *u, sd_straight *straight)
         failed |= sd_list_sum(before, SD_SUM_PLAIN, p.rows + i, -1, -1);
     for (int32_t j = 0; j < u->solved; j++)
         failed |= sd_list_sum(before, SD_SUM_PLAIN, place_of_z(u, &p, j), -1, -1);
-    failed |= list_kinematics(u, &p, before);
-    failed |= list_entries(u, &p, straight->entry, behind) | list_factors(u->linear->elimination, straight->entry, behind);
-    failed |= list_solution(u, &p, behind);
+    failed |= straight_kinematics(u, &p, before);
+    failed |= straight_entries(u, &p, straight->entry, behind) | straight_factors(u->linear->elimination, straight->entry, behind);
+    failed |= straight_solution(u, &p, behind);
     for (int32_t j = 0; j < u->solved; j++)
         failed |= sd_list_pair(behind, place_of_z(u, &p, j), p.zero);
     failed |= sd_list_sum(behind, SD_SUM_PLAIN, p.check, -1, -1);
-    return u->flows ? failed | list_kinematics(u, &p, behind) : failed;
+    return u->flows ? failed | straight_kinematics(u, &p, behind) : failed;
 }
 
 /* code for the order that the elimination has now */
-static SD_APART sd_straight *renew(sd_underlying *u)
+static SD_APART sd_straight *straight_code(sd_underlying *u)
 {
     const sd_elimination *e = u->linear->elimination;
     sd_straight *straight = u->straight ? u->straight : calloc(1, sizeof *straight);
@@ -137,7 +137,7 @@ static SD_APART sd_straight *renew(sd_underlying *u)
     straight->code = NULL;
     straight->order = e->prepared;
     u->written[u->writes + 1] = -1.0;
-    if (write_lists(u, straight) == 0)
+    if (straight_lists(u, straight) == 0)
         straight->code = sd_code_new(&straight->list[0], &straight->list[1], SD_REAL_NUMBERS);
     return straight;
 }
@@ -163,7 +163,7 @@ const sd_straight *sd_straight_of(sd_underlying *u)
         return NULL; /* writing costs about as many of the evaluations that it makes cheaper */
     const sd_straight *straight = u->straight;
     if (!straight || straight->order != e->prepared)
-        straight = renew(u);
+        straight = straight_code(u);
     return straight && straight->code ? straight : NULL;
 }
 
