@@ -163,6 +163,10 @@ static inline double sd_radau_newton_weight(const sd_radau *radau, int32_t i)
     return radau->newton_weight ? radau->newton_weight[i] : sd_radau_weight(radau, i);
 }
 
+/* radau_rooms.c: room for what steps work in, where it rests; 0 or not: no memory */
+int sd_radau_provide(sd_radau *radau);
+/* right sides with what is extrapolated anew before the next step */
+double *sd_radau_spare(void *radau, size_t *numbers);
 /* radau.c: root mean square over the tested unknowns in the error weights; what the estimate of a method counts beside
  * that of three stages */
 double sd_radau_norm(const sd_radau *radau, const double *x);
