@@ -106,7 +106,8 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     if (test < 0).all():
         test[:] = 0
     idle = multiplier | implicit | (flows & ~differential)
-    common = _common(system, jyd, flows & (state if index >= 2 else stepped) & ~smooth)
+    alone = np.zeros_like(flows) if index > 2 else flows & (state if index == 2 else stepped) & ~smooth
+    common = _common(system, jyd, alone)
     return Roles(test, power, state, differential, smooth, idle, common)
 
 
