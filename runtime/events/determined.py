@@ -113,8 +113,8 @@ class Determined:
         values, before = contacts.observer(t, *point), contacts.state()
         _, part, told = self._open(t, *point)
         # of equal shares the first counts, not what round-off makes the larger
-        order = [k for k in np.argsort(-np.round(part, ALIKE), kind="stable") if part[k] > NOTHING]
-        order = self._lowest_first(t, point, order)
+        shares = np.argsort(-np.round(part, ALIKE), kind="stable").tolist()
+        order = self._lowest_first(t, point, [k for k in shares if part[k] > NOTHING])
         zero = {k: abs(values[(row := contacts.contacts[k].value)]) <= contacts.observer.zero(row) for k in order}
         for pivots, small in ((False, True), (True, True), (False, False)):
             for k in sorted(order, key=lambda k: k in turned):
@@ -130,14 +130,14 @@ class Determined:
                             yield found, less
                     contacts.become(before)
 
-    def _lowest_first(self, t: float, point: Point, order: list[np.int64]) -> list[np.int64]:
+    def _lowest_first(self, t: float, point: Point, order: list[int]) -> list[int]:
         """Contacts by the index of the set in which one is turned: of diodes that may hold a node the one that is there
         anyhow, not one behind a coil, whose current then is a constraint of a constraint.
         """
         contacts, before = self.contacts, self.contacts.state()
         if len(order) < 2 or self._system.unknowns > SMALL:
             return order
-        indices = dict[np.int64, int]()
+        indices = dict[int, int]()
         for k in order:
             contacts.active[k] ^= True
             contacts.apply()
