@@ -164,7 +164,8 @@ class Determined:
         if told is None:
             return self.contacts.contacts[k].hold < 0 or _same(yd, other_d, self._moves, NOTHING)
         flows = self._moves & told
-        return _same(y, other, flows, SAME) and _same(yd, other_d, flows & self._rated, SAME)
+        size = np.abs(y[: flows.size][flows]).max(initial=0.0) / self.contacts.time if self.contacts.time > 0.0 else 0.0
+        return _same(y, other, flows, SAME) and _same(yd, other_d, flows & self._rated, SAME, size)
 
     @cached_property
     def _moves(self) -> NDArray[np.bool_]:
@@ -214,7 +215,7 @@ def _index_of(e: Floats, b: Floats) -> int:
     return round(float(np.log(near / far) / np.log(CLOSE[1] / CLOSE[0]))) if min(near, far) > 0.0 else FAR
 
 
-def _same(a: Floats, b: Floats, which: NDArray[np.bool_], part: float) -> bool:
-    """Whether two vectors differ in these entries by no more than that part of the largest of them."""
+def _same(a: Floats, b: Floats, which: NDArray[np.bool_], part: float, size: float = 0.0) -> bool:
+    """Whether two vectors differ in these entries by no more than that part of the largest of them; size: at least."""
     pair = np.stack([one[: which.size][which] for one in (a, b)])
-    return bool((np.abs(pair[0] - pair[1]) <= part * np.abs(pair).max(initial=0.0)).all())
+    return bool((np.abs(pair[0] - pair[1]) <= part * np.abs(pair).max(initial=size)).all())
