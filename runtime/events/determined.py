@@ -33,6 +33,11 @@ ALIKE = 9
 GENERIC = 0.7310585786300049
 """Of dF/dyd beside dF/dy: at it a regular pencil is a regular matrix."""
 
+SMALL = 60
+"""Unknowns up to which sets are told apart by their index."""
+CLOSE, FAR = (1e2, 1e4), 9
+"""Times the fastest rate of a row: what a power is told by; an index of what has none."""
+
 Point = tuple[Floats, Floats]
 
 
@@ -42,6 +47,7 @@ class Determined:
     def __init__(self, contacts: Contacts) -> None:
         self.contacts = contacts
         self._pivoting = Pivoting(contacts, self._singular)
+        self._indices: dict[tuple[bool, ...], int] = {}
         self._regular: dict[tuple[bool, ...], tuple[int, Floats, NDArray[np.bool_]]] = {}
 
     @cached_property
@@ -107,7 +113,8 @@ class Determined:
         values, before = contacts.observer(t, *point), contacts.state()
         _, part, told = self._open(t, *point)
         # of equal shares the first counts, not what round-off makes the larger
-        order = [k for k in np.argsort(-np.round(part, ALIKE), kind="stable") if part[k] > NOTHING]
+        shares = np.argsort(-np.round(part, ALIKE), kind="stable").tolist()
+        order = self._lowest_first(t, point, [k for k in shares if part[k] > NOTHING])
         zero = {k: abs(values[(row := contacts.contacts[k].value)]) <= contacts.observer.zero(row) for k in order}
         for pivots, small in ((False, True), (True, True), (False, False)):
             for k in sorted(order, key=lambda k: k in turned):
@@ -123,6 +130,31 @@ class Determined:
                             yield found, less
                     contacts.become(before)
 
+    def _lowest_first(self, t: float, point: Point, order: list[int]) -> list[int]:
+        """Contacts by the index of the set in which one is turned: of diodes that may hold a node the one that is there
+        anyhow, not one behind a coil, whose current then is a constraint of a constraint.
+        """
+        contacts, before = self.contacts, self.contacts.state()
+        if len(order) < 2 or self._system.unknowns > SMALL:
+            return order
+        indices = dict[int, int]()
+        for k in order:
+            contacts.active[k] ^= True
+            contacts.apply()
+            indices[k] = self._index(t, *point)
+            contacts.become(before)
+        return sorted(order, key=indices.__getitem__)
+
+    def _index(self, t: float, y: Floats, yd: Floats) -> int:
+        """That of the equations with the present active set, less 1."""
+        key = tuple(self.contacts.active.tolist())
+        if key not in self._indices:
+            n = self._system.form.written
+            jy, jyd = (self._system.dense(part) for part in self._system.jacobian(t, y[:n], yd[:n]))
+            finite = np.isfinite(jy).all() and np.isfinite(jyd).all()
+            self._indices[key] = _index_of(*equilibrated(jyd, jy)) if finite else FAR
+        return self._indices[key]
+
     def _goes_on(self, k: int, points: tuple[Point, Point], told: NDArray[np.bool_] | None) -> bool:
         """Whether the motion is the same: what a relation leaves open moves something where its sense decides.  told
         [unknowns as written]: of a flow that need not be zero, flows that are told are the same, and those that have a
@@ -132,7 +164,8 @@ class Determined:
         if told is None:
             return self.contacts.contacts[k].hold < 0 or _same(yd, other_d, self._moves, NOTHING)
         flows = self._moves & told
-        return _same(y, other, flows, SAME) and _same(yd, other_d, flows & self._rated, SAME)
+        size = np.abs(y[: flows.size][flows]).max(initial=0.0) / self.contacts.time if self.contacts.time > 0.0 else 0.0
+        return _same(y, other, flows, SAME) and _same(yd, other_d, flows & self._rated, SAME, size)
 
     @cached_property
     def _moves(self) -> NDArray[np.bool_]:
@@ -171,7 +204,18 @@ class Determined:
         return found[:2]
 
 
-def _same(a: Floats, b: Floats, which: NDArray[np.bool_], part: float) -> bool:
-    """Whether two vectors differ in these entries by no more than that part of the largest of them."""
+def _index_of(e: Floats, b: Floats) -> int:
+    """Of e y' + b y = r, less 1: the power with which the least singular value falls beyond the fastest rate."""
+    rated, own = np.abs(e).max(axis=1, initial=0.0), np.abs(b).max(axis=1, initial=0.0)
+    rates = rated > 0.0
+    size = np.where(rates, rated, 1.0)
+    fast = float((own / size)[rates].max(initial=0.0)) or 1.0
+    ways = (e / size[:, None] + b / np.where(rates, size * fast * close, 1.0)[:, None] for close in CLOSE)
+    near, far = (float(decomposed(m)[1].min(initial=1.0)) for m in ways)
+    return round(float(np.log(near / far) / np.log(CLOSE[1] / CLOSE[0]))) if min(near, far) > 0.0 else FAR
+
+
+def _same(a: Floats, b: Floats, which: NDArray[np.bool_], part: float, size: float = 0.0) -> bool:
+    """Whether two vectors differ in these entries by no more than that part of the largest of them; size: at least."""
     pair = np.stack([one[: which.size][which] for one in (a, b)])
-    return bool((np.abs(pair[0] - pair[1]) <= part * np.abs(pair).max(initial=0.0)).all())
+    return bool((np.abs(pair[0] - pair[1]) <= part * np.abs(pair).max(initial=size)).all())

@@ -53,7 +53,8 @@ class Pivoting:
 
     def __init__(self, contacts: Contacts, singular: Callable[[float, Floats, Floats], bool]) -> None:
         self.contacts, self.singular = contacts, singular
-        self._contradicts: set[tuple[float, ...]] = set()
+        self._contradicts: set[tuple[float, ...]] = set()  # of the point that was asked last
+        self._asked: tuple[float, Floats] | None = None
         self._flows = not contacts.starting and any(c.kind == "psi" for c in contacts.contacts)
 
     def fit(self, t: float, y: Floats, yd: Floats, settle: Settle, touched: Sequence[int] = ()) -> Point:
@@ -223,7 +224,13 @@ class Pivoting:
         return chain(islice(nearest, BESIDE), [rest] if rest else [])
 
     def _settled_by(self, t: float, y: Floats, yd: Floats, settle: Settle) -> tuple[Floats, Floats, Floats] | None:
-        """As settle; a set whose equations depend on each other, and that contradicted itself, is not tried again."""
+        """As settle; a set whose equations depend on each other, and that contradicted itself, is not tried again from
+        that point.  From another it may not: two diodes short a source but where that is zero, and where all block a
+        coil beside them has no current.
+        """
+        if self._asked is None or self._asked[0] != t or not np.array_equal(self._asked[1], y):
+            self._asked = t, y.copy()
+            self._contradicts.clear()
         key = self.contacts.state()
         if key in self._contradicts:
             return None

@@ -31,7 +31,9 @@ class Told:
         if kept is not None:  # as where their rates are unknowns too: rows q' = f pull at nothing
             self.smooth[roles.smooth & system.are("q")[kept]] = UNPULLED
         self.idle = roles.idle.astype(np.int32) if system.form.scales else None
-        self.groups = roles.groups() if request.method == "bdf" and (roles.common >= 0).any() else None
+        grouped = roles.common >= 0
+        apart = request.method == "bdf" or (request.method == "radau" and bool((roles.test[grouped] > 0).all()))
+        self.groups = roles.groups() if apart and grouped.any() else None
 
     def tell(self, method: Method) -> None:
         """The core's structure has the addresses; the arrays live as long as this."""

@@ -93,7 +93,8 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
         if system.form.scales:
             steep[system.pattern.columns_of()[system.steep_rows(t)[system.pattern.row]]] = True
         power[multiplier | ((implicit | (flows & ~differential)) & ~steep)] = 1
-        # flows that stores know by differences alone: what they have in common is a rate of what balances hold
+        # flows that stores know by differences alone: what they have in common is a rate of what balances hold; where
+        # plain differences are states (`common`), these are tested as they are
         shared = flows & state & ~smooth
         power[shared] = test[shared] = 1
     if index >= 3:
@@ -105,7 +106,8 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     if (test < 0).all():
         test[:] = 0
     idle = multiplier | implicit | (flows & ~differential)
-    common = _common(system, jyd, flows & stepped & ~smooth if index < 2 else np.zeros_like(flows))
+    alone = np.zeros_like(flows) if index > 2 else flows & (state if index == 2 else stepped) & ~smooth
+    common = _common(system, jyd, alone)
     return Roles(test, power, state, differential, smooth, idle, common)
 
 

@@ -68,10 +68,31 @@ static void set_newton_weights(sd_radau *radau)
     }
 }
 
+/* squares, in the error weights, of the unknowns of groups without what those of each have in common */
+static double apart(const sd_radau *radau, const double *x)
+{
+    double sum = 0.0;
+    for (int32_t g = 0; g < radau->commons; g++) {
+        const int32_t *first = radau->common + radau->common_from[g], *end = radau->common + radau->common_from[g + 1];
+        double weights = 0.0, mean = 0.0;
+        for (const int32_t *i = first; i < end; i++) {
+            double w = sd_radau_weight(radau, *i);
+            weights += w * w;
+            mean += w * w * x[*i];
+        }
+        mean /= weights;
+        for (const int32_t *i = first; i < end; i++) {
+            double v = sd_radau_weight(radau, *i) * (x[*i] - mean);
+            sum += v * v;
+        }
+    }
+    return sum;
+}
+
 /* root mean square over the tested unknowns in the error weights */
 double sd_radau_norm(const sd_radau *radau, const double *x)
 {
-    double sum = 0.0;
+    double sum = apart(radau, x);
     for (int32_t i = 0; i < radau->n; i++)
         if (radau->test[i] >= 0) {
             double v = x[i] * sd_radau_weight(radau, i) * (radau->test[i] ? radau->h : 1.0);

@@ -65,6 +65,8 @@ typedef struct sd_radau {
     double *met;              /* [n] max |y| */
     const int8_t *test, *power, *smooth;   /* [n] as in bdf.h; smooth: 1 where yd is the derivative,
                                                * SD_UNPULLED: and is interpolated whatever pulls */
+    const int32_t *common_from, *common; /* as in bdf.h: groups that are tested with h but for what they have in common */
+    int32_t commons;
     /* state of the integration */
     double tolerance;         /* 0.1 rtol^(2/3) */
     double strict[SD_METHODS]; /* what the estimate of each method counts beside the first one's */

@@ -164,6 +164,8 @@ class Radau(c.Structure):
         *[(name, I) for name in ["n", "tested", "stages", "most_stages"]],
         *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
         *[(name, P) for name in ["atol", "magnitude", "met", "test", "power", "smooth"]],
+        *[(name, P) for name in ["common_from", "common"]],
+        ("commons", I),
         ("tolerance", D),
         ("strict", D * 3),
         ("strict_first", D),
