@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Any
@@ -362,8 +363,15 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
     """The most similar name, if one is similar at all."""
     among = list(dict.fromkeys(n for n in names if len(n) < 100))
     alike = [n for n in among if n != name and n.lower() == name.lower()]
+    if not alike and (numbered := _unnumbered(name)) != name:
+        alike = [n for n in among if n != name and _unnumbered(n) == numbered]
     if not alike:
         from difflib import get_close_matches  # of mistakes alone
 
         alike = get_close_matches(name[:80], among, 1, 0.6)
     return alike[0] if alike else None
+
+
+def _unnumbered(name: str) -> str:
+    """A name with one sign for each number in it: C1 is nearer to C2 than C is."""
+    return re.sub(r"[0-9]+", "#", name)

@@ -9,6 +9,8 @@ import re
 import unicodedata
 from collections.abc import Collection
 
+from sysdyn.dsl.model.functions import FUNCTIONS
+
 # fmt: off
 MODEL_WORDS = frozenset(
     {
@@ -65,7 +67,7 @@ _OTHERS = {
         "phi name: ... = ... of displacements, psi name: ... = ... of flows",
     ),
     **dict.fromkeys(("force", "forces", "torque", "moment", "load", "apply"), "work F on x"),
-    **dict.fromkeys(("mass", "inertia", "kinetic_energy", "lagrangian"), "energy T* = 1/2*m*x'^2, energy V = ..."),
+    **dict.fromkeys(("mass", "inertia", "kinetic", "potential", "kinetic_energy", "lagrangian"), "energy T* = 1/2*m*x'^2, energy V = ..."),
     **dict.fromkeys(("friction", "damping", "dissipation", "rayleigh"), "content D = 1/2*b*x'^2"),
     "import": "from std.electrical import resistor",
     "include": "from std.electrical import resistor",
@@ -196,8 +198,8 @@ def conditional() -> Complaint:
     return "E110", message, "(if ... then ... else ...)"
 
 
-def unknown(word: str, after: str, body: str) -> Complaint:
-    """A statement whose first word begins no statement of this body; `after` is the text behind it."""
+def unknown(word: str, after: str, body: str, text: str = "") -> Complaint:
+    """A statement whose first word begins no statement of this body; `after` is what stands behind it in the text."""
     here = _HERE[body]
     if word not in _OWN[body]:
         for words, place in (
@@ -219,7 +221,7 @@ def unknown(word: str, after: str, body: str) -> Complaint:
         return "E113", "an action assigns: name := expression", None
     if body == "bundle_member":
         return "E113", "a bundle lists nodes: x, y: translation", None
-    if body == "statement" and (element := _element(word, after.partition("\n")[0])) is not None:
+    if body == "statement" and (element := _element(word, after.partition("\n")[0], text)) is not None:
         return "E113", f"no statement begins with '{word}'; an element has a label", element
     if after.startswith("=") and not after.startswith("=="):
         wanted = "set" if body == "scene_statement" else "const" if body == "item" else "let"
@@ -229,6 +231,10 @@ def unknown(word: str, after: str, body: str) -> Complaint:
             f"no statement begins with '{word}'; a value is given by a word before it",
             f"{wanted} {word} = ...",
         )
+    if body != "item" and (member := re.match(r"(?:\.\w+)+'?(?=\s*=(?!=))", after)) is not None:
+        path = f"{word}{member[0]}"
+        given = f", set {path} = ... of a parameter" if body == "scene_statement" else ""
+        return "E113", f"no statement begins with '{path}'", f"init {path} = ... where it begins{given}"
     if after.startswith("'"):
         help_ = f"init {word}' = ... where it begins, dynamic {word}' = ... of a state"
         help_ = f"names of a trace are joined by commas: trace x, {word}'" if body == "scene_statement" else help_
@@ -251,13 +257,22 @@ def unknown(word: str, after: str, body: str) -> Complaint:
     return "E113", f"no statement begins with '{word}'", said or (near[0] if near else None)
 
 
-def _element(word: str, after: str) -> str | None:
-    """The element that is meant by `R1 = resistor(...) a -> b` and by `resistor R1(...)`."""
+def _element(word: str, after: str, text: str) -> str | None:
+    """The element that is meant by `R1 = resistor(...) a -> b`, by `resistor R1(...)` and by `R1 resistor(...)`."""
     assigned = _ASSIGNED.match(after)
     if assigned is not None:
         return f"{word}: {assigned[1].strip()}"
     declared = _DECLARED.match(after)
-    return None if declared is None else f"{declared[1]}: {word}({declared[2]}) {declared[3] or 'a -> b'}"
+    if declared is None:
+        return None
+    turned = _is_component(declared[1], text) and not _is_component(word, text)
+    label, component = (word, declared[1]) if turned else (declared[1], word)
+    return f"{label}: {component}({declared[2]}) {declared[3] or 'a -> b'}"
+
+
+def _is_component(name: str, text: str) -> bool:
+    """Whether a file imports or declares a component of that name."""
+    return re.search(rf"\bimport\b[\w\s,]*?\b{name}\b|^\s*component\s+{name}\b", text, re.MULTILINE) is not None
 
 
 SHAPES = {
@@ -315,7 +330,8 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
         shape = f"factors are joined by '*': ... * {text}"
     unit = re.search(r"([\d.]+)\s+([^\W\d]\w*)$", line)
     if text == "(" and "*" in accepted and unit is not None:
-        meant = f"factors are joined by '*': {unit[1]}*{unit[2]}(...)"
+        called = "(...)" if unit[2] in FUNCTIONS else "*(...)"
+        meant = f"factors are joined by '*': {unit[1]}*{unit[2]}{called}"
         return "E113", f"'{unit[2]}' stands where a unit is read", meant
     last = re.search(r"([\d.]+\s+[^\s()]*?)\s*([./]?)([^\W\d]\w*)$", line)
     if text == "[" and word != "param" and "*" in accepted and last is not None:

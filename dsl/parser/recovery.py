@@ -232,7 +232,7 @@ class Recovery:
             what = "level x = name" if body == "statement" else "level name { }"
             self._error(("E107", f"'{what}' belongs in {where}, not in {here}", None), Span(start, start + 5))
         elif word and word not in self._words_here(size) and after[:1] not in (":", "["):
-            complaint = complaints.unknown(word, after, body)
+            complaint = complaints.unknown(word, after, body, scanner.text)
             netlist = foreign.spice(word, after) if body == "statement" and complaint[::2] == ("E113", None) else None
             if netlist is not None:
                 complaint = (complaint[0], "an element is written with its label, its parameters named", netlist)

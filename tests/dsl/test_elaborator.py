@@ -211,3 +211,16 @@ def test_nodes_in_a_row_are_named_in_the_remedy(ends, named):
     elaborator.elements()
     elaborator.settle()
     assert [(d.code, d.help) for d in report] == [("E402", named)]
+
+
+def test_a_condition_over_an_input_that_stands_still_never_comes_true():
+    """An input given a constant, by its user, a default or a let between, is no mistake of the condition's author."""
+    unit = "component valve {{ input u: 1\n discrete shut = u <= 0.5\n {}\n when on {{ shut := false }} }}"
+    for condition in ("let on = u > 0.5", "let up = u\n let on = up > 0.5 and true"):
+        elaborator, said = whole(f"{unit.format(condition)}\nmodel m {{ V: valve() u = 1 }}")
+        assert said == []
+        assert elaborator.parts.events == []
+    elaborator, said = whole("model m { input u: 1 = 0; discrete g = 1; when u > 0.5 { g := 2 } }")
+    assert said == []
+    assert elaborator.parts.events == []
+    assert whole("model m { param u = 1; discrete g = 1; when u > 0.5 { g := 2 } }")[1] == ["E701"]
