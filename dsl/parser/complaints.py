@@ -67,7 +67,10 @@ _OTHERS = {
         "phi name: ... = ... of displacements, psi name: ... = ... of flows",
     ),
     **dict.fromkeys(("force", "forces", "torque", "moment", "load", "apply"), "work F on x"),
-    **dict.fromkeys(("mass", "inertia", "kinetic", "potential", "kinetic_energy", "lagrangian"), "energy T* = 1/2*m*x'^2, energy V = ..."),
+    **dict.fromkeys(
+        ("mass", "inertia", "kinetic", "potential", "kinetic_energy", "lagrangian"),
+        "energy T* = 1/2*m*x'^2, energy V = ...",
+    ),
     **dict.fromkeys(("friction", "damping", "dissipation", "rayleigh"), "content D = 1/2*b*x'^2"),
     "import": "from std.electrical import resistor",
     "include": "from std.electrical import resistor",
