@@ -253,6 +253,7 @@ class Definition:
     span: syntax.Span
     implied: bool = False
     bound: tuple[tuple[str, Typed | Vector], ...] = ()  # loop variables in sight where it is read
+    loops: tuple[Loop, ...] = ()  # of these, with those of the space
     shape: Shape = ()  # of an input that is an array
     beside: Node | None = None  # added to an input: a parameter that an analysis moves
 
@@ -363,12 +364,12 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
     """The most similar name, if one is similar at all."""
     among = list(dict.fromkeys(n for n in names if len(n) < 100))
     alike = [n for n in among if n != name and n.lower() == name.lower()]
-    if not alike and (numbered := _unnumbered(name)) != name:
-        alike = [n for n in among if n != name and _unnumbered(n) == numbered]
     if not alike:
         from difflib import get_close_matches  # of mistakes alone
 
         alike = get_close_matches(name[:80], among, 1, 0.6)
+        if alike and (numbered := _unnumbered(name)) != name:
+            alike = [n for n in among if n != name and _unnumbered(n) == numbered] or alike
     return alike[0] if alike else None
 
 
