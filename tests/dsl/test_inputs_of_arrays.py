@@ -3,7 +3,6 @@
 from sysdyn.dsl import load
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 
-
 CELLS = """component cell {{
   input u: 1
   state s = 0
