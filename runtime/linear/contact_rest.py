@@ -109,6 +109,10 @@ class ContactRest:
                 y[[place, contacts.multiplier[k + 1]]] = values[contact.upper] * along / np.hypot(*along)
         return y
 
+    def alike(self, point: Floats) -> bool:
+        """Nothing is certain: the contacts decide where a point leads."""
+        return False
+
     def apart(self, one: Rest, other: Rest) -> bool:
         """Whether two states differ by more than what the first leaves open."""
         one.stand(self.system)
@@ -122,6 +126,7 @@ class SampledRest:
     def __init__(self, equations: Equations, system: System, sampled: tuple[Sampled, ...]) -> None:
         self.equations, self.system, self.sampled = equations, system, sampled
         self.first, self.problem, self.apart = equations.first, equations.problem, equations.apart
+        self.alike = equations.alike
         self.observer = Observer(system)
         self.changes: dict[str, None] = {}
 
