@@ -44,8 +44,10 @@ NEAR, NOISE = 1e-9, 1e-13
 """Parts of a magnitude, and of the largest of its kind and unit, that are tried as zero."""
 FAR = 1e9
 """Times its magnitude: a displacement that is left open and has wandered off."""
-SHARE = 0.05
-"""Of the work that a search for a start may take: that of one search for rest."""
+SHARE, SOUGHT = 0.05, 5
+"""Of the work that a search for a start may take: that of one search for rest; points that may take all of it while no
+state is known (a twentieth is two iterations of a large model).
+"""
 STRAIGHT = 1e-10
 """Of its terms: by how much a row may miss its tangent at a point that lies on the straight piece of another."""
 MANY = 20_000
@@ -82,7 +84,7 @@ class Resting:
 
     def __init__(self, system: System, tangible: AbstractSet[str], t: float, first: Floats) -> None:
         self.system, self.tangible, self.t, self.first = system, tangible, t, first
-        self.starter = Starter(system)
+        self.starter, self.share = Starter(system), SHARE
         self.rows = system.another("rated")
         self.n = system.form.written
         families = system.description.families
@@ -185,7 +187,7 @@ class Resting:
             guess=guess,
             scale=scale,
             weight=np.where(follows, 1e-3, 1.0),
-            work=Work(SHARE),
+            work=Work(self.share),
         )
 
     def found(self, guess: Floats, near: Floats | None = None) -> Rest | None:
@@ -336,6 +338,7 @@ class Equations(Protocol):
     """What states of rest are found of: Resting, or with constraints that hold at times contact_rest.ContactRest."""
 
     first: Floats
+    share: float
 
     @property
     def turns(self) -> Mask:
@@ -375,6 +378,7 @@ def rests(
         point = guess if k == 0 else mirrored.pop() if mirrored else guess + shaken
         if begun and resting.alike(point):
             continue
+        resting.share = 1.0 if k < SOUGHT and not kept else SHARE
         found = resting.found(point)
         begun = begun or (k == 0 and found is not None)
         if found is not None and all(resting.apart(other, found) for other in kept):

@@ -113,7 +113,7 @@ def resting(of, tangible=("x",), **first):
     ],
 )
 def test_points_of_the_piece_that_was_searched_are_not_searched_again(potential, states, sought):
-    """Rows that are straight lead from anywhere to one state; two pieces of one slope are told apart by their values."""
+    """Straight rows lead from anywhere to one state; two pieces of one slope are told apart by their values."""
     of = resting(system("x", "f_x**2/2", potential, initial=SWINGING), q_x=1.7)
     found, begun = of.found, []
     of.found = lambda guess: begun.append(guess) or found(guess)
