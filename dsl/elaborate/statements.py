@@ -140,6 +140,11 @@ class Statements(Declarations):
                 help_ = f"dynamic {self.source_text(target.span)}' = ..."
             raise self.resolver.fail("E508", "a dynamic gives the rate of a state", s.target.span, help=help_)
         self.parts.given.add(value.node.data[0])
+        if value.node.data[2]:
+            name = value.node.data[0]
+            help_ = f"a state for the rate, v = {name}': dynamic {name}' = v, dynamic v' = ...; or coord and energy T*"
+            said = f"a dynamic gives the first derivative of a state, not {value.node}'"
+            raise self.resolver.fail("E508", said, s.target.span, help=help_)
         rate = dim.quotient(value.dimension or NONE, dim.TIME)
         node = self._wants(f"dynamic {value.node}'", s.value, rate)
         for inner in sorted(ex.variables(node), key=lambda n: n.number):

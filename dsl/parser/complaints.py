@@ -226,6 +226,8 @@ def unknown(word: str, after: str, body: str, text: str = "") -> Complaint:
         return "E113", "a bundle lists nodes: x, y: translation", None
     if body == "statement" and (element := _element(word, after.partition("\n")[0], text)) is not None:
         return "E113", f"no statement begins with '{word}'; an element has a label", element
+    if word in ("L", "Lagrangian") and body == "statement" and re.match(r"=[^\n]*'", after) is not None:
+        return "E113", f"no statement begins with '{word}'; a Lagrangian is written by its parts", MOTION
     if after.startswith("=") and not after.startswith("=="):
         wanted = "set" if body == "scene_statement" else "const" if body == "item" else "let"
         wanted = "law" if body == "statement" and word in ("e", "f", "q", "p") else wanted
@@ -309,6 +311,7 @@ SHAPES = {
     "trace": "trace x in mm as pos, y every 1 ms",
     "expect": "expect always: a <= b",
     "accuracy": "accuracy 1e-6 on x",
+    "limit": "limit steps 100000, limit events 1000",
     "scene": "scene name of model { ... }",
     "model": "model name { ... }",
     "component": "component name { ... }",
@@ -331,6 +334,9 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
         shape = f"one name a statement: {SHAPES.get(word, word + ' on = false')}"
     if kind == "<name>" and "*" in accepted and (word in _EXPRESSIONS or ")" in accepted):
         shape = f"factors are joined by '*': ... * {text}"
+    reduced = re.search(r"\b(sum|prod|max|min)\((?:[^()]|\([^()]*\))*$", line)
+    if text == "for" and reduced is not None:
+        return "E113", said, f"the index stands first: {reduced[1]}(i in 1..n: ...)"
     unit = re.search(r"([\d.]+)\s+([^\W\d]\w*)$", line)
     if text == "(" and "*" in accepted and unit is not None:
         called = "(...)" if unit[2] in FUNCTIONS else "*(...)"

@@ -224,3 +224,13 @@ def test_a_condition_over_an_input_that_stands_still_never_comes_true():
     assert said == []
     assert elaborator.parts.events == []
     assert whole("model m { param u = 1; discrete g = 1; when u > 0.5 { g := 2 } }")[1] == ["E701"]
+
+
+def test_a_dynamic_of_a_second_derivative_is_no_dynamic_of_the_first():
+    """It was read as q' = -q, by the units of q''."""
+    report = Report()
+    document = load.document(SourceText("m.sd", "model m {\n state q: m = 1 m\n dynamic q'' = -q/(1 s^2)\n}"), report)
+    assert load.network(document, document.models["m"], None, report) is None
+    (found,) = report
+    assert (found.code, *found.place.start) == ("E508", 3, 10)
+    assert "dynamic q' = v, dynamic v' = ..." in found.help

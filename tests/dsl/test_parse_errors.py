@@ -111,6 +111,8 @@ CASES = [
     ("R1: resistor a -> b (R = 1 ohm)", "E113", 23, "stand behind the component", "resistor(R = 1 ohm) a -> b"),
     ("kinetic T* = 1 J", "E113", 3, "no statement begins with 'kinetic'", "energy T* = 1/2*m*x'^2"),
     ("let y = 2 m (a + b)", "E113", 15, "'m' stands where a unit is read", ": 2*m*(...)"),
+    ("let y = sum(x[i]^2*sin(k) for i in 1..n)", "E113", 29, "found 'for'", "sum(i in 1..n: ...)"),
+    ("L = 1/2*m*x'^2 - V", "E113", 3, "a Lagrangian is written by its parts", "energy T* = 1/2*m*x'^2, energy V"),
     ("let y = 2 sin(a)", "E113", 16, "'sin' stands where a unit is read", ": 2*sin(...)"),
     ("param a = 3kg", "E114", 13, "'3kg': a number and its unit are separated by a space", "3 kg"),
     ("let y = 2x", "E114", 11, "'2x'", "2 x"),
