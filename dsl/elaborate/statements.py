@@ -129,6 +129,11 @@ class Statements(Declarations):
             text = self.source_text(where.span)
             help_ = f"work ... on {text.replace(chr(39), '')}" if "'" in text else "work E on q, or work E on quasi(w)"
             raise self.resolver.fail("E319", message, where.span, help=help_)
+        read = ex.variables(node) - {ex.time()}
+        if read and all(n.op == "var" and n.data[1] == "s" for n in read):
+            states = ", ".join(sorted(map(str, read)))
+            message, help_ = f"work on {states}, which no effort moves", "a coord, or a term in the state's dynamic"
+            raise self.resolver.fail("E319", message, where.span, help=help_)
 
     def _dynamic(self, s: syntax.Dynamic) -> None:
         target = s.target.base if isinstance(s.target, syntax.Prime) else s.target
@@ -164,6 +169,11 @@ class Statements(Declarations):
     def _initial(self, s: syntax.Init, target_syntax: syntax.Expr, override: bool, outer: int) -> None:
         with self.resolver.leniently():
             target = self.resolver.scalar(target_syntax)
+        if target.node.op == "param" and target.node.data in self.parts.discretes:
+            name = target.node.data
+            message = f"'{name}' is a discrete variable: it begins with the value of its declaration"
+            help_ = f"discrete {name} = ... there; a param as its value can be set in a scene"
+            raise self.resolver.fail("E903", message, s.span, help=help_)
         message = f"'{target.node}' is in {dim.show(target.dimension)} but starts at {{}}"
         given = self.values_at_start(target.node, s.initial.value, target.dimension or NONE, message, outer)
         for one, value, loops in given:

@@ -234,3 +234,20 @@ def test_a_dynamic_of_a_second_derivative_is_no_dynamic_of_the_first():
     (found,) = report
     assert (found.code, *found.place.start) == ("E508", 3, 10)
     assert "dynamic q' = v, dynamic v' = ..." in found.help
+
+
+@pytest.mark.parametrize(
+    ("statement", "code", "message"),
+    [
+        ("work 3 N on s", "E319", "work on s, which no effort moves"),
+        ("init g = 1", "E903", "'g' is a discrete variable: it begins with the value of its declaration"),
+        ("work 3 N on s*x/(1 m)", None, ""),
+    ],
+)
+def test_what_has_no_virtual_displacement_and_what_has_no_start(statement, code, message):
+    text = "coord x: translation = 1 m\n state s: m = 1 m\n dynamic s' = -s/(1 s)\n discrete g = 0"
+    report = Report()
+    inside = f"{text}\n energy T* = 1/2*(1 kg)*x'^2\n {statement}\n"
+    document = load.document(SourceText("m.sd", f"model m {{\n {inside}}}"), report)
+    load.network(document, document.models["m"], None, report)
+    assert [(d.code, d.message) for d in report] == ([(code, message)] if code else [])
