@@ -168,8 +168,8 @@ def _element_slip(text: str, span: Span, line: str) -> Complaint | None:
     if not parameters and re.fullmatch(r"\w+\s*=.*", behind) and sign[:1].isalpha():
         given = " ".join(behind.split())
         return "E113", "parameters stand in parentheses", f"{component}({given}) {sign} -> ..."
-    if not parameters and "->" in behind and sign == "(" and (given := re.match(r"(\s*\w+\s*=.*)\)", rest)):
-        return "E113", "parameters stand behind the component", f"{component}({given[1].strip()}) {behind}"
+    if not parameters and "->" in behind and sign == "(" and (late := re.match(r"(\s*\w+\s*=.*)\)", rest)):
+        return "E113", "parameters stand behind the component", f"{component}({late[1].strip()}) {behind}"
     if parameters and sign == ":" and re.search(r"(^|,\s*)\w+$", behind):
         name = re.findall(r"\w+", behind)[-1]
         return "E113", "a port is bound by '='", f"{name} = {second}"

@@ -154,6 +154,8 @@ def test_a_text_in_utf_16_is_told_once(tmp_path, capsys, encoding):
 
 def test_modules_that_import_each_other_are_both_named(tmp_path, capsys):
     for name, other in (("a", "b"), ("b", "a")):
-        (tmp_path / f"{name}.sd").write_text(f"from {other} import {other}1\ncomponent {name}1 {{ param k = 1 }}\n")
+        (tmp_path / f"{name}.sd").write_text(
+            f"from {other} import {other}1\ncomponent {name}1 {{ param k = 1 }}\nmodel m {{ }}\n"
+        )
     assert run(["check", str(tmp_path / "a.sd")]) == 1
     assert "error E801: modules 'a' and 'b' import each other" in capsys.readouterr().err
