@@ -251,3 +251,11 @@ def test_what_has_no_virtual_displacement_and_what_has_no_start(statement, code,
     document = load.document(SourceText("m.sd", f"model m {{\n {inside}}}"), report)
     load.network(document, document.models["m"], None, report)
     assert [(d.code, d.message) for d in report] == ([(code, message)] if code else [])
+
+
+def test_a_parameter_of_what_moves_is_told_as_such():
+    """Parameters are known before all else: what they name was told as unknown; an index of a sum is its own."""
+    text = "param k = 2*x/(1 m)\n param j = sum(i in 1..3: i)*2*pi\n coord x: translation = 1 m\n coord i: translation"
+    elaborator, said = whole(f"model m {{ {text}\n energy T* = 1 kg*x'^2 + 1 kg*i'^2\n param q = z }}")
+    assert said == ["E101", "E807"]
+    assert "j" in elaborator.parts.parameters
