@@ -259,3 +259,14 @@ def test_a_parameter_of_what_moves_is_told_as_such():
     elaborator, said = whole(f"model m {{ {text}\n energy T* = 1 kg*x'^2 + 1 kg*i'^2\n param q = z }}")
     assert said == ["E101", "E807"]
     assert "j" in elaborator.parts.parameters
+
+
+@pytest.mark.parametrize(
+    ("value", "help_"), [("u - x", "over a time: (u - x)/(1 s), or a parameter in s"), ("y", "y' in place of y?")]
+)
+def test_a_dynamic_without_its_time_is_helped_by_a_time_not_by_its_own_rate(value, help_):
+    """`x' in place of x?` would be E508; the flow of a coordinate may stand there."""
+    report = Report()
+    text = f"model m {{\n state x: m = 1 m\n coord y: translation\n input u: m = 0 m\n dynamic x' = {value}\n}}"
+    load.network(document := load.document(SourceText("m.sd", text), report), document.models["m"], None, report)
+    assert [(d.code, d.help) for d in report] == [("E208", help_)]
