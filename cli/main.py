@@ -160,8 +160,20 @@ def _ended_like_an_interruption() -> Iterator[None]:
     sent = [s for s in (signal.SIGTERM, signal.SIGHUP) if mine and signal.getsignal(s) is signal.SIG_DFL]
     for one in sent:
         signal.signal(one, signal.default_int_handler)
+    heard = [s for s in (signal.SIGINT, *sent) if mine and signal.getsignal(s) is signal.default_int_handler]
+    before = sys.unraisablehook
+
+    def told(lost: sys.UnraisableHookArgs) -> None:
+        """Python drops what is raised where an object is taken apart: the interruption comes again, behind that."""
+        if heard and lost.exc_type is not None and issubclass(lost.exc_type, KeyboardInterrupt):
+            threading.Timer(0.01, signal.pthread_kill, (threading.get_ident(), heard[0])).start()
+        else:
+            before(lost)
+
+    sys.unraisablehook = told
     try:
         yield
     finally:
+        sys.unraisablehook = before
         for one in sent:
             signal.signal(one, signal.SIG_DFL)

@@ -19,6 +19,7 @@ from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.starter import Starter
 from sysdyn.values import dataclass
 
 AHEAD = (0.0, 1e-9, 1e-6, 1e-3, 1e-2, 1e-1)
@@ -57,6 +58,22 @@ def culprit(prepared: Prepared, system: System, error: SolverFailure) -> Culprit
             if found is not None:
                 last.time, last.y = point[0], point[1]
                 return _told(prepared, *found, last)
+    return None
+
+
+def undefined_at_start(prepared: Prepared, system: System, t: float) -> tuple[str, Place] | None:
+    """The operation that is no number at the guesses of the start, and its statement; None where all are."""
+    y = Starter(system).given.guess[: system.unknowns]
+    oracle = Oracle(prepared.compiled.form, prepared.binding)
+    for block in prepared.compiled.form.blocks:
+        if block.name in (*WITHOUT_ENTRIES, "initial"):
+            continue
+        with np.errstate(all="ignore"):
+            found = oracle.undefined(block.name, t, y, np.zeros_like(y))
+        if found is not None:
+            told = _told(prepared, *found, LastState(prepared, system, t, y))
+            place = _statement(prepared, found[1]) or prepared.compiled.form.rows[found[0]].place
+            return told.text, place or prepared.network.place
     return None
 
 

@@ -178,7 +178,7 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
         if not isinstance(error.partial, Outcome):
             raise
         outcome = error.partial
-        failure = stopped(target, prepared, started, error, report)
+        failure = stopped(target, prepared, started, error, report, options)
     found = Report()
     claims = judge(prepared, outcome, found, finished=outcome.reached >= options.t_end)
     if outcome.judgement is None or outcome.met:

@@ -67,7 +67,7 @@ def start(
         _refused(prepared, t0, error, report)
         return None
     except NotFiniteError:
-        _steep(prepared, report)
+        _steep(prepared, system, t0, report)
         return None
     except SolverFailure:
         _late(prepared, "while the start is sought", "a higher limit, or guesses nearer to a start", report)
@@ -137,8 +137,15 @@ def shortened(lines: list[str]) -> list[str]:
     return lines if len(lines) <= 6 else [*lines[:5], f"... {len(lines) - 5} more of these"]
 
 
-def _steep(prepared: Prepared, report: Report) -> None:
-    """E519: the slopes of the rows at the start are no numbers."""
+def _steep(prepared: Prepared, system: System, t0: float, report: Report) -> None:
+    """E519: the rows at the start, or their slopes, are no numbers."""
+    from sysdyn.cli.run.culprit import undefined_at_start  # of mistakes alone
+
+    found = undefined_at_start(prepared, system, t0)
+    if found is not None:
+        help_ = "initial values at which it is defined, or a law that is defined there"
+        report.error("E519", f"at the start {found[0]}", found[1], help=help_)
+        return
     message = "the slopes of the equations are no numbers at the start: values beyond 1e308, or a root at zero?"
     report.error("E519", message, prepared.network.place, help="look at the sizes of parameters and initial values")
 

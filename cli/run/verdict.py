@@ -18,6 +18,7 @@ from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.model.expression import topological
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.judgement import Cancelled, NotMet
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.scales import group_maximum
@@ -98,7 +99,26 @@ _BLOCKED = "where all that meets at a node may block at once, a large resistance
 _RANK = "an earlier end, or lengths with which the mechanism does not reach its dead centre"
 
 
-def stopped(target: Target, prepared: Prepared, started: Started, error: SolverFailure, report: Report) -> str:
+LOOSER = "a looser --accuracy"
+
+
+def _knob(options: Options | None, code: str) -> str:
+    """What makes a run shorter, or where it cannot step on possible."""
+    if options is None or (options.method != "euler" and options.rtol is None and options.atol is None):
+        return LOOSER
+    if options.method != "euler":
+        return "a looser --rtol"
+    return "a shorter --step" if code == "E930" else "a longer --step"
+
+
+def stopped(
+    target: Target,
+    prepared: Prepared,
+    started: Started,
+    error: SolverFailure,
+    report: Report,
+    options: Options | None = None,
+) -> str:
     """Reports where the solver stopped; the sentence of it."""
     code, cause = _CAUSES.get(error.cause, ("E930", error.cause))
     asked = ("nonfinite", "newton", "step_too_small", "crawl")
@@ -136,6 +156,7 @@ def stopped(target: Target, prepared: Prepared, started: Started, error: SolverF
         usual = _BLOCKED if error.cause == "singular" else f"{usual}; {_BLOCKED}"
     if error.cause == "singular" and len(started.system.description.switches.places):
         usual = _TWICE
+    usual = usual.replace(LOOSER, _knob(options, code))
     remedy = _BOUNDED if why else _RANK if lost else usual
     known = f"last good state at {last.time:.9g} s: {last.listed()}" if last is not None and last.states() else ""
     help_ = "; ".join(filter(None, (remedy, known)))

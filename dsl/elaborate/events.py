@@ -28,9 +28,10 @@ from sysdyn.dsl.model.network import (
     loop_ranges,
 )
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
+from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.laws import LawOf
-from sysdyn.dsl.names.symbols import ParameterSymbol, Typed, Vector
+from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Typed, Vector
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
@@ -131,11 +132,30 @@ def when(frame: ElaborationContext, s: syntax.When) -> None:
     resolver = frame.resolver
     condition = resolver.condition(s.condition)
     moving = any(ex.variables(n) or _discretes(frame, n) for n in ex.topological([condition]) if n.op == "cmp")
+    if not moving and _reads_input(frame, s.condition):
+        return  # what is given to it stands still: it never comes true
     if not moving:
         raise resolver.fail("E701", "'when' condition has no relation that can cross", s.condition.span)
     place = frame.place(s.span)
     name = " ".join(resolver.source.text[s.condition.span.start : s.condition.span.end].split())
     _enter(frame, EventDraft(f"when {name}", condition, None, _actions(frame, s.actions), resolver.loops, place))
+
+
+def _reads_input(frame: ElaborationContext, condition: syntax.Expr) -> bool:
+    """Whether an input stands in a condition, by way of definitions too: what it is given may stand still."""
+    seen: set[str] = set()
+    stack = [condition]
+    while stack:
+        names = {node.name for node in walk(stack.pop()) if isinstance(node, syntax.Name)} - seen
+        seen |= names
+        for name in names:
+            symbol = frame.scope.find(name)
+            given = isinstance(symbol, ParameterSymbol) and symbol.family.name in frame.parts.inputs
+            if given or (isinstance(symbol, Definition) and symbol.kind == "input"):
+                return True
+            if isinstance(symbol, Definition) and symbol.kind in ("let", "output"):
+                stack.append(symbol.expression)
+    return False
 
 
 def every(frame: ElaborationContext, s: syntax.Every) -> None:

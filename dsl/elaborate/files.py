@@ -219,7 +219,11 @@ class FileScope:
         if path in self._modules:
             found = self._modules[path]
             if found is None:
-                self.report.error("E801", f"module '{'.'.join(names)}' imports itself", place)
+                here = Path(source.name).stem
+                said = (
+                    f"'{here}' and '{names[-1]}' import each other" if here != names[-1] else f"'{here}' imports itself"
+                )
+                self.report.error("E801", f"modules {said}" if here != names[-1] else f"module {said}", place)
             return found
         if not path.is_file():
             modules = sorted(p.stem for p in folder.glob("*.sd") if p.stem != "prelude")

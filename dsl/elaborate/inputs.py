@@ -118,7 +118,7 @@ class Inputs(Elements):
 
     def bind_inputs(self, s: syntax.Instance, space: Space, head: Interface, inputs: dict[str, syntax.Expr]) -> None:
         """The inputs of a component: what its user gives them, a scene or the command line in its place, a default."""
-        sight = self.resolver.sight()
+        sight, around = self.resolver.sight(), self.resolver.loops
         for name, statement in head.inputs.items():
             with self.entering(space):
                 unit = self.unit(statement.unit)
@@ -128,12 +128,12 @@ class Inputs(Elements):
                 self._give(name, unit, shape, space, self.given_inputs[path])
                 continue
             if name in inputs:
-                value, here, bound = inputs[name], self.current, tuple(sight.items())
+                value, here, bound, loops = inputs[name], self.current, tuple(sight.items()), around
             else:
                 assert statement.value is not None
-                value, here, bound = statement.value, space, ()
+                value, here, bound, loops = statement.value, space, (), ()
             definition = Definition(
-                name, "input", value, (), unit.dimension, here, place, value.span, bound=bound, shape=shape
+                name, "input", value, (), unit.dimension, here, place, value.span, bound=bound, loops=loops, shape=shape
             )
             space.scope.symbols[name] = definition if space.prefix else self._with_move(definition, path, unit)
 

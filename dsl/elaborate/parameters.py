@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import nullcontext
 
 from sysdyn.dsl.elaborate.head import Body
-from sysdyn.dsl.elaborate.parts import ElaborationContext
+from sysdyn.dsl.elaborate.parts import ElaborationContext, declared
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.dependence import in_order
@@ -16,6 +16,7 @@ from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.symbols import ParameterSymbol, Typed, Vector
 from sysdyn.dsl.names.unit_reading import read_unit
+from sysdyn.dsl.parser.notes import PREDEFINED
 from sysdyn.dsl.text.diagnostics import Place, Related
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
@@ -45,6 +46,7 @@ class Parameters(ElaborationContext):
         for statement, loops in order:
             try:
                 with self.inside(loops) if loops else nullcontext():
+                    self._is_of_constants(body, statement, statement.decl.name in given)
                     self._parameter(statement, given.get(statement.decl.name))
             except Failed:
                 self.scope.broken.add(statement.decl.name)
@@ -167,6 +169,23 @@ class Parameters(ElaborationContext):
                 message = f"parameter '{statement.decl.name}' depends on '{inner}': a parameter is a constant"
                 vary = f"numbers and parameters alone; 'input {statement.decl.name}' could vary"
                 raise self._wrong("E807", message, statement, given, help=None if given is None else vary)
+
+    def _is_of_constants(self, body: Body, statement: syntax.Param, given: bool) -> None:
+        """E807: a default that names what the body declares beside parameters, all of which are known before it."""
+        if given or statement.value is None:
+            return
+        names = [n for n in walk(statement.value) if isinstance(n, syntax.Name) and n.name not in PREDEFINED]
+        names = [n for n in names if self.scope.find(n.name) is None]
+        if not names:
+            return
+        own = {n.index.name for n in walk(statement.value) if isinstance(n, syntax.Reduction)}
+        others = {d.name for other, _ in body if not isinstance(other, syntax.Param) for d in declared(other)}
+        for name in names:
+            if name.name in others - own - self.resolver.sight().keys():
+                what = statement.decl.name
+                message = f"parameter '{what}' depends on '{name.name}': a parameter is a constant"
+                help_ = f"let {what} = ..., which may vary"
+                raise self.resolver.fail("E807", message, name.span, help=help_)
 
     def _wrong(
         self, code: str, message: str, statement: syntax.Param, given: Argument | None, help: str | None

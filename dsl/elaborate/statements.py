@@ -59,13 +59,17 @@ class Statements(Declarations):
         help_ = self.resolver.missing(left.dimension, right.dimension, *within)
         raise self.resolver.fail("E208", message, where.span, help=help_)
 
-    def _wants(self, what: str, expression: syntax.Expr, dimension: Dimension) -> Node:
+    def _wants(self, what: str, expression: syntax.Expr, dimension: Dimension, rate: bool = False) -> Node:
+        """The value of an expression in its dimension, E208; rate: of a state, where no rate of one may stand."""
         value = self.resolver.scalar(expression)
         if value.dimension is not None and value.dimension != dimension:
             want, have = dim.show(dimension), dim.show(value.dimension)
             factor = dim.show(dim.quotient(dimension, value.dimension))
             message = f"{what}: {want} expected, {have} found (factor: {factor})"
             help_ = self.resolver.missing(value.dimension, dimension, expression)
+            moved = self.scope.find((help_ or "").partition("' in place of")[0])
+            if rate and isinstance(moved, UnknownSymbol) and moved.kind == "s":
+                help_ = f"over a time: ({self.source_text(expression.span)})/(1 s), or a parameter in s"
             raise self.resolver.fail("E208", message, expression.span, help=help_)
         return value.node
 
@@ -129,6 +133,11 @@ class Statements(Declarations):
             text = self.source_text(where.span)
             help_ = f"work ... on {text.replace(chr(39), '')}" if "'" in text else "work E on q, or work E on quasi(w)"
             raise self.resolver.fail("E319", message, where.span, help=help_)
+        read = ex.variables(node) - {ex.time()}
+        if read and all(n.op == "var" and n.data[1] == "s" for n in read):
+            states = ", ".join(sorted(map(str, read)))
+            message, help_ = f"work on {states}, which no effort moves", "a coord, or a term in the state's dynamic"
+            raise self.resolver.fail("E319", message, where.span, help=help_)
 
     def _dynamic(self, s: syntax.Dynamic) -> None:
         target = s.target.base if isinstance(s.target, syntax.Prime) else s.target
@@ -140,8 +149,13 @@ class Statements(Declarations):
                 help_ = f"dynamic {self.source_text(target.span)}' = ..."
             raise self.resolver.fail("E508", "a dynamic gives the rate of a state", s.target.span, help=help_)
         self.parts.given.add(value.node.data[0])
+        if value.node.data[2]:
+            name = value.node.data[0]
+            help_ = f"a state for the rate, v = {name}': dynamic {name}' = v, dynamic v' = ...; or coord and energy T*"
+            said = f"a dynamic gives the first derivative of a state, not {value.node}'"
+            raise self.resolver.fail("E508", said, s.target.span, help=help_)
         rate = dim.quotient(value.dimension or NONE, dim.TIME)
-        node = self._wants(f"dynamic {value.node}'", s.value, rate)
+        node = self._wants(f"dynamic {value.node}'", s.value, rate, rate=True)
         for inner in sorted(ex.variables(node), key=lambda n: n.number):
             if inner.op == "var" and inner.data[2]:
                 message = f"dynamic {value.node}' = ... contains {inner}"
@@ -159,6 +173,11 @@ class Statements(Declarations):
     def _initial(self, s: syntax.Init, target_syntax: syntax.Expr, override: bool, outer: int) -> None:
         with self.resolver.leniently():
             target = self.resolver.scalar(target_syntax)
+        if target.node.op == "param" and target.node.data in self.parts.discretes:
+            name = target.node.data
+            message = f"'{name}' is a discrete variable: it begins with the value of its declaration"
+            help_ = f"discrete {name} = ... there; a param as its value can be set in a scene"
+            raise self.resolver.fail("E903", message, s.span, help=help_)
         message = f"'{target.node}' is in {dim.show(target.dimension)} but starts at {{}}"
         given = self.values_at_start(target.node, s.initial.value, target.dimension or NONE, message, outer)
         for one, value, loops in given:

@@ -34,7 +34,10 @@ ALL = Reals(-math.inf, math.inf)
 NOT_NEGATIVE = Reals(0.0, math.inf)
 POSITIVE = Reals(0.0, math.inf, True)
 NEGATIVE = Reals(-math.inf, 0.0, True)
-_CALLS = {"exp": POSITIVE, "cosh": Reals(1.0, math.inf, True), "abs": NOT_NEGATIVE, "tanh": Reals(-1.0, 1.0)}
+_CALLS = {"exp": POSITIVE, "cosh": Reals(1.0, math.inf, True), "abs": NOT_NEGATIVE}
+_CALLS |= dict.fromkeys(("tanh", "sin", "cos"), Reals(-1.0, 1.0)) | dict.fromkeys(
+    ("step", "smoothstep"), Reals(0.0, 1.0)
+)
 _ODD = ("sinh", "asinh", "atan", "sign")
 
 
@@ -62,6 +65,9 @@ def _of(node: Node, args: list[Reals]) -> Reals:
             return {1: POSITIVE, -1: NEGATIVE}.get(args[0].sign, ALL)
         case "call":
             return _CALLS.get(node.data, ALL)
+        case "cond":
+            one, other = args[1:]
+            return Reals(min(one.low, other.low), max(one.high, other.high), one.strict and other.strict)
     return ALL
 
 

@@ -48,5 +48,7 @@ def circular(chain: Sequence[Definition]) -> tuple[str, str]:
         one = f"{names[0]}[{', '.join(chain[0].at)}]"
         help_ = f"sum(j in ...) or prod(j in ...) over what is added up; or 'implicit' and a gamma for each {one}"
         return f"{said}{through}: a let knows no order of its elements", help_
-    said = " -> ".join([*names, names[0]])
-    return f"circular definition: {said}", "break it with a state or an implicit closed by a gamma"
+    said, help_ = " -> ".join([*names, names[0]]), "break it with a state or an implicit closed by a gamma"
+    if any(s.loops or s.space.prefix for s in chain):
+        help_ = f"the elements of an array of components are one definition: {help_}"
+    return f"circular definition: {said}", help_

@@ -276,7 +276,9 @@ class Names(Context):
         self._active.append(symbol)
         placeholders = {n: Typed(ex.index(f"{symbol.name}.{n}"), NONE) for n in symbol.at}
         try:
-            around = self.space(symbol.space), self.bound({**dict(symbol.bound), **placeholders}), self.aside()
+            loops = symbol.loops or symbol.space.loops
+            sight = {**symbol.space.bound, **dict(symbol.bound), **placeholders}
+            around = self.space(symbol.space), self.inside(loops, sight), self.aside()
             with around[0], around[1], around[2] as self._derived[key]:
                 value = self.resolve(symbol.expression)
                 value = self._declared(symbol, value)

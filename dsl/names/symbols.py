@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Any
@@ -252,6 +253,7 @@ class Definition:
     span: syntax.Span
     implied: bool = False
     bound: tuple[tuple[str, Typed | Vector], ...] = ()  # loop variables in sight where it is read
+    loops: tuple[Loop, ...] = ()  # of these, with those of the space
     shape: Shape = ()  # of an input that is an array
     beside: Node | None = None  # added to an input: a parameter that an analysis moves
 
@@ -366,4 +368,11 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
         from difflib import get_close_matches  # of mistakes alone
 
         alike = get_close_matches(name[:80], among, 1, 0.6)
+        if alike and (numbered := _unnumbered(name)) != name:
+            alike = [n for n in among if n != name and _unnumbered(n) == numbered] or alike
     return alike[0] if alike else None
+
+
+def _unnumbered(name: str) -> str:
+    """A name with one sign for each number in it: C1 is nearer to C2 than C is."""
+    return re.sub(r"[0-9]+", "#", name)

@@ -9,6 +9,9 @@ import re
 import unicodedata
 from collections.abc import Collection
 
+from sysdyn.dsl.model.functions import FUNCTIONS
+from sysdyn.dsl.parser.shapes import OTHERS, SHAPES
+
 # fmt: off
 MODEL_WORDS = frozenset(
     {
@@ -52,50 +55,6 @@ _HERE = {
     "action": "among the actions of 'when' or 'every'",
 }
 _CONTINUE = "end the line above with a comma, or break it inside the parentheses"
-_OTHERS = {
-    "default": "level name default { ... }",
-    "connect": "ports are joined by naming nodes: label: component() a -> b",
-    "parameter": "param k = 3 N/m",
-    "var": "let x = ...",
-    "variable": "let x = ..., or state s = ...",
-    "equation": "let, law, phi, psi or gamma",
-    "equations": "let, law, phi, psi or gamma",
-    **dict.fromkeys(
-        ("constraint", "constraints", "constrain", "holonomic", "nonholonomic"),
-        "phi name: ... = ... of displacements, psi name: ... = ... of flows",
-    ),
-    **dict.fromkeys(("force", "forces", "torque", "moment", "load", "apply"), "work F on x"),
-    **dict.fromkeys(("mass", "inertia", "kinetic_energy", "lagrangian"), "energy T* = 1/2*m*x'^2, energy V = ..."),
-    **dict.fromkeys(("friction", "damping", "dissipation", "rayleigh"), "content D = 1/2*b*x'^2"),
-    "import": "from std.electrical import resistor",
-    "include": "from std.electrical import resistor",
-    "class": "component or model",
-    "function": "fn f(x: m) -> N = ...",
-    "def": "fn f(x: m) -> N = ...",
-    "constant": "const g0 = 9.81 m/s^2",
-    "if": "when c { a := b }, or let x = if c then a else b",
-    "plot": "trace x, y every 1 ms",
-    "assert": "require k > 0 N/m of parameters, or expect always: ...",
-    "real": "param k = 3 N/m, coord, state or let",
-    "der": "dynamic x' = ...",
-    "ddt": "dynamic x' = ...",
-    "print": "trace x, y",
-    "save": "trace x, y",
-    "return": "output y = ...",
-    "subckt": "component name { ... }",
-    "module": "component name { ... }",
-    "package": "component name { ... }",
-    "block": "component name { ... }",
-    **dict.fromkeys(("translation", "rotation", "electrical", "hydraulic", "thermal", "heat"), "node a, b: DOMAIN"),
-    "end": "}",
-    "algorithm": "when c { a := b }, or let",
-    "initial": "init x = 1 m",
-    "tran": "scene s of m { time 0 s to 1 s }",
-    "simulate": "scene s of m { time 0 s to 1 s }",
-    **dict.fromkeys(("tspan", "duration", "tend", "tstop", "stoptime", "stop_time", "until"), "time 0 s to 5 s"),
-    **dict.fromkeys(("tolerance", "tol", "rtol", "reltol", "abstol", "precision"), "accuracy 1e-6, or of a run --rtol"),
-    **dict.fromkeys(("method", "integrator"), "solver radau"),
-}
 _SIGNS = {
     "&": "and",
     "|": "or between conditions; abs(x)",
@@ -196,8 +155,8 @@ def conditional() -> Complaint:
     return "E110", message, "(if ... then ... else ...)"
 
 
-def unknown(word: str, after: str, body: str) -> Complaint:
-    """A statement whose first word begins no statement of this body; `after` is the text behind it."""
+def unknown(word: str, after: str, body: str, text: str = "") -> Complaint:
+    """A statement whose first word begins no statement of this body; `after` is what stands behind it in the text."""
     here = _HERE[body]
     if word not in _OWN[body]:
         for words, place in (
@@ -219,8 +178,10 @@ def unknown(word: str, after: str, body: str) -> Complaint:
         return "E113", "an action assigns: name := expression", None
     if body == "bundle_member":
         return "E113", "a bundle lists nodes: x, y: translation", None
-    if body == "statement" and (element := _element(word, after.partition("\n")[0])) is not None:
+    if body == "statement" and (element := _element(word, after.partition("\n")[0], text)) is not None:
         return "E113", f"no statement begins with '{word}'; an element has a label", element
+    if word in ("L", "Lagrangian") and body == "statement" and re.match(r"=[^\n]*'", after) is not None:
+        return "E113", f"no statement begins with '{word}'; a Lagrangian is written by its parts", MOTION
     if after.startswith("=") and not after.startswith("=="):
         wanted = "set" if body == "scene_statement" else "const" if body == "item" else "let"
         wanted = "law" if body == "statement" and word in ("e", "f", "q", "p") else wanted
@@ -229,6 +190,10 @@ def unknown(word: str, after: str, body: str) -> Complaint:
             f"no statement begins with '{word}'; a value is given by a word before it",
             f"{wanted} {word} = ...",
         )
+    if body != "item" and (member := re.match(r"(?:\.\w+)+'?(?=\s*=(?!=))", after)) is not None:
+        path = f"{word}{member[0]}"
+        given = f", set {path} = ... of a parameter" if body == "scene_statement" else ""
+        return "E113", f"no statement begins with '{path}'", f"init {path} = ... where it begins{given}"
     if after.startswith("'"):
         help_ = f"init {word}' = ... where it begins, dynamic {word}' = ... of a state"
         help_ = f"names of a trace are joined by commas: trace x, {word}'" if body == "scene_statement" else help_
@@ -244,63 +209,29 @@ def unknown(word: str, after: str, body: str) -> Complaint:
     if body == "statement" and named is not None and word in ("translation", "rotation"):
         return "E113", f"no statement begins with '{word}'", f"coord {named[1]}: {word} {named[2].strip()}"
     near = get_close_matches(word, sorted(_OWN[body] | MODEL_WORDS | SCENE_WORDS | ITEM_WORDS), 1, 0.7)
-    said = _OTHERS.get(word.lower(), "").replace("DOMAIN", word.lower())
+    said = OTHERS.get(word.lower(), "").replace("DOMAIN", word.lower())
     if after.startswith("(") and body == "statement" and not said and (not near or near[0] not in MODEL_WORDS):
         label = f"{word[0].upper()}1: {word}(...) a -> b"
         return "E113", f"no statement begins with '{word}'; an element has a label", label
     return "E113", f"no statement begins with '{word}'", said or (near[0] if near else None)
 
 
-def _element(word: str, after: str) -> str | None:
-    """The element that is meant by `R1 = resistor(...) a -> b` and by `resistor R1(...)`."""
+def _element(word: str, after: str, text: str) -> str | None:
+    """The element that is meant by `R1 = resistor(...) a -> b`, by `resistor R1(...)` and by `R1 resistor(...)`."""
     assigned = _ASSIGNED.match(after)
     if assigned is not None:
         return f"{word}: {assigned[1].strip()}"
     declared = _DECLARED.match(after)
-    return None if declared is None else f"{declared[1]}: {word}({declared[2]}) {declared[3] or 'a -> b'}"
+    if declared is None:
+        return None
+    turned = _is_component(declared[1], text) and not _is_component(word, text)
+    label, component = (word, declared[1]) if turned else (declared[1], word)
+    return f"{label}: {component}({declared[2]}) {declared[3] or 'a -> b'}"
 
 
-SHAPES = {
-    "param": "param k = 3 N/m",
-    "const": "const c = 3 m/s",
-    "node": "node a, b: electrical",
-    "port": "port a, b: electrical",
-    "branch": "branch: electrical",
-    "coord": "coord x: translation = 0 m",
-    "cocoord": "cocoord p: translation = 0 N.s",
-    "state": "state s: m = 0 m",
-    "dynamic": "dynamic s' = ...",
-    "let": "let y = ...",
-    "input": "input u: V = 5 V",
-    "output": "output y = ...",
-    "energy": "energy T* = ..., energy V = ...",
-    "content": "content D = ...",
-    "work": "work F on x",
-    "phi": "phi name: left = right",
-    "psi": "psi name: left = right",
-    "gamma": "gamma name: left = right",
-    "init": "init x = 1 m",
-    "law": "law e = R*f",
-    "when": "when x >= 1 m { y := 0 }",
-    "every": "every 5 ms { y := x }",
-    "discrete": "discrete on = false",
-    "for": "for i in 1..n { ... }",
-    "time": "time 0 s to 5 s",
-    "set": "set k = 3 N/m",
-    "level": "level M = thermal in a scene, level thermal { ... } in a component",
-    "trace": "trace x in mm as pos, y every 1 ms",
-    "expect": "expect always: a <= b",
-    "accuracy": "accuracy 1e-6 on x",
-    "scene": "scene name of model { ... }",
-    "model": "model name { ... }",
-    "component": "component name { ... }",
-    "from": "from std.electrical import resistor, capacitor",
-    "formulation": "formulation hamiltonian",
-    "solver": "solver radau(order = 9)",
-    "fn": "fn f(x: m) -> N = ...",
-    "table": "table f(x: m) -> N linear clamp [ (0, 0), (1, 2) ]",
-}
-"""The shape of a statement, by its first word."""
+def _is_component(name: str, text: str) -> bool:
+    """Whether a file imports or declares a component of that name."""
+    return re.search(rf"\bimport\b[\w\s,]*?\b{name}\b|^\s*component\s+{name}\b", text, re.MULTILINE) is not None
 
 
 def expected(accepted: Collection[str], kind: str, text: str, line: str, word: str = "") -> Complaint:
@@ -313,9 +244,13 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
         shape = f"one name a statement: {SHAPES.get(word, word + ' on = false')}"
     if kind == "<name>" and "*" in accepted and (word in _EXPRESSIONS or ")" in accepted):
         shape = f"factors are joined by '*': ... * {text}"
+    reduced = re.search(r"\b(sum|prod|max|min)\((?:[^()]|\([^()]*\))*$", line)
+    if text == "for" and reduced is not None:
+        return "E113", said, f"the index stands first: {reduced[1]}(i in 1..n: ...)"
     unit = re.search(r"([\d.]+)\s+([^\W\d]\w*)$", line)
     if text == "(" and "*" in accepted and unit is not None:
-        meant = f"factors are joined by '*': {unit[1]}*{unit[2]}(...)"
+        called = "(...)" if unit[2] in FUNCTIONS else "*(...)"
+        meant = f"factors are joined by '*': {unit[1]}*{unit[2]}{called}"
         return "E113", f"'{unit[2]}' stands where a unit is read", meant
     last = re.search(r"([\d.]+\s+[^\s()]*?)\s*([./]?)([^\W\d]\w*)$", line)
     if text == "[" and word != "param" and "*" in accepted and last is not None:

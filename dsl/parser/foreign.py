@@ -10,7 +10,7 @@ from sysdyn.dsl.parser.complaints import Complaint
 from sysdyn.dsl.text.source import Span
 from sysdyn.values import dataclass
 
-_DIGITS_BEFORE = re.compile(r"[0-9]+$")
+_DIGITS_BEFORE = re.compile(r"(?<!\w)[0-9]+$")
 _UNIT = re.compile(r"[^\W\d]\w*(?:\^-?[0-9]+)?(?:[./][^\W\d]\w*(?:\^-?[0-9]+)?)*")
 _DIGITS = re.compile(r"[0-9]+")
 _SPICE = re.compile(r"(?:[\w.+-]+[ \t]+){2,}[\w.+-]+[ \t]*(?:[#;].*)?$")
@@ -71,6 +71,9 @@ def around(text: str, start: int, end: int, kind: str) -> Slip | None:
             either = f"{meant}, or {before.group()}{behind.group()}"
             return Slip(("E113", said, either))
         return Slip(("E113", said, meant), meant, span)
+    unclosed = _unclosed(text, Span(start, end), line) if kind == "<name>" else None
+    if unclosed is not None:
+        return Slip(unclosed)
     quantity = grouped(text, start) if kind in ("<name>", "<number>", "(") else None
     if quantity is not None:
         said = f"'{text[quantity.start : quantity.end]}': {UNGROUPED}"
@@ -126,6 +129,18 @@ _ELEMENT = re.compile(r"\s*[\w\[\], +-]+:\s*([\w.]+)\s*(\(.*\))?\s*(.*)$")
 """An element's line up to a token: component, parameters, what stands behind them."""
 
 
+def _unclosed(text: str, span: Span, line: str) -> Complaint | None:
+    """A first node behind parameters that are not closed: `resistor(R = 1 ohm a -> b`."""
+    found = _ELEMENT.match(line)
+    if found is None or re.match(r"[\w.]*(?:\[[^\]]*\])?\s*->", text[span.end :]) is None:
+        return None
+    given = line[found.end(1) :].strip()
+    if not given.startswith("(") or given.count("(") != given.count(")") + 1:
+        return None
+    shown = f"{found[1]}{given}) {text[span.start : span.end]} -> ..."
+    return "E112", f"the parentheses of '{found[1]}' are not closed", shown
+
+
 def _element_slip(text: str, span: Span, line: str) -> Complaint | None:
     """What does not fit in `label: component(name = value) a -> b`."""
     sign = text[span.start : span.end]
@@ -153,6 +168,8 @@ def _element_slip(text: str, span: Span, line: str) -> Complaint | None:
     if not parameters and re.fullmatch(r"\w+\s*=.*", behind) and sign[:1].isalpha():
         given = " ".join(behind.split())
         return "E113", "parameters stand in parentheses", f"{component}({given}) {sign} -> ..."
+    if not parameters and "->" in behind and sign == "(" and (late := re.match(r"(\s*\w+\s*=.*)\)", rest)):
+        return "E113", "parameters stand behind the component", f"{component}({late[1].strip()}) {behind}"
     if parameters and sign == ":" and re.search(r"(^|,\s*)\w+$", behind):
         name = re.findall(r"\w+", behind)[-1]
         return "E113", "a port is bound by '='", f"{name} = {second}"

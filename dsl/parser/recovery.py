@@ -15,6 +15,7 @@ from sysdyn.dsl.parser.automaton import MAX_NESTING, Automaton
 from sysdyn.dsl.parser.complaints import Complaint
 from sysdyn.dsl.parser.lexing import RESERVED, Bracket
 from sysdyn.dsl.parser.notes import MAX_TERMS
+from sysdyn.dsl.parser.shapes import SHAPES
 from sysdyn.dsl.text.diagnostics import Related
 from sysdyn.dsl.text.source import Span
 from sysdyn.dsl.tree.syntax import Broken
@@ -232,7 +233,7 @@ class Recovery:
             what = "level x = name" if body == "statement" else "level name { }"
             self._error(("E107", f"'{what}' belongs in {where}, not in {here}", None), Span(start, start + 5))
         elif word and word not in self._words_here(size) and after[:1] not in (":", "["):
-            complaint = complaints.unknown(word, after, body)
+            complaint = complaints.unknown(word, after, body, scanner.text)
             netlist = foreign.spice(word, after) if body == "statement" and complaint[::2] == ("E113", None) else None
             if netlist is not None:
                 complaint = (complaint[0], "an element is written with its label, its parameters named", netlist)
@@ -247,7 +248,7 @@ class Recovery:
             message, help_ = f"'{word}' begins a statement here and cannot be the label of an element", f"{word}_: ..."
             element = _ELEMENT.match(after) is not None
             if not element and word in _UNLABELLED:
-                help_ = f"{complaints.SHAPES.get(word, word + ' ...')}, without ':'"
+                help_ = f"{SHAPES.get(word, word + ' ...')}, without ':'"
             if not element and word in ("phi", "psi", "gamma"):
                 message, help_ = f"a {word} has a label, by which its multiplier is read", f"{word} name: ... = ..."
             self.nameless = True

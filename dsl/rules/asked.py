@@ -17,7 +17,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, ElementSetting, Loop, Parameter
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.rules.bound_values import friction_bounds
-from sysdyn.dsl.rules.graph_checks import modulus
+from sysdyn.dsl.rules.graph_checks import modulus, negative
 from sysdyn.dsl.rules.passivity import active
 from sysdyn.values import dataclass
 
@@ -123,4 +123,4 @@ class Asked:
         known = Values(parameters, elements)
         asked = mine.others if scalar else [(c, loops) for c, loops, _ in self._conditions]
         held = all(known.truth(c, at) for c, loops in asked for at in known.cases(c, loops))
-        return held and not any(active(branch, known) for branch in mine.laws)
+        return held and not any(active(branch, known) or negative(branch, known) for branch in mine.laws)

@@ -208,7 +208,7 @@ def _dynamics(model: Elaborator, known: Values, report: Report) -> None:
         box = [range(round(known.number(a)), round(known.number(b)) + 1) for a, b in state.shape if _known(a, b, known)]
         every = itertools.product(*box) if len(box) == len(state.shape) else ()
         wrong = next((element for element in every if element not in counts), None) if twice is None else twice
-        if wrong is not None:
+        if wrong is not None and (twice is not None or not report.failed):  # else a statement was refused
             name = _indexed(state.name, wrong)
             what = "has no dynamic" if twice is None else f"has {counts[wrong]} dynamics"
             report.error("E507", f"state {name} {what}", said[-1].place, help="each element once")

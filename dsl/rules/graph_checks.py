@@ -13,6 +13,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, NodeFamily, Terminal
 from sysdyn.dsl.model.rewriting import expressions
+from sysdyn.dsl.model.signs import Reals, reals
 from sysdyn.dsl.model.values import Values, as_constants
 from sysdyn.dsl.parser.notes import PREDEFINED
 from sysdyn.dsl.rules import lossless
@@ -211,6 +212,13 @@ def modulus(branch: Branch) -> Node | None:
     return None if moves else slope
 
 
+def negative(branch: Branch, known: Values) -> bool:
+    """Whether the modulus of a linear law is negative."""
+    report = Report()
+    _sign(branch, known, report)
+    return report.failed
+
+
 def _sign(branch: Branch, known: Values, report: Report) -> None:
     """E321, E325: the modulus of a linear law, judged with the values bound."""
     own = _own(branch)
@@ -218,22 +226,40 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
         return
     slope = modulus(branch)
     if slope is None:
+        _modulated(branch, derivative(branch.law, own), own, known, report)
         return
     found = ((at, known.number(slope, at)) for at in known.cases(slope, branch.loops))
     at, value = next((case for case in found if case[1] < 0.0), ({}, 0.0))
     if not value < 0.0:
         return
-    name = branch.name.rpartition("#")[0] or branch.name
     slope = ex.substitute(slope, as_constants(at))
-    shown = f"{value:g}" if slope.op == "const" else f"{slope} = {value:g}"
+    _negative(branch, f"{value:g}" if slope.op == "const" else f"{slope} = {value:g}", report)
+
+
+def _modulated(branch: Branch, slope: Node | None, own: Node, known: Values, report: Report) -> None:
+    """E321, E325 of a linear law whose modulus moves: where it is negative whatever time and other unknowns are."""
+    nodes = () if slope is None else ex.topological([slope])
+    if slope is None or own in nodes:
+        return
+    params = [n for n in nodes if n.op == "param"]
+    for at in known.cases(slope, branch.loops):
+        numbers = {n: known.number(n, at) for n in params} | at
+        if not all(map(math.isfinite, numbers.values())):
+            continue
+        found = reals(slope, {n: Reals(v, v, v != 0.0) for n, v in numbers.items()})
+        if found.sign < 0:
+            _negative(branch, f"{found.low:g} to {found.high:g}", report)
+            return
+
+
+def _negative(branch: Branch, shown: str, report: Report) -> None:
+    name = branch.name.rpartition("#")[0] or branch.name
     if branch.kind == "kinetic":
         message = f"'{name}': the inertia is negative ({shown}): the motion is not determined forward in time"
         report.error("E321", message, branch.place)
         return
     what = {"potential": "stiffness or capacitance", "dissipator": "resistance or damping"}[branch.kind]
-    message = f"'{name}': negative {what} ({shown})"
     function = "V = 1/2*k*x.q^2" if branch.kind == "potential" else "D = 1/2*b*x.f^2"
     keyword = "energy" if branch.kind == "potential" else "content"
-    report.error(
-        "E325", message, branch.place, help=f"an unstable element that is meant is written as '{keyword} {function}'"
-    )
+    help_ = f"an unstable element that is meant is written as '{keyword} {function}'"
+    report.error("E325", f"'{name}': negative {what} ({shown})", branch.place, help=help_)

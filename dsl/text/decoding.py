@@ -22,6 +22,9 @@ def decode(name: str, stream: BinaryIO) -> SourceText:
         place = SourceText(name, "").place(0, 0)
         raise ModelError([Diagnostic("E116", message, place, "a table of data belongs in a .csv file")])
     try:
+        if b"\0" in data:  # UTF-16 without its mark, or no text
+            at = data.index(b"\0")
+            raise UnicodeDecodeError("utf-8", data, at, at + 1, "no character of a text")
         return SourceText(name, data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         text = data[: error.start].decode("utf-8-sig", "replace")

@@ -19,7 +19,7 @@ from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting
 from sysdyn.runtime.events.plan import Plan, Sampled
-from sysdyn.runtime.linear.rest import SAME, Equations, Rest, Resting
+from sysdyn.runtime.linear.rest import SAME, SHARE, Equations, Rest, Resting
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.gauss_newton import Problem
@@ -36,6 +36,7 @@ class ContactRest:
         self.contacts.take(system.description.switches.active)
         self._frictions = [k for k, c in enumerate(plan.contacts) if c.kind in ("friction", "planar")]
         self._of: dict[tuple[bool, ...], Resting] = {}
+        self.share = SHARE
         started = self.contacts.state()
         self._stick()
         self._begins = dict.fromkeys((self.contacts.state(), started))  # what rubs on a belt slips at rest
@@ -53,6 +54,7 @@ class ContactRest:
         key = tuple(self.contacts.active.tolist())
         if key not in self._of:
             self._of[key] = Resting(self.system, self.tangible, self.t, self.first)
+        self._of[key].share = self.share
         return self._of[key]
 
     @property
@@ -109,6 +111,10 @@ class ContactRest:
                 y[[place, contacts.multiplier[k + 1]]] = values[contact.upper] * along / np.hypot(*along)
         return y
 
+    def alike(self, point: Floats) -> bool:
+        """Nothing is certain: the contacts decide where a point leads."""
+        return False
+
     def apart(self, one: Rest, other: Rest) -> bool:
         """Whether two states differ by more than what the first leaves open."""
         one.stand(self.system)
@@ -122,8 +128,18 @@ class SampledRest:
     def __init__(self, equations: Equations, system: System, sampled: tuple[Sampled, ...]) -> None:
         self.equations, self.system, self.sampled = equations, system, sampled
         self.first, self.problem, self.apart = equations.first, equations.problem, equations.apart
+        self.alike = equations.alike
         self.observer = Observer(system)
         self.changes: dict[str, None] = {}
+
+    @property
+    def share(self) -> float:
+        """Of the work of one search."""
+        return self.equations.share
+
+    @share.setter
+    def share(self, share: float) -> None:
+        self.equations.share = share
 
     @property
     def turns(self) -> np.ndarray:

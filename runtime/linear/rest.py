@@ -26,6 +26,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.gauss_newton import Problem, solve
 from sysdyn.runtime.numerics.least_change import DENSE
+from sysdyn.runtime.numerics.products import add_product, add_sizes
 from sysdyn.runtime.numerics.rank import least_squares, null_space
 from sysdyn.runtime.numerics.work import Work
 from sysdyn.runtime.start.start import ConsistentState
@@ -43,8 +44,12 @@ NEAR, NOISE = 1e-9, 1e-13
 """Parts of a magnitude, and of the largest of its kind and unit, that are tried as zero."""
 FAR = 1e9
 """Times its magnitude: a displacement that is left open and has wandered off."""
-SHARE = 0.05
-"""Of the work that a search for a start may take: that of one search for rest."""
+SHARE, SOUGHT = 0.05, 5
+"""Of the work that a search for a start may take: that of one search for rest; points that may take all of it while no
+state is known (a twentieth is two iterations of a large model).
+"""
+STRAIGHT = 1e-10
+"""Of its terms: by how much a row may miss its tangent at a point that lies on the straight piece of another."""
 MANY = 20_000
 """Unknowns up to which random points are tried: far from the guess factors of a line of 80000 took 6 GB."""
 NEAREST, FARTHEST = -1.0, 1.5
@@ -79,7 +84,7 @@ class Resting:
 
     def __init__(self, system: System, tangible: AbstractSet[str], t: float, first: Floats) -> None:
         self.system, self.tangible, self.t, self.first = system, tangible, t, first
-        self.starter = Starter(system)
+        self.starter, self.share = Starter(system), SHARE
         self.rows = system.another("rated")
         self.n = system.form.written
         families = system.description.families
@@ -182,7 +187,7 @@ class Resting:
             guess=guess,
             scale=scale,
             weight=np.where(follows, 1e-3, 1.0),
-            work=Work(SHARE),
+            work=Work(self.share),
         )
 
     def found(self, guess: Floats, near: Floats | None = None) -> Rest | None:
@@ -278,6 +283,20 @@ class Resting:
         found[problem.free] = column[:, None] * null
         return found
 
+    def alike(self, point: Floats) -> bool:
+        """Whether the rows at a point are those of the first guess: of one straight piece, from which Newton's method
+        leads to where it led from there.
+        """
+        values = self._slopes(self.first)
+        if not np.array_equal(values, self._slopes(point)):
+            return False
+        problem, away = self.problem(self.first), point - self.first
+        tangent, terms = self.residual(self.first), np.zeros(problem.number)
+        add_product(problem.rows, problem.columns, values, away, tangent)
+        add_sizes(problem.rows, problem.columns, values, np.abs(self.first) + np.abs(away), terms)
+        miss = np.abs(self.residual(point) - tangent) <= STRAIGHT * (terms + np.abs(tangent))
+        return bool(miss[self.use if not self.along.size else problem.use].all())
+
     def apart(self, one: Rest, other: Rest) -> bool:
         """Whether two states differ by more than what the first leaves open, and no states of rest lie between them."""
         problem = self.problem(one.state.y)
@@ -319,6 +338,7 @@ class Equations(Protocol):
     """What states of rest are found of: Resting, or with constraints that hold at times contact_rest.ContactRest."""
 
     first: Floats
+    share: float
 
     @property
     def turns(self) -> Mask:
@@ -329,6 +349,9 @@ class Equations(Protocol):
 
     def found(self, guess: Floats) -> Rest | None:
         """The state of rest that is come to from a guess."""
+
+    def alike(self, point: Floats) -> bool:
+        """Whether Newton's method leads from a point to where it led from the first guess, for certain."""
 
     def apart(self, one: Rest, other: Rest) -> bool:
         """Whether two states differ by more than what the first leaves open."""
@@ -341,7 +364,7 @@ def rests(
     many are wanted; advance: told how many points were tried.
     """
     kept: list[Rest] = []
-    guess = resting.first
+    guess, begun = resting.first, False
     random = np.random.default_rng(7)
     scale = resting.problem(guess).scale
     scale = np.where(resting.turns, np.maximum(scale, 1.0), scale)
@@ -353,7 +376,11 @@ def rests(
             advance(k)
         shaken = 10.0 ** random.uniform(NEAREST, FARTHEST) * scale * random.standard_normal(guess.size)
         point = guess if k == 0 else mirrored.pop() if mirrored else guess + shaken
+        if begun and resting.alike(point):
+            continue
+        resting.share = 1.0 if k < SOUGHT and not kept else SHARE
         found = resting.found(point)
+        begun = begun or (k == 0 and found is not None)
         if found is not None and all(resting.apart(other, found) for other in kept):
             kept.append(found)
             mirrored.append(-found.state.y)

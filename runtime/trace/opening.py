@@ -54,7 +54,7 @@ def of_sweep(file: Any) -> bool:
 def replaceable(path: str | Path, *, sweep: bool = False) -> bool:
     """Nothing is lost where a new trace (sweep: a new sweep) takes this path: there is nothing yet, an empty file, or
     one of sysdyn of the same kind; or one that a living run writes, which cannot be read at every instant (its claim
-    says so: claim.py).
+    says so: claim.py).  OSError where another program holds it.
     """
     import h5py
 
@@ -66,6 +66,10 @@ def replaceable(path: str | Path, *, sweep: bool = False) -> bool:
             return _outside_but_parameters(file) is None and _is_ours(file) and of_sweep(file) == sweep
     except FileNotFoundError:
         return True
+    except BlockingIOError as error:
+        if being_written(Path(path).resolve()):
+            return True
+        raise OSError(error.errno, "another program holds this file open to write it", str(path)) from error
     except (OSError, RuntimeError, ValueError, KeyError, TypeError):
         return being_written(Path(path).resolve())
 

@@ -437,3 +437,37 @@ def test_rest_is_not_sought_where_what_is_left_open_hides_the_rows(tmp_path):
         lost = 0.2 * (hot - 293.15) + 1e-9 * (hot**4 - 293.15**4)
         assert joule == pytest.approx(lost, rel=1e-6)
         assert abs(state.values["w"]) < 1.0
+
+
+LADDER = """from std.electrical import capacitor, resistor, voltage
+model ladder {
+  param n = 400
+  node v[0..n]: electrical
+  V: voltage(v = 1 V) v[0] -> ground
+  for i in 1..n {
+    R[i]: resistor(R = 1 ohm) v[i-1] -> v[i]
+    C[i]: capacitor(C = 1 mF) v[i] -> ground
+    D[i]: dissipator(f = 0.1 ohm^-1*(1 V^-2)*e^3) v[i] -> ground
+    init C[i].e = 0 V
+  }
+}
+scene s of ladder { time 0 s to 1 s; trace v[1].e as first, v[2].e as second }
+"""
+
+
+def test_a_long_ladder_of_flat_laws_rests(tmp_path, capsys):
+    """At the guess all slopes are zero; backwards v[i - 1] = v[i] + the currents of what follows, from the last on."""
+
+    def ends(last):
+        volts, current = [last], 0.0
+        while len(volts) < 401 and volts[-1] < 10.0:
+            current += 0.1 * volts[-1] ** 3
+            volts.append(volts[-1] + current)
+        return volts
+
+    last = brentq(lambda v: ends(v)[-1] - 1.0 if len(ends(v)) == 401 else 10.0, 1e-4, 0.1, xtol=1e-18, rtol=1e-14)
+    path = write(tmp_path, LADDER)
+    (found,) = rests(capsys, path, "--tries", "2")
+    volts = ends(last)
+    charges = [found["values"][f"C[{k}]"] for k in (1, 2, 400)]
+    assert charges == pytest.approx([1e-3 * volts[-2], 1e-3 * volts[-3], 1e-3 * volts[0]], rel=1e-8)

@@ -140,3 +140,22 @@ def test_a_link_to_itself_and_no_name_are_unreadable_files(tmp_path, capsys, mon
     for name in ("loop.sd",) if command == "new" else ("loop.sd", ""):
         assert run([*command.split(), name]) == 5, name
         assert "fault" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_a_text_in_utf_16_is_told_once(tmp_path, capsys, encoding):
+    path = tmp_path / "odd.sd"
+    path.write_bytes("model m {\n  param a = 1\n}\n".encode(encoding))
+    assert run(["check", str(path)]) == 1
+    said = capsys.readouterr().err
+    assert said.count("error") == said.count("error E116") == 1
+    assert "save the file as UTF-8" in said
+
+
+def test_modules_that_import_each_other_are_both_named(tmp_path, capsys):
+    for name, other in (("a", "b"), ("b", "a")):
+        (tmp_path / f"{name}.sd").write_text(
+            f"from {other} import {other}1\ncomponent {name}1 {{ param k = 1 }}\nmodel m {{ }}\n"
+        )
+    assert run(["check", str(tmp_path / "a.sd")]) == 1
+    assert "error E801: modules 'a' and 'b' import each other" in capsys.readouterr().err

@@ -158,3 +158,35 @@ def test_home_that_cannot_be_written(tmp_path):
     assert ran.returncode == 0, ran.stderr
     assert json.loads(ran.stdout)["ok"]
     assert process("plot", "model-swing.h5", env=environ).returncode == 0
+
+
+LOST = """
+import os, signal, time, click
+from sysdyn.cli import main
+class Held:
+    def __del__(self):
+        print("taken apart", flush=True)
+        time.sleep(5.0)
+@click.command()
+def command():
+    Held()
+    print("went on", flush=True)
+    time.sleep(5.0)
+main.Group.get_command = lambda *_: command
+main.main(["check"])
+"""
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_while_an_object_is_taken_apart_is_not_lost(sent):
+    """Python drops what is raised there."""
+    command = [sys.executable, "-c", LOST]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "taken apart\n"
+        began = time.monotonic()
+        process.send_signal(sent)
+        out, said = process.communicate(timeout=8)
+        assert time.monotonic() - began < 3.0
+    assert process.returncode == 130
+    assert out == "went on\n"
+    assert said.split() == ["interrupted"]

@@ -346,3 +346,20 @@ def test_a_limit_of_wall_time_that_is_over_before_the_run(tmp_path, capsys):
     path = write(tmp_path, "model m { state x: 1 = 1\ndynamic x' = -x/(1 s) }\nscene s of m { time 0 s to 1 s }")
     assert run(["simulate", path, "--max-wall", "1 ns", "-o", str(tmp_path / "t.h5")]) == 3
     assert "E934" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "remedy"),
+    [
+        ([], "a looser --accuracy"),
+        (["--rtol", "1e-6"], "a looser --rtol"),
+        (["--method", "euler", "--step", "1e-3"], "a longer --step"),
+    ],
+)
+def test_what_would_shorten_a_stopped_run_is_what_it_listens_to(tmp_path, capsys, monkeypatch, options, remedy):
+    monkeypatch.chdir(tmp_path)
+    code, found = run_json(capsys, "simulate", write(tmp_path, PENDULUM), "--max-steps", "5", *options)
+    assert code == 3
+    (said,) = [d for d in found["diagnostics"] if d["severity"] == "error"]
+    assert said["code"] == "E934"
+    assert said["help"].startswith(f"a higher limit, or {remedy}")

@@ -3,6 +3,8 @@
 import errno
 import resource
 import signal
+import subprocess
+import sys
 
 import pytest
 from sysdyn.cli import whole_files
@@ -68,3 +70,20 @@ def test_a_text_beside_which_no_file_can_be_made_is_named(tmp_path):
     with pytest.raises(FileNotFoundError) as caught:
         whole_files.replace(target, "text")
     assert caught.value.filename == str(target)
+
+
+@pytest.mark.parametrize(("mode", "code"), [("r+", 5), ("r", 0)])
+def test_a_trace_that_another_program_writes_is_said_to_be_held(tmp_path, capsys, mode, code):
+    """And is as before; one that somebody reads is replaced."""
+    model, output = write(tmp_path, PENDULUM), tmp_path / "o.h5"
+    assert run(["simulate", str(model), "-q", "-o", str(output)]) == 0
+    before = output.stat()
+    script = "import h5py, sys; file = h5py.File(*sys.argv[1:]); print('held', flush=True); input()"
+    command = [sys.executable, "-c", script, str(output), mode]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout.readline() == "held\n"
+        capsys.readouterr()
+        assert run(["simulate", str(model), "-q", "-o", str(output)]) == code
+        assert (f"{output}: another program holds this file open" in capsys.readouterr().err) == (mode == "r+")
+        other.communicate("\n")
+    assert (output.stat().st_ino == before.st_ino) == (mode == "r+")

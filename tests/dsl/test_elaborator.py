@@ -211,3 +211,62 @@ def test_nodes_in_a_row_are_named_in_the_remedy(ends, named):
     elaborator.elements()
     elaborator.settle()
     assert [(d.code, d.help) for d in report] == [("E402", named)]
+
+
+def test_a_condition_over_an_input_that_stands_still_never_comes_true():
+    """An input given a constant, by its user, a default or a let between, is no mistake of the condition's author."""
+    unit = "component valve {{ input u: 1\n discrete shut = u <= 0.5\n {}\n when on {{ shut := false }} }}"
+    for condition in ("let on = u > 0.5", "let up = u\n let on = up > 0.5 and true"):
+        elaborator, said = whole(f"{unit.format(condition)}\nmodel m {{ V: valve() u = 1 }}")
+        assert said == []
+        assert elaborator.parts.events == []
+    elaborator, said = whole("model m { input u: 1 = 0; discrete g = 1; when u > 0.5 { g := 2 } }")
+    assert said == []
+    assert elaborator.parts.events == []
+    assert whole("model m { param u = 1; discrete g = 1; when u > 0.5 { g := 2 } }")[1] == ["E701"]
+
+
+def test_a_dynamic_of_a_second_derivative_is_no_dynamic_of_the_first():
+    """It was read as q' = -q, by the units of q''."""
+    report = Report()
+    document = load.document(SourceText("m.sd", "model m {\n state q: m = 1 m\n dynamic q'' = -q/(1 s^2)\n}"), report)
+    assert load.network(document, document.models["m"], None, report) is None
+    (found,) = report
+    assert (found.code, *found.place.start) == ("E508", 3, 10)
+    assert "dynamic q' = v, dynamic v' = ..." in found.help
+
+
+@pytest.mark.parametrize(
+    ("statement", "code", "message"),
+    [
+        ("work 3 N on s", "E319", "work on s, which no effort moves"),
+        ("init g = 1", "E903", "'g' is a discrete variable: it begins with the value of its declaration"),
+        ("work 3 N on s*x/(1 m)", None, ""),
+    ],
+)
+def test_what_has_no_virtual_displacement_and_what_has_no_start(statement, code, message):
+    text = "coord x: translation = 1 m\n state s: m = 1 m\n dynamic s' = -s/(1 s)\n discrete g = 0"
+    report = Report()
+    inside = f"{text}\n energy T* = 1/2*(1 kg)*x'^2\n {statement}\n"
+    document = load.document(SourceText("m.sd", f"model m {{\n {inside}}}"), report)
+    load.network(document, document.models["m"], None, report)
+    assert [(d.code, d.message) for d in report] == ([(code, message)] if code else [])
+
+
+def test_a_parameter_of_what_moves_is_told_as_such():
+    """Parameters are known before all else: what they name was told as unknown; an index of a sum is its own."""
+    text = "param k = 2*x/(1 m)\n param j = sum(i in 1..3: i)*2*pi\n coord x: translation = 1 m\n coord i: translation"
+    elaborator, said = whole(f"model m {{ {text}\n energy T* = 1 kg*x'^2 + 1 kg*i'^2\n param q = z }}")
+    assert said == ["E101", "E807"]
+    assert "j" in elaborator.parts.parameters
+
+
+@pytest.mark.parametrize(
+    ("value", "help_"), [("u - x", "over a time: (u - x)/(1 s), or a parameter in s"), ("y", "y' in place of y?")]
+)
+def test_a_dynamic_without_its_time_is_helped_by_a_time_not_by_its_own_rate(value, help_):
+    """`x' in place of x?` would be E508; the flow of a coordinate may stand there."""
+    report = Report()
+    text = f"model m {{\n state x: m = 1 m\n coord y: translation\n input u: m = 0 m\n dynamic x' = {value}\n}}"
+    load.network(document := load.document(SourceText("m.sd", text), report), document.models["m"], None, report)
+    assert [(d.code, d.help) for d in report] == [("E208", help_)]

@@ -147,6 +147,24 @@ def test_a_modulus_below_zero_of_one_element_of_an_array(law, values, code, show
     assert all(shown in message for _, message, _ in found)
 
 
+@pytest.mark.parametrize(
+    ("law", "code", "shown"),
+    [
+        ("dissipator(e = -k*(1 + 0.5*sin(t/(1 s)))*f*(1 N.s/m))", "E325", "damping (-3 to -1)"),
+        ("dissipator(f = (if y.q > 0 m then -1 else -k)*e*(1 m/s/N))", "E325", "damping (-2 to -1)"),
+        ("potential(e = (step(t/(1 s) - 1) - k)*q*(1 N/m))", "E325", "capacitance (-2 to -1)"),
+        ("kinetic(p = -exp(y.q/(1 m))*f*(1 kg))", "E321", "negative (-inf to "),
+        ("dissipator(e = -k*(1 + sin(t/(1 s)))*f*(1 N.s/m))", None, ""),
+        ("dissipator(e = -k*(1 + y.q/(1 m))*f*(1 N.s/m))", None, ""),
+        ("dissipator(e = (k - 1)*(2 + cos(t/(1 s)))*f*(1 N.s/m))", None, ""),
+    ],
+)
+def test_a_modulus_that_moves_is_refused_where_it_is_negative_whatever_moves_it(law, code, shown):
+    found = said(f"param k = 2\nnode x, y: translation\nM: kinetic(p = 1 kg*f) y\nN: kinetic(p = 1 kg*f) x\nX: {law} x")
+    assert [c for c, _, _ in found] == ([code] if code else [])
+    assert all(shown in message for _, message, _ in found)
+
+
 COUPLED = """component machine {{
   branch coil: electrical
   branch shaft: rotation

@@ -14,7 +14,7 @@ from sysdyn.dsl.names.calls import Calls, walk
 from sysdyn.dsl.names.context import Context
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.laws import law_of, own_variables, ratio_of
-from sysdyn.dsl.names.symbols import Vector
+from sysdyn.dsl.names.symbols import Vector, nearest
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 from sysdyn.dsl.tree import syntax
 
@@ -331,3 +331,9 @@ def test_what_is_no_two_port_is_told_what_it_is(read, kind, side, text, code, me
     found = ratio(read, kind, side, text)
     assert found[:2] == (code, message)
     assert help_ is None or found[2] == help_
+
+
+@pytest.mark.parametrize(("name", "near"), [("C2", "C1"), ("r", "R"), ("Rload", "R_load"), ("zz", None)])
+def test_the_nearest_name(name, near):
+    """Another number is nearer than none: C is no slip for C2 where there is C1."""
+    assert nearest(name, ["C", "R", "C1", "R_load", "x3"]) == near

@@ -99,6 +99,21 @@ CASES = [
     ("param y: m^1.5 = 1", "E113", 14, "integer", None),
     ("param y: 2 = 1", "E113", 12, "no number 2", None),
     ("let y = norm(i in 1..3: x[i])", "E113", 11, "'norm' does not run over an index", "sum"),
+    ("C1.e = 0 V", "E113", 3, "no statement begins with 'C1.e'", "init C1.e = ... where it begins"),
+    (
+        "R1: resistor(R = 1 ohm a -> b",
+        "E112",
+        26,
+        "the parentheses of 'resistor' are not closed",
+        "(R = 1 ohm) a -> ...",
+    ),
+    ("V1: voltage(v = (1 V)*sin(f*t) a[1] -> b", "E112", 34, "of 'voltage' are not closed", "sin(f*t)) a -> ..."),
+    ("R1: resistor a -> b (R = 1 ohm)", "E113", 23, "stand behind the component", "resistor(R = 1 ohm) a -> b"),
+    ("kinetic T* = 1 J", "E113", 3, "no statement begins with 'kinetic'", "energy T* = 1/2*m*x'^2"),
+    ("let y = 2 m (a + b)", "E113", 15, "'m' stands where a unit is read", ": 2*m*(...)"),
+    ("let y = sum(x[i]^2*sin(k) for i in 1..n)", "E113", 29, "found 'for'", "sum(i in 1..n: ...)"),
+    ("L = 1/2*m*x'^2 - V", "E113", 3, "a Lagrangian is written by its parts", "energy T* = 1/2*m*x'^2, energy V"),
+    ("let y = 2 sin(a)", "E113", 16, "'sin' stands where a unit is read", ": 2*sin(...)"),
     ("param a = 3kg", "E114", 13, "'3kg': a number and its unit are separated by a space", "3 kg"),
     ("let y = 2x", "E114", 11, "'2x'", "2 x"),
     ("param a = 1e999 m", "E114", 13, "too large", "inf"),
@@ -117,6 +132,12 @@ def test_what_is_said_about_a_line(line, code, column, message, help_):
     assert (found.code, *found.place.start) == (code, 3, column)
     assert message in found.message
     assert help_ is None or help_ in (found.help or "")
+
+
+@pytest.mark.parametrize("line", ["R1 resistor(R = 1 ohm) a -> b", "resistor R1(R = 1 ohm) a -> b"])
+def test_a_label_without_its_colon_stands_before_the_component_that_the_file_knows(line):
+    found = only(f"from std.electrical import voltage,\n    resistor\nmodel m {{\n  {line}\n}}\n")
+    assert found.help == "R1: resistor(R = 1 ohm) a -> b"
 
 
 def test_messages_never_name_terminals_of_the_grammar():

@@ -105,6 +105,22 @@ def resting(of, tangible=("x",), **first):
     return Resting(of, set(tangible), 0.0, guess)
 
 
+@pytest.mark.parametrize(
+    ("potential", "states", "sought"),
+    [
+        ("3*(q_x - 1)**2", [1.0], range(1, 2)),
+        ("Piecewise((3*(q_x + 2)**2, q_x < 0), (3*(q_x - 1)**2, True))", [-2.0, 1.0], range(2, 20)),
+    ],
+)
+def test_points_of_the_piece_that_was_searched_are_not_searched_again(potential, states, sought):
+    """Straight rows lead from anywhere to one state; two pieces of one slope are told apart by their values."""
+    of = resting(system("x", "f_x**2/2", potential, initial=SWINGING), q_x=1.7)
+    found, begun = of.found, []
+    of.found = lambda guess: begun.append(guess) or found(guess)
+    assert sorted(by_name(of.system, r.state.y)["q_x"] for r in rests(of, 40)) == pytest.approx(states, abs=1e-12)
+    assert len(begun) in sought
+
+
 def test_a_double_well_rests_in_both_and_between_them():
     """V = (q^2 - 4)^2: 0 and -+2."""
     of = system("x", "f_x**2/2", "(q_x**2 - 4)**2", initial=SWINGING)

@@ -1,0 +1,28 @@
+"""A function that is no number where a run would begin: the statement, the call and its argument are told."""
+
+import pytest
+from texts import run_json, write
+
+MODEL = """model m {{
+  param a = 0.5
+  coord h: translation = -1 m
+  energy T* = 1/2*(1 kg)*h'^2
+  work -(1 N.s/m)*h' on h
+  work {}*(1 N) on h
+  init h' = 0 m/s
+}}
+scene s of m {{ time 0 s to 1 s; trace h }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("law", "argument"), [("sqrt(h/(1 m))", "-1"), ("ln(a + h/(1 m))", "-0.5"), ("acos(a - h/(1 m))", "1.5")]
+)
+@pytest.mark.parametrize("command", ["check", "simulate"])
+def test_the_function_is_named_where_it_stands(tmp_path, capsys, monkeypatch, command, law, argument):
+    monkeypatch.chdir(tmp_path)
+    code, found = run_json(capsys, command, str(write(tmp_path, MODEL.format(law))))
+    assert code == 1
+    (said,) = [d for d in found["diagnostics"] if d["severity"] == "error"]
+    assert (said["code"], said["line"], said["column"]) == ("E519", 6, 3)
+    assert said["message"] == f"at the start {law} is no number: its argument is {argument}, h = -1 m"
