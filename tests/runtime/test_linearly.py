@@ -9,8 +9,8 @@ from sysdyn.runtime.start.linearly import unmet
 from sysdyn.runtime.start.settled import Settler
 
 
-def asked(f, *parts, **more):
-    """`unmet` of a model whose flow f_x, its state, is f; everything else one."""
+def settled(f, *parts, **more):
+    """A settler of a model whose flow f_x, its state, is f, with that point: everything else one."""
     manifest, binding, module = models.small(*parts, **more)
     system = System(manifest, binding, load(module), "settled")
     names = [system.name(k) for k in range(system.unknowns)]
@@ -18,8 +18,20 @@ def asked(f, *parts, **more):
     state[[names.index("q_x"), names.index("f_x")]] = True
     y[names.index("f_x")] = f
     kinematics = system.form.k_q, system.form.k_f
-    settler = Settler(system, kinematics, np.full(system.unknowns, f), 1.0, state)
+    return Settler(system, kinematics, np.full(system.unknowns, f), 1.0, state), y, state
+
+
+def asked(f, *parts, **more):
+    """`unmet` there."""
+    settler, y, state = settled(f, *parts, **more)
     return unmet(settler, 0.0, y, np.ones_like(y), state)
+
+
+def test_rows_that_contradict_each_other_are_left_where_no_move_changes_anything():
+    """Two speeds at once: of three searches, of up to 52 matrices, each ends at the point that is nearest to both."""
+    settler, y, _ = settled(1.0, "x", "f_x**2/2", psi={"one": "f_x - 1", "two": "f_x - 2"})
+    assert settler.settle(0.0, y, np.ones_like(y))[2] is False
+    assert settler.linear.contents.factorisations <= 9
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-9, 1e9])

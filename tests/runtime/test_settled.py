@@ -77,3 +77,18 @@ def test_a_basis_that_was_refused_is_tried_again_later(settler):
         tried.append(core.refused == 0)
     assert tried[-1]
     assert not all(tried[: AGAIN // 2])
+
+
+def test_a_draft_is_content_with_what_it_asks_for(settler):
+    """A residual that a draft takes for none ends the search: no other weights, no other point, no failure."""
+    settler, y, yd, _ = settler
+    core = settler.core.contents
+    core.basis, core.enough = None, 1e-4
+    settler.settle(0.0, y, yd)
+    made = settler.linear.contents.factorisations
+    off = y + settler._state[: y.size] * 1e-2 * settler.scale[: y.size] * np.arange(1, y.size + 1) / y.size
+    core.ready = 0
+    _, _, fine = settler.settle(0.0, off, yd)
+    assert fine
+    assert 1e-9 < core.residual <= 1e-4
+    assert settler.linear.contents.factorisations - made <= 2

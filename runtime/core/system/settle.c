@@ -355,6 +355,8 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
             settle->floor = fmax(settle->floor, 2.0 * now);
         if (!isfinite(now) || (stays && now < (fresh && m > 0 ? CLOSE : fmax(FINE, settle->floor))))
             break;
+        if (fresh && m > 0 && stays && moved < STILL) /* what is left no move takes away: the next would be the same */
+            break;
         if (now > CONTRACTS * before && now > fmax(EXACT, settle->enough)) {
             failed = factorise(settle, t, y, yd);
             fresh = 1;
@@ -437,6 +439,7 @@ static int strays(const sd_settle *settle)
 /* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */
 static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 {
+    const double close = fmax(CLOSE, settle->enough);
     double best;
     settle->calls++;
     settle->contracted = 0.0;
@@ -445,7 +448,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     memcpy(settle->usual, settle->scale, steep);
     int tried = settle->refused < REFUSALS || (settle->refused < SD_BASIS_OUT && settle->calls % AGAIN == 0);
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && tried) {
-        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, fmax(CLOSE, settle->enough))) {
+        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, close)) {
             note_met(settle, y, yd);
             finish(settle, t, y, yd, 1, 1);
             return 0;
@@ -459,7 +462,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     int plain = settle->hold == 1.0; /* else factors are of another weight, and serve once */
     settle->ready = plain ? settle->ready : SD_BY_NONE;
     iterate(settle, t, y, yd, ITERATIONS, &best);
-    if (best > CLOSE) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
+    if (best > close) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
         put(settle, settle->x0, y, yd);
         settle->hold = HELD;
         settle->ready = 0;
@@ -469,9 +472,9 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     }
     settle->ready = plain ? settle->ready : SD_BY_NONE;
     int done = 0;
-    if (best <= CLOSE) {
+    if (best <= close) {
         put(settle, settle->x, y, yd);
-        done = holds(settle, t, y, yd, best, CLOSE);
+        done = holds(settle, t, y, yd, best, close);
     }
     if (!done && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
         if (steep) {
@@ -483,7 +486,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     }
     /* the best point met, or the given one; a rate may have no bound */
     put(settle, settle->x, y, yd);
-    done = (done || holds(settle, t, y, yd, best, CLOSE)) && !strays(settle);
+    done = (done || holds(settle, t, y, yd, best, close)) && !strays(settle);
     if (done)
         note_met(settle, y, yd);
     else
