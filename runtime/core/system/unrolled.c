@@ -39,7 +39,7 @@ void sd_unrolled_renew(sd_unrolled *unrolled, const sd_condensed *condensed)
         for (int32_t i = 0; i < s->number; i++) {
             for (int32_t k = 0; k < s->terms; k++)
                 *to++ = s->alike ? s->factor[k * s->alike] : s->factor[k * s->number + i];
-            *to++ = s->constant ? s->constant[i] : -0.0; /* which added to any number leaves it */
+            *to++ = s->constant ? s->constant[i] : s->terms ? -0.0 : 0.0; /* a zero that added to any number leaves it */
         }
 }
 
