@@ -55,17 +55,18 @@ _CAUSES = {
 AT_REST = 1e-8
 """Of what there was of its kind at the start: an unknown that has come to rest."""
 _OF_EVENTS = ("max_events", "chatter", "zeno", "complementarity", "conflict", "slides", "drives", "endless", "pulsed")
+LOOSER = "a looser --accuracy"
 _REMEDIES = {
     "E704": "one event for both, or conditions that do not become true together",
-    "E930": "another --method or --index, a looser --accuracy, or a smoother law there",
+    "E930": f"another --method or --index, {LOOSER}, or a smoother law there",
     "E931": "a range of the law that keeps it positive, or an earlier end: --until",
     "E932": "data that reach further, or 'clamp' or 'extend' in the table",
     "E933": "a law that is defined there, or an earlier end: --until",
-    "E934": "a higher limit, or a looser --accuracy",
+    "E934": f"a higher limit, or {LOOSER}",
 }
 
 _REMEDIES_OF_CAUSES = {
-    "crawl": "an earlier end (--until), another --method, or a looser --accuracy",
+    "crawl": f"an earlier end (--until), another --method, or {LOOSER}",
     "drives": "a bound of zero or more: abs(c), max(c, 0); the other sign of a reaction (floor.on(y) is the effort"
     " along y); or an earlier end: --until",
     "unbalanced": "another --formulation, or a ramp in place of the jump",
@@ -97,9 +98,6 @@ _BLOCKED = "where all that meets at a node may block at once, a large resistance
 
 
 _RANK = "an earlier end, or lengths with which the mechanism does not reach its dead centre"
-
-
-LOOSER = "a looser --accuracy"
 
 
 def _knob(options: Options | None, code: str) -> str:

@@ -220,10 +220,8 @@ class FileScope:
             found = self._modules[path]
             if found is None:
                 here = Path(source.name).stem
-                said = (
-                    f"'{here}' and '{names[-1]}' import each other" if here != names[-1] else f"'{here}' imports itself"
-                )
-                self.report.error("E801", f"modules {said}" if here != names[-1] else f"module {said}", place)
+                other = f"modules '{here}' and '{names[-1]}' import each other"
+                self.report.error("E801", f"module '{here}' imports itself" if here == names[-1] else other, place)
             return found
         if not path.is_file():
             modules = sorted(p.stem for p in folder.glob("*.sd") if p.stem != "prelude")

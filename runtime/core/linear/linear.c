@@ -218,15 +218,21 @@ void sd_linear_left(const sd_linear *linear, char *left)
             left[linear->dense ? linear->place[k] : linear->sparse->order[k]] = 1;
 }
 
+/* the factors of `elimination` serve: 1 */
+static int serve_replayed(sd_linear *linear)
+{
+    linear->smallest = 1.0;
+    linear->rank = linear->n;
+    return linear->replayed = 1;
+}
+
 /* by the list of operations, if there is one and it serves: a column that nothing determines has no pivot there, which shows.
  * Where weak pivots are to be left, rows are exchanged */
 static int replay(sd_linear *linear, const sd_number *values, const double *scale)
 {
     if (!linear->elimination || linear->null_pivot > SD_LEAST_PIVOT || !sd_elimination_factor(linear->elimination, values, scale))
-        return 0;
-    linear->smallest = 1.0;
-    linear->rank = linear->n;
-    return 1;
+        return linear->replayed = 0;
+    return serve_replayed(linear);
 }
 
 int sd_linear_in_cells(sd_linear *linear)
@@ -235,11 +241,8 @@ int sd_linear_in_cells(sd_linear *linear)
     if (!sd_elimination_healthy(e))
         return 0;
     linear->factorisations++;
-    linear->replayed = 1;
-    linear->smallest = 1.0;
-    linear->rank = linear->n;
     e->served = ++e->tries;
-    return 1;
+    return serve_replayed(linear);
 }
 
 /* which columns the sparse factors may leave */
@@ -464,8 +467,7 @@ int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *s
     linear->factorisations++;
     if (!linear->pivoted)
         forget(linear);
-    linear->replayed = replay(linear, values, scale);
-    return linear->replayed ? 0 : pivot(linear, values, scale);
+    return replay(linear, values, scale) ? 0 : pivot(linear, values, scale);
 }
 
 int32_t *sd_linear_pivoted(sd_linear *linear)

@@ -1,6 +1,7 @@
 /* Passes of the BDF's step over all unknowns (see bdf.h, lanes.h); arrays of its own end on whole lanes, with zeros. */
 #include "steppers/bdf.h"
 #include "linear/lanes.h"
+#include "steppers/groups.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -149,26 +150,14 @@ SD_WIDE void sd_bdf_shift(sd_bdf *bdf)
         OF_ORDER(shift, bdf, bdf->order_used, 0)
 }
 
-/* Squares, in the error weights, of x + by[0] one + by[1] two (NULL: none) over the unknowns of groups, without what those of
- * each group have in common */
+static double own_weight(const void *bdf, int32_t i)
+{
+    return ((const sd_bdf *)bdf)->own[i];
+}
+
 static double apart(const sd_bdf *bdf, const double *x, const double *by, const double *one, const double *two)
 {
-    double sum = 0.0;
-    for (int32_t g = 0; g < bdf->commons; g++) {
-        const int32_t *first = bdf->common + bdf->common_from[g], *end = bdf->common + bdf->common_from[g + 1];
-        double weights = 0.0, mean = 0.0;
-        for (const int32_t *i = first; i < end; i++) {
-            double w = bdf->own[*i] * bdf->own[*i];
-            weights += w;
-            mean += w * (x[*i] + by[0] * one[*i] + (two ? by[1] * two[*i] : 0.0));
-        }
-        mean /= weights;
-        for (const int32_t *i = first; i < end; i++) {
-            double v = bdf->own[*i] * (x[*i] + by[0] * one[*i] + (two ? by[1] * two[*i] : 0.0) - mean);
-            sum += v * v;
-        }
-    }
-    return sum;
+    return sd_squares_apart(bdf->commons, bdf->common_from, bdf->common, own_weight, bdf, x, by, one, two);
 }
 
 /* whether the order above may be asked for: its difference is one of equal steps */

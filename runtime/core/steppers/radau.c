@@ -1,5 +1,6 @@
 /* The step of Radau IIA: weights, start, error, step size (see radau.h). */
 #include "linear/lanes.h"
+#include "steppers/groups.h"
 #include "steppers/radau.h"
 #include "steppers/threads.h"
 #include "system/condensed.h"
@@ -68,31 +69,16 @@ static void set_newton_weights(sd_radau *radau)
     }
 }
 
-/* squares, in the error weights, of the unknowns of groups without what those of each have in common */
-static double apart(const sd_radau *radau, const double *x)
+static double weight_of(const void *radau, int32_t i)
 {
-    double sum = 0.0;
-    for (int32_t g = 0; g < radau->commons; g++) {
-        const int32_t *first = radau->common + radau->common_from[g], *end = radau->common + radau->common_from[g + 1];
-        double weights = 0.0, mean = 0.0;
-        for (const int32_t *i = first; i < end; i++) {
-            double w = sd_radau_weight(radau, *i);
-            weights += w * w;
-            mean += w * w * x[*i];
-        }
-        mean /= weights;
-        for (const int32_t *i = first; i < end; i++) {
-            double v = sd_radau_weight(radau, *i) * (x[*i] - mean);
-            sum += v * v;
-        }
-    }
-    return sum;
+    return sd_radau_weight(radau, i);
 }
 
 /* root mean square over the tested unknowns in the error weights */
 double sd_radau_norm(const sd_radau *radau, const double *x)
 {
-    double sum = apart(radau, x);
+    const double none = 0.0;
+    double sum = sd_squares_apart(radau->commons, radau->common_from, radau->common, weight_of, radau, x, &none, x, NULL);
     for (int32_t i = 0; i < radau->n; i++)
         if (radau->test[i] >= 0) {
             double v = x[i] * sd_radau_weight(radau, i) * (radau->test[i] ? radau->h : 1.0);

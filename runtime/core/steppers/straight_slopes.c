@@ -6,7 +6,6 @@
 #include "linear/machine_code.h"
 #include "steppers/underlying.h"
 
-#include <math.h>
 #include <stdlib.h>
 
 struct sd_straight {
@@ -25,10 +24,11 @@ static places places_of(const sd_underlying *u)
 {
     const sd_elimination *e = u->linear->elimination;
     places p = {.one = e->inside - 2, .rows = e->inside, .written = e->inside + (int32_t)(u->written - u->r)};
-    p.zero = p.written + u->writes;
-    p.minus = p.zero + 1;
-    p.check = p.zero + 2;
-    p.sums = p.zero + 3;
+    const int32_t behind = p.written + u->writes;
+    p.zero = behind + SD_ZERO;
+    p.minus = behind + SD_MINUS_ONE;
+    p.check = behind + SD_CHECK;
+    p.sums = behind + SD_ENTRY_SUMS;
     p.y = p.sums + e->entries;
     p.yd = p.y + u->n;
     return p;
@@ -136,7 +136,7 @@ static SD_APART sd_straight *straight_code(sd_underlying *u)
     sd_code_free(straight->code);
     straight->code = NULL;
     straight->order = e->prepared;
-    u->written[u->writes + 1] = -1.0;
+    u->written[u->writes + SD_MINUS_ONE] = -1.0;
     if (straight_lists(u, straight) == 0)
         straight->code = sd_code_new(&straight->list[0], &straight->list[1], SD_REAL_NUMBERS);
     return straight;
@@ -175,5 +175,5 @@ void sd_straight_clear(const sd_straight *straight, const sd_underlying *u, doub
 int sd_straight_solve(const sd_straight *straight, const sd_underlying *u, double *y, double *yd)
 {
     straight->code->second(u->linear->elimination->cell, u->r, y, yd, NULL, NULL);
-    return u->written[u->writes + 2] == 0.0 && sd_linear_in_cells(u->linear);
+    return u->written[u->writes + SD_CHECK] == 0.0 && sd_linear_in_cells(u->linear);
 }

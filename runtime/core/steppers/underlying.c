@@ -102,7 +102,7 @@ static int find_places(sd_underlying *u)
 {
     const sd_system *system = u->matrix;
     const int32_t none = written_by(system), entries = u->linear->entries;
-    u->r = calloc((size_t)(u->system->rows + 1 + none + 3 + entries), sizeof *u->r);
+    u->r = calloc((size_t)(u->system->rows + 1 + none + SD_ENTRY_SUMS + entries), sizeof *u->r);
     u->from = malloc(((size_t)entries + 2 * (size_t)none + 1) * sizeof *u->from);
     u->list = malloc((2 * (size_t)system->calls + 1) * sizeof *u->list);
     if (!u->r || !u->from || !u->list)

@@ -21,6 +21,9 @@
 typedef struct sd_written sd_written;
 typedef struct sd_straight sd_straight;
 
+/* behind what the blocks write: a zero; then, of straight_slopes.c, minus one, a check, and sums of entries */
+enum sd_behind_written { SD_ZERO, SD_MINUS_ONE, SD_CHECK, SD_ENTRY_SUMS };
+
 typedef struct sd_underlying {
     sd_system *system;           /* form 0 */
     sd_system *matrix;           /* the same rows, with the entries that the matrix holds alone */
@@ -40,7 +43,7 @@ typedef struct sd_underlying {
     double *values, *r, *step, *rest, *memory;
     int32_t *place_y, *place_yd; /* [entries of system] place of dF/dy, dF/dyd in the matrix, one behind it where they have none */
     sd_written *list;            /* [lists] the blocks of the matrix */
-    double *written;             /* behind the rows r: what they write, one behind the other, a zero, and room for straight_slopes.c */
+    double *written;             /* behind the rows r: what they write, one behind the other, and sd_behind_written */
     int32_t *from, *more;        /* [entries of linear] which of these each is; [mores][2]: entry, another that is added to it */
     sd_straight *straight;       /* NULL: there was no need of it yet */
     int32_t lists, mores, flows; /* flows: some are solved for themselves */
