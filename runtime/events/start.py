@@ -8,6 +8,7 @@ from contextlib import suppress
 import numpy as np
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
+from sysdyn.runtime.events.implicit import DENSE
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting, Settle
 from sysdyn.runtime.events.plan import Plan
@@ -141,12 +142,12 @@ class _Starts:
 
     def held(self) -> Floats | None:
         """What the guesses say of a point [unknowns as written] where inequalities of flows ask for nothing; None:
-        there are none, or there is no such point.
+        there are none, or too many unknowns for implicit steps, or there is no such point.
         """
         self._begin()
         contacts = self.contacts
         free = [c.number for k, c in enumerate(contacts.contacts) if c.kind == "psi" and not contacts.barred[k]]
-        if not free:
+        if not free or contacts.system.unknowns > DENSE:
             return None
         try:
             state = consistent_start(contacts.system, self._t, until=self._until, quickly=True, without=free)
@@ -185,8 +186,10 @@ class _Starts:
         """
         contacts, t = self.contacts, self._t
         known, time = contacts.observer.largest.copy(), max(contacts.time, LEAST)
-        for jumps, h in itertools.product((False, True), [part * time for part in SHORT]):
+        parts = SHORT if self._quickly else SHORT[:1]  # it takes long to be sure that a set has no start
+        for jumps, part in itertools.product((False, True), parts):
             self._begin()
+            h = part * time
             behind = pivoting.ahead(t, held, h, t)
             if behind is None:
                 continue
