@@ -325,7 +325,7 @@ def _consistent(
     if quickly and not starter.jumping and no_start(starter, t0, guess, starter.free):
         raise InconsistentStart("stuck", float("inf"))
     best, strategy = _attempt(starter, t0, guess, starter.free, 1 if quickly else None)
-    if quickly and not strategy:
+    if (quickly or starter.jumping) and not strategy:
         raise InconsistentStart("stuck", best.residual)
     if not strategy:
         flat = _flat(starter, t0, guess, starter.free)

@@ -14,6 +14,8 @@ from sysdyn.runtime.numerics.products import add_product, add_sizes
 from sysdyn.runtime.numerics.rank import left_null_vectors, null_space
 from sysdyn.values import dataclass
 
+CANCELS = 1e-14
+"""Of the terms of a sum: what is less is left of them by round-off, and no coefficient."""
 Entries = tuple[Places, Places]
 
 
@@ -64,7 +66,9 @@ class Sums:
 
     def slopes(self, values: Floats) -> Floats:
         """Values of what is summed with those of the sums behind them; of summed rows by themselves none are left."""
-        own = np.bincount(self._slot, self._weight * values[self._entry], minlength=self.rows.size)
+        terms = self._weight * values[self._entry]
+        own, size = (np.bincount(self._slot, of, minlength=self.rows.size) for of in (terms, np.abs(terms)))
+        own[np.abs(own) <= CANCELS * size] = 0.0
         alone = values.copy()
         alone[self._mine] = 0.0
         return np.append(alone, own)
