@@ -237,7 +237,7 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
             if explicit is not None and failure.cause == "max_steps":
                 others = (replace(explicit[0], lasting=True), runs.way, *others)
             explicit = None
-            if failure.cause == "stiff" and others[0].method == "radau":
+            if failure.cause == "stiff" and not runs.way.lasting and others[0].method == "radau":
                 explicit = runs.way, int(np.ceil((options.t_end - options.t_start) / failure.step))
         else:
             short = _short(runs, options, achieved) if (steep or runs.way.law.brief) and others else None
