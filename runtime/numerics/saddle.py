@@ -57,8 +57,9 @@ def _ahead(pattern: Pattern, faint: NDArray[np.bool_]) -> Pattern:
     later = np.ones(number, dtype=bool)
     later[column[row == column]] = False
     later |= faint
-    across = later[column] & ~later[row]
-    given = np.isin(row.astype(np.int64) * number + column, column.astype(np.int64) * number + row) & across
+    into, out = (np.flatnonzero(later[one] & ~later[other]) for one, other in ((column, row), (row, column)))
+    back = column[out].astype(np.int64) * number + row[out]
+    given = into[np.isin(row[into].astype(np.int64) * number + column[into], back)]
     return compress(number, number, [Places(column[given], row[given])])[0]
 
 
