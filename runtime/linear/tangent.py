@@ -355,7 +355,7 @@ def _inverted(square: Floats) -> Callable[[Floats], Floats] | None:
         return sure
     if not square.size or count(singular_values(square), CERTAIN) < square.shape[0]:
         return None
-    return lambda aim: np.linalg.solve(square, aim)
+    return lambda aim: np.asarray(np.linalg.solve(square, aim), dtype=np.float64)
 
 
 def _rates(starter: Starter, system: System, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -376,7 +376,7 @@ def _refuse_undetermined(
 ) -> None:
     """NoLinearisation where rates of states move though no state does: constraints are hidden deeper than the rows."""
     if part.shape[0] > max(FEW, part.shape[1]):  # the same directions, of a triangle
-        part = np.linalg.qr(part, mode="r")
+        part = np.linalg.qr(part)[1]
     _, _, vt = decomposed(part) if part.size else (None, None, np.eye(tangent.shape[1]))
     still = tangent @ vt[rank:].T
     if not still.size or not rates.size:

@@ -204,7 +204,8 @@ class Settler:
                 return np.concatenate([unknowns, rates[self.rates]])
             kept = self._left.kept
             row = np.append(numbers_of(self.system.rows, self._left.kept_rows), -1).astype(np.int32)
-            return row[np.concatenate([unknowns[kept], rates[kept[self.rates]]])]
+            told: Ints = row[np.concatenate([unknowns[kept], rates[kept[self.rates]]])]
+            return told
 
         return saddle_order(self.pattern, self._state, own)
 
