@@ -95,7 +95,7 @@ def _left(runs: Runs, failure: SolverFailure) -> str:
     if failure.cause == "stiff":
         return f"stiff: {method} is held to steps of {failure.step:.2g} s"
     if failure.cause == "max_steps":
-        return f"{method} needs more than {runs.patience} steps"
+        return f"{method} needs more than {runs.most_steps} steps"
     return f"{method} stopped at {failure.time:.6g} s"
 
 
@@ -211,13 +211,16 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
     Of steep laws the next one begins, too, where the first does not reach what was asked: the bdf tests its states
     alone, and efforts that blocked diodes leave to a source may bend between its steps.  Where the bdf is held back at
     its highest order the motion is smooth, and radau takes all its stages (ring modulator at 1e-6: 5.3 s -> 1.3).
+    Where a draft of radau takes more steps than stability leaves the dopri, whose steps are cheaper, that goes on.
     """
     doubted, smooth, tame, steep = False, False, False, bool(runs.system.form.scales)
     missed: Achieved | None = None
     stands = runs.way
     stopped: SolverFailure | None = None
+    explicit: tuple[Way, int] | None = None
     while True:
         runs.patience = PATIENCE.get(runs.method, (None, None))[steep] if others else None
+        runs.patience_with_draft = explicit[1] if explicit is not None and others else None
         try:
             lighter = _lighter(runs, options, others)
             achieved = _achieved(runs, options, last=not others, doubted=doubted, tame=tame, lighter=lighter)
@@ -231,6 +234,11 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
             why = _left(runs, failure)
             smooth = failure.smooth and failure.cause == "max_steps"
             stopped = failure if doubted else stopped
+            if explicit is not None and failure.cause == "max_steps":
+                others = (replace(explicit[0], lasting=True), runs.way, *others)
+            explicit = None
+            if failure.cause == "stiff" and not runs.way.lasting and others[0].method == "radau":
+                explicit = runs.way, int(np.ceil((options.t_end - options.t_start) / failure.step))
         else:
             short = _short(runs, options, achieved) if (steep or runs.way.law.brief) and others else None
             if short is None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,14 +53,13 @@ def command(
     if reduced:
         console.say(f"sizes of {path.parent.name}/{path.name}: {', '.join(f'{n} = {v}' for n, v in reduced)}")
     request = replace(request, settings=(*reduced, *request.settings))
-    with ExitStack() as stack:
-        if output is None:
-            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sysdyn-")))
-        else:
-            folder = Path(output)
-            folder.mkdir(parents=True, exist_ok=True)
-        stack.callback(line.clear)
+    folder = None if output is None else Path(output)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    try:
         found = verify(request, console.report, folder, line, jobs)
+    finally:
+        line.clear()
     if found is None:
         return console.unable()
     console.result = _result(found, keep=output is not None, timings=not no_timings)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +17,6 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.comparison.arrays import Arrays, arrays_of
 from sysdyn.runtime.comparison.curve import Floats
-from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
 INSTANTS = 2000
@@ -64,24 +61,22 @@ def run(request: Request, also: Floats | None = None) -> Run:
     also [m] s: further instants of the trace.  Raises Stopped, UsageError, OSError, TraceError.
     """
     report = Report()
-    with tempfile.TemporaryDirectory(prefix="sysdyn-golden-") as folder:
-        path = Path(folder) / "trace.h5"
-        ran = _ran(replace(request, output=str(path)), report, also)
-        later = (*OF_CLAIMS, *OF_RUNS)  # claims are judged by `simulate`, at the scene's own accuracy
-        errors = [d for d in report.diagnostics if d.severity == "error" and (ran is None or d.code not in later)]
-        if ran is None or errors:
-            first = next(iter(errors), None)
-            where = f"{first.place.file}:{first.place.start[0]}: " if first and first.place else ""
-            if first is None:  # notes alone: what is planned for later
-                note = next(iter(report.diagnostics), None)
-                raise Stopped(1, note.message if note else "the model has errors", note.code if note else "")
-            raise Stopped(1, f"{where}{first.code}: {first.message}", first.code)
-        if ran.failure:
-            raise Stopped(3, ran.failure)
-        if not ran.outcome.met:
-            unmet = next(d for d in report.diagnostics if d.code in OF_RUNS)
-            raise Stopped(3, unmet.message, unmet.code)
-        trace = Trace.open(path)
+    ran = _ran(request, report, also)
+    later = (*OF_CLAIMS, *OF_RUNS)  # claims are judged by `simulate`, at the scene's own accuracy
+    errors = [d for d in report.diagnostics if d.severity == "error" and (ran is None or d.code not in later)]
+    if ran is None or errors:
+        first = next(iter(errors), None)
+        where = f"{first.place.file}:{first.place.start[0]}: " if first and first.place else ""
+        if first is None:  # notes alone: what is planned for later
+            note = next(iter(report.diagnostics), None)
+            raise Stopped(1, note.message if note else "the model has errors", note.code if note else "")
+        raise Stopped(1, f"{where}{first.code}: {first.message}", first.code)
+    if ran.failure:
+        raise Stopped(3, ran.failure)
+    if not ran.outcome.met:
+        unmet = next(d for d in report.diagnostics if d.code in OF_RUNS)
+        raise Stopped(3, unmet.message, unmet.code)
+    trace = ran.outcome.traced
     energy, constraints = (_largest(trace[f"audit.{meter}"].values) for meter in ("energy", "constraints"))
     parameters = {name: value for name, (value, _) in trace.parameters.items()}
     source = arrays_of(trace)
@@ -112,7 +107,7 @@ def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
         wanted = even if also is None else np.union1d(even, also)
         wanted = wanted[np.diff(wanted, prepend=-np.inf) > APART * (options.t_end - options.t_start)]
         inside = wanted[(wanted >= options.t_start) & (wanted <= options.t_end)]
-        options = replace(options, every=None, at=tuple(inside.tolist()))
+        options = replace(options, output=None, every=None, at=tuple(inside.tolist()))
         return integrate(target, prepared, options, report)
 
 

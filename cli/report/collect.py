@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.report.balance import Share, observed, shares
@@ -50,8 +48,7 @@ def collect(request: Request, report: Report, progress: Progress | None = None) 
     prepared = _prepared(request, network, report, stages)
     if prepared is None:
         return None
-    with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
-        return _study(request, target, prepared, report, stages, began, progress, Path(folder))
+    return _study(request, target, prepared, report, stages, began, progress)
 
 
 def _study(
@@ -62,7 +59,6 @@ def _study(
     stages: Stages,
     began: float,
     progress: Progress | None,
-    folder: Path,
 ) -> Study | None:
     scene = prepared.network.scene
     findings: list[str] = []
@@ -75,7 +71,7 @@ def _study(
         options = options_of(request, target, prepared, report, began, progress)
         if options is None:
             return None
-        options = replace(options, output=str(folder / "trace.h5"), every=None)
+        options = replace(options, output=None, every=None)
         with _timed("start, integration and trace", stages):
             ran = integrate(target, prepared, options, report)
         started = ran.started if ran is not None else None
@@ -83,7 +79,7 @@ def _study(
             trace = ran.outcome.traced
             _split(stages, ran)
             findings += ran.outcome.warnings
-            found = _energies(target, prepared, options, ran, folder, stages)
+            found = _energies(target, prepared, options, ran, stages)
     if started is None:
         return None
     sources = sources_of(target, prepared.network)
@@ -122,7 +118,6 @@ def _energies(
     prepared: Prepared,
     options: Options,
     ran: Ran,
-    folder: Path,
     stages: Stages,
 ) -> tuple[Share, ...] | None:
     """A second run to the first one's accuracy, in which the power of every element is observed; None without."""
@@ -131,7 +126,7 @@ def _energies(
         return None
     # what is observed may have no underlying equation
     method = {"dopri": options.method, "energy": "auto"}.get(ran.outcome.method, ran.outcome.method)
-    fixed = replace(options, output=str(folder / "energies.h5"), method=method, progress=None)
+    fixed = replace(options, method=method, progress=None)
     fixed = of_these_alone(fixed, prepared.network.traced)
     with _timed("energies of the elements (a run of their own)", stages):
         try:

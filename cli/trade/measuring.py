@@ -199,16 +199,19 @@ class Bench:
     # --- runs ---------------------------------------------------------------------------------------------------
 
     def trace(
-        self, combination: Combination, tolerance: float, limits: Limits, *, name: str = "run"
+        self, combination: Combination, tolerance: float, limits: Limits, *, name: str | None = None
     ) -> tuple[Ran | None, str, Said | None]:
-        """One run at the solver's own tolerance: what came of it, why it may not be used, and the finding of that."""
+        """One run at the solver's own tolerance: what came of it, why it may not be used, and the finding of that.
+
+        name: of the file of its trace, which else stays in memory.
+        """
         carried, report = self.carry(combination), Report()
         if carried is None:
             return None, f"{combination.formulation} cannot express {combination.level}", None
         most = [n for n in (carried.options.max_steps, limits.steps) if n is not None]
         options = replace(
             carried.options,
-            output=self.folder / f"{name}.h5",
+            output=None if name is None else self.folder / f"{name}.h5",
             accuracy=None,
             accuracy_on=(),
             rtol=tolerance,

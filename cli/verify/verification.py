@@ -5,7 +5,7 @@ accuracy gives the horizon: the instant up to which two runs of one formulation 
 compared as far as its own runs justify (where it is chaotic, those of the runs that differ count too).  Up to there
 every two runs shall agree within TIMES x accuracy x nominal on every traced quantity; quantities that read multipliers
 of redundant constraints are left out.
-Received: a request and a folder for the traces; handed back: `Verified`.
+Received: a request and a folder for the traces (None: they stay in memory); handed back: `Verified`.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ JUDGED = (*OF_CLAIMS, *OF_RUNS)
 def verify(
     request: Request,
     report: Report,
-    folder: Path,
+    folder: Path | None,
     progress: Callable[[float, float | None], None] | None = None,
     jobs: int | None = 1,
 ) -> Verified | None:
@@ -83,7 +83,7 @@ class _Part:
     said: tuple[Diagnostic, ...]
 
 
-def _part(asked: tuple[Request, Path, str | None]) -> _Part:
+def _part(asked: tuple[Request, Path | None, str | None]) -> _Part:
     """One formulation (None: the reference) in a process of its own."""
     request, folder, name = asked
     report = Report()
@@ -109,7 +109,7 @@ class _Verification:
         request: Request,
         target: Target,
         report: Report,
-        folder: Path,
+        folder: Path | None,
         progress: Callable[[float, float | None], None] | None,
     ) -> None:
         self.request, self.target, self.report, self.folder, self._progress = request, target, report, folder, progress
@@ -161,7 +161,7 @@ class _Verification:
         assert self.finer is not None
         return self._compared(self.finer)
 
-    def _here(self, item: tuple[Request, Path, str | None]) -> None:
+    def _here(self, item: tuple[Request, Path | None, str | None]) -> None:
         """A formulation in this process."""
         self._formulation(item[2])
 
@@ -248,7 +248,7 @@ class _Verification:
         return None if ran is None else _read(ran, coarser, report)
 
     def _run(self, prepared: Prepared, options: Options, method: str, report: Report, suffix: str) -> Ran | None:
-        path = self.folder / f"{prepared.formulation}-{method}{suffix}.h5"
+        path = None if self.folder is None else self.folder / f"{prepared.formulation}-{method}{suffix}.h5"
         options = replace(options, output=path, method=method, progress=self._advance)
         return integrate(self.target, prepared, options, report)
 

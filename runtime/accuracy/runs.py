@@ -93,6 +93,7 @@ class Runs:
         self.way, self.system, self.method, self.index = way, way.system, way.method, way.index
         self.quantities = Quantities(self.system, self.columns, self.options)
         self.patience: int | None = patience
+        self.patience_with_draft: int | None = None
         self.opening = 0.0
         self._compared_before = self.instants.common
         if before is way or (before.system, before.index) != (way.system, way.index):
@@ -116,6 +117,7 @@ class Runs:
     def request(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Request:
         """One integration's request; longest: step, as part of the span."""
         options, draft = self.options, self.controlled and self.done is None
+        tried = options.method == "auto" and not self.way.lasting
         instants, kinds = self.instants.rows(compared=self.controlled, draft=draft)
         return Request(
             t_end=options.t_end,
@@ -133,8 +135,8 @@ class Runs:
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
             stages=self._stages,
-            stiff_steps=HELD if options.method == "auto" else STIFF,
-            spare_steps=SPARE if draft and options.method == "auto" and self.system.unknowns <= FACTORED else 0.0,
+            stiff_steps=HELD if tried else STIFF,
+            spare_steps=SPARE if draft and tried and self.system.unknowns <= FACTORED else 0.0,
             # of steep laws points that settle as loosely would count as failed
             settled_to=ROUGH * rtol if self.controlled and not self.system.form.scales else 0.0,
             draft=draft,
@@ -159,8 +161,9 @@ class Runs:
 
     @property
     def most_steps(self) -> int | None:
-        """The steps of a run: of the options, or of the patience with a method on trial."""
-        return min((n for n in (self.options.max_steps, self.patience) if n is not None), default=None)
+        """The steps of a run: of the options, or of the patience with a method on trial, or with its draft."""
+        drafted = self.patience_with_draft if self.done is None else None
+        return min((n for n in (self.options.max_steps, self.patience, drafted) if n is not None), default=None)
 
     def _write(self, rows: Floats) -> None:
         kind = rows[:, 1].astype(np.int32)

@@ -26,8 +26,8 @@ system of which radau's factors are cheap enough for it to take over."""
 @dataclass(frozen=True, slots=True)
 class Way:
     """A method on a form of the model; index: of the form as the error test takes it, name: as the trace names it;
-    reason: why method auto takes it; smooth: the motion is long and smooth, however steep its laws; reduced: equations
-    of index 2 taken at index 1.
+    reason: why method auto takes it; lasting: stability may hold its steps, for those of another are no longer; smooth:
+    the motion is long and smooth, however steep its laws; reduced: equations of index 2 taken at index 1.
     """
 
     method: str
@@ -35,6 +35,7 @@ class Way:
     index: int
     name: str
     reason: str = ""
+    lasting: bool = False
     smooth: bool = False
     reduced: bool = False
 

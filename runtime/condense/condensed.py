@@ -39,6 +39,8 @@ GAIN = 0.7
 """Part of the unknowns that may be left."""
 DEFINED = "leaves runs: a constant sum of others"
 UNREAD = "leaves runs: nothing reads it"
+AUDITED = ("audit", "ledger")
+"""Blocks that are read where a step's energies are balanced."""
 OBSERVING = ("observe", "observe_rate", "audit", "ledger")
 
 
@@ -228,6 +230,15 @@ class Condensed:
         gone[self.gone] = True
         return bool(read & self.whole.families_in(gone))
 
+    def _mark_audited(self) -> None:
+        """Says which stretches powers and energies read, or what they read: between rows no others are looked at."""
+        blocks, families = self.whole.description.blocks, self.whole.family_of
+        kernels = [kernel.reads for name in AUDITED for kernel in blocks.get(name, ())]
+        if None in kernels:
+            return
+        read = np.isin(families, sorted(frozenset[int]().union(*(reads or () for reads in kernels))))
+        self._straights.mark(read)
+
     def _own_rows(self) -> Ints:
         """Kept rows q' - f as stretches (core/system/condensed.h), where no block adds to any and none is held."""
         whole, form = self.whole, self.whole.form
@@ -289,6 +300,7 @@ class Condensed:
     def make(self) -> None:
         """The core's structures, of entries that are numbered: once."""
         whole = self.whole
+        self._mark_audited()
         self._own = self._own_rows()
         self._trim = self._trimmed()
         del self._number

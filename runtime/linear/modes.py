@@ -18,7 +18,7 @@ from sysdyn.runtime.linear import precise
 from sysdyn.runtime.linear.precise import Decomposed
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import count, decomposed
+from sysdyn.runtime.numerics.rank import count, decomposed, singular_values
 from sysdyn.values import dataclass
 
 Complexes = NDArray[np.complex128]
@@ -257,7 +257,7 @@ def _at_origin(a: Floats, b: Floats, c: Floats, d: float, zeros: Complexes) -> C
 def regular(a: Floats) -> bool:
     """Whether a square matrix has an inverse to be trusted."""
     row, column = factors(a)
-    sigma = decomposed(row[:, None] * a * column)[1]
+    sigma = singular_values(row[:, None] * a * column)
     return count(sigma) == sigma.size
 
 

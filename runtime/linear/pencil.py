@@ -17,7 +17,7 @@ from sysdyn.runtime.linear import precise
 from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced, Wide, lost
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed, null_space
+from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed, null_space, singular_values
 from sysdyn.values import dataclass
 
 CLOCKS = (0, 3, 6, 9, 12, -3, -6)
@@ -111,7 +111,7 @@ def _motions(e: Floats, a: Floats) -> tuple[float, tuple[Floats, Floats, Floats]
 
 def _regular(matrix: Floats) -> bool:
     """Of a matrix whose parts are of size one: round-off alone has no rank."""
-    sigma = decomposed(matrix)[1]
+    sigma = singular_values(matrix)
     return not sigma.size or bool(count(sigma) == sigma.size and sigma[0] > CERTAIN)
 
 

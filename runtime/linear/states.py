@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.rank import CERTAIN, decomposed
+from sysdyn.runtime.numerics.rank import CERTAIN, decomposed, singular_values
 from sysdyn.runtime.start.start import ConsistentState
 
 Mask = NDArray[np.bool_]
@@ -59,18 +59,21 @@ def pivots(matrix: Floats, number: int) -> NDArray[np.int64]:
     """The rows of a matrix [m, n] that are farthest from each other's spans, one after the other (ascending)."""
     from scipy.linalg import qr
 
-    _, _, order = qr(matrix.T, mode="economic", pivoting=True)
+    _, order = qr(matrix.T, mode="r", pivoting=True)
     return np.sort(order[:number].astype(np.int64))
 
 
 def rank_of(part: Floats) -> int:
     """Rank of rows of orthonormal columns: potentials that differ little from each other are two."""
-    return int((decomposed(part)[1] > CERTAIN).sum()) if part.size else 0
+    return int((singular_values(part) > CERTAIN).sum()) if part.size else 0
 
 
 def unseen(rows: Floats) -> Floats:
     """Directions that some rows of orthonormal columns do not see."""
-    return np.asarray(decomposed(rows)[2][rank_of(rows) :].T) if rows.size else np.eye(rows.shape[1])
+    if not rows.size:
+        return np.eye(rows.shape[1])
+    _, sigma, vt = decomposed(rows)
+    return np.asarray(vt[int((sigma > CERTAIN).sum()) :].T)
 
 
 def _coordinate(system: System, place: int) -> tuple[str, int]:

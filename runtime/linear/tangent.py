@@ -28,7 +28,16 @@ from sysdyn.runtime.linear.states import Mask, candidates_of, chosen_states, piv
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed, least_squares
+from sysdyn.runtime.numerics.rank import (
+    CERTAIN,
+    TOLERANCE,
+    count,
+    decomposed,
+    least_squares,
+    singular_values,
+    sure_complement,
+    sure_solver,
+)
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.values import dataclass
@@ -37,6 +46,8 @@ LARGEST = 1500
 """Unknowns and rates up to which full matrices are taken."""
 WIDEST = 150
 """Unknowns and rates up to which states are chosen in many digits."""
+FEW = 200
+"""The same from which on rank is told by factors where these leave no doubt, and by singular values where they do."""
 NOISE = 1e-13
 """Of the largest variation, in equilibrated unknowns: what is smaller is round-off of the solution."""
 PASSES, MOVES = 2, 1e-13
@@ -169,6 +180,9 @@ def _no_heavier(g: Floats, units: Floats, moves: Mask) -> Floats:
 
 def _null_space(matrix: Floats) -> Floats:
     """Orthonormal columns that a matrix maps to zero, to round-off: a fast mode is no constraint."""
+    sure = sure_complement(matrix, CERTAIN) if matrix.shape[0] > FEW else None
+    if sure is not None:
+        return sure
     _, sigma, vt = decomposed(matrix)
     return np.asarray(vt[count(sigma, CERTAIN) :].T)
 
@@ -322,15 +336,26 @@ def _eliminated(matrix: Floats, aim: Floats, kept: NDArray[np.int64]) -> Floats:
     (Skeel 1980); by singular values where none do.
     """
     square = matrix[kept]
-    if kept.size and count(decomposed(square)[1], CERTAIN) == kept.size:
-        found = np.linalg.solve(square, aim[kept])
+    solve = _inverted(square)
+    if solve is not None:
+        found = solve(aim[kept])
         for _ in range(2):
-            found = found + np.linalg.solve(square, aim[kept] - square @ found)
+            found = found + solve(aim[kept] - square @ found)
         return np.asarray(found)
     found = least_squares(matrix, aim, 1e-14)
     for _ in range(2):
         found = found + least_squares(matrix, aim - matrix @ found, 1e-14)
     return found
+
+
+def _inverted(square: Floats) -> Callable[[Floats], Floats] | None:
+    """What solves by a square matrix; None where singular values say that it has no inverse."""
+    sure = sure_solver(square, CERTAIN) if square.shape[0] > FEW else None
+    if sure is not None:
+        return sure
+    if not square.size or count(singular_values(square), CERTAIN) < square.shape[0]:
+        return None
+    return lambda aim: np.asarray(np.linalg.solve(square, aim), dtype=np.float64)
 
 
 def _rates(starter: Starter, system: System, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -350,6 +375,8 @@ def _refuse_undetermined(
     rank: int,
 ) -> None:
     """NoLinearisation where rates of states move though no state does: constraints are hidden deeper than the rows."""
+    if part.shape[0] > max(FEW, part.shape[1]):  # the same directions, of a triangle
+        part = np.linalg.qr(part)[1]
     _, _, vt = decomposed(part) if part.size else (None, None, np.eye(tangent.shape[1]))
     still = tangent @ vt[rank:].T
     if not still.size or not rates.size:

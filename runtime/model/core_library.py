@@ -231,7 +231,7 @@ def _load() -> Any:
         "sd_linear_z_factor_sum": (_I, [_P]),
         "sd_firsts": (None, [_I, _P, _P]),
         "sd_pairs": (_L, [_I, _I, _I, _P, _P, _P, _P, _P]),
-        "sd_column_order": (c.c_int, [_I, _I, _P, _P, _P, _P]),
+        "sd_column_order": (c.c_int, [_I, _I, _P, _P, _P, _P, _P, _P]),
         "sd_both_ends": (c.c_int, [_I, _P, _P, _P]),
         "sd_trim": (None, [c.c_int]),
         "sd_threads": (c.c_int, []),

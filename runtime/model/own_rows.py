@@ -14,6 +14,9 @@ from sysdyn.runtime.model.system import System
 _CONSTRAINTS = (("kappa", ("phi", "phi_rate", "phi_acceleration")), ("mu", ("psi", "psi_rate")))
 """Kinds of multipliers and the groups of rows of their constraints: the last one that a form has is theirs."""
 
+_BALANCES = ("dynamics", "f"), ("dynamics", "p"), ("momentum_rate", "f")
+"""Groups of rows, and whose rates they tell."""
+
 
 def own_rows(system: System) -> Ints:
     """The row of each unknown [unknowns]; -1 where none is sure.  A constraint reads its multiplier only once
@@ -26,6 +29,17 @@ def own_rows(system: System) -> Ints:
         own[unknown[unknown >= 0]] = np.flatnonzero(unknown >= 0)
     own[form.k_f] = form.k_row
     _constraints(system, own)
+    return own
+
+
+def own_rows_of_rates(system: System) -> Ints:
+    """The row that tells the rate of each unknown [unknowns]; -1 where none is sure."""
+    pattern, rated = system.pattern, system.structural()[1]
+    columns = pattern.columns_of()
+    own = np.full(system.unknowns, -1, dtype=np.int32)
+    for group, kind in _BALANCES:
+        mine = rated & (own_unknown(system, group, kind)[pattern.row] == columns)
+        own[columns[mine]] = pattern.row[mine]
     return own
 
 

@@ -212,10 +212,18 @@ def tall_order(pattern: Pattern) -> Ints:
     return least_degree(pattern) if pattern.unknowns <= SMALL else _large(pattern)[0]
 
 
-def _large(pattern: Pattern) -> tuple[Ints, int]:
+def least_fill(pattern: Pattern, ahead: Pattern | None = None) -> tuple[Ints, int]:
+    """Least degree of A + A^T, and the entries of a factor.  ahead: rows of each of its columns are unknowns that come
+    behind it.
+    """
+    return _large(neighbours(pattern), ahead)
+
+
+def _large(pattern: Pattern, ahead: Pattern | None = None) -> tuple[Ints, int]:
     """The same by approximate degrees, in the core (core/linear/order.h), and what it fills at most."""
     found, filled = np.zeros(pattern.unknowns, dtype=np.int32), np.zeros(1, dtype=np.int64)
-    places, answers = (pattern.column, pattern.row), (lib.pointer(found), lib.pointer(filled))
+    answers = lib.pointer(found), lib.pointer(filled)
+    places = pattern.column, pattern.row, *((None, None) if ahead is None else (ahead.column, ahead.row))
     if lib.core.sd_column_order(pattern.rows, pattern.unknowns, *map(lib.pointer, places), *answers):
         raise MemoryError
     return found, int(filled[0])

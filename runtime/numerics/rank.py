@@ -8,6 +8,8 @@ above that, and below the conditioning of a model that a double can be trusted w
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
@@ -18,6 +20,10 @@ TOLERANCE = 1e-9
 """Singular values below this part of the largest count as zero."""
 CERTAIN = 1e-12
 """The same where a model is refused for it: what is above may be a true, if bad, conditioning."""
+
+DOUBT = 10.0
+"""Times that an estimate of a condition, which in sums is n times that of singular values at most, may be too small;
+counter-examples are made by hand (Higham, SIAM Rev. 29, 1987)."""
 
 
 class NotFiniteError(ArithmeticError):
@@ -37,6 +43,41 @@ def decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:
     return u, sigma, vt
 
 
+def singular_values(matrix: Floats) -> Floats:
+    """Those of a matrix [m, n], falling [min(m, n)]: half of the work where nothing else is asked.  NotFiniteError."""
+    if not np.isfinite(matrix).all():
+        raise NotFiniteError
+    try:
+        return np.asarray(np.linalg.svd(matrix, compute_uv=False))
+    except np.linalg.LinAlgError:
+        return decomposed(matrix)[1]
+
+
+def sure_complement(matrix: Floats, smallest: float) -> Floats | None:
+    """Orthonormal columns [n, n - m] that a matrix [m, n] maps to zero, where its rows are independent beyond doubt: no
+    singular value below `smallest` of the largest.  None where singular values have to tell.
+    """
+    from scipy.linalg import qr
+    from scipy.linalg.lapack import dtrcon
+
+    m, n = matrix.shape
+    if not 0 < m <= n or not np.isfinite(matrix).all():
+        return None
+    q, r = qr(matrix.T, check_finite=False)
+    return np.asarray(q[:, m:]) if dtrcon(r[:m])[0] > DOUBT * m * smallest else None
+
+
+def sure_solver(matrix: Floats, smallest: float) -> Callable[[Floats], Floats] | None:
+    """What solves by a matrix [n, n] that is regular beyond doubt, in this sense."""
+    from scipy.linalg.lapack import dgecon, dgetrf, dgetrs
+
+    n = matrix.shape[0]
+    lu, pivots, failed = dgetrf(matrix)
+    if failed or not dgecon(lu, np.linalg.norm(matrix, 1))[0] > DOUBT * n * smallest:
+        return None
+    return lambda aim: np.asarray(dgetrs(lu, pivots, aim)[0])
+
+
 def count(sigma: Floats, smallest: float = TOLERANCE) -> int:
     """How many singular values [k] are not zero: above `smallest` of the largest."""
     return int((sigma > smallest * sigma.max(initial=0.0)).sum())
@@ -47,7 +88,7 @@ def rank(matrix: Floats) -> int:
     if not matrix.size:
         return 0
     if max(matrix.shape) > SMALL:
-        return count(decomposed(matrix)[1])
+        return count(singular_values(matrix))
     matrix = np.ascontiguousarray(matrix, dtype=np.float64)
     found = int(lib.core.sd_rank(*matrix.shape, lib.pointer(matrix), TOLERANCE))
     if found < 0:

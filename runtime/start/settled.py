@@ -15,12 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.condense.condensed import Condensed
 from sysdyn.runtime.condense.elimination import affine
+from sysdyn.runtime.condense.sums import numbers_of
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.layout import entries_of
+from sysdyn.runtime.model.own_rows import own_rows, own_rows_of_rates
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.ordering import column_order, tall_order
+from sysdyn.runtime.numerics.ordering import Order, tall_order
+from sysdyn.runtime.numerics.saddle import saddle_order
 from sysdyn.runtime.numerics.tall import free_unknowns
 
 LATER = 2000
@@ -190,13 +193,21 @@ class Settler:
     def _provide(self) -> None:
         """The factors of the saddle-point matrix, and where its parts stand."""
         self.pattern, self._slots = self.system.once(("saddle", *self._key), self._saddle)
-        self._order = self.system.once(("saddle order", *self._key), lambda: column_order(self.pattern))
-        self.linear = lib.core.sd_linear_new(
-            self.pattern.unknowns,
-            *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, self._order)),
-        )
-        if not self.linear:
-            raise MemoryError
+        self._order = self.system.once(("saddle order", *self._key, self._state.tobytes()), self._saddle_order)
+        self.linear = self._order.linear(self.pattern)
+
+    def _saddle_order(self) -> Order:
+        def own() -> Ints:
+            """Rows that tell what follows from the state."""
+            unknowns, rates = own_rows(self.system), own_rows_of_rates(self.system)
+            if not isinstance(self._left, Condensed):
+                return np.concatenate([unknowns, rates[self.rates]])
+            kept = self._left.kept
+            row = np.append(numbers_of(self.system.rows, self._left.kept_rows), -1).astype(np.int32)
+            told: Ints = row[np.concatenate([unknowns[kept], rates[kept[self.rates]]])]
+            return told
+
+        return saddle_order(self.pattern, self._state, own)
 
     def _placed(self) -> None:
         """What the core is told of them."""

@@ -13,7 +13,7 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
-from sysdyn.runtime.numerics.rank import TOLERANCE, decomposed, null_space
+from sysdyn.runtime.numerics.rank import TOLERANCE, null_space, singular_values
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Mask, Starter
 
@@ -71,4 +71,4 @@ def _tangent(starter: Starter, state: ConsistentState, rows: Mask, free: Mask) -
 
 def _rank(part: Floats) -> int:
     """Rank of some rows of orthonormal columns: their size is known, so what is small beside one is zero."""
-    return int((decomposed(part)[1] > TOLERANCE).sum()) if part.size else 0
+    return int((singular_values(part) > TOLERANCE).sum()) if part.size else 0

@@ -21,7 +21,7 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
 from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.numerics.points import normal
-from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed
+from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed, singular_values
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanished
 from sysdyn.values import dataclass
@@ -113,7 +113,7 @@ def null_vectors(e: Floats, b: Floats) -> tuple[Floats, Floats]:
 
 
 def _regular(matrix: Floats) -> bool:
-    sigma = decomposed(equilibrated(matrix)[0])[1]
+    sigma = singular_values(equilibrated(matrix)[0])
     return count(sigma, CERTAIN) == sigma.size
 
 

@@ -126,6 +126,32 @@ def copy(template: Any, group: Any, name: str, value: float) -> None:
     h5o.copy(template, b".", group, name.encode())
 
 
+def scalars(group: Any) -> dict[str, tuple[float, str]]:
+    """Every data set of a group of h5py's, which holds one number, and its unit.  TypeError: one holds more, or is no
+    data set.
+    """
+    held, found = np.empty(()), {}
+    for stored in group.id:
+        name, data = stored.decode(errors="surrogateescape"), h5o.open(group.id, stored)
+        if not isinstance(data, h5d.DatasetID) or data.shape != ():
+            raise TypeError(f"'{name}' is no number")
+        data.read(h5s.ALL, h5s.ALL, held)
+        found[name] = float(held), _said(data, b"units", "1")
+    return found
+
+
+def _said(data: Any, name: bytes, without: str) -> str:
+    """A text that is an attribute."""
+    if not h5a.exists(data, name):
+        return without
+    attribute = h5a.open(data, name)
+    if attribute.shape != () or attribute.dtype.kind != "S":
+        return str(h5py.Dataset(data).attrs[name])
+    text = np.empty((), dtype=attribute.dtype)
+    attribute.read(text)
+    return bytes(text[()]).decode()
+
+
 def whole(file: Any, name: str, values: Any) -> Any:
     """A data set of all that it will ever hold: numbers [n] or texts, as fixed-length UTF-8."""
     held, stored = (values, _number_of(values.dtype)) if isinstance(values, np.ndarray) else _texts(values)

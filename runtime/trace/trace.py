@@ -106,6 +106,7 @@ class Trace:
     def open(cls, file: str | Path) -> Trace:
         """Reads a whole trace, also of a run that was killed.  Raises TraceError."""
         import h5py
+        from sysdyn.runtime.trace.hdf5 import scalars
 
         path = Path(file)
         with _damaged(path), input_output(path), opened(path) as source:
@@ -138,10 +139,7 @@ class Trace:
                     _plain(item.attrs["nominal"]) if "nominal" in item.attrs else None,
                     rate,
                 )
-            parameters = {
-                name: (float(item[()]), str(_plain(item.attrs.get("units", "1"))))
-                for name, item in source.get("parameters", {}).items()
-            }
+            parameters = scalars(source["parameters"]) if "parameters" in source else {}
             attributes = {name: _plain(value) for name, value in source.attrs.items()}
             events = _events(source["events"]) if "events" in source else ()
             return cls(str(path), np.asarray(data["time"][:length]), attributes, parameters, quantities, events)

@@ -9,6 +9,8 @@ from scipy import signal
 from scipy.linalg import eigvals, svdvals
 from sysdyn.api import linearize
 from sysdyn.cli.main import run
+from sysdyn.runtime.linear import tangent
+from sysdyn.runtime.numerics.rank import decomposed
 from texts import ROOT, run_json, write
 
 CLOSE = 1e-10
@@ -785,3 +787,16 @@ def test_a_response_of_nothing_says_what_is_missing(tmp_path, capsys):
         err = capsys.readouterr().err
         assert (code, "no bode: " in err) == ((0, True) if said else (2, False))
         assert said is None or said in err
+
+
+def test_a_long_ladder_takes_no_singular_vectors(capsys, monkeypatch):
+    """Of 575 unknowns and rates: factors leave no doubt of what rows determine.  Its modes by a closed form."""
+    cells, asked = 72, []
+    monkeypatch.setattr(tangent, "decomposed", lambda matrix: (asked.append(min(matrix.shape)), decomposed(matrix))[1])
+    path = ROOT / "models" / "benchmark" / "rc_ladder.sd"
+    found = values(linear(capsys, path, "--set", f"n={cells}")["eigenvalues"])
+    odd = 2.0 * np.arange(1, cells + 1) - 1.0
+    wanted = -4.0 * cells**2 * np.sin(odd * np.pi / (2.0 * (2 * cells + 1))) ** 2
+    assert np.abs(np.sort(found.real) / np.sort(wanted) - 1.0).max() < 1e-9
+    assert np.abs(found.imag).max() == 0.0
+    assert max(asked) <= cells

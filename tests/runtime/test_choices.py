@@ -9,13 +9,14 @@ from sysdyn.cli.run.prepare import prepare
 from sysdyn.dsl import load as text
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
+from sysdyn.runtime import simulate as simulation
 from sysdyn.runtime.accuracy.alternatives import NOT_STIFF, alternatives
 from sysdyn.runtime.accuracy.options import Options, choose_index, choose_method, own_tolerances
 from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.underlying import obstacle, rateless, underlying_form
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.description import describe
-from sysdyn.runtime.model.failures import NoSuchForm, WrongOption
+from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure, WrongOption
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
 
@@ -228,3 +229,44 @@ def test_two_capacitors_in_parallel_have_no_underlying_equation():
     found, missing, form, left = unknown(tied)
     assert found == missing == left != []
     assert form == "0"
+
+
+class Taken:
+    """What `_chosen` asks of runs: ways as they are taken, with the steps that a draft may take."""
+
+    def __init__(self, way):
+        self.way, self.system, self.options = way, way.system, AUTO
+        self.patience = self.patience_with_draft = None
+        self.seen = []
+
+    @property
+    def method(self):
+        return self.way.method
+
+    @property
+    def most_steps(self):
+        return self.patience_with_draft
+
+    def take(self, way):
+        self.way = way
+
+
+@pytest.mark.parametrize("ends", ["dopri", "radau"])
+def test_the_explicit_method_goes_on_once_where_radau_takes_more_steps(monkeypatch, ends):
+    """Its steps of 2 ms leave it 500 in a second, which a draft of radau may take; behind that nobody has a limit."""
+
+    def achieved(runs, options, **_):
+        runs.seen.append((runs.method, runs.way.lasting, runs.most_steps))
+        if runs.method == "dopri" and (ends == "radau" or not runs.way.lasting):
+            raise SolverFailure("stiff", 0.1, 2e-3)
+        if runs.method == "radau" and runs.most_steps is not None:
+            raise SolverFailure("max_steps", 0.5, 1e-3)
+        return SimpleNamespace(met=True)
+
+    monkeypatch.setattr(simulation, "_achieved", achieved)
+    plain = SimpleNamespace(form=SimpleNamespace(scales=()))
+    ways = [Way(method, plain, 1, "0") for method in ("dopri", "radau", "bdf")]
+    runs = Taken(ways[0])
+    assert simulation._chosen(runs, AUTO, tuple(ways[1:])).met
+    expected = [("dopri", False, None), ("radau", False, 500), ("dopri", True, None), ("radau", False, None)]
+    assert runs.seen == (expected if ends == "radau" else expected[:3])

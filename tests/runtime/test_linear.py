@@ -557,9 +557,12 @@ def test_rows_of_a_long_line_pivot_in_their_own_columns(faint):
     lib.core.sd_linear_free(linear)
 
 
+@pytest.mark.parametrize("waits", [False, True])
 @pytest.mark.parametrize("seed", range(8))
-def test_the_fill_of_a_column_order_is_that_of_rows_merged_by_hand(seed):
-    """Also behind the column whose merged row holds all that are left: the rest stands in one row."""
+def test_the_fill_of_a_column_order_is_that_of_rows_merged_by_hand(seed, waits):
+    """Also behind the column whose merged row holds all that are left: the rest stands in one row.  What waits for
+    others comes behind them.
+    """
     rng = np.random.default_rng(seed)
     m, n = 14 + seed, 12 + seed
     there = rng.random((m, n)) < 0.08 + 0.03 * (seed % 4)
@@ -567,10 +570,15 @@ def test_the_fill_of_a_column_order_is_that_of_rows_merged_by_hand(seed):
     pattern = csc_array(there.astype(float))
     pattern.sort_indices()
     order, filled = np.zeros(n, dtype=np.int32), np.zeros(1, dtype=np.int64)
+    later = np.flatnonzero(rng.random(n) < 0.4) if waits else np.zeros(0, dtype=int)
+    waiting = [(c, j) for c in range(n) for j in later if c not in later and rng.random() < 0.3]
+    starts = np.searchsorted([c for c, _ in waiting], np.arange(n + 1)).astype(np.int32)
+    ahead = (starts, np.array([j for _, j in waiting], dtype=np.int32)) if waits else (None, None)
     places = (np.ascontiguousarray(a, dtype=np.int32) for a in (pattern.indptr, pattern.indices))
-    arrays = [lib.pointer(a) for a in (*places, order, filled)]
+    arrays = [lib.pointer(a) for a in (*places, *ahead, order, filled)]
     assert lib.core.sd_column_order(m, n, *arrays) == 0
     assert sorted(order) == list(range(n))
+    assert all(list(order).index(c) < list(order).index(j) for c, j in waiting)
     rows, wanted = [set(np.flatnonzero(row)) for row in there], 0
     for c in order:
         merged = set().union(*(r for r in rows if c in r)) - {c}

@@ -53,6 +53,40 @@ def test_layout(tmp_path):
     assert np.asarray(trace["q1"]).shape == trace.time.shape
 
 
+def test_parameters_are_read_without_objects_for_each(tmp_path, monkeypatch):
+    """A ladder of 1000 cells has 2000: h5py's objects took two thirds of the time to open its trace."""
+    path, made = tmp_path / "o.h5", []
+    known = tuple(Parameter(f"R[{k}].R", 0.5 + k, "ohm" if k % 2 else "1") for k in range(300))
+    written(path, parameters=known)
+    create = h5py.Dataset.__init__
+    monkeypatch.setattr(h5py.Dataset, "__init__", lambda *given, **named: (made.append(1), create(*given, **named))[1])
+    trace = Trace.open(path)
+    assert trace.parameters == {p.name: (p.value, p.unit) for p in known}
+    assert len(made) < 50
+
+
+def test_parameters_of_others_are_read_or_refused(tmp_path):
+    """Whole numbers, units of any length, none at all; more than one number is none."""
+    path = tmp_path / "o.h5"
+    written(path)
+    with h5py.File(path, "r+") as file:
+        file["parameters/cells"] = 7
+        file["parameters/long"] = np.float32(2.5)
+        file["parameters/long"].attrs["units"] = "kg*m^2"  # of variable length
+    known = Trace.open(path).parameters
+    assert known == {"m": (1.13, "kg"), "cells": (7.0, "1"), "long": (2.5, "kg*m^2")}
+    for wrong in ([1.0, 2.0], "text", None):
+        with h5py.File(path, "r+") as file:
+            if wrong is None:
+                file.create_group("parameters/none")
+            else:
+                file["parameters/more"] = wrong
+        with pytest.raises(TraceError):
+            Trace.open(path)
+        with h5py.File(path, "r+") as file:
+            del file[f"parameters/{'none' if wrong is None else 'more'}"]
+
+
 def test_opens_in_xarray(tmp_path):
     xarray = pytest.importorskip("xarray")
     path = tmp_path / "o.h5"

@@ -19,6 +19,8 @@ typedef struct {
     int32_t *mark, *rest;               /* [columns]; [rows] members of a row outside the pivot's */
     int32_t *seen;                      /* [rows] at which pivot `rest` was begun */
     char *done;                         /* [columns] */
+    const int32_t *ahead, *behind;      /* columns that wait for c: behind[ahead[c] .. ahead[c + 1]]; NULL: none do */
+    int32_t *waits;                     /* [columns] for how many each does */
 } graph;
 
 static void enlist(graph *g, int32_t c, int32_t score)
@@ -134,9 +136,37 @@ static void rescore(graph *g, int32_t pivot, int32_t left)
         }
         g->of[g->own[j] + kept++] = new; /* it was in one of the rows that are gone */
         g->count[j] = kept;
+        score = score < left ? score : left;
+        if (g->waits[j]) {
+            g->score[j] = (int32_t)score;
+            continue;
+        }
         delist(g, j);
-        enlist(g, j, (int32_t)(score < left ? score : left));
+        enlist(g, j, (int32_t)score);
     }
+}
+
+/* column c is done: what waited for it alone is listed; the least score of that, or the one given */
+static int32_t release(graph *g, int32_t c, int32_t least)
+{
+    for (int32_t k = g->ahead ? g->ahead[c] : 0; g->ahead && k < g->ahead[c + 1]; k++) {
+        int32_t j = g->behind[k];
+        if (--g->waits[j] || g->done[j])
+            continue;
+        enlist(g, j, g->score[j]);
+        least = g->score[j] < least ? g->score[j] : least;
+    }
+    return least;
+}
+
+/* All that is left stands in one row, from `begin` on: the last of its columns comes first, each time anew, but for what
+ * waits for some of them */
+static void end_with(const graph *g, int64_t begin, int32_t left, int32_t *order)
+{
+    for (int waiting = 0; waiting < 2; waiting++)
+        for (int32_t k = left; k-- > 0;)
+            if ((g->waits[g->member[begin + k]] > 0) == waiting)
+                *order++ = g->member[begin + k];
 }
 
 /* order [last]: the columns that are listed, in the order of their elimination.  0; -1: no memory */
@@ -158,33 +188,37 @@ static int eliminate(graph *g, int32_t *order, int32_t last)
             if (g->length[g->of[g->own[c] + k]])
                 g->of[g->own[c] + kept++] = g->of[g->own[c] + k];
         g->count[c] = kept;
-        if (!kept)
+        if (!kept) {
+            least = release(g, c, least);
             continue;
+        }
         if (!merge(g, c, pivot))
             return -1;
         int32_t left = g->length[g->made - 1];
-        if (place + left == last) { /* it stands in for all rows: the last of its columns comes first, each time anew */
+        if (place + left == last) { /* it stands in for all rows */
             g->filled += (int64_t)left * (left - 1) / 2;
-            while (left)
-                order[place++] = g->member[g->start[g->made - 1] + --left];
+            end_with(g, g->start[g->made - 1], left, order + place);
             return 0;
         }
         rescore(g, pivot, g->columns - 1);
         for (int64_t at = g->start[g->made - 1]; at < g->start[g->made - 1] + g->length[g->made - 1]; at++)
-            least = g->score[g->member[at]] < least ? g->score[g->member[at]] : least;
+            if (!g->waits[g->member[at]] && g->score[g->member[at]] < least)
+                least = g->score[g->member[at]];
+        least = release(g, c, least);
     }
 }
 
-int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *order,
-                    int64_t *filled)
+int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const int32_t *ahead,
+                    const int32_t *behind, int32_t *order, int64_t *filled)
 {
     size_t n = (size_t)columns, entries = (size_t)column[columns], m = (size_t)rows + n;
-    graph g = {.columns = columns, .rows = rows + columns, .made = rows, .room = (int64_t)(entries + entries / 2 + 64)};
+    graph g = {.columns = columns, .rows = rows + columns, .made = rows, .ahead = ahead,
+               .behind = behind, .room = (int64_t)(entries + entries / 2 + 64)};
     g.start = calloc(m + 1, sizeof *g.start);
     g.length = calloc(m + 1, sizeof *g.length);
     g.member = malloc((size_t)g.room * sizeof *g.member);
     g.of = malloc((entries + 1) * sizeof *g.of);
-    g.own = malloc(7 * (n + 2) * sizeof *g.own);
+    g.own = malloc(8 * (n + 2) * sizeof *g.own);
     g.seen = malloc(2 * (m + 1) * sizeof *g.seen);
     g.done = calloc(n + 1, 1);
     int failed = -1;
@@ -195,6 +229,8 @@ int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const 
         g.before = g.next + n + 2;
         g.first = g.before + n + 2;
         g.mark = g.first + n + 2;
+        g.waits = g.mark + n + 2;
+        memset(g.waits, 0, n * sizeof *g.waits);
         g.rest = g.seen + m + 1;
         for (size_t k = 0; k < n + 2; k++)
             g.first[k] = g.mark[k] = NONE;
@@ -207,6 +243,8 @@ int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const 
                 g.done[c] = 1;
                 continue;
             }
+            for (int32_t k = ahead ? ahead[c] : 0; ahead && k < ahead[c + 1]; k++)
+                g.waits[behind[k]]++;
             for (int32_t e = column[c]; e < column[c + 1]; e++)
                 g.length[row[e]]++;
         }
@@ -236,7 +274,9 @@ int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const 
             int64_t score = 0;
             for (int32_t k = 0; k < g.count[c]; k++)
                 score += g.length[g.of[g.own[c] + k]] - 1;
-            enlist(&g, c, (int32_t)(score < columns ? score : columns));
+            g.score[c] = (int32_t)(score < columns ? score : columns);
+            if (!g.waits[c])
+                enlist(&g, c, g.score[c]);
         }
         failed = eliminate(&g, order, last);
         *filled = g.filled;

@@ -9,10 +9,11 @@
 
 #include <stdint.h>
 
-/* order [columns]: the columns in the order of elimination; column [columns + 1], row: the pattern; filled: entries of U at
+/* order [columns]: the columns in the order of elimination; column [columns + 1], row: the pattern; ahead
+ * [columns + 1], behind: columns behind[ahead[c] ..] come behind c, for none of which others wait (NULL: none do); filled: entries of U at
  * most, whatever the pivots (of two rows for each pair of neighbours: those of a symmetric factor).  0; -1: no memory */
-int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t *order,
-                    int64_t *filled);
+int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const int32_t *ahead,
+                    const int32_t *behind, int32_t *order, int64_t *filled);
 
 /* peeled [rows]: 1 where a row of a matrix [rows, columns] can be taken away because it alone of those left stands in some
  * column, with an entry of `least` or more: such rows are independent of all others.  row, column, value [entries].

@@ -10,8 +10,6 @@
 #include "linear/told.h"
 
 #define THRESHOLD 0.1    /* a sparser row may pivot if its entry is this close to the largest */
-#define FAINT_PIVOT 1e-7 /* and a column's own one of quasi-definite matrices, whose factors any of them has: refined once or
-                          * twice their solutions are as good (those of 4650 masses at random: a fifth of the time) */
 #define ROOM 2           /* entries of a factor for each of the matrix: room for them */
 #define SMALL 10000      /* columns up to which room that was not taken is kept for the next pivoting */
 

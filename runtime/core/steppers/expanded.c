@@ -52,14 +52,18 @@ static void dense(const void *self, double t, double *y, double *yd)
     sd_condensed_show(expanded->condensed, z, zd, y, yd);
 }
 
+/* within the step what powers and energies read, at its end all */
 static void values(const void *self, double t, double *y)
 {
     const sd_expanded *expanded = self;
     const sd_stepper *inner = expanded->inner;
+    if (t == *inner->t) {
+        sd_condensed_expand(expanded->condensed, inner->y, y, 0);
+        return;
+    }
     double *z = room_of(expanded);
-    if (t != *inner->t)
-        inner->values(inner->self, t, z);
-    sd_condensed_expand(expanded->condensed, t != *inner->t ? z : inner->y, y, 0);
+    inner->values(inner->self, t, z);
+    sd_condensed_audited(expanded->condensed, z, y);
 }
 
 static void refine(void *self, sd_settle *settle)

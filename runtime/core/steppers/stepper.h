@@ -52,7 +52,7 @@ typedef struct sd_stepper {
     int32_t collocated;        /* 1: at most SD_NODES nodes; a polynomial through them and the start serves within the step */
     /* y, yd [n] := those at node k, where they do not stand in node_y, node_yd (NULL: they do) */
     void (*show)(const void *self, int32_t k, double *y, double *yd);
-    /* y alone [n] at any t within the last step; NULL: dense gives it */
+    /* y alone [n] at any t within the last step, as far as powers and energies read it; NULL: dense gives it */
     void (*values)(const void *self, double t, double *y);
     /* y, yd [n] of `dense` at t moved onto the equations by what the method has at hand: 0, and how far in `moved`
      * (magnitudes); else they are as they were (NULL: it has nothing) */

@@ -74,15 +74,18 @@ SD_WIDE static void evaluate_many(const sd_straight *straight, double *x, int ra
         evaluate(straight, x, rate);
 }
 
+static inline void evaluate_straight(const sd_straight *straight, double *x, int rate)
+{
+    if (straight->number == 1)
+        evaluate_one(straight, x, rate);
+    else
+        evaluate_many(straight, x, rate);
+}
+
 void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)
 {
-    for (int32_t s = 0; s < condensed->straights; s++) {
-        const sd_straight *straight = &condensed->straight[s];
-        if (straight->number == 1)
-            evaluate_one(straight, x, rate);
-        else
-            evaluate_many(straight, x, rate);
-    }
+    for (int32_t s = 0; s < condensed->straights; s++)
+        evaluate_straight(&condensed->straight[s], x, rate);
 }
 
 /* a span of numbers, most of a small model of one */
@@ -115,6 +118,14 @@ void sd_condensed_expand(const sd_condensed *condensed, const double *z, double 
 {
     sd_condensed_put(condensed, z, x);
     sd_condensed_complete(condensed, x, rate);
+}
+
+void sd_condensed_audited(const sd_condensed *condensed, const double *z, double *x)
+{
+    sd_condensed_put(condensed, z, x);
+    for (int32_t s = 0; s < condensed->straights; s++)
+        if (condensed->straight[s].audited)
+            evaluate_straight(&condensed->straight[s], x, 0);
 }
 
 void sd_condensed_show(const sd_condensed *condensed, const double *z, const double *zd, double *y, double *yd)

@@ -25,9 +25,9 @@ typedef struct sd_span {
 } sd_span;
 
 /* y[place + i] = constant[i] + sum over k of factor[k * number + i] * y[source[k] + i]; alike, where each term has one
- * factor: how far those of its terms stand apart, else 0 */
+ * factor: how far those of its terms stand apart, else 0; audited: powers and energies read these, or what does */
 typedef struct sd_straight {
-    int32_t place, number, terms, alike;
+    int32_t place, number, terms, alike, audited;
     const int32_t *source;  /* [terms] */
     const double *factor;   /* [terms][number], or [terms][alike] */
     const double *constant; /* [number], NULL: zeros */
@@ -93,6 +93,8 @@ void sd_condensed_put(const sd_condensed *condensed, const double *z, double *x)
 /* all unknowns x of the full system from kept values z; rate: x and z are derivatives.  What is neither kept nor
  * eliminated stays as it is */
 void sd_condensed_expand(const sd_condensed *condensed, const double *z, double *x, int rate);
+/* of all unknowns x those that powers and energies read; the others stay as they are */
+void sd_condensed_audited(const sd_condensed *condensed, const double *z, double *x);
 /* y, yd of a point that is observed but not settled: rates only as far as they are read */
 void sd_condensed_show(const sd_condensed *condensed, const double *z, const double *zd, double *y, double *yd);
 /* the eliminated ones of x from its kept ones */

@@ -102,7 +102,7 @@ class Straight(c.Structure):
     """sd_straight."""
 
     _fields_ = [
-        *[(name, I) for name in ["place", "number", "terms", "alike"]],
+        *[(name, I) for name in ["place", "number", "terms", "alike", "audited"]],
         *[(name, P) for name in ["source", "factor", "constant"]],
     ]
 
