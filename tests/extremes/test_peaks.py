@@ -1,0 +1,77 @@
+"""Laws that are nothing but within a narrow range: no step passes over a peak, however narrow it is."""
+
+import numpy as np
+import pytest
+from running import ran
+from scipy.integrate import quad
+
+HILL = """
+%s
+model m {
+  coord x: translation = 0 m
+  energy T* = 1/2*(1 kg)*x'^2
+  energy V = %s
+  init x' = 1 m/s
+}
+scene s of m {
+  time 0 s to 2 s
+  trace x, x' as v every 50 ms
+}
+"""
+TOOTH = "table tooth(x: m) -> J pchip extend [ (0, 0), (0.5, 0), (0.501, 0.3), (0.502, 0), (2, 0), (4, 0) ]"
+
+
+def pchip(x):
+    """Between a node of no slope and the top of none."""
+    s = max(1.0 - abs(x - 0.501) / 1e-3, 0.0)
+    return 0.3 * s * s * (3.0 - 2.0 * s)
+
+
+HILLS = {
+    "0.3 J*exp(-((x - 0.5 m)/(10 mm))^2)": (lambda x: 0.3 * np.exp(-(((x - 0.5) / 1e-2) ** 2)), 0.5, 0.07),
+    "0.3 J*exp(-(x - 0.5 m)^2/(2*(1 mm)^2))": (lambda x: 0.3 * np.exp(-(((x - 0.5) / 1e-3) ** 2) / 2), 0.5, 1e-2),
+    "0.3 J*exp(-((x - 0.5 m)/(1 um))^2)": (lambda x: 0.3 * np.exp(-(((x - 0.5) / 1e-6) ** 2)), 0.5, 7e-6),
+    "(0.3 J) / cosh((x - 0.5 m)/(1 mm))^2": (lambda x: 0.3 * (1.0 - np.tanh((x - 0.5) / 1e-3) ** 2), 0.5, 2e-2),
+    "tooth(x)": (pchip, 0.501, 1e-3),
+}
+
+
+@pytest.mark.parametrize("hill", HILLS)
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
+def test_a_hill_on_a_plain_delays(hill, formulation, accuracy, tmp_path):
+    """By v^2/2 + V = 1/2 in all rows, and as much as it takes.  It was passed over, told as met."""
+    law, top, half = HILLS[hill]
+    delay = quad(lambda s: 1.0 / np.sqrt(1.0 - 2.0 * law(top + s)) - 1.0, -half, half, points=[0.0], epsabs=1e-13)[0]
+    found = ran(tmp_path, HILL % (TOOTH, hill), formulation=formulation, accuracy=accuracy)
+    assert found.met
+    assert not len(found.trace.events)
+    x, v, last = np.asarray(found.trace["x"]), np.asarray(found.trace["v"]), found.at("x", np.array([2.0]))[0]
+    assert abs(last - (2.0 - delay)) < 2.0 * accuracy
+    assert np.abs(v**2 / 2.0 + np.array([law(place) for place in x]) - 0.5).max() < 10.0 * accuracy
+    assert abs(v[-1] - 1.0) < accuracy
+
+
+LATENT = """
+model m {
+  param width = 1 K
+  state T: K = 280 K
+  let c = 1 kJ/K + 200 kJ / width / sqrt(pi)*exp(-((T - 330 K)/width)^2)
+  dynamic T' = 300 W / c
+}
+scene s of m {
+  time 0 s to 3000 s
+  trace T every 20 s
+}
+"""
+
+
+@pytest.mark.parametrize("width", [1.0, 0.1, 0.01])
+@pytest.mark.parametrize("options", [{}, {"accuracy": 1e-6}, {"accuracy": 1e-6, "method": "bdf"}])
+def test_the_heat_of_a_melting_is_not_left_out(width, options, tmp_path):
+    """200 kJ at 330 K: behind it the temperature is what the heat says.  It was 190 K more by default, told as met."""
+    found = ran(tmp_path, LATENT, settings=(("width", str(width)),), **options)
+    assert found.met
+    after = 280.0 + (300.0 * 3000.0 - 200e3) / 1e3
+    assert abs(found.at("T", np.array([3000.0]))[0] - after) < after * options.get("accuracy", 1e-4)
+    assert abs(found.at("T", np.array([500.0]))[0] - 330.0) < 2.5 * width
