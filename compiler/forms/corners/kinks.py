@@ -56,8 +56,8 @@ MOST = 200
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """u = 0: where the branch changes; jumps: whether a row does there; row: the first row family that has it; passage: of
-    a peak (peaks.py), which begins where u becomes positive: how far u goes while it is passed.
+    """u = 0: where the branch changes; jumps: whether a row does there; row: the first row family that has it;
+    passage: of a peak (peaks.py), which begins where u becomes positive: how far u goes while it is passed.
     """
 
     u: Node
