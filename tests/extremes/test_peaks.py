@@ -121,3 +121,38 @@ def test_hills_of_arrays(number, tmp_path):
             0
         ]
         assert abs(found.at(f"x[{i}]", np.array([2.0]))[0] - (2.0 * speed - slow)) < 5e-6
+
+
+PASSED = """
+table tooth(x: m) -> 1 pchip clamp [ (0, 0), (0.5003, 0), (0.5004, 1), (0.5005, 0), (5, 0) ]
+table sharp(x: m) -> 1 linear clamp [ (0, 0), (0.5003, 0), (0.500301, 1), (0.500302, 0), (5, 0) ]
+model m {
+  coord x: translation = 0 m
+  discrete n = 0
+  energy T* = 1/2*(1 kg)*x'^2
+  when %s > 0.5 { n := n + 1 }
+  init x' = 1 m/s
+}
+scene s of m {
+  time 0 s to 2 s
+  trace x, n every 50 ms
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("watched", "at"),
+    [
+        ("exp(-((x - 0.5003 m)/(1 mm))^2)", 0.5003 - 1e-3 * np.sqrt(np.log(2.0))),
+        ("exp(-((x - 0.5003 m)/(1 um))^2)", 0.5003 - 1e-6 * np.sqrt(np.log(2.0))),
+        ("tooth(x)", 0.50035),
+        ("sharp(x)", 0.5003005),
+    ],
+)
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
+def test_a_peak_that_an_event_waits_for_is_met(watched, at, accuracy, tmp_path):
+    """Looks passed over it, and the event did not happen."""
+    found = ran(tmp_path, PASSED % watched, accuracy=accuracy)
+    assert found.met
+    assert [round(event.time, 9) for event in found.trace.events] == [pytest.approx(at, abs=2.0 * accuracy)]
+    assert np.asarray(found.trace["n"])[-1] == 1.0

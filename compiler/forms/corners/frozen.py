@@ -64,10 +64,10 @@ READ = ("observe", "observe_rate", "observe_scale", "initial")
 def frozen(form: DescriptorForm, network: Network) -> tuple[DescriptorForm, tuple[Parameter, ...]]:
     """The form of a network with frozen branches, and the parameters that hold them."""
     tables, place = {t.name: t for t in network.tables}, network.place
-    form = replace(form, blocks=tuple(_opened(b, tables) for b in form.blocks)) if tables else form
+    whole, form = form, replace(form, blocks=tuple(_opened(b, tables) for b in form.blocks)) if tables else form
     form = written(form, network)
     found = surfaces(form, frozenset(n.data for s in network.switches for n in s.direction))
-    found += peaks(form, network, len(found))
+    found += peaks(form, whole, network, len(found))
     if not found:
         return form, ()
     freezer = _Freezer(form, found)

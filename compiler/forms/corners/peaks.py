@@ -4,7 +4,7 @@
     cosh(b)^-n, tanh(b)^2                   within b^2 < FLAT
     cos(b)^n, n large                       within n sin(b)^2 < 2 FADES
     (1 + q)^-n                              within q < FEW^(1/n)
-    pchip, cubic: narrow cells              between the ends of these
+    tables: narrow cells                    between the ends of these
 
 Where nothing acts a step is as long as it may be; its ends, its stages and the next finer run know nothing of a peak
 between them: a latent heat of 1 K on the way from 280 K to 430 K was left out, told as met.  The function
@@ -21,7 +21,7 @@ from itertools import pairwise
 from itertools import product as product_of
 
 from sysdyn.compiler.forms.corners.kinks import JUDGED, MOST, Surface
-from sysdyn.compiler.forms.descriptor import DescriptorForm
+from sysdyn.compiler.forms.descriptor import DescriptorForm, Kernel
 from sysdyn.dsl.model.expression import (
     Node,
     call,
@@ -55,14 +55,16 @@ CELLS = 8
 """Narrow cells side by side, at most, that one passage in parts sees."""
 
 
-def peaks(form: DescriptorForm, network: Network, known: int) -> tuple[Surface, ...]:
-    """The surfaces at which peaks begin and end, of each element of arrays; none where they and the known ones are more
-    than MOST.
+def peaks(form: DescriptorForm, whole: DescriptorForm, network: Network, known: int) -> tuple[Surface, ...]:
+    """The surfaces at which peaks begin and end, of each element of arrays, in rows and in what events watch; none where
+    they and the known ones are more than MOST.  whole: the form with its tables of straight pieces, which events may
+    watch.
     """
     tables, first = {t.name: t for t in network.tables}, dict[Node, Surface]()
     values = Values({p.name: p for p in network.parameters}, network.elements)
     blocks = (block for name in JUDGED if (block := form.block(name)) is not None)
-    for kernel in (kernel for block in blocks for kernel in block.kernels):
+    kernels = (kernel for block in blocks for kernel in block.kernels)
+    for kernel in (*kernels, *_watching(whole, network)):
         nodes = topological([s.expression for s in kernel.rows])
         if not any(True for node in nodes for _ in _depths(node, tables)):
             continue
@@ -77,6 +79,17 @@ def peaks(form: DescriptorForm, network: Network, known: int) -> tuple[Surface, 
                 if len(first) + known > MOST:
                     return ()
     return tuple(first.values())
+
+
+def _watching(form: DescriptorForm, network: Network) -> Iterator[Kernel]:
+    """Rows whose signs events watch: one that is a peak is nothing but within it, too."""
+    conditions = [e.condition for e in network.events if e.condition is not None]
+    names = {v.data[0] for condition in conditions for v in variables(condition)}
+    block = form.block("observe") if names else None
+    for kernel in block.kernels if block is not None else ():
+        rows = tuple(s for s in kernel.rows if form.rows[s.row].owner in names)
+        if rows:
+            yield Kernel(kernel.nest, rows)
 
 
 def _each(root: Node, tables: Mapping[str, Table], values: Values) -> Iterator[tuple[Node, float]]:
@@ -166,7 +179,7 @@ def _even(node: Node) -> bool:
 
 def _teeth(table: Table) -> Iterator[tuple[float, float]]:
     """Ends of narrow cells side by side."""
-    if table.method not in ("pchip", "cubic") or len(table.points) > 1:
+    if len(table.points) > 1:
         return
     points, values = table.points[0], table.values
     cells, changes = ([b - a for a, b in pairwise(each)] for each in (points, values))
