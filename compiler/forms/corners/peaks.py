@@ -56,9 +56,9 @@ CELLS = 8
 
 
 def peaks(form: DescriptorForm, whole: DescriptorForm, network: Network, known: int) -> tuple[Surface, ...]:
-    """The surfaces at which peaks begin and end, of each element of arrays, in rows and in what events watch; none where
-    they and the known ones are more than MOST.  whole: the form with its tables of straight pieces, which events may
-    watch.
+    """The surfaces at which peaks begin and end, of each element of arrays, in rows and in what events watch; none
+    where they and the known ones are more than MOST.  whole: the form with its tables of straight pieces, which events
+    may watch.
     """
     tables, first = {t.name: t for t in network.tables}, dict[Node, Surface]()
     values = Values({p.name: p for p in network.parameters}, network.elements)
