@@ -241,6 +241,17 @@ def _made(make: Any, *arguments: Any, **options: Any) -> Request:
     return request
 
 
+_NUMBERS: dict[str, type[float] | type[int]] = {"accuracy": float, "rtol": float, "atol": float, "max_steps": int}
+
+
+def _number(name: str, value: Any, kind: type[float] | type[int]) -> float | int:
+    """As the command reads a text."""
+    try:
+        return kind(value)
+    except (TypeError, ValueError):
+        raise UsageError(f"{name} {value!r}: a number") from None
+
+
 def _changes(options: dict[str, Any]) -> dict[str, Any]:
     """Options as a request has them."""
     given = dict(options)
@@ -250,6 +261,9 @@ def _changes(options: dict[str, Any]) -> dict[str, Any]:
     for name in ("until", "max_wall", "step"):
         if given.get(name) is not None:
             given[name] = text_of(given[name])
+    for name, kind in _NUMBERS.items():
+        if given.get(name) is not None:
+            given[name] = _number(name, given[name], kind)
     at = given.get("at")
     if at is not None and not isinstance(at, str):
         given["at"] = ",".join(text_of(t) for t in np.atleast_1d(at))

@@ -46,7 +46,7 @@ class Determined:
 
     def __init__(self, contacts: Contacts) -> None:
         self.contacts = contacts
-        self._pivoting = Pivoting(contacts, self._singular)
+        self.pivoting = Pivoting(contacts, self._singular)
         self._indices: dict[tuple[bool, ...], int] = {}
         self._regular: dict[tuple[bool, ...], tuple[int, Floats, NDArray[np.bool_]]] = {}
 
@@ -94,7 +94,7 @@ class Determined:
         """As Pivoting.fit, of a set that leaves as little open as one can; turned: what has just changed changes back
         last.
         """
-        found = self._pivoting.fit(t, y, yd, settle, turned)
+        found = self.pivoting.fit(t, y, yd, settle)
         if self._system.unknowns > DENSE:
             return found
         open_ = self.nullity(t, *found)
@@ -195,7 +195,7 @@ class Determined:
         """The point of the present active set where that fits, or with pivots of one that fits; None without."""
         if pivots:
             try:
-                return self._pivoting.fit(t, *point, settle)
+                return self.pivoting.fit(t, *point, settle)
             except NoActiveSetError:
                 return None
         found = settle(t, *point)

@@ -27,6 +27,8 @@ PIVOT = 1e-11
 """Of the largest entry of a column: what is less is no pivot."""
 PIVOTS = 10
 """Of Lemke's method, an inequality."""
+SHARE = 1e-9
+"""Of a unit vector: a row's part in what is open."""
 ALIKE = 1e-12
 """Of a ratio: two that differ by less are one."""
 
@@ -46,31 +48,29 @@ class Implicit:
         return [k for k in told if k not in contacts.frozen and not contacts.barred[k]]
 
     def after(self, t: float, y: Floats, h: float) -> tuple[NDArray[np.bool_], Floats] | None:
-        """The active set behind a step of h (s) from y [unknowns as written], and the point there; None where there is
-        none, or where the present set, from which it is sought, leaves something open.
+        """The active set behind a step of h (s) from y [unknowns as written], on the rows at t, and the point there;
+        None where there is none.
         """
         contacts, free = self.contacts, self._free()
         if self.system.unknowns > DENSE:
             return None
         own = [contacts.contacts[k] for k in free]
         row, at = np.array([self._places[c.number] for c in own], dtype=int).reshape(-1, 2).T
-        value, held = [c.value for c in own], contacts.active[free]
-        matrix, residual, now = self._linear(t + h, y, h, free)
+        value = [c.value for c in own]
+        matrix, residual, now = self._linear(t, y, h, free)
         if not (np.isfinite(matrix).all() and np.isfinite(residual).all()):
             return None
-        slope = self._sign(t + h, y, matrix[row], value)[:, None] * matrix[row]
+        slope = self._sign(t, y, matrix[row], value)[:, None] * matrix[row]
         unit = np.zeros_like(slope)
         unit[np.arange(len(free)), at] = 1.0
-        # of each pair what the present set has at zero (said) may grow, the other is what follows from it
-        said, told = (np.where(held[:, None], *pair) for pair in ((slope, unit), (unit, slope)))
-        begin, end = (np.where(held, *pair) for pair in ((now[value], y[at]), (y[at], now[value])))
-        matrix[row] = said
         right = np.zeros((len(matrix), len(free) + 1))
-        right[:, -1] = -residual
-        right[row, -1], right[row, np.arange(len(free))] = -begin, 1.0
-        moves = _solved(matrix, right)
-        if moves is None:
+        right[:, -1], right[row, np.arange(len(free))] = -residual, 1.0
+        pairs = (slope, unit), (now[value], y[at])
+        found = base_of(matrix, right, row, pairs, contacts.active[free])
+        if found is None:
             return None
+        moves, held = found
+        told, end = (np.where(held[:, None] if one.ndim > 1 else held, other, one) for one, other in pairs)
         largest = contacts.observer.largest
         pair = largest[value], largest[[c.multiplier for c in own]]
         size, grows = (np.where(held, *sizes) for sizes in (pair[::-1], pair))
@@ -79,7 +79,7 @@ class Implicit:
         if turned is None:
             return None
         active = contacts.active.copy()
-        active[np.array(free)[turned > 0.0]] ^= True
+        active[free] = held ^ (turned > 0.0)
         return active, y + moves[:, :-1] @ (grows * turned) + moves[:, -1]
 
     def _linear(self, t: float, y: Floats, h: float, free: list[int]) -> tuple[Floats, Floats, Floats]:
@@ -102,14 +102,42 @@ class Implicit:
         return np.where(rises, 1.0, -1.0)
 
 
-def _solved(matrix: Floats, right: Floats) -> Floats | None:
-    """The solution of a square system whose rows and columns are of very different size; None: it is singular."""
+def base_of(
+    matrix: Floats,
+    right: Floats,
+    row: NDArray[np.intp],
+    pairs: tuple[tuple[Floats, Floats], ...],
+    held: NDArray[np.bool_],
+) -> tuple[Floats, NDArray[np.bool_]] | None:
+    """What the unknowns move by as those of each pair that are at zero grow, and at last without; which values those
+    are: `held` [inequalities] where that leaves nothing open, else as much turned as it takes (of what is passive some
+    choice is regular: Sznajder and Gowda 1995).  None: whatever holds, something else is open.
+    """
+    (slope, unit), (value, multiplier) = pairs
+    held, turned = held.copy(), np.zeros(held.size, dtype=bool)
+    while True:
+        matrix[row], right[row, -1] = np.where(held[:, None], slope, unit), -np.where(held, value, multiplier)
+        found, open_ = _solved(matrix, right)
+        if found is not None:
+            return found, held
+        part = np.where(turned, 0.0, open_[row])
+        if not part.max(initial=0.0) > SHARE:
+            return None
+        k = int(np.argmax(part))
+        held[k], turned[k] = not held[k], True
+
+
+def _solved(matrix: Floats, right: Floats) -> tuple[Floats | None, Floats]:
+    """The solution of a square system whose rows and columns are of very different size; None: it is singular, and how
+    much each row [rows] has to do with that.
+    """
     row, column = (factor[:, None] for factor in factors(matrix))
     even = row * matrix * column.T
-    if not np.linalg.svd(even, compute_uv=False)[-1:].min(initial=1.0) > REGULAR:
-        return None
+    left, sigma, _ = np.linalg.svd(even)
+    if not sigma[-1:].min(initial=1.0) > REGULAR:
+        return None, np.abs(left[:, -1])
     found: Floats = column * np.linalg.solve(even, row * right)
-    return found
+    return found, np.zeros(len(matrix))
 
 
 def lemke(m: Floats, q: Floats) -> Floats | None:

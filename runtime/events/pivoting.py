@@ -57,13 +57,11 @@ class Pivoting:
         self._asked: tuple[float, Floats] | None = None
         self._flows = not contacts.starting and any(c.kind == "psi" for c in contacts.contacts)
 
-    def fit(self, t: float, y: Floats, yd: Floats, settle: Settle, touched: Sequence[int] = ()) -> Point:
-        """A consistent point whose active set fits, from the present one; NoActiveSetError.  touched: what turned just
-        now, behind a set that left nothing open.
-        """
+    def fit(self, t: float, y: Floats, yd: Floats, settle: Settle) -> Point:
+        """A consistent point whose active set fits, from the present one; NoActiveSetError."""
         self.contacts.reversed.clear()
         before, turned = (self.contacts.active.copy(), self.contacts.p.copy()), dict[int, set[bool]]()
-        found = self._among_flows(t, y, yd, settle, touched) if self._flows else None
+        found = self._among_flows(t, y, yd, settle) if self._flows else None
         if found is not None:
             return found
         self.contacts.active[:], self.contacts.p[:] = before
@@ -84,17 +82,17 @@ class Pivoting:
     def _implicit(self) -> Implicit:
         return Implicit(self.contacts, self.contacts.system.another("3"))
 
-    def _among_flows(self, t: float, y: Floats, yd: Floats, settle: Settle, touched: Sequence[int]) -> Point | None:
+    def _among_flows(self, t: float, y: Floats, yd: Floats, settle: Settle) -> Point | None:
         """The same where one-way flows alone turn; None: neither turning them nor a short implicit step finds it."""
         contacts, p, known = self.contacts, self.contacts.p.copy(), self.contacts.observer.largest.copy()
-        turned, stood = contacts.active.copy(), contacts.active.copy()
-        stood[[k for k in touched if contacts.contacts[k].kind == "psi"]] ^= True
+        turned = contacts.active.copy()
         try:
             return self._pivoted(t, y, yd, settle, {}, once=True)
         except NoActiveSetError:
             contacts.p[:] = p
         for later in AHEAD:
-            told = self._ahead(t, y, later * contacts.time, (stood, turned))
+            contacts.active[:] = turned
+            told = self.ahead(t, y, later * contacts.time)
             # rows hold only nearly: from its point, where what leaks decide about has moved for it
             for begin in () if told is None else (y, told):
                 found = settle(t, begin, yd)
@@ -103,19 +101,17 @@ class Pivoting:
                 contacts.observer.largest[:] = known
         return None
 
-    def _ahead(self, t: float, y: Floats, h: float, bases: Sequence[NDArray[np.bool_]]) -> Floats | None:
-        """The point behind an implicit step of h (s), whose active set then is that of the model; it is sought from the
-        first of the sets that leaves nothing open.
+    def ahead(self, t: float, y: Floats, h: float, at: float | None = None) -> Floats | None:
+        """The point behind an implicit step of h (s), whose active set then is that of the model; at: the instant whose
+        rows hold (None: at its end).
         """
-        for base in bases:
-            self.contacts.active[:] = base
-            self.contacts.apply()
-            told = self._implicit.after(t, y, h)
-            if told is not None:
-                self.contacts.active[:] = told[0]
-                self.contacts.apply()
-                return told[1]
-        return None
+        self.contacts.apply()
+        told = self._implicit.after(t + h if at is None else at, y, h)
+        if told is None:
+            return None
+        self.contacts.active[:] = told[0]
+        self.contacts.apply()
+        return told[1]
 
     def _pivoted(
         self, t: float, y: Floats, yd: Floats, settle: Settle, turned: dict[int, set[bool]], *, once: bool = False

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from contextlib import suppress
 
 import numpy as np
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
+from sysdyn.runtime.events.implicit import DENSE
 from sysdyn.runtime.events.observer import Observer
-from sysdyn.runtime.events.pivoting import NoActiveSetError, Settle
+from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting, Settle
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart
@@ -22,6 +24,12 @@ have moved.
 """
 BETWEEN = 3
 """Points of sets that ask for each other, near which one is sought."""
+SHORT, LEAST = (1e-7, 1e-9, 1e-5, 1e-3), 1e-3
+"""Of that time, but of so much (s) at least (what leaks tell is no time of the rest): implicit steps that say which set
+begins.
+"""
+TURNS = 4
+"""Sets that are tried behind such a step."""
 SPAN = 1.0
 """s: in which what starts at rest may come to its magnitude."""
 
@@ -68,58 +76,155 @@ def _pivoted(
 ) -> ConsistentState:
     """The same; quickly: each set by the first strategy of a start alone.
 
+    First what stores hold stays as it is guessed, or moves by impulses of the inequalities alone: the set behind a
+    short implicit step from there says which hold.  Else by turning those that do not fit, of starts that each set has.
     Where the least change of one set asks for another, and that for the first again, both hold at the point between
     them: a capacitor that a diode charges up to its source, which falls.  It is sought near what such a set asked for.
     """
-    contacts = Contacts(plan, system, Observer(system), system.description.p, starting=True)
-    zeros = np.zeros(system.form.written)
-    found: list[ConsistentState] = []
-    errors: list[InconsistentStart] = []
-    near: ConsistentState | None = None
-    known = dict[tuple[float, tuple[float, ...]], ConsistentState | None]()  # by instant and set
+    starts = _Starts(system, t0, plan, until, constants=constants, quickly=quickly)
+    try:
+        return starts.fitted(starts.held())
+    except NoActiveSetError as error:
+        failed = starts.failure(error)
+    for asked in starts.found[: -1 - BETWEEN : -1] if quickly else ():
+        with suppress(NoActiveSetError):
+            return starts.fitted(near=asked)
+    raise failed
 
-    def started(t: float) -> ConsistentState | None:
+
+class _Starts:
+    """Of a model at t0 by its active sets; found, errors: in the order in which they were sought."""
+
+    def __init__(
+        self, system: System, t0: float, plan: Plan, until: float | None, *, constants: bool, quickly: bool
+    ) -> None:
+        self.contacts = Contacts(plan, system, Observer(system), system.description.p, starting=True)
+        self.found: list[ConsistentState] = []
+        self.errors: list[InconsistentStart] = []
+        self._t, self._until, self._constants, self._quickly = t0, until, constants, quickly
+        self._zeros = np.zeros(system.form.written)
+        self._near: ConsistentState | None = None
+        self._known = dict[tuple[float, tuple[float, ...]], ConsistentState | None]()  # by instant and set
+
+    def failure(self, error: NoActiveSetError) -> InconsistentStart:
+        """That of the set that follows from what is wrong: those behind it are tried beside it."""
+        return self.errors[0] if self.errors else InconsistentStart("stuck", float("inf"), names=error.names)
+
+    def _sought_near(self, near: ConsistentState | None) -> None:
+        """What stores are guessed to hold from now on; None: as the text says."""
+        self._near = near
+        self._known.clear()
+
+    def _started(self, t: float, jumped: tuple[Floats, Floats] | None = None) -> ConsistentState | None:
+        """That of the present set; jumped: points behind an impulse that say which stores move."""
+        system, constants, quickly = self.contacts.system, self._constants, self._quickly
         try:
-            return consistent_start(system, t, near, until, constants=constants, quickly=quickly)
+            return consistent_start(
+                system, t, self._near, self._until, constants=constants, quickly=quickly, jumped=jumped
+            )
         except InconsistentStart as error:
-            errors.append(error)
+            self.errors.append(error)
             return None
 
-    def settle(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
-        which = t, contacts.state()
-        if constants or which not in known:  # these are written where it is found
-            known[which] = started(t)
-        state = known[which]
+    def _settle(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+        which = t, self.contacts.state()
+        if self._constants or which not in self._known:  # these are written where it is found
+            self._known[which] = self._started(t)
+        state = self._known[which]
         if state is None:
             return None
-        found.append(state)
-        y, yd = state.y, state.yd
-        contacts.size(*magnitudes(system, t, t + SPAN, y, yd))
-        return y, yd, np.zeros_like(zeros)
+        self.found.append(state)
+        self._size(t, state.y, state.yd)
+        return state.y, state.yd, np.zeros_like(self._zeros)
 
-    def fitted() -> ConsistentState:
+    def _size(self, t: float, y: Floats, yd: Floats) -> None:
+        self.contacts.size(*magnitudes(self.contacts.system, t, t + SPAN, y, yd))
+
+    def held(self) -> Floats | None:
+        """What the guesses say of a point [unknowns as written] where inequalities of flows ask for nothing; None:
+        there are none, or too many unknowns for implicit steps, or there is no such point.
+        """
+        self._begin()
+        contacts = self.contacts
+        free = [c.number for k, c in enumerate(contacts.contacts) if c.kind == "psi" and not contacts.barred[k]]
+        if not free or contacts.system.unknowns > DENSE:
+            return None
+        try:
+            state = consistent_start(contacts.system, self._t, until=self._until, quickly=True, without=free)
+        except InconsistentStart:
+            return None
+        self._size(self._t, state.y, state.yd)
+        return state.y
+
+    def _begin(self) -> None:
+        """Nothing holds but what the text says."""
+        contacts = self.contacts
         contacts.begin()
-        values = contacts.observer(t0, zeros, zeros)
-        for k, contact in enumerate(plan.contacts):
+        values = contacts.observer(self._t, self._zeros, self._zeros)
+        for k, contact in enumerate(contacts.contacts):
             if contact.kind == "guarded":
                 contacts.active[k] = bool(values[contact.guard])
-        determined = Determined(contacts)
-        y, yd = determined.fit(t0, zeros, zeros, settle)
-        if _tied(contacts, contacts.observer(t0, y, yd)):
-            y = _ahead(contacts, determined, t0, settle, y)
-        return next(state for state in reversed(found) if state.y is y)
+            else:
+                contacts.bar(k, values)
 
-    try:
-        return fitted()
-    except NoActiveSetError as error:
-        # that of the set that follows from what is wrong: those behind it are tried beside it
-        failed = errors[0] if errors else InconsistentStart("stuck", float("inf"), names=error.names)
-    for asked in found[: -1 - BETWEEN : -1] if quickly else ():
-        near = asked
-        known.clear()
-        with suppress(NoActiveSetError):
-            return fitted()
-    raise failed
+    def fitted(self, held: Floats | None = None, near: ConsistentState | None = None) -> ConsistentState:
+        """A state whose set fits; NoActiveSetError.  held: the point that a first set is told from; near: which point
+        is sought.
+        """
+        self._sought_near(near)
+        determined, contacts = Determined(self.contacts), self.contacts
+        if held is None or not self._behind_steps(determined.pivoting, held):
+            self._begin()
+        y, yd = determined.fit(self._t, self._zeros, self._zeros, self._settle)
+        if _tied(contacts, contacts.observer(self._t, y, yd)):
+            y = _ahead(contacts, determined, self._t, self._settle, y)
+        return next(state for state in reversed(self.found) if state.y is y)
+
+    def _behind_steps(self, pivoting: Pivoting, held: Floats) -> bool:
+        """Whether a set that a short implicit step from there asks for fits, which the model then has: with stores as
+        they are guessed, or as impulses leave them.
+        """
+        contacts, t = self.contacts, self._t
+        known, time = contacts.observer.largest.copy(), max(contacts.time, LEAST)
+        parts = SHORT if self._quickly else SHORT[:1]  # it takes long to be sure that a set has no start
+        for jumps, part in itertools.product((False, True), parts):
+            self._begin()
+            h = part * time
+            behind = pivoting.ahead(t, held, h, t)
+            if behind is None:
+                continue
+            self._sought_near(None)
+            if jumps:
+                self._sought_near(self._jumped(pivoting, held, behind, 0.5 * h))
+            pivoting.ahead(t, behind, h)  # impulses are over then
+            if self._nearly_fits(kept=not jumps):
+                return True
+            contacts.observer.largest[:] = known
+        self._sought_near(None)
+        return False
+
+    def _jumped(self, pivoting: Pivoting, held: Floats, behind: Floats, half: float) -> ConsistentState | None:
+        """What the impulses of the present set leave, where a step of half (s) tells as well which stores move."""
+        during = self.contacts.state()
+        again = pivoting.ahead(self._t, held, half, self._t)
+        self.contacts.become(during)
+        return None if again is None else self._started(self._t, (behind, again))
+
+    def _nearly_fits(self, *, kept: bool) -> bool:
+        """Whether the set fits, or one a few turns away (what leaks decide is behind a step); kept: of those that leave
+        stores as they are guessed.
+        """
+        contacts, t, zeros = self.contacts, self._t, self._zeros
+        for _ in range(TURNS):
+            found = self._settle(t, zeros, zeros)
+            if found is None or (kept and not self.found[-1].kept):
+                return False
+            if contacts.fits(t, zeros, found):
+                return True
+            values = contacts.observer(t, *found[:2])
+            contacts.turn(contacts.wrong(values, found[2]), values)
+            contacts.apply()
+        return False
 
 
 def _tied(contacts: Contacts, values: Floats) -> bool:

@@ -24,6 +24,8 @@ from sysdyn.values import dataclass
 
 SMALL = 32
 """Rows and unknowns up to which a problem that the core knows is solved there."""
+CORRECTED = 240
+"""The same up to which rows are corrected: a few eliminations in which each entry has its round-off."""
 _ITERATIONS = 60
 _FOLDS = 709
 """Iterations that an exponential, falling by e in each, takes from the largest number: as long as rows shrink as fast
@@ -347,7 +349,7 @@ def stepped(problem: Problem, x: Floats) -> Floats:
 def corrected(problem: Problem, x: Floats) -> Correction | None:
     """One step from x in what the rows determine; None where that is nothing, or the problem is no small one."""
     linear = _Linear(problem, x)
-    return linear.correction() if max(linear.shape) <= SINGULAR_VALUES else None
+    return linear.correction() if max(linear.shape) <= CORRECTED else None
 
 
 def least_residual(problem: Problem, x: Floats) -> Floats:

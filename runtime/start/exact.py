@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.gauss_newton import Correction, Solution, corrected, solve, stepped
+from sysdyn.runtime.numerics.gauss_newton import Solution, corrected, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
+from sysdyn.runtime.start.corrections import EXACT, by_corrections, leaves_open
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.flat import at_rest
 from sysdyn.runtime.start.least import problem_of
-from sysdyn.runtime.start.starter import NOISE, STATE, Mask, Starter
-from sysdyn.runtime.start.strategies import CLOSED, EXACT, own_residual, rescaled
+from sysdyn.runtime.start.starter import NOISE, Mask, Starter
+from sysdyn.runtime.start.strategies import CLOSED, own_residual, rescaled
 
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
-SHARPER = 60
-"""Corrections in which what follows from the state is found, or left as it was."""
 
 
 def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
@@ -57,11 +56,11 @@ def sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | 
     follows, steep = free & starter.following(t, best.x), bool(starter.system.form.scales)
     follows &= ~at_rest(starter, t, best.x, follows)
     written = starter.every & ~starter.groups(*HIDDEN) & starter.reading(follows)
-    x, held = _corrected(starter, t, best.x, written, follows & (np.arange(follows.size) < starter.n))
+    x, held = by_corrections(starter, t, best.x, written, follows & (np.arange(follows.size) < starter.n))
     if not held and steep:
         return None
     x = x if held else best.x
-    near, held = _corrected(starter, t, x, starter.every, follows)
+    near, held = by_corrections(starter, t, x, starter.every, follows)
     if held and near is not x:
         best = Solution(near, own_residual(starter, t, near, near))
     elif x is not best.x and np.isfinite(starter.jacobian(t, x)).all():
@@ -75,40 +74,4 @@ def _tells(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> boo
     """
     problem = problem_of(starter, t, x, x, rows=rows, free=free)
     near = corrected(problem, x)
-    return near is None or (near.agrees and not _leaves_open(starter, t, near, np.maximum(problem.scale, np.abs(x))))
-
-
-def _leaves_open(starter: Starter, t: float, near: Correction, size: Floats) -> bool:
-    """Whether round-off leaves a state or an effort open by more than the largest of its like, and of what rows add to
-    it as it is (the head of an orifice between vessels of one pressure is what is left of these).
-    """
-    told, largest = starter.moves(*STATE, "e"), starter.largest_alike(size)
-    if (near.open_ <= largest)[told].all():
-        return False
-    added = np.abs(starter.jacobian(t, near.x)) == 1.0
-    rows, columns = starter.rows[added], starter.columns[added]
-    terms = np.zeros(starter.settled.rows)
-    np.maximum.at(terms, rows, size[columns])
-    np.maximum.at(largest, columns, terms[rows])
-    return bool((near.open_ > largest)[told].any())
-
-
-def _corrected(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> tuple[Floats, bool]:
-    """X after corrections that vanish, and whether the rows hold to their round-off then and leave no state or effort
-    open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little.
-    """
-    begun, agrees, last = x, True, np.inf
-    for _ in range(SHARPER):
-        problem = problem_of(starter, t, x, x, rows=rows, free=free)
-        near = corrected(problem, x)
-        if near is None:
-            return begun, agrees
-        agrees = near.agrees
-        step, size = np.abs(near.x - x), np.maximum(problem.scale, np.abs(x))
-        most = float(np.max(step / size, initial=0.0))
-        if most <= EXACT and (agrees or most > 0.5 * last):  # a steep law tells 1e-13 of a volt from its round-off
-            return x, agrees and not _leaves_open(starter, t, near, size)
-        if starter.work.done:
-            return begun, False
-        x, last = near.x, most
-    return begun, True
+    return near is None or (near.agrees and not leaves_open(starter, t, near, np.maximum(problem.scale, np.abs(x))))

@@ -10,10 +10,12 @@ are tried in order until the rows hold; the name of the one that found it stays 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints, Places
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
+from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.slopes import labels, rows_without_slope
@@ -55,7 +57,7 @@ class ConsistentState:
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
     found it; "" of a state that was not sought from guesses.  zeros: where y is what the search left of a zero (None:
     nowhere), by which nothing else is sized: a slope made of such a current would have 1e19 K balance a voltage.
-    displaced: whether a displacement is not as guessed.
+    displaced: whether a displacement is not as guessed; kept: whether all that carries the state is.
     """
 
     t: float
@@ -66,6 +68,7 @@ class ConsistentState:
     strategy: str = ""
     zeros: Mask | None = None
     displaced: bool = False
+    kept: bool = True
 
     @property
     def y(self) -> Floats:
@@ -266,16 +269,19 @@ def consistent_start(
     *,
     constants: bool = False,
     quickly: bool = False,
+    without: Sequence[int] = (),
+    jumped: tuple[Floats, Floats] | None = None,
 ) -> ConsistentState:
     """A state at t0 that satisfies all rows and their hidden derivatives.
 
     system: any index form of the model; near: a state to stay close to, else the guesses; until: `time.monotonic()` at
     which the search is given up; constants: those of integrated constraints, which the model then has, follow from the
-    rest; quickly: by the first strategy alone, and no word why there is none.  Raises InconsistentStart; SolverFailure
-    (max_wall).
+    rest; quickly: by the first strategy alone, and no word why there is none; without: switches of constraints that ask
+    for nothing; jumped: points behind a step, and behind one of half its length, that say which stores alone move.
+    Raises InconsistentStart; SolverFailure (max_wall).
     """
     try:
-        return _consistent(system, t0, near, until, constants=constants, quickly=quickly)
+        return _consistent(system, t0, near, until, without, jumped, constants=constants, quickly=quickly)
     except OutOfTimeError as error:
         raise SolverFailure("max_wall", t0, 0.0) from error
 
@@ -290,7 +296,15 @@ def _integrated(starter: Starter) -> tuple[Places, Places]:
 
 
 def _consistent(
-    system: System, t0: float, near: ConsistentState | None, until: float | None, *, constants: bool, quickly: bool
+    system: System,
+    t0: float,
+    near: ConsistentState | None,
+    until: float | None,
+    without: Sequence[int],
+    jumped: tuple[Floats, Floats] | None,
+    *,
+    constants: bool,
+    quickly: bool,
 ) -> ConsistentState:
     """The same; OutOfTimeError."""
     system = system if system.form.name == "3" else system.another("3")
@@ -298,12 +312,17 @@ def _consistent(
     if constants:
         integrated, places = _integrated(starter)
         starter.every[integrated] = False
+    if without:
+        rows, _, numbers, _ = switch_rows(system.description, starter.settled.form)
+        starter.every[rows[np.isin(numbers, without)]] = False
     starter.work = Work(until=until)
+    if jumped is not None:
+        starter.jump_alone(t0, jumped)
     guess = _aimed(starter, t0)
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
         guess = starter.unknowns(t0, y, np.zeros(y.size))
-    if quickly and no_start(starter, t0, guess, starter.free):
+    if quickly and not starter.jumping and no_start(starter, t0, guess, starter.free):
         raise InconsistentStart("stuck", float("inf"))
     best, strategy = _attempt(starter, t0, guess, starter.free, 1 if quickly else None)
     if quickly and not strategy:
@@ -321,6 +340,8 @@ def _consistent(
     displaced = bool((best.x[at] != guess[at]).any())
     starter.spare()
     largest = np.maximum(starter.scale(t0, guess), starter.largest_alike(best.x))
+    state = starter.free & ~starter.following(t0, best.x)
+    kept = bool((np.abs(best.x - guess) <= EXACT * largest)[state].all())
     zeros = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: system.form.written]
     del largest
     moved = tuple(moved_guesses(starter, t0, best.x, starter.scale(t0, best.x)))
@@ -331,4 +352,4 @@ def _consistent(
         starter.forget()
         del starter, guess
         system.trim(LARGE)
-    return ConsistentState(t0, y, yd, moved, best.residual, strategy, zeros, displaced)
+    return ConsistentState(t0, y, yd, moved, best.residual, strategy, zeros, displaced, kept)

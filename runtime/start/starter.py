@@ -38,6 +38,8 @@ from sysdyn.values import dataclass
 Mask = NDArray[np.bool_]
 STATE = ("q", "f", "p", "s", *START)
 NOISE = 1e-13
+DRIFT = 0.1
+"""Of what a state moves by in a step: what is left of it, to a step of no length, and has not jumped."""
 WRITTEN = 4.0 * float(np.finfo(float).eps)
 """Of the largest of its like: a fixed value that is no round-off of the text's own."""
 EQUATIONS = "equations of the start"
@@ -105,6 +107,7 @@ class Starter:
         self.system = system
         self.here, self.known = (0.0, False, b""), dict[str, NDArray[Any]]()
         self.work, self._residue = Work(), Residue()  # of one search for a start
+        self.jumping = False  # what is free of the state is what jumps, and no more (`jump_alone`)
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
         if system.unknowns > LARGE:  # found again where it is asked
@@ -337,6 +340,16 @@ class Starter:
         text fixes is as it says.
         """
         return np.where((np.abs(x) > NOISE * np.maximum(scale, self.largest_alike(x))) | self.pinned, x, 0.0)
+
+    def jump_alone(self, t: float, behind: tuple[Floats, Floats]) -> None:
+        """Holds of the state what drifts: behind a step [unknowns as written] twice as far as behind one of half its
+        length, where what jumps is as far.
+        """
+        far, near = (self.unknowns(t, y, np.zeros(y.size)) - self.guess for y in behind)
+        size = self.largest_alike(np.abs(self.guess) + np.abs(far))
+        drifts = (np.abs(2.0 * near - far) <= DRIFT * np.abs(far)) | (np.abs(far) <= NOISE * size)
+        self.free &= self.following(t, self.guess) | ~drifts
+        self.jumping = True
 
     def largest_alike(self, x: Floats) -> Floats:
         """Of each unknown the largest magnitude of its kind and unit."""

@@ -14,8 +14,9 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.model.slopes import rows_without_slope
-from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
+from sysdyn.runtime.numerics.gauss_newton import CORRECTED, Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
+from sysdyn.runtime.start.corrections import EXACT, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.flat import OWN, flat_at, off_the_flat, unasked, without_rates
 from sysdyn.runtime.start.least import problem_of
@@ -27,7 +28,6 @@ _RESCALINGS, _DOUBTED = 6, 3
 """Times that magnitudes are taken anew; after which of them a state that is held is asked whether it can be, of active
 sets, which may contradict it.
 """
-EXACT = 1e-9
 CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
 WALKED = 0.2
@@ -134,12 +134,25 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
             if nearly:
                 break
         exact = nearly and (found.residual <= CLOSED or own_residual(starter, t, found.x, found.x) <= CLOSED)
-        yield found, exact
+        near = None if exact else _by_corrections(starter, t, found, follows)
+        yield (found, exact) if near is None else (near, True)
+    if starter.jumping and (near := _by_corrections(starter, t, Solution(x, 0.0), free)) is not None:
+        yield near, True
     with starter.granted():  # what a state that contradicts has taken is not missed then
         everything = rescaled(starter, t, x, guess, free)
     yield everything
     if nearly:
         yield found, True
+
+
+def _by_corrections(starter: Starter, t: float, found: Solution, free: Mask) -> Solution | None:
+    """What is free as all rows determine it; None where they do not, or the problem is no small one."""
+    if found.x.size > CORRECTED or not np.isfinite(found.residual):
+        return None
+    x, held = by_corrections(starter, t, found.x, starter.every, free)
+    if x is found.x or not held or not (residual := own_residual(starter, t, x, x)) < OWN:
+        return None
+    return Solution(x, residual)
 
 
 def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:

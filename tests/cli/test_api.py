@@ -35,6 +35,8 @@ def test_options_have_the_commands_names(tmp_path):
     assert trace.attributes["formulation"] == "hamiltonian"
     with pytest.raises(api.UsageError, match="colour"):
         api.simulate(path, scene="again", colour="red")
+    with pytest.raises(api.UsageError, match="rtol 'fine': a number"):
+        api.simulate(path, rtol="fine")
     with pytest.raises(api.UsageError, match="several scenes"):
         api.simulate(path)
 

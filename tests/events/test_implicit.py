@@ -3,7 +3,7 @@
 from itertools import product
 
 import numpy as np
-from sysdyn.runtime.events.implicit import lemke
+from sysdyn.runtime.events.implicit import base_of, lemke
 
 
 def by_sets(m, q):
@@ -40,3 +40,21 @@ def test_what_is_passive():
 def test_none_where_there_is_none():
     assert lemke(np.zeros((1, 1)), np.array([-1.0])) is None
     assert lemke(np.array([[0.0, -1.0], [1.0, 0.0]]), np.array([-1.0, -1.0])) is None
+
+
+def test_a_base_that_leaves_nothing_open_is_found():
+    """A source u, a diode to x and one back to ground, x held by nothing else: where both block x floats, where both
+    conduct their currents are open; one of each does.
+    """
+    matrix = np.zeros((3, 3))  # unknowns x, currents a, b; rows: balance at x, then the pairs (voltage, current)
+    matrix[0] = 0.0, 1.0, -1.0
+    right = np.zeros((3, 3))
+    right[1, 0] = right[2, 1] = 1.0
+    voltages, currents = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    pairs = (voltages, currents), (np.array([0.0, 2.0]), np.zeros(2))
+    for held in product((False, True), repeat=2):
+        found = base_of(matrix.copy(), right.copy(), np.array([1, 2]), pairs, np.array(held))
+        assert found is not None
+        moves, base = found
+        assert base.sum() == 1
+        assert np.isfinite(moves).all()

@@ -57,6 +57,12 @@ def test_what_rows_do_not_determine_is_left():
     assert answer == 2  # nowhere for the current to go
 
 
+def test_of_more_columns_than_rows_the_last_are_left():
+    """A rate that stands in one row with another, which stands alone in a second: three columns, two rows."""
+    answer, x, _ = corrected([[2, 1, 0], [0, 4, 1]], [3, 4], [0, 0])
+    assert (answer, x.tolist()) == (0, [1.0, 1.0, 0.0])
+
+
 def test_a_leak_in_a_sum_of_conductances_is_known_as_far_as_its_digits_reach():
     """The same with 1e-12 S from node 2 to ground, summed with the 3 S: one leak's current says 1 V, but for the digits
     that the sum lost; of 1e-17 S it keeps none, and the current is missed.

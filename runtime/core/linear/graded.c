@@ -20,6 +20,7 @@ typedef struct {
     int32_t *holder;               /* [m + 1] the column, from 1, that a row, from 1, is assigned to; 0: none */
     int32_t *way, *least;          /* [m + 1] of the search for one column: the row before, the cost of getting there */
     char *seen;                    /* [m + 1] */
+    char *left;                    /* [n] columns without a row of their own are left out, and told; NULL: there may be none */
 } scales;
 
 static void cost(scales *s, const double *a)
@@ -40,8 +41,8 @@ static void cost(scales *s, const double *a)
     }
 }
 
-/* Rows for all columns at least cost, by shortest augmenting paths (Jonker and Volgenant 1987); 0: there are none.  Adds the
- * dual solution to the exponents: cost - column - row is nowhere negative, and zero where assigned. */
+/* Rows for the columns, the first before others, at least cost, by shortest augmenting paths (Jonker and Volgenant 1987); 0:
+ * there are none.  Adds the dual solution to the exponents: cost - column - row is nowhere negative, and zero where assigned. */
 static int assign(scales *s)
 {
     int32_t m = s->m, n = s->n;
@@ -74,7 +75,7 @@ static int assign(scales *s)
                 }
             }
             if (step == NONE)
-                return 0;
+                break;
             for (int32_t i = 0; i <= m; i++)
                 if (s->seen[i]) {
                     u[s->holder[i]] += step;
@@ -83,6 +84,12 @@ static int assign(scales *s)
                     s->least[i] -= step;
             at = next;
         } while (s->holder[at]);
+        if (s->holder[at]) {
+            if (!s->left)
+                return 0;
+            s->left[j - 1] = 1;
+            continue;
+        }
         for (; at; at = s->way[at])
             s->holder[at] = s->holder[s->way[at]];
     }
@@ -91,20 +98,22 @@ static int assign(scales *s)
     return 1;
 }
 
-/* a, b and its round-off (NULL: not asked for) scaled; 1: done, 0: some columns have no row of their own, -2: no memory */
+/* a, b and its round-off (NULL: not asked for) scaled; 1: done, 0: some columns have no row of their own, -2: no memory.  With
+ * round-off these are empty then. */
 static int scaled(int32_t m, int32_t n, double *a, double *b, double *noise, int32_t *column)
 {
     size_t rows = (size_t)m + 1, full = (size_t)m * (size_t)n;
-    int32_t *memory = malloc((full + 5 * rows) * sizeof *memory + rows);
+    int32_t *memory = calloc((full + 5 * rows) * sizeof *memory + rows + (size_t)n, 1);
     if (!memory)
         return -2;
+    char *seen = (char *)(memory + full + 5 * rows), *left = noise ? seen + rows : NULL;
     scales s = {m, n, memory, memory + full, column, memory + full + rows, memory + full + 2 * rows,
-                memory + full + 4 * rows, (char *)(memory + full + 5 * rows)};
+                memory + full + 4 * rows, seen, left};
     cost(&s, a);
     int done = assign(&s);
     for (int32_t i = 0; i < m && done; i++) {
         for (int32_t j = 0; j < n; j++)
-            a[(size_t)i * n + j] = ldexp(a[(size_t)i * n + j], s.row[i] + column[j]);
+            a[(size_t)i * n + j] = left && left[j] ? 0.0 : ldexp(a[(size_t)i * n + j], s.row[i] + column[j]);
         b[i] = ldexp(b[i], s.row[i]);
         if (noise)
             noise[i] = ldexp(noise[i], s.row[i]);
@@ -304,9 +313,17 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
     if (noise)
         memset(doubt, 0, (size_t)n * sizeof *doubt);
     int failed = 1;
-    if (k <= m) {
+    if (k <= m || noise) {
         failed = scaled(m, k, a, b, noise, column);
         failed = failed < 0 ? failed : !failed;
+    }
+    if (!failed && noise) {
+        int32_t all = k;
+        k = used(m, all, a, place);
+        for (int32_t j = 0; j < k; j++) {
+            own[j] = own[place[j]];
+            column[j] = column[place[j]];
+        }
     }
     int32_t pivots = k, left = 0;
     if (!failed) {
