@@ -68,6 +68,8 @@ less than another method's draft (the ring modulator at 1e-2, 1e-3, 1e-6: 0.10, 
 tolerance below which methods of more stages or steps cost less."""
 UNSEEN = 0.5
 """Of an error, what is credited at most to a finer run whose steps are hardly shorter."""
+ALIKE = 1.1
+"""Times the steps of the coarser run: with no more than that events hold most, where both are as far off."""
 LAST, BY_CHANCE = 10.0, 1.5
 """Times the finest tolerance: behind such a run there is none that tells; the power of its errors that is believed."""
 TINY = 1e-30
@@ -121,7 +123,7 @@ def _shrink(law: Law, power: float, step: float, longer: float, *, jumps: bool) 
     no shorter ones the tolerance says nothing.
     """
     ratio = max(10.0 ** (-power * step), law.far**law.credit)
-    if jumps and longer <= 1.0:
+    if jumps and longer <= ALIKE:
         ratio = max(ratio, UNSEEN)
     if law.order:
         ratio = max(ratio, min(max(longer, 1.0) ** -law.order, UNSEEN))
