@@ -49,7 +49,7 @@ def pressures(rows):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 def test_a_relief_valve_that_opens_with_each_stroke(formulation, tmp_path):
-    """1.2 times what was asked of its flow, and a tenth of that told: 790 steps of a draft, 826 of the run behind it."""
+    """1.2 times what was asked of its flow, and a tenth of that told: 790 steps of a draft, 826 behind it."""
     rows = np.linspace(0.0, 3.0, 601)
     found = ran(tmp_path, PUMP, formulation=formulation, accuracy=1e-3)
     assert found.met
