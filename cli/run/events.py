@@ -76,7 +76,7 @@ class _Planner:
         rate = -1 if k.rate is None else self.row[k.rate]
         above, below = (self.row[name] for name in k.slide) if k.slide else (-1, -1)
         branch = self.prepared.compiled.program.scalars.index(k.branch)
-        return Kink(k.text, k.label, branch, self.row[k.value], rate, above, below, k.jumps, k.inner)
+        return Kink(k.text, k.label, branch, self.row[k.value], rate, above, below, k.jumps, k.inner, k.passage)
 
     def _when(self, event: Event) -> When:
         assert event.condition is not None

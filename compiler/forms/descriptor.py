@@ -122,7 +122,8 @@ class Pin:
 class Frozen:
     """A switching function whose branch events set (frozen.py): the parameter that holds it, its text, the row that it
     stands in; rows of block observe: value, rate, 1 - sense and 1 + sense (() where it does not slide); jumps: whether
-    a row does at its zero; inner: whether coordinates, rates or momenta move it, so that stores gain nothing there.
+    a row does at its zero; inner: whether coordinates, rates or momenta move it, so that stores gain nothing there;
+    passage: of a peak (peaks.py).
     """
 
     branch: str
@@ -134,6 +135,7 @@ class Frozen:
     slide: tuple[str, ...]
     jumps: bool
     inner: bool
+    passage: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

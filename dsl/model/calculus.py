@@ -46,7 +46,7 @@ _ONE_ARGUMENT: Mapping[str, Callable[[Node], Node]] = {
     "acos": lambda x: product(-1.0, ((-0.5, sub(const(1.0), mul(x, x))),)),
     "atan": lambda x: product(1.0, ((-1.0, add(const(1.0), mul(x, x))),)),
     "sinh": lambda x: call("cosh", x),
-    "cosh": lambda x: call("sinh", x),
+    "cosh": lambda x: mul(call("cosh", x), call("tanh", x)),  # sinh/cosh^3 is inf/inf far out
     "tanh": lambda x: sub(const(1.0), product(1.0, ((2.0, call("tanh", x)),))),
     "asinh": lambda x: product(1.0, ((-0.5, add(const(1.0), mul(x, x))),)),
     "acosh": lambda x: product(1.0, ((-0.5, sub(mul(x, x), const(1.0))),)),

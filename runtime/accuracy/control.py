@@ -68,6 +68,10 @@ less than another method's draft (the ring modulator at 1e-2, 1e-3, 1e-6: 0.10, 
 tolerance below which methods of more stages or steps cost less."""
 UNSEEN = 0.5
 """Of an error, what is credited at most to a finer run whose steps are hardly shorter."""
+ALIKE = 1.1
+"""Times the steps of the coarser run: with no more than that events hold most, where both are as far off."""
+LAST, BY_CHANCE = 10.0, 1.5
+"""Times the finest tolerance: behind such a run there is none that tells; the power of its errors that is believed."""
 TINY = 1e-30
 """An estimate beside what was asked below which it counts as none."""
 QUIET, AGREE = 5, 2.0
@@ -119,7 +123,7 @@ def _shrink(law: Law, power: float, step: float, longer: float, *, jumps: bool) 
     no shorter ones the tolerance says nothing.
     """
     ratio = max(10.0 ** (-power * step), law.far**law.credit)
-    if jumps and longer <= 1.0:
+    if jumps and longer <= ALIKE:
         ratio = max(ratio, UNSEEN)
     if law.order:
         ratio = max(ratio, min(max(longer, 1.0) ** -law.order, UNSEEN))
@@ -206,7 +210,7 @@ class _Estimate:
             elif over > 0.0 and np.isfinite(over_before):
                 power = np.log10(over_before / over) / step_before
                 self._power = float(np.clip(power, 0.3, 1.0))
-                if power > self.law.fastest:  # by chance: the pair before speaks for the last run
+                if power > self._fastest(fine):  # by chance: the pair before speaks for the last run
                     luck = 10.0 ** ((power - credit) * step_before)
         if shrink is None:
             longer = fine.steps / max(coarse.steps, 1)
@@ -220,6 +224,13 @@ class _Estimate:
         off, off_over = passed_over(coarse, fine, self.target, self.law.safety * UNSEEN / (1.0 - UNSEEN))
         self.apart, self.over = max(self.apart, off), max(self.over, off_over)
         return apart
+
+    def _fastest(self, fine: Sampled) -> float:
+        """The power beyond which differences fall by chance; with events at the finest tolerances round-off is what is
+        left, which events that follow from each other let grow.
+        """
+        last = fine.jumps and fine.tolerance <= LAST * self.law.finest
+        return min(self.law.fastest, BY_CHANCE) if last else self.law.fastest
 
     def shorter(self) -> float:
         """How much shorter the longest step of the next run is where that is what holds the steps."""

@@ -76,6 +76,8 @@ class Handler:
         self.contacts = Contacts(plan, system, self.observer, self.p)
         self.determined = Determined(self.contacts)
         self.succession = Succession(plan, self.contacts, self.determined)
+        self.passes = np.inf
+        """How long (s) a peak takes that began at the last event; inf: none did."""
         self.kinks, self.turns = Kinks(plan.kinks, self.observer, self.p), Turns(plan, self.observer, self.succession)
         self.side = np.ones(len(plan.relations))
         self.truth = [False] * len(plan.whens)
@@ -292,6 +294,7 @@ class Handler:
         self.struck = self.struck if self._bounced(self.struck) else -1
         self.simple &= not self.bounces
         self.happened += self.kinks.happened(t, stood)
+        self.passes = self.kinks.passing(stood, self.observer(t, *point)) if self.kinks.peaks else np.inf
         return point
 
     def _hold(self, values: Floats, crossed: Sequence[int]) -> None:

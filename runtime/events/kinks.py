@@ -10,10 +10,14 @@ sign) leaves the function without a rate, it rests.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Happened, Kink
+
+if TYPE_CHECKING:
+    from sysdyn.runtime.events.handler import Watched
 from sysdyn.runtime.model.description import Floats
 
 LIVE, ABOVE, BELOW, SLIDES, RESTS = 0.0, 1.0, -1.0, 2.0, 3.0
@@ -37,6 +41,7 @@ class Kinks:
 
     def __init__(self, kinks: tuple[Kink, ...], observer: Observer, p: Floats) -> None:
         self.kinks, self.observer, self.p = kinks, observer, p
+        self.peaks = any(kink.passage for kink in kinks)
         self._turned: dict[int, list[float]] = {}
         self._tried: set[int] = set()  # whether they rest, at this instant
 
@@ -120,6 +125,20 @@ class Kinks:
                 return SLIDES  # it came from the other side, and is driven back to it
         return -branch
 
+    def only_peaks(self, which: Sequence[Watched]) -> bool:
+        """Whether begins and ends of peaks alone are what crosses."""
+        return all(w.kink >= 0 and self.kinks[w.kink].passage > 0.0 for w in which)
+
+    def passing(self, before: Sequence[float], values: Floats) -> float:
+        """How long (s) the shortest of the peaks takes that have begun since branches were `before`; inf: none has."""
+        begun = [
+            kink
+            for kink, was in zip(self.kinks, before, strict=True)
+            if kink.passage and kink.rate >= 0 and was == BELOW and self.p[kink.branch] == ABOVE
+        ]
+        rates = [abs(float(values[kink.rate])) for kink in begun]
+        return min((k.passage / rate for k, rate in zip(begun, rates, strict=True) if rate > 0.0), default=np.inf)
+
     def _moves(self, kink: Kink, values: Floats) -> float:
         """The rate of a function that has one, 0 where it is nothing."""
         rate = float(values[kink.rate]) if kink.rate >= 0 else 0.0
@@ -130,6 +149,6 @@ class Kinks:
         found = []
         for kink, was in zip(self.kinks, before, strict=True):
             now = float(self.p[kink.branch])
-            if now != was:
+            if now != was and not kink.passage:
                 found.append(Happened(t, kink.name, kink.element, WORDS[was], WORDS[now]))
         return found

@@ -93,7 +93,8 @@ class Kink:
 
     value, rate: rows (rate -1 where it has none); branch: place in p, see kinks.py; above, below: rows 1 - sense and
     1 + sense of a law that jumps and may slide between its branches (else -1); element: whose law; inner: whether
-    coordinates move it, so that what is stored is the same on both sides.
+    coordinates move it, so that what is stored is the same on both sides; passage: of a peak, which begins where the
+    function becomes positive and changes no branch: how far that goes while it is passed.
     """
 
     name: str
@@ -105,6 +106,7 @@ class Kink:
     below: int = -1
     jumps: bool = False
     inner: bool = False
+    passage: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

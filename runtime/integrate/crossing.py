@@ -77,7 +77,7 @@ def go_on(run: Integration, t: float, label: float, point: list[Floats]) -> None
     y[:n] = run.driver.arrive(t, point.pop(), run.start_rate[:n], run.sizes.magnitude)
     run.method.rest()
     yd = np.where(run.roles.differential, run.start_rate, 0.0)
-    run.sizes.begin_to_move(t, y, run.start_rate)
+    run.sizes.begin_to_move(t, run.method.contents.t_end, y, run.start_rate)
     run.sizes.resolve(t, y, yd, run.roles.state)
     run.sizes.hand_down()
     run.method.begin(y, yd)

@@ -145,7 +145,7 @@ class Modes:
             contacts[k] = lib.Contact(KINDS["follows" if k in handler.contacts.frozen else one.kind], *rows)
         for k, kink in enumerate(plan.kinks):
             functions = kink.branch, kink.value, kink.rate, kink.above, kink.below
-            kinks[k] = lib.Kink(*functions, kink.inner, kink.jumps)
+            kinks[k] = lib.Kink(*functions, kink.inner, kink.jumps, kink.passage)
         pieces = core_pieces(self.run.segments)
         systems = (c.c_void_p * len(self._systems))(*(c.addressof(s.core) for s in self._systems))
         self._keep += [contacts, kinks, systems, pieces]
@@ -245,7 +245,8 @@ class Modes:
     def _turned(self, row: Sequence[float]) -> list[Happened]:
         """The entry of a law whose branch the core turned: time (s), -1 - its number, its branches."""
         kink = self.handler.plan.kinks[-1 - int(row[1])]
-        return [Happened(row[0], kink.name, kink.element, WORDS[row[2]], WORDS[row[3]])]
+        told = Happened(row[0], kink.name, kink.element, WORDS[row[2]], WORDS[row[3]])
+        return [] if kink.passage else [told]
 
     def stands(self) -> int:
         """The number of the handler's present mode, which the core is in from now on; -1: one too many."""

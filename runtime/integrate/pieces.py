@@ -78,7 +78,7 @@ class Pieces:
         y, run.start_rate[:n] = point
         run.y[:n] = run.driver.arrive(run.start.t, y, run.start_rate[:n], run.sizes.magnitude)
         run.yd = np.where(run.roles.differential, run.start_rate, 0.0)
-        run.sizes.begin_to_move(run.start.t, run.y, run.start_rate)
+        run.sizes.begin_to_move(run.start.t, self._end, run.y, run.start_rate)
         run.method.start(run.start.t, run.y, run.yd)
 
     def _watch(self) -> None:
@@ -209,11 +209,15 @@ class Pieces:
                 which += self._met(t, before, which)
                 point = self._fire(t, before, [], which)
             if point is not None:
-                self._accept(t, TRACE, sink, which)
+                kind = 0 if self.handler.kinks.only_peaks(which) else TRACE
+                self._accept(t, kind, sink, which)
                 misled = self.handler.stands(which) or (
                     begun and self._first_step.at_once(which, (core.t_from, t, end))
                 )
-                self._go_on(t, point, before, misled=end - core.t_from if misled else 0.0)
+                parts = end - core.t_from if misled else np.inf
+                if end - core.t_from > self.handler.passes / PARTS:
+                    parts = min(parts, self.handler.passes)
+                self._go_on(t, point, before, misled=parts if np.isfinite(parts) else 0.0, kind=kind)
                 return time.process_time() - began
             begin = t
 

@@ -16,6 +16,7 @@ from sysdyn.runtime.integrate.round_off import open_unknowns
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import GROUP, ROUND_OFF, UNKNOWN, group_maximum, magnitudes, noise
 from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.numerics.stretches import Ascents, Stretches, whole_of
 from sysdyn.runtime.start.start import ConsistentState
 
@@ -141,7 +142,7 @@ class Sizes:
         sizes[kept] = magnitude
         return largest, sizes
 
-    def begin_to_move(self, t: float, y: Floats, rate: Floats) -> None:
+    def begin_to_move(self, t: float, end: float, y: Floats, rate: Floats) -> None:
         """Unknowns that stood at zero so far, and whose rates say only now how large they will be: their size, where it
         is unknown; a part of what their like have been at least, as at the start.
         """
@@ -149,12 +150,23 @@ class Sizes:
         unknown = moves & (self.met <= ROUND_OFF) & (self.magnitude == UNKNOWN)
         if unknown.any():
             with np.errstate(over="ignore"):
-                found, _ = magnitudes(self.system, t, self._request.t_end, y, rate)
-            self.magnitude[unknown] = np.maximum(found, self.least)[unknown]
+                found, _ = magnitudes(self.system, t, end, y, rate)
+            grows = self._grows(t, end, np.where(unknown, 0.0, y), np.where(unknown, 0.0, rate))
+            self.magnitude[unknown] = np.maximum(np.maximum(found, grows), self.least)[unknown]
         if (moves & (self.met <= ROUND_OFF * self.met.max(initial=0.0))).any():
             like = group_maximum(self.system, self.met)
             begin = moves & (self.met <= ROUND_OFF * like)
             self.magnitude[begin] = np.maximum(self.magnitude, GROUP * like)[begin]
+
+    def _grows(self, t: float, end: float, y: Floats, rate: Floats) -> Floats:
+        """Magnitudes [unknowns] by what moves with t up to `end` (s): at the very instant at which that begins, rates
+        are round-off of it.
+        """
+        if self.system.unknowns > LARGE:
+            return np.zeros(self.system.unknowns)
+        far = *self.system.jacobian(t, y, rate), rate, net_order_of(self.system).address
+        found, _ = magnitudes(self.system, t, end, y, rate, far)
+        return np.where(found == UNKNOWN, 0.0, found)
 
     def resolve(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
         """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; carries

@@ -18,6 +18,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.forms.corners.broken import broken
 from sysdyn.compiler.forms.corners.kinks import YES, Surface, surfaces, watched
+from sysdyn.compiler.forms.corners.peaks import peaks
 from sysdyn.compiler.forms.corners.written import written
 from sysdyn.compiler.forms.descriptor import (
     BESIDE,
@@ -63,9 +64,10 @@ READ = ("observe", "observe_rate", "observe_scale", "initial")
 def frozen(form: DescriptorForm, network: Network) -> tuple[DescriptorForm, tuple[Parameter, ...]]:
     """The form of a network with frozen branches, and the parameters that hold them."""
     tables, place = {t.name: t for t in network.tables}, network.place
-    form = replace(form, blocks=tuple(_opened(b, tables) for b in form.blocks)) if tables else form
+    whole, form = form, replace(form, blocks=tuple(_opened(b, tables) for b in form.blocks)) if tables else form
     form = written(form, network)
     found = surfaces(form, frozenset(n.data for s in network.switches for n in s.direction))
+    found += peaks(form, whole, network, len(found))
     if not found:
         return form, ()
     freezer = _Freezer(form, found)
@@ -128,7 +130,7 @@ class _Freezer:
         rate = f"#rate {k}" if self._rate(k) is not None else None
         slide = (f"#above {k}", f"#below {k}") if self.sense[k] is not None else ()
         inner = any(n.op == "var" and n.data[1] in ("q", "f", "p") for n in variables(s.u))
-        return Frozen(f"#branch {k}", text, row.label, row.place, f"#value {k}", rate, slide, s.jumps, inner)
+        return Frozen(f"#branch {k}", text, row.label, row.place, f"#value {k}", rate, slide, s.jumps, inner, s.passage)
 
     def _rate(self, k: int) -> Node | None:
         try:

@@ -56,11 +56,14 @@ MOST = 200
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """u = 0: where the branch changes; jumps: whether a row does there; row: the first row family that has it."""
+    """u = 0: where the branch changes; jumps: whether a row does there; row: the first row family that has it;
+    passage: of a peak (peaks.py), which begins where u becomes positive: how far u goes while it is passed.
+    """
 
     u: Node
     jumps: bool
     row: int
+    passage: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +110,7 @@ def surfaces(form: DescriptorForm, directions: frozenset[str] = frozenset()) -> 
     """
     first: dict[Node, int] = {}
     holding: dict[Node, dict[Node, None]] = {}
-    for root, row in _roots(form):
+    for root, row in roots(form):
         for node in topological([root]):
             found = watched(node)
             if found is None:
@@ -128,7 +131,8 @@ def surfaces(form: DescriptorForm, directions: frozenset[str] = frozenset()) -> 
     return tuple(kept)
 
 
-def _roots(form: DescriptorForm) -> Iterator[tuple[Node, int]]:
+def roots(form: DescriptorForm) -> Iterator[tuple[Node, int]]:
+    """What rows are made of, and the row family of each."""
     for name in JUDGED:
         block = form.block(name)
         for kernel in block.kernels if block is not None else ():

@@ -149,29 +149,6 @@ static void leave(sd_run *run)
     memcpy(m->p, m->p_after, size);
 }
 
-/* On from the point behind an event at t, whose row, of kind `kind`, is as of `label`; it counts as so many, and is told
- * in so many rows of the log. */
-static void go_on(sd_run *run, double t, double label, int32_t kind, int32_t logged, int64_t entries)
-{
-    sd_modes *m = run->modes;
-    double sample = INFINITY;
-    for (int32_t k = 0; k < m->samples; k++)
-        sample = fmin(sample, m->first + (double)m->next[k] * m->period[k]);
-    m->begun = t;
-    *m->h_max = m->longest;
-    *m->t_end = sample < m->segment - m->nothing ? sample : m->segment; /* where the text jumps too, that is first */
-    run->end_kind = sample <= m->segment + m->nothing ? SD_TRACE : 0;
-    for (int32_t i = 0; i < m->unknowns; i++)
-        m->restart_d[i] = m->differential[i] ? m->rate[i] : 0.0;
-    run->start_kind = kind;
-    leave(run);
-    sd_run_restart(run, t, label, m->restart, m->restart_d);
-    run->start_kind = 0;
-    m->logged += logged;
-    m->left -= entries;
-    watch(run);
-}
-
 /* The next steps, from t on, are parts of one that misled, until its end is passed. */
 static void shorten(sd_run *run, double t, double step)
 {
@@ -181,6 +158,31 @@ static void shorten(sd_run *run, double t, double step)
         *m->t_end = t + step;
         run->end_kind = 0;
     }
+}
+
+/* On from the point behind an event at t, whose row, of kind `kind`, is as of `label`; it counts as so many, and is told
+ * in so many rows of the log; misled: how long (s) steps are shorter. */
+static void go_on(sd_run *run, double t, double label, int32_t kind, int32_t logged, int64_t entries, double misled)
+{
+    sd_modes *m = run->modes;
+    double sample = INFINITY;
+    for (int32_t k = 0; k < m->samples; k++)
+        sample = fmin(sample, m->first + (double)m->next[k] * m->period[k]);
+    m->begun = t;
+    *m->h_max = m->longest;
+    *m->t_end = sample < m->segment - m->nothing ? sample : m->segment; /* where the text jumps too, that is first */
+    run->end_kind = sample <= m->segment + m->nothing ? SD_TRACE : 0;
+    if (misled > 0.0)
+        shorten(run, t, misled);
+    for (int32_t i = 0; i < m->unknowns; i++)
+        m->restart_d[i] = m->differential[i] ? m->rate[i] : 0.0;
+    run->start_kind = kind;
+    leave(run);
+    sd_run_restart(run, t, label, m->restart, m->restart_d);
+    run->start_kind = 0;
+    m->logged += logged;
+    m->left -= entries;
+    watch(run);
 }
 
 static int same(int32_t n, const int32_t *a, int32_t number, const int32_t *b)
@@ -231,6 +233,27 @@ static int early(const sd_run *run, double t, double end, int32_t crossed)
     return gaps < crossed && run->t_from == m->begun && since > m->at_once && since < m->early * (end - run->t_from);
 }
 
+/* How long (s) the shortest of the peaks takes that begin with what has just turned; INFINITY: none does. */
+static double passing(const sd_modes *m)
+{
+    double found = INFINITY;
+    for (int32_t k = 0; k < m->kinks; k++) {
+        const sd_kink *kink = &m->kink[k];
+        if (kink->passage > 0.0 && kink->rate >= 0 && m->p_before[kink->branch] < 0.0 && m->p[kink->branch] == 1.0)
+            found = fmin(found, kink->passage / fabs(m->values[kink->rate]));
+    }
+    return found;
+}
+
+/* Whether the laws that have just turned are peaks, whose begins and ends are no rows. */
+static int only_peaks(const sd_modes *m, int32_t crossed)
+{
+    int32_t k = 0;
+    while (k < crossed && m->kink[m->turning[k]].passage > 0.0)
+        k++;
+    return k == crossed;
+}
+
 /* What changes within the last step, whose points count to round-off (what is left over of one that holds nearly would be a
  * state that jumps); enough: for rows. */
 static int event(sd_run *run, double enough)
@@ -267,15 +290,16 @@ static int event(sd_run *run, double enough)
             m->begin = t;
             continue;
         }
+        double passes = passing(m);
         int32_t to = back(run, from);
         double step = end - run->t_from;
         int misled = one && one->strike && run->t_from == m->begun && t - run->t_from < AT_ONCE * step;
         run->settle->enough = enough;
-        sd_run_accept(run, t, SD_TRACE);
+        int kind = one || !only_peaks(m, crossed) ? SD_TRACE : 0;
+        sd_run_accept(run, t, kind);
         forth(run, to);
-        go_on(run, t, t, SD_TRACE, one ? 1 : crossed, one ? one->entries : crossed);
-        if (misled)
-            shorten(run, t, step);
+        double parts = fmin(misled ? step : INFINITY, step > passes / SHORTER ? passes : INFINITY);
+        go_on(run, t, t, kind, one ? 1 : crossed, one ? one->entries : crossed, isfinite(parts) ? parts : 0.0);
         return SD_RUNNING;
     }
 }
@@ -361,7 +385,7 @@ static int sample(sd_run *run, int32_t due)
     for (int32_t i = 0; i < due; i++)
         while (m->first + (double)m->next[one->sample[i]] * m->period[one->sample[i]] <= t + m->nothing)
             m->next[one->sample[i]]++;
-    go_on(run, t, t, SD_TRACE, 1, one->entries);
+    go_on(run, t, t, SD_TRACE, 1, one->entries, 0.0);
     return SD_RUNNING;
 }
 
@@ -402,7 +426,7 @@ static int jump(sd_run *run)
     m->log[(size_t)m->logged * (size_t)m->width] = next->label;
     m->at++;
     m->segment = next->end;
-    go_on(run, t, next->label, one->entries ? SD_TRACE : 0, one->entries != 0, one->entries);
+    go_on(run, t, next->label, one->entries ? SD_TRACE : 0, one->entries != 0, one->entries, 0.0);
     return SD_RUNNING;
 }
 

@@ -77,6 +77,7 @@ typedef struct sd_contact {
 typedef struct sd_kink {
     int32_t branch, value, rate, above, below;
     int32_t inner, jumps;             /* coordinates move it, and nothing is supplied at its zero; it may rest there */
+    double passage;                   /* of a peak: how far the function goes while it is passed; else 0 */
 } sd_kink;
 
 /* A smooth piece of the text (s); label: of the row in which it begins. */

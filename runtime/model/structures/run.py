@@ -95,7 +95,10 @@ class Contact(c.Structure):
 class Kink(c.Structure):
     """sd_kink."""
 
-    _fields_ = [(name, I) for name in ["branch", "value", "rate", "above", "below", "inner", "jumps"]]
+    _fields_ = [
+        *[(name, I) for name in ["branch", "value", "rate", "above", "below", "inner", "jumps"]],
+        ("passage", D),
+    ]
 
 
 class Piece(c.Structure):
