@@ -175,6 +175,8 @@ class _Starts:
         determined, contacts = Determined(self.contacts), self.contacts
         if held is None or not self._behind_steps(determined.pivoting, held):
             self._begin()
+        else:
+            self._let_go(determined)
         y, yd = determined.fit(self._t, self._zeros, self._zeros, self._settle)
         if _tied(contacts, contacts.observer(self._t, y, yd)):
             y = _ahead(contacts, determined, self._t, self._settle, y)
@@ -202,6 +204,24 @@ class _Starts:
             contacts.observer.largest[:] = known
         self._sought_near(None)
         return False
+
+    def _let_go(self, determined: Determined) -> None:
+        """Frees what holds without a flow, where that leaves something open: which one holds it is asked again."""
+        contacts, t, zeros = self.contacts, self._t, self._zeros
+        found = self._settle(t, zeros, zeros)
+        assert found is not None  # it fits
+        values, zero = contacts.observer(t, *found[:2]), contacts.observer.zero
+        for k, c in enumerate(contacts.contacts):
+            if c.kind != "psi" or not contacts.active[k] or abs(values[c.multiplier]) > zero(c.multiplier):
+                continue
+            before = contacts.state()
+            contacts.flip(k, values)
+            contacts.apply()
+            if determined.nullity(t, *found[:2]) > 0:
+                free = self._settle(t, zeros, zeros)
+                if free is not None and contacts.fits(t, zeros, free):
+                    continue
+            contacts.become(before)
 
     def _jumped(self, pivoting: Pivoting, held: Floats, behind: Floats, half: float) -> ConsistentState | None:
         """What the impulses of the present set leave, where a step of half (s) tells as well which stores move."""

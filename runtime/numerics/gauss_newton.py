@@ -80,12 +80,17 @@ class Solution:
 @dataclass(frozen=True, slots=True)
 class Correction:
     """x [unknowns] after one step in what rows determine, what they do not staying as it is; open_ [unknowns]: what
-    round-off leaves open of it; whether rows that are left agree to round-off.
+    round-off leaves open of it, infinite where it has no row of its own; whether rows that are left agree to round-off.
     """
 
     x: Floats
     open_: Floats
     agrees: bool
+
+    @property
+    def whole(self) -> bool:
+        """Whether there are rows for all unknowns."""
+        return bool(np.isfinite(self.open_).all())
 
 
 def _numbered(places: Any, used: Mask) -> Any:

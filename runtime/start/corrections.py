@@ -17,15 +17,18 @@ SHARPER = 60
 """Corrections in which what follows from the state is found, or left as it was."""
 
 
-def by_corrections(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> tuple[Floats, bool]:
+def by_corrections(
+    starter: Starter, t: float, x: Floats, rows: Mask, free: Mask, *, partly: bool = False
+) -> tuple[Floats, bool]:
     """X after corrections that vanish, and whether the rows hold to their round-off then and leave no state or effort
-    open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little.
+    open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little:
+    partly: what has no row of its own stays.
     """
     begun, agrees, last = x, True, np.inf
     for _ in range(SHARPER):
         problem = problem_of(starter, t, x, x, rows=rows, free=free)
         near = corrected(problem, x)
-        if near is None:
+        if near is None or not (partly or near.whole):
             return begun, agrees
         agrees = near.agrees
         step, size = np.abs(near.x - x), np.maximum(problem.scale, np.abs(x))
@@ -43,7 +46,7 @@ def leaves_open(starter: Starter, t: float, near: Correction, size: Floats) -> b
     """Whether round-off leaves a state or an effort open by more than the largest of its like, and of what rows add to
     it as it is (the head of an orifice between vessels of one pressure is what is left of these), or rows of momenta.
     """
-    told, largest = starter.moves(*STATE, "e"), starter.largest_alike(size)
+    told, largest = starter.moves(*STATE, "e") & np.isfinite(near.open_), starter.largest_alike(size)
     if (near.open_ <= largest)[told].all():
         return False
     slopes = np.abs(starter.jacobian(t, near.x))

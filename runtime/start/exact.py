@@ -74,4 +74,6 @@ def _tells(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> boo
     """
     problem = problem_of(starter, t, x, x, rows=rows, free=free)
     near = corrected(problem, x)
-    return near is None or (near.agrees and not leaves_open(starter, t, near, np.maximum(problem.scale, np.abs(x))))
+    if near is None or not near.whole:
+        return True
+    return near.agrees and not leaves_open(starter, t, near, np.maximum(problem.scale, np.abs(x)))

@@ -24,6 +24,7 @@ from sysdyn.runtime.numerics.gauss_newton import Solution, least_residual, solve
 from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.numerics.work import OutOfTimeError, Work
+from sysdyn.runtime.start.corrections import EXACT
 from sysdyn.runtime.start.exact import anew, sharp
 from sysdyn.runtime.start.flat import OWN, off_the_flat, unasked, without_rates
 from sysdyn.runtime.start.least import problem_of
@@ -31,7 +32,6 @@ from sysdyn.runtime.start.linearly import contradicting, no_start
 from sysdyn.runtime.start.moved import moved_guesses
 from sysdyn.runtime.start.starter import STATE, Mask, Starter
 from sysdyn.runtime.start.strategies import (
-    EXACT,
     applicable,
     around,
     first,

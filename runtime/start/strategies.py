@@ -149,7 +149,7 @@ def _by_corrections(starter: Starter, t: float, found: Solution, free: Mask) -> 
     """What is free as all rows determine it; None where they do not, or the problem is no small one."""
     if found.x.size > CORRECTED or not np.isfinite(found.residual):
         return None
-    x, held = by_corrections(starter, t, found.x, starter.every, free)
+    x, held = by_corrections(starter, t, found.x, starter.every, free, partly=True)
     if x is found.x or not held or not (residual := own_residual(starter, t, x, x)) < OWN:
         return None
     return Solution(x, residual)

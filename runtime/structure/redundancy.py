@@ -22,10 +22,10 @@ from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.gauss_newton import solve
 from sysdyn.runtime.numerics.points import normal, uniform
 from sysdyn.runtime.numerics.rank import TOLERANCE
+from sysdyn.runtime.start.corrections import EXACT
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
-from sysdyn.runtime.start.strategies import EXACT
 from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]

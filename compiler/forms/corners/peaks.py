@@ -150,7 +150,7 @@ def _degree(q: Node) -> float:
     """How steeply it grows far out, at least 2: its root is about as far as unknowns are."""
     terms = q.args if q.op == "sum" else (q,)
     factors = [(e, n) for term in terms if term.op == "mul" for e, n in zip(term.data, term.args, strict=True)]
-    return max([2.0, *(e for e, n in factors if _moves(n))])
+    return max([2.0, *(float(e) for e, n in factors if _moves(n))])
 
 
 def _moves(node: Node) -> bool:

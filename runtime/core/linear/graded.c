@@ -312,7 +312,7 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
     memset(x, 0, (size_t)n * sizeof *x);
     if (noise)
         memset(doubt, 0, (size_t)n * sizeof *doubt);
-    int failed = 1;
+    int failed = 1, without = 0;
     if (k <= m || noise) {
         failed = scaled(m, k, a, b, noise, column);
         failed = failed < 0 ? failed : !failed;
@@ -320,6 +320,13 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
     if (!failed && noise) {
         int32_t all = k;
         k = used(m, all, a, place);
+        without = all - k;
+        for (int32_t j = 0, kept = 0; j < all; j++) {
+            if (kept < k && place[kept] == j)
+                kept++;
+            else
+                doubt[own[j]] = INFINITY;
+        }
         for (int32_t j = 0; j < k; j++) {
             own[j] = own[place[j]];
             column[j] = column[place[j]];
@@ -333,6 +340,7 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
         pivots = eliminate(m, k, a, open, b, noise, missing, place);
         failed = !noise && (pivots < k || !(largest(m - k, b + k) <= AGREES * most));
         left = noise && (missed(m - pivots, b + pivots, noise + pivots) || doubtful(m, k, a, pivots));
+        failed |= left && without; /* others, left out for these, may agree */
     }
     if (!failed) {
         substitute(pivots, k, a, b);
