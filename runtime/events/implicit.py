@@ -29,6 +29,8 @@ PIVOTS = 10
 """Of Lemke's method, an inequality."""
 SHARE = 1e-9
 """Of a unit vector: a row's part in what is open."""
+ROUND_OFF = 1e-15
+"""Of the terms of a value: what is less is nothing."""
 ALIKE = 1e-12
 """Of a ratio: two that differ by less are one."""
 
@@ -75,7 +77,9 @@ class Implicit:
         pair = largest[value], largest[[c.multiplier for c in own]]
         size, grows = (np.where(held, *sizes) for sizes in (pair[::-1], pair))
         answer = told @ moves
-        turned = lemke(answer[:, :-1] * grows / size[:, None], (end + answer[:, -1]) / size)
+        begin = end + answer[:, -1]
+        begin[np.abs(begin) <= ROUND_OFF * (np.abs(end) + np.abs(told) @ np.abs(moves[:, -1]))] = 0.0
+        turned = lemke(answer[:, :-1] * grows / size[:, None], begin / size)
         if turned is None:
             return None
         active = contacts.active.copy()

@@ -28,6 +28,8 @@ SHORT, LEAST = (1e-7, 1e-9, 1e-5, 1e-3), 1e-3
 """Of that time, but of so much (s) at least (what leaks tell is no time of the rest): implicit steps that say which set
 begins.
 """
+LONGER = 100.0
+"""Times such a step: one whose set a shorter one is begun with."""
 TURNS = 4
 """Sets that are tried behind such a step."""
 SPAN = 1.0
@@ -190,9 +192,8 @@ class _Starts:
         known, time = contacts.observer.largest.copy(), max(contacts.time, LEAST)
         parts = SHORT if self._quickly else SHORT[:1]  # it takes long to be sure that a set has no start
         for jumps, part in itertools.product((False, True), parts):
-            self._begin()
             h = part * time
-            behind = pivoting.ahead(t, held, h, t)
+            behind = self._behind(pivoting, held, h, SHORT[-1] * time)
             if behind is None:
                 continue
             self._sought_near(None)
@@ -204,6 +205,16 @@ class _Starts:
             contacts.observer.largest[:] = known
         self._sought_near(None)
         return False
+
+    def _behind(self, pivoting: Pivoting, held: Floats, h: float, longest: float) -> Floats | None:
+        """The point behind an implicit step of h (s) from there, whose set the model then has: where leaks and impulses
+        are too far apart for one, begun with the set behind a longer one.
+        """
+        self._begin()
+        behind = pivoting.ahead(self._t, held, h, self._t)
+        if behind is None and h < longest and self._behind(pivoting, held, LONGER * h, longest) is not None:
+            behind = pivoting.ahead(self._t, held, h, self._t)
+        return behind
 
     def _let_go(self, determined: Determined) -> None:
         """Frees what holds without a flow, where that leaves something open: which one holds it is asked again."""

@@ -21,8 +21,8 @@ def by_corrections(
     starter: Starter, t: float, x: Floats, rows: Mask, free: Mask, *, partly: bool = False
 ) -> tuple[Floats, bool]:
     """X after corrections that vanish, and whether the rows hold to their round-off then and leave no state or effort
-    open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little:
-    partly: what has no row of its own stays.
+    open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little.
+    partly: what has no row of its own stays, and what is less than its round-off is nothing.
     """
     begun, agrees, last = x, True, np.inf
     for _ in range(SHARPER):
@@ -35,6 +35,8 @@ def by_corrections(
         step[step <= near.open_] = 0.0
         most = float(np.max(step / size, initial=0.0))
         if most <= EXACT and (agrees or most >= 0.5 * last):  # a steep law tells 1e-13 of a volt from its round-off
+            if partly:
+                x = np.where(np.isfinite(near.open_) & (np.abs(x) <= near.open_), 0.0, x)
             return x, agrees and not leaves_open(starter, t, near, size)
         if starter.work.done:
             return begun, False

@@ -38,8 +38,8 @@ from sysdyn.values import dataclass
 Mask = NDArray[np.bool_]
 STATE = ("q", "f", "p", "s", *START)
 NOISE = 1e-13
-DRIFT = 0.1
-"""Of what a state moves by in a step: what is left of it, to a step of no length, and has not jumped."""
+DRIFT = 0.55
+"""Of what a state moves by in a step, behind one of half its length: with no more it drifts, and has not jumped."""
 WRITTEN = 4.0 * float(np.finfo(float).eps)
 """Of the largest of its like: a fixed value that is no round-off of the text's own."""
 EQUATIONS = "equations of the start"
@@ -343,11 +343,11 @@ class Starter:
 
     def jump_alone(self, t: float, behind: tuple[Floats, Floats]) -> None:
         """Holds of the state what drifts: behind a step [unknowns as written] twice as far as behind one of half its
-        length, where what jumps is as far.
+        length and more, where what jumps is as far.
         """
         far, near = (self.unknowns(t, y, np.zeros(y.size)) - self.guess for y in behind)
         size = self.largest_alike(np.abs(self.guess) + np.abs(far))
-        drifts = (np.abs(2.0 * near - far) <= DRIFT * np.abs(far)) | (np.abs(far) <= NOISE * size)
+        drifts = (near * np.sign(far) <= DRIFT * np.abs(far)) | (np.abs(far) <= NOISE * size)
         self.free &= self.following(t, self.guess) | ~drifts
         self.jumping = True
 

@@ -20,7 +20,7 @@ typedef struct {
     int32_t *holder;               /* [m + 1] the column, from 1, that a row, from 1, is assigned to; 0: none */
     int32_t *way, *least;          /* [m + 1] of the search for one column: the row before, the cost of getting there */
     char *seen;                    /* [m + 1] */
-    char *left;                    /* [n] columns without a row of their own are left out, and told; NULL: there may be none */
+    char *left;                    /* [n] told: columns without a row of their own; NULL: there may be none */
 } scales;
 
 static void cost(scales *s, const double *a)
@@ -98,22 +98,21 @@ static int assign(scales *s)
     return 1;
 }
 
-/* a, b and its round-off (NULL: not asked for) scaled; 1: done, 0: some columns have no row of their own, -2: no memory.  With
- * round-off these are empty then. */
-static int scaled(int32_t m, int32_t n, double *a, double *b, double *noise, int32_t *column)
+/* a, b and its round-off (NULL: not asked for) scaled; left [n]: columns without a row of their own; 1: done, 0: there are
+ * some (NULL), -2: no memory */
+static int scaled(int32_t m, int32_t n, double *a, double *b, double *noise, int32_t *column, char *left)
 {
     size_t rows = (size_t)m + 1, full = (size_t)m * (size_t)n;
-    int32_t *memory = calloc((full + 5 * rows) * sizeof *memory + rows + (size_t)n, 1);
+    int32_t *memory = malloc((full + 5 * rows) * sizeof *memory + rows);
     if (!memory)
         return -2;
-    char *seen = (char *)(memory + full + 5 * rows), *left = noise ? seen + rows : NULL;
     scales s = {m, n, memory, memory + full, column, memory + full + rows, memory + full + 2 * rows,
-                memory + full + 4 * rows, seen, left};
+                memory + full + 4 * rows, (char *)(memory + full + 5 * rows), left};
     cost(&s, a);
     int done = assign(&s);
     for (int32_t i = 0; i < m && done; i++) {
         for (int32_t j = 0; j < n; j++)
-            a[(size_t)i * n + j] = left && left[j] ? 0.0 : ldexp(a[(size_t)i * n + j], s.row[i] + column[j]);
+            a[(size_t)i * n + j] = ldexp(a[(size_t)i * n + j], s.row[i] + column[j]);
         b[i] = ldexp(b[i], s.row[i]);
         if (noise)
             noise[i] = ldexp(noise[i], s.row[i]);
@@ -135,12 +134,38 @@ static int power_of_two(double value)
     return fabs(frexp(value, &exponent)) == 0.5;
 }
 
-static void swap_lines(int32_t m, int32_t n, double *a, int32_t row, int32_t column, int32_t k)
+static void swap_rows(int32_t n, double *a, int32_t row, int32_t k)
 {
     for (int32_t j = 0; j < n && row != k; j++)
         swap(a + (size_t)row * n + j, a + (size_t)k * n + j);
+}
+
+static void swap_columns(int32_t m, int32_t n, double *a, int32_t column, int32_t k)
+{
     for (int32_t i = 0; i < m && column != k; i++)
         swap(a + (size_t)i * n + column, a + (size_t)i * n + k);
+}
+
+/* moves columns that are left behind the others, whose number it returns; own [n], column [n] of them */
+static int32_t apart(int32_t m, int32_t n, double *a, char *left, int32_t *own, int32_t *column)
+{
+    int32_t first = n;
+    for (int32_t j = 0; j < first;) {
+        if (!left[j]) {
+            j++;
+            continue;
+        }
+        first--;
+        swap_columns(m, n, a, j, first);
+        int32_t kept[2] = {own[j], column[j]};
+        own[j] = own[first];
+        column[j] = column[first];
+        own[first] = kept[0];
+        column[first] = kept[1];
+        left[j] = left[first];
+        left[first] = 1;
+    }
+    return first;
 }
 
 /* line -= factor pivot from k on; of [n] each, with the bounds of their round-off, `open` that of the factor */
@@ -162,33 +187,47 @@ static void subtract(int32_t k, int32_t n, double factor, double open, const dou
     }
 }
 
-/* a := its factors, lines moved so that pivots stand on the diagonal, b := L^-1 b; place [n]: the column that was there;
- * open [m, n], noise [m]: bounds of round-off; missing [m]: that of b as it was, moved along.  Returns the number of pivots
- * that are more than that. */
-static int32_t eliminate(int32_t m, int32_t n, double *a, double *open, double *b, double *noise, double *missing,
-                         int32_t *place)
+/* the largest entry of a from line k on, in columns below `last`; of equal ones one without round-off */
+static void largest_entry(int32_t m, int32_t n, const double *a, const double *open, int32_t k, int32_t last, int32_t *row,
+                          int32_t *column)
+{
+    double most = -1.0;
+    for (int32_t i = k; i < m; i++)
+        for (int32_t j = k; j < last; j++) {
+            size_t e = (size_t)i * n + j;
+            double size = fabs(a[e]);
+            size += open[e] == 0.0 && size >= LARGE ? 2.0 : 0.0;
+            if (size > most) {
+                most = size;
+                *row = i;
+                *column = j;
+            }
+        }
+}
+
+/* a := its factors, lines moved so that pivots stand on the diagonal, b := L^-1 b, the `first` columns before the others;
+ * place [n]: the column that was there; open [m, n], noise [m]: bounds of round-off; missing [m]: that of b as it was, moved
+ * along.  Returns the number of pivots that are more than that. */
+static int32_t eliminate(int32_t m, int32_t n, int32_t first, double *a, double *open, double *b, double *noise,
+                         double *missing, int32_t *place)
 {
     double certain = noise ? LIKELY : CERTAIN;
     for (int32_t j = 0; j < n; j++)
         place[j] = j;
     for (size_t e = 0; e < (size_t)m * (size_t)n; e++)
         open[e] = power_of_two(a[e]) ? 0.0 : DBL_EPSILON * fabs(a[e]);
-    for (int32_t k = 0; k < n; k++) {
+    for (int32_t k = 0; k < n && k < m; k++) {
         int32_t row = k, column = k;
-        double most = -1.0;
-        for (int32_t i = k; i < m; i++)
-            for (int32_t j = k; j < n; j++) {
-                size_t e = (size_t)i * n + j;
-                double size = fabs(a[e]);
-                size += open[e] == 0.0 && size >= LARGE ? 2.0 : 0.0;
-                if (size > most) {
-                    most = size;
-                    row = i;
-                    column = j;
-                }
-            }
-        swap_lines(m, n, a, row, column, k);
-        swap_lines(m, n, open, row, column, k);
+        largest_entry(m, n, a, open, k, first, &row, &column);
+        size_t at = (size_t)row * n + column;
+        if (first < n && (k >= first || !(fabs(a[at]) > certain * open[at]))) {
+            first = n;
+            largest_entry(m, n, a, open, k, first, &row, &column);
+        }
+        swap_rows(n, a, row, k);
+        swap_columns(m, n, a, column, k);
+        swap_rows(n, open, row, k);
+        swap_columns(m, n, open, column, k);
         swap(b + row, b + k);
         if (noise) {
             swap(noise + row, noise + k);
@@ -214,7 +253,7 @@ static int32_t eliminate(int32_t m, int32_t n, double *a, double *open, double *
                 noise[i] += fabs(factor) * noise[k] + unsure * fabs(b[k]);
         }
     }
-    return n;
+    return n < m ? n : m;
 }
 
 /* the columns that have entries, moved together in a: their number; place [n] */
@@ -300,47 +339,34 @@ static void doubts(int32_t k, int32_t n, const double *a, const double *open, co
 
 int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double *x, double *doubt)
 {
-    int32_t *own = malloc((3 * (size_t)n + 1) * sizeof *own);
+    int32_t *own = malloc((3 * (size_t)n + 1) * sizeof *own + (size_t)n);
     double *open = malloc(((size_t)m * (size_t)n + (size_t)m + 2 * (size_t)n + 1) * sizeof *open);
     if (!own || !open) {
         free(own);
         free(open);
         return -2;
     }
-    int32_t *column = own + n, *place = own + 2 * (size_t)n, k = used(m, n, a, own);
+    int32_t *column = own + n, *place = own + 2 * (size_t)n, k = used(m, n, a, own), first = k;
+    char *behind = (char *)(own + 3 * (size_t)n + 1);
     double *missing = open + (size_t)m * (size_t)n, *room = missing + m, *unsure = room + n;
     memset(x, 0, (size_t)n * sizeof *x);
+    memset(behind, 0, (size_t)n);
     if (noise)
         memset(doubt, 0, (size_t)n * sizeof *doubt);
-    int failed = 1, without = 0;
+    int failed = 1;
     if (k <= m || noise) {
-        failed = scaled(m, k, a, b, noise, column);
+        failed = scaled(m, k, a, b, noise, column, noise ? behind : NULL);
         failed = failed < 0 ? failed : !failed;
-    }
-    if (!failed && noise) {
-        int32_t all = k;
-        k = used(m, all, a, place);
-        without = all - k;
-        for (int32_t j = 0, kept = 0; j < all; j++) {
-            if (kept < k && place[kept] == j)
-                kept++;
-            else
-                doubt[own[j]] = INFINITY;
-        }
-        for (int32_t j = 0; j < k; j++) {
-            own[j] = own[place[j]];
-            column[j] = column[place[j]];
-        }
     }
     int32_t pivots = k, left = 0;
     if (!failed) {
+        first = apart(m, k, a, behind, own, column);
         double most = largest(m, b);
         if (noise)
             memcpy(missing, noise, (size_t)m * sizeof *missing);
-        pivots = eliminate(m, k, a, open, b, noise, missing, place);
+        pivots = eliminate(m, k, first, a, open, b, noise, missing, place);
         failed = !noise && (pivots < k || !(largest(m - k, b + k) <= AGREES * most));
         left = noise && (missed(m - pivots, b + pivots, noise + pivots) || doubtful(m, k, a, pivots));
-        failed |= left && without; /* others, left out for these, may agree */
     }
     if (!failed) {
         substitute(pivots, k, a, b);
@@ -352,6 +378,8 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
             if (noise)
                 doubt[j] = ldexp(unsure[i], exponent);
         }
+        for (int32_t i = pivots; i < k && first < k; i++)
+            doubt[own[place[i]]] = INFINITY;
     }
     free(open);
     free(own);
