@@ -26,7 +26,7 @@ DENSE = 300
 """Unknowns up to which matrices are full; larger models are taken as they come."""
 NOTHING = 1e-9
 """Of a unit vector: a contact's share of what is open."""
-SAME = 1e-6
+SAME = 1e-4
 """Of the largest flow, or rate of one: what a point found with another set may differ by, and is the same."""
 ALIKE = 9
 """Digits to which shares are compared."""
