@@ -118,14 +118,23 @@ class _Starts:
         self._known.clear()
 
     def _started(self, t: float, jumped: tuple[Floats, Floats] | None = None) -> ConsistentState | None:
-        """That of the present set; jumped: points behind an impulse that say which stores move."""
-        system, constants, quickly = self.contacts.system, self._constants, self._quickly
+        """That of the present set, the first failure with a word why; jumped: points behind an impulse that say which
+        stores move.
+        """
         try:
             return consistent_start(
-                system, t, self._near, self._until, constants=constants, quickly=quickly, jumped=jumped
+                self.contacts.system,
+                t,
+                self._near,
+                self._until,
+                constants=self._constants,
+                quickly=self._quickly,
+                silent=bool(self.errors),
+                jumped=jumped,
             )
         except InconsistentStart as error:
-            self.errors.append(error)
+            if jumped is None:
+                self.errors.append(error)
             return None
 
     def _settle(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:

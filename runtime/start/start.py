@@ -269,6 +269,7 @@ def consistent_start(
     *,
     constants: bool = False,
     quickly: bool = False,
+    silent: bool = False,
     without: Sequence[int] = (),
     jumped: tuple[Floats, Floats] | None = None,
 ) -> ConsistentState:
@@ -276,12 +277,15 @@ def consistent_start(
 
     system: any index form of the model; near: a state to stay close to, else the guesses; until: `time.monotonic()` at
     which the search is given up; constants: those of integrated constraints, which the model then has, follow from the
-    rest; quickly: by the first strategy alone, and no word why there is none; without: switches of constraints that ask
-    for nothing; jumped: points behind a step, and behind one of half its length, that say which stores alone move.
+    rest; quickly: by the first strategy alone, and no word why there is none; silent: no word where linear rows
+    contradict each other; without: switches of constraints that ask for nothing; jumped: points behind a step, and
+    behind one of half its length, that say which stores alone move.
     Raises InconsistentStart; SolverFailure (max_wall).
     """
     try:
-        return _consistent(system, t0, near, until, without, jumped, constants=constants, quickly=quickly)
+        return _consistent(
+            system, t0, near, until, without, jumped, constants=constants, quickly=quickly, silent=silent or quickly
+        )
     except OutOfTimeError as error:
         raise SolverFailure("max_wall", t0, 0.0) from error
 
@@ -305,6 +309,7 @@ def _consistent(
     *,
     constants: bool,
     quickly: bool,
+    silent: bool,
 ) -> ConsistentState:
     """The same; OutOfTimeError."""
     system = system if system.form.name == "3" else system.another("3")
@@ -322,7 +327,7 @@ def _consistent(
     if near is not None:  # but for its multipliers, which redundant rows make as large as they like
         y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
         guess = starter.unknowns(t0, y, np.zeros(y.size))
-    if quickly and not starter.jumping and no_start(starter, t0, guess, starter.free):
+    if silent and not starter.jumping and no_start(starter, t0, guess, starter.free):
         raise InconsistentStart("stuck", float("inf"))
     best, strategy = _attempt(starter, t0, guess, starter.free, 1 if quickly else None)
     if (quickly or starter.jumping) and not strategy:
