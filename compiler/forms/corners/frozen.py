@@ -67,7 +67,7 @@ def frozen(form: DescriptorForm, network: Network) -> tuple[DescriptorForm, tupl
     whole, form = form, replace(form, blocks=tuple(_opened(b, tables) for b in form.blocks)) if tables else form
     form = written(form, network)
     found = surfaces(form, frozenset(n.data for s in network.switches for n in s.direction))
-    found += peaks(form, whole, network, len(found))
+    found += peaks(form, whole, network, found)
     if not found:
         return form, ()
     freezer = _Freezer(form, found)
