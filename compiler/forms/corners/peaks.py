@@ -1,6 +1,6 @@
 """Laws that are nothing but within a narrow range of what they read: peaks that a step would pass over.
 
-    exp(c - q), q >= 0 (a Gaussian)         within q < FADES
+    exp(c - q), 2^(c - q), q >= 0           within q < FADES (a Gaussian)
     cosh(b)^-n, tanh(b)^2                   within b^2 < FLAT
     cos(b)^n, n large                       within n sin(b)^2 < 2 FADES
     (1 + q)^-n                              within q < FEW^(1/n)
@@ -16,6 +16,7 @@ Received: a descriptor form; returned: its `Surface`s.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from itertools import product as product_of
@@ -133,6 +134,10 @@ def _depths(node: Node, tables: Mapping[str, Table]) -> Iterator[tuple[Node, flo
     """Functions q >= 0 and the values beyond which an operation is flat."""
     if node.op == "call" and node.data == "exp":
         q = _below(node.args[0])
+        if q is not None:
+            yield q, FADES
+    elif node.op == "pow" and node.args[0].op == "const" and node.args[0].data > 0.0:
+        q = _below(scale(math.log(node.args[0].data), node.args[1]))
         if q is not None:
             yield q, FADES
     elif node.op == "mul":
