@@ -21,7 +21,7 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from itertools import product as product_of
 
-from sysdyn.compiler.forms.corners.kinks import JUDGED, MOST, Surface
+from sysdyn.compiler.forms.corners.kinks import JUDGED, Surface
 from sysdyn.compiler.forms.corners.turning import rising, turning
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Kernel
 from sysdyn.dsl.model.expression import (
@@ -41,6 +41,7 @@ from sysdyn.dsl.model.expression import (
 )
 from sysdyn.dsl.model.network import Loop, Network, Table
 from sysdyn.dsl.model.values import Values, as_constants
+from sysdyn.dsl.text.diagnostics import Diagnostic
 
 FADES = 36.0
 """exp(-36) is round-off of exp(0)."""
@@ -48,6 +49,8 @@ FLAT = 144.0
 """cosh(12)^-2 is 2e-10 of cosh(0)^-2."""
 FEW = 1e6
 """A millionth of what it is at its top: beyond that steps follow its feet."""
+MOST = 2000
+"""Surfaces: of 1000 hills of an array, watched, a run takes 45 s at 1e-6, of which a tenth looks at them."""
 STEEP = 64.0
 """A power of a sine that is a peak."""
 TOOTH = 0.05
@@ -62,9 +65,9 @@ CELLS = 8
 
 def peaks(
     form: DescriptorForm, whole: DescriptorForm, network: Network, known: tuple[Surface, ...]
-) -> tuple[Surface, ...]:
+) -> tuple[tuple[Surface, ...], tuple[Diagnostic, ...]]:
     """The surfaces at which peaks begin and end, of each element of arrays, in rows and in what events watch, and at
-    which the latter turn; none where they and the known ones are more than MOST.  whole: the form with its tables of
+    which the latter turn; none, and a note, where they are more than MOST.  whole: the form with its tables of
     straight pieces, which events may watch.
     """
     tables, ends, first = {t.name: t for t in network.tables}, {s.u for s in known}, dict[Node, Surface]()
@@ -80,9 +83,10 @@ def peaks(
                 for u, passage in _hidden(part, tables, watched):
                     if _watchable(u) and not {u, neg(u)} & (ends | first.keys()):
                         first[u] = Surface(u, jumps=False, row=summand.row, passage=passage)
-            if len(first) + len(known) > MOST:
-                return ()
-    return tuple(first.values())
+            if len(first) > MOST:
+                text = f"peaks of laws and moments of conditions are more than {MOST}: steps may pass over them"
+                return (), (Diagnostic("N608", text, network.place, "solver auto(longest = ...) in the scene"),)
+    return tuple(first.values()), ()
 
 
 def _hidden(root: Node, tables: Mapping[str, Table], watched: bool) -> Iterator[tuple[Node, float]]:
