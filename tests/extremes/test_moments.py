@@ -73,3 +73,23 @@ def test_what_happens_within_a_hill_does_not_lengthen_its_steps(method, tmp_path
     assert found.met
     assert np.abs(v**2 / 2.0 + stored - 0.5).max() < 1e-5
     assert stored.max() > 0.25
+
+
+TEETH = """
+model m {
+  coord x: translation = 0 m
+  energy T* = 1/2*(1 kg)*x'^2
+  work (if %s then 30 N else 0 N) on x
+  init x' = 1 m/s
+}
+scene s of m { time 0 s to 2 s; trace x, x' as v }
+"""
+
+
+@pytest.mark.parametrize("window", ["floor(x/(1 mm)) == 500", "mod(x + 0.5 m, 1 m) < 1 mm and x < 1 m"])
+@pytest.mark.parametrize("options", [{"accuracy": 1e-3}, {"accuracy": 1e-6}, {"accuracy": 1e-6, "method": "dopri"}])
+def test_a_law_within_a_narrow_window_of_whole_numbers_acts(window, options, tmp_path):
+    """30 N over 1 mm, by v^2/2.  It was passed over: no force, told as met, its energy balance zero."""
+    found = ran(tmp_path, TEETH % window, **options)
+    assert found.met
+    assert abs(found.trace["v"][-1] - np.sqrt(1.0 + 2.0 * 0.03)) < options["accuracy"]

@@ -38,13 +38,24 @@ def turning(root: Node) -> Iterator[Node]:
         if on is not None:
             jumps = node.op == "cmp" or node.data in ("sign", "step")
             yield from _beside(on.u, magnitude(on.u)) if jumps else (on.u,)
-        elif node.op == "call" and node.data in ("floor", "ceil"):
-            yield from _beside(call("sin", scale(math.pi, node.args[0])), const(1.0))
-        elif node.op == "call" and node.data == "mod":
-            a, b = node.args
-            yield from _beside(call("sin", product(math.pi, ((1.0, a), (-1.0, b)))), const(1.0))
-        elif node.op == "mul":
+        yield from _whole(node)
+        if node.op == "mul":
             yield from _factors(node)
+
+
+def compared(root: Node) -> Iterator[Node]:
+    """The same of floor, mod and frac that conditions of a law read: a window in which it holds may be narrow."""
+    conditions = [node for node in topological_unbound([root]) if node.op == "cmp"]
+    for node in topological_unbound(conditions):
+        yield from _whole(node)
+
+
+def _whole(node: Node) -> Iterator[Node]:
+    if node.op == "call" and node.data in ("floor", "ceil"):
+        yield from _beside(call("sin", scale(math.pi, node.args[0])), const(1.0))
+    elif node.op == "call" and node.data == "mod":
+        a, b = node.args
+        yield from _beside(call("sin", product(math.pi, ((1.0, a), (-1.0, b)))), const(1.0))
 
 
 def _beside(u: Node, size: Node) -> Iterator[Node]:
