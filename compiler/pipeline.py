@@ -53,7 +53,7 @@ from sysdyn.compiler.program.program import Program
 from sysdyn.compiler.program.program_text import verify_program
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model.collecting import at_rest
-from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.model.network import Network, Parameter
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass
 
@@ -195,7 +195,9 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         lowered = _lowered(own, formulation)
         titles = tuple(replace(r, label=word(formulation, r.label)) if r.block == "audit" else r for r in lowered.rows)
         lowered = replace(lowered, formulation=formulation, rows=titles)
-        form, branches = frozen(with_book_signs(lowered), network) if traced else (with_book_signs(lowered), ())
+        form, branches, many = with_book_signs(lowered), tuple[Parameter, ...](), tuple[Diagnostic, ...]()
+        if traced:
+            form, branches, many = frozen(form, network)
         network = replace(network, parameters=(*network.parameters, *branches))
         form = scaled(form)
         descriptor.verify_descriptor(form)
@@ -204,7 +206,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         verify_program(program)
     with _timed("emit", timings):
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
-    said = (*inverted, *notes, *cut, *found)
+    said = (*inverted, *notes, *cut, *found, *many)
     return CompiledModel(family, network, model, own, form, program, backend, text, said, steps, tuple(timings))
 
 

@@ -88,6 +88,8 @@ class Handler:
         self.simple, self.struck, self.rounds, self.soon = False, -1, list[Round](), 0.0
         self._plain = all(c.kind in ("phi", "friction") and c.guard < 0 for c in plan.contacts)
         self._exact: list[int] = []
+        self._jumps: dict[int, float] = {}
+        """Relations that jump where they were found to cross, on whose other side the point is, by round-off: that."""
         self._sinking: set[int] = set()
         self.back(begin)
         self.before = self.now()
@@ -175,12 +177,13 @@ class Handler:
 
     def _side(self, k: int, value: float, before: float) -> float:
         """The side of relation k, which was `before`: a value that a jump made zero is on neither, one that was found
-        as the root of a crossing is past it.
+        as the root of a crossing is past it, and one that jumps there.
         """
         relation = self.plan.relations[k]
         small = self.observer.zero(relation.row) if relation.moves else 0.0
         near = abs(value) <= small and (value != 0.0 or k in self._exact)
-        return before if near else float(np.sign(value))
+        side = float(np.sign(value))
+        return before if near or self._jumps.get(k) == side else side
 
     # -- samples -------------------------------------------------------------------------------------------------
 
@@ -256,6 +259,11 @@ class Handler:
         crossed = [w.relation for w in which if w.relation >= 0]
         values = self.observer(t, y, yd) if self.plan.relations else np.zeros(0)
         self._exact = [k for k in crossed if values[self.plan.relations[k].row] == 0.0]
+        self._jumps = {
+            w.relation: float(w.side)
+            for w in which
+            if w.relation >= 0 and w.side * values[w.row] > self.observer.zero(w.row)
+        }
         self._hold(values, crossed)
         which = self.turns.passed(t, which)
         for w in which:

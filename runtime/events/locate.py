@@ -14,6 +14,8 @@ from sysdyn.runtime.model.description import Floats
 PARTS = 4
 """Of a step, as core/run/run.c looks at it."""
 ITERATIONS = 60
+AT_ONCE = 1e-6
+"""Of what is searched: a moment."""
 
 Dense = Callable[[float], Floats]
 """t (s) -> values [observed] there."""
@@ -25,14 +27,20 @@ that is its level, else the round-off of many bounces adds up to a fall.
 
 
 def crossing(dense: Dense, watches: Sequence[Watch], begin: float, end: float) -> tuple[float, list[int]] | None:
-    """The first instant, and the numbers of the watches that change there; None where none does."""
+    """The first instant, and the numbers of the watches that change there; None where none does.  Where what is found
+    turns others may have changed before, and be back at the end.
+    """
     grid = [begin + (end - begin) * k / PARTS for k in range(1, PARTS)] + [end]
     low, before = begin, dense(begin)
     for high in grid:
         values = dense(high)
         hit = [k for k, watch in enumerate(watches) if _falls(watch, before, values)]
-        if hit:
-            return _first(dense, watches, hit, (low, before), (high, values))
+        while hit:
+            t, which = _first(dense, watches, hit, (low, before), (high, values))
+            known, high, values = set(hit), t, dense(t)
+            hit = [k for k, watch in enumerate(watches) if _falls(watch, before, values)]
+            if not low < t or known.issuperset(hit):
+                return t, which
         low, before = high, values
     return None
 
@@ -79,10 +87,16 @@ def _instant(dense: Dense, watch: Watch, low: tuple[float, Floats], high: tuple[
 def _root(
     dense: Dense, row: int, side: int, low: tuple[float, float], high: tuple[float, float], level: float = 0.0
 ) -> float:
-    """Where side*value - level falls through zero; low where it is not above zero there already."""
+    """Where side*value - level falls through zero; low where it is not above zero there already, nor a
+    moment behind.
+    """
     (a, fa), (b, fb) = low, high
-    if fa <= 0.0:
-        return a
+    if fa <= 0.0:  # it may rise before it falls
+        behind = a + AT_ONCE * (b - a)
+        fa = side * float(dense(behind)[row]) - level
+        if not (a < behind and fa > 0.0):
+            return a
+        a = behind
     for _ in range(ITERATIONS):
         middle = 0.5 * (a + b)
         if not a < middle < b:

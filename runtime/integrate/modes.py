@@ -111,7 +111,7 @@ class Modes:
         self._systems = list({id(s): s for s in settled}.values())
         self._fixed = [k.sense for k in plan.contacts if k.sense >= 0] + [k.branch for k in plan.kinks]
         self._fixed += [k.hold for k in plan.contacts if k.hold >= 0]
-        self.core = lib.Modes(now=-1, last=-np.inf, begin=run.start.t, longest=longest, left=UNLIMITED)
+        self.core = lib.Modes(now=-1, last=-np.inf, begin=run.start.t, longest=longest, passed=-np.inf, left=UNLIMITED)
         self.core.chatters = STALLED
         self._sizes(plan)
         self._plan(plan)

@@ -58,6 +58,7 @@ class Pieces:
         if np.isfinite(plan.turns):
             run.driver.run.turns, method.h_max = plan.turns, min(method.h_max, FOLLOWED * plan.turns)
         self._longest, self._landing = method.h_max, np.inf
+        self._passing = lib.Modes(passed=-np.inf)
         self.at = 0
         """The number of the segment."""
         n = run.system.form.written
@@ -66,6 +67,8 @@ class Pieces:
             run.driver.note(start.t, *before)
         self._first(self.handler.begin(start.t, *before))
         self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
+        if self.modes is not None:
+            self._passing = self.modes.core
         self._first_step = FirstStep(run, self.handler, self._values)
         self._mode, self._open, self._begun = -1, np.full(run.driver.observed, np.inf), start.t
         self._watch()
@@ -156,6 +159,22 @@ class Pieces:
         self._landing = min(t + step, self._landing)
         self.aim()
 
+    def _pass(self, t: float, step: float) -> None:
+        """Peaks that have begun at t, behind a step (s), are passed in parts, beside those that already are."""
+        passes, core = self.handler.passes, self._passing
+        within = t < core.passed
+        if np.isfinite(passes) and (within or step > passes / PARTS):
+            core.part = min(passes / PARTS, core.part if within else np.inf)
+            core.passed = max(t + passes, core.passed if within else t)
+
+    def _in_parts(self, t: float) -> None:
+        """Steps from t (s) on are parts of what is being passed."""
+        if t < self._passing.passed:
+            method = self.run.method.contents
+            method.h_max = min(self._passing.part, method.h_max)
+            self._landing = min(self._passing.passed, self._landing)
+            self.aim()
+
     # -- where a piece ends --------------------------------------------------------------------------------------
 
     def _point(self, t: float) -> tuple[Floats, Floats]:
@@ -182,6 +201,7 @@ class Pieces:
         stepper = method.stepper
         self._told()
         self.handler.before = self.handler.now()
+        sides, truth = self.handler.side.copy(), list(self.handler.truth)
         if stepper.refine:
             _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
         end, begun = method.t, core.t_from == (self._begun if self.modes is None else self.modes.core.begun)
@@ -202,6 +222,7 @@ class Pieces:
                 continue
             step = self._first_step.shorter(which, (core.t_from, t, end)) if begun else 0.0
             if step:
+                self.handler.side[:], self.handler.truth = sides, truth  # what changed within it has not yet
                 self._again(core.t_from, step, sink)
                 return time.process_time() - began
             with run.settler.exactly():
@@ -214,10 +235,8 @@ class Pieces:
                 misled = self.handler.stands(which) or (
                     begun and self._first_step.at_once(which, (core.t_from, t, end))
                 )
-                parts = end - core.t_from if misled else np.inf
-                if end - core.t_from > self.handler.passes / PARTS:
-                    parts = min(parts, self.handler.passes)
-                self._go_on(t, point, before, misled=parts if np.isfinite(parts) else 0.0, kind=kind)
+                self._pass(t, end - core.t_from)
+                self._go_on(t, point, before, misled=end - core.t_from if misled else 0.0, kind=kind)
                 return time.process_time() - began
             begin = t
 
@@ -299,6 +318,7 @@ class Pieces:
             self.modes.core.begun = t
         if misled:
             self._short(t, misled)
+        self._in_parts(t)
         self.leave(*before)
         go_on(self.run, t, t, [*point])
         core.start_kind = 0
@@ -325,6 +345,7 @@ class Pieces:
         if not due and method.t < end:  # a bounce that has not come back
             self._landing, method.h_max = np.inf, self._longest
             self.aim()
+            self._in_parts(method.t)
             return True
         if due:
             n = run.system.form.written

@@ -42,7 +42,7 @@ def sign_of(f):
 
 
 def test_dry_friction_reads_its_branch_and_lies_between_while_it_slides():
-    form, parameters = frozen(*lowered(sign_of))
+    form, parameters, _ = frozen(*lowered(sign_of))
     assert [(p.name, evaluate(list(p.values), {}.get)) for p in parameters] == [("#branch 0", [LIVE])]
     (row,) = rows(form, "dynamics")
     inertia = read(row, rate=1.0, branch=ABOVE) - read(row, branch=ABOVE)
@@ -56,7 +56,7 @@ def test_dry_friction_reads_its_branch_and_lies_between_while_it_slides():
 
 
 def test_the_sense_is_the_branch_or_what_holds_the_surface():
-    form, _ = frozen(*lowered(sign_of))
+    form, _, _ = frozen(*lowered(sign_of))
     (row,) = rows(form, "gamma")
     for branch in (ABOVE, BELOW):
         assert read(row, branch=branch, f=0.4, sense=branch) == 0.0
@@ -65,7 +65,7 @@ def test_the_sense_is_the_branch_or_what_holds_the_surface():
 
 
 def test_a_law_that_bends_has_branches_and_no_sense():
-    form, parameters = frozen(*lowered(lambda f: x.add(f, x.call("abs", f))))
+    form, parameters, _ = frozen(*lowered(lambda f: x.add(f, x.call("abs", f))))
     (row,) = rows(form, "dynamics")
     assert len(parameters) == 1
     assert form.block("gamma") is None
@@ -76,6 +76,6 @@ def test_a_law_that_bends_has_branches_and_no_sense():
 
 def test_what_has_no_corner_is_handed_on():
     form, network = lowered(lambda f: x.scale(4.0, f))
-    same, parameters = frozen(form, network)
+    same, parameters, _ = frozen(form, network)
     assert same is form
     assert parameters == ()

@@ -55,25 +55,28 @@ from sysdyn.dsl.model.expression import (
 )
 from sysdyn.dsl.model.network import Network, Parameter, Table
 from sysdyn.dsl.model.units import NONE, si
-from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.dsl.text.diagnostics import Diagnostic, Place
 
 LIVE, ABOVE, BELOW, SLIDES, RESTS = 0.0, 1.0, -1.0, 2.0, 3.0
 READ = ("observe", "observe_rate", "observe_scale", "initial")
 
 
-def frozen(form: DescriptorForm, network: Network) -> tuple[DescriptorForm, tuple[Parameter, ...]]:
-    """The form of a network with frozen branches, and the parameters that hold them."""
+def frozen(
+    form: DescriptorForm, network: Network
+) -> tuple[DescriptorForm, tuple[Parameter, ...], tuple[Diagnostic, ...]]:
+    """The form of a network with frozen branches, and the parameters that hold them; notes."""
     tables, place = {t.name: t for t in network.tables}, network.place
     whole, form = form, replace(form, blocks=tuple(_opened(b, tables) for b in form.blocks)) if tables else form
     form = written(form, network)
     found = surfaces(form, frozenset(n.data for s in network.switches for n in s.direction))
-    found += peaks(form, whole, network, len(found))
+    passed, notes = peaks(form, whole, network, found)
+    found += passed
     if not found:
-        return form, ()
+        return form, (), notes
     freezer = _Freezer(form, found)
     parameters = (Parameter(k.branch, (), si(NONE), (const(LIVE),), (), form.rows[s.row].place or place)
                   for k, s in zip(freezer.kinks, found, strict=True))  # fmt: skip
-    return freezer.form(place), tuple(parameters)
+    return freezer.form(place), tuple(parameters), notes
 
 
 def _opened(block: Block, tables: Mapping[str, Table]) -> Block:

@@ -1,6 +1,6 @@
 """Laws that are nothing but within a narrow range of what they read: peaks that a step would pass over.
 
-    exp(c - q), q >= 0 (a Gaussian)         within q < FADES
+    exp(c - q), 2^(c - q), q >= 0           within q < FADES (a Gaussian)
     cosh(b)^-n, tanh(b)^2                   within b^2 < FLAT
     cos(b)^n, n large                       within n sin(b)^2 < 2 FADES
     (1 + q)^-n                              within q < FEW^(1/n)
@@ -16,17 +16,20 @@ Received: a descriptor form; returned: its `Surface`s.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from itertools import product as product_of
 
-from sysdyn.compiler.forms.corners.kinks import JUDGED, MOST, Surface
+from sysdyn.compiler.forms.corners.kinks import JUDGED, Surface
+from sysdyn.compiler.forms.corners.turning import compared, rising, turning
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Kernel
 from sysdyn.dsl.model.expression import (
     Node,
     call,
     const,
     linear,
+    neg,
     power,
     product,
     scale,
@@ -38,6 +41,7 @@ from sysdyn.dsl.model.expression import (
 )
 from sysdyn.dsl.model.network import Loop, Network, Table
 from sysdyn.dsl.model.values import Values, as_constants
+from sysdyn.dsl.text.diagnostics import Diagnostic
 
 FADES = 36.0
 """exp(-36) is round-off of exp(0)."""
@@ -45,40 +49,55 @@ FLAT = 144.0
 """cosh(12)^-2 is 2e-10 of cosh(0)^-2."""
 FEW = 1e6
 """A millionth of what it is at its top: beyond that steps follow its feet."""
+MOST = 2000
+"""Surfaces: of 1000 hills of an array, watched, a run takes 45 s at 1e-6, of which a tenth looks at them."""
 STEEP = 64.0
 """A power of a sine that is a peak."""
 TOOTH = 0.05
 """Of the widest cell of a table, or of all of it where this part of its range lies in one cell: narrower ones may hold
 what steps would pass over.
 """
+AT_ONCE = 1e300
+"""What turns or jumps at a zero is passed there: steps behind it may be as long as they will."""
 CELLS = 8
 """Narrow cells side by side, at most, that one passage in parts sees."""
 
 
-def peaks(form: DescriptorForm, whole: DescriptorForm, network: Network, known: int) -> tuple[Surface, ...]:
-    """The surfaces at which peaks begin and end, of each element of arrays, in rows and in what events watch; none
-    where they and the known ones are more than MOST.  whole: the form with its tables of straight pieces, which events
-    may watch.
+def peaks(
+    form: DescriptorForm, whole: DescriptorForm, network: Network, known: tuple[Surface, ...]
+) -> tuple[tuple[Surface, ...], tuple[Diagnostic, ...]]:
+    """The surfaces at which peaks begin and end, of each element of arrays, in rows and in what events watch, and at
+    which the latter turn; none, and a note, where they are more than MOST.  whole: the form with its tables of
+    straight pieces, which events may watch.
     """
-    tables, first = {t.name: t for t in network.tables}, dict[Node, Surface]()
+    tables, ends, first = {t.name: t for t in network.tables}, {s.u for s in known}, dict[Node, Surface]()
     values = Values({p.name: p for p in network.parameters}, network.elements)
     blocks = (block for name in JUDGED if (block := form.block(name)) is not None)
-    kernels = (kernel for block in blocks for kernel in block.kernels)
-    for kernel in (*kernels, *_watching(whole, network)):
-        nodes = topological([s.expression for s in kernel.rows])
-        if not any(True for node in nodes for _ in _depths(node, tables)):
+    laws = ((kernel, False) for block in blocks for kernel in block.kernels)
+    for kernel, watched in (*laws, *((kernel, True) for kernel in _watching(whole, network))):
+        if not any(True for s in kernel.rows for part in _bodies(s.expression) for _ in _hidden(part, tables, watched)):
             continue
         for at, summand in product_of(values.iterations(kernel.nest), kernel.rows):
-            for q, end in _each(substitute(summand.expression, as_constants(at)), tables, values):
-                if not _watchable(q):
-                    continue
-                root = 1.0 / _degree(q)
-                wide = (1.0 + end) ** root
-                u = sub(const(wide), power(linear(1.0, ((1.0, q),)), const(root)))
-                first.setdefault(u, Surface(u, jumps=False, row=summand.row, passage=2.0 * wide))
-                if len(first) + known > MOST:
-                    return ()
-    return tuple(first.values())
+            root = substitute(summand.expression, as_constants(at))
+            for part in _terms(root, values):
+                for u, passage in _hidden(part, tables, watched):
+                    if _watchable(u) and not {u, neg(u)} & (ends | first.keys()):
+                        first[u] = Surface(u, jumps=False, row=summand.row, passage=passage)
+            if len(first) > MOST:
+                text = f"peaks of laws and moments of conditions are more than {MOST}: steps may pass over them"
+                return (), (Diagnostic("N608", text, network.place, "solver auto(longest = ...) in the scene"),)
+    return tuple(first.values()), ()
+
+
+def _hidden(root: Node, tables: Mapping[str, Table], watched: bool) -> Iterator[tuple[Node, float]]:
+    """Functions at whose zeros a step ends, and how far each goes while that is passed which begins there."""
+    depths = [found for node in topological_unbound([root]) for found in _depths(node, tables)]
+    for q, end in (*depths, *(rising(root) if watched else ())):
+        degree = 1.0 / _degree(q)
+        wide = (1.0 + end) ** degree
+        yield sub(const(wide), power(linear(1.0, ((1.0, q),)), const(degree))), 2.0 * wide
+    for u in turning(root) if watched else compared(root):
+        yield u, AT_ONCE
 
 
 def _watching(form: DescriptorForm, network: Network) -> Iterator[Kernel]:
@@ -92,13 +111,19 @@ def _watching(form: DescriptorForm, network: Network) -> Iterator[Kernel]:
             yield Kernel(kernel.nest, rows)
 
 
-def _each(root: Node, tables: Mapping[str, Table], values: Values) -> Iterator[tuple[Node, float]]:
-    """Depths (`_depths`) of an expression, of each term of its sums over indices."""
+def _bodies(root: Node) -> Iterator[Node]:
+    """An expression, and what its sums over indices add."""
+    yield root
+    yield from (node.args[2] for node in topological([root]) if node.op == "reduce")
+
+
+def _terms(root: Node, values: Values) -> Iterator[Node]:
+    """An expression, and each term of its sums over indices."""
+    yield root
     for node in topological_unbound([root]):
-        yield from _depths(node, tables)
         if node.op == "reduce":
             for at in values.iterations((Loop(node.data[1], *node.args[:2]),)):
-                yield from _each(substitute(node.args[2], as_constants(at)), tables, values)
+                yield from _terms(substitute(node.args[2], as_constants(at)), values)
 
 
 def _watchable(q: Node) -> bool:
@@ -113,6 +138,10 @@ def _depths(node: Node, tables: Mapping[str, Table]) -> Iterator[tuple[Node, flo
     """Functions q >= 0 and the values beyond which an operation is flat."""
     if node.op == "call" and node.data == "exp":
         q = _below(node.args[0])
+        if q is not None:
+            yield q, FADES
+    elif node.op == "pow" and node.args[0].op == "const" and node.args[0].data > 0.0:
+        q = _below(scale(math.log(node.args[0].data), node.args[1]))
         if q is not None:
             yield q, FADES
     elif node.op == "mul":

@@ -12,6 +12,7 @@
 #define CLOSER 6         /* of these, after which what is ENOUGH will do */
 #define ROUND_OFF 1e-15  /* of the largest value and terms of a row, or of its flight: it is no closer to zero */
 #define ENOUGH 1e-3      /* of what counts as zero: what is watched may be past it by */
+#define AT_ONCE 1e-6     /* of what is searched: a moment */
 #define WIDER 3.0        /* times the stretch before: the next one that is searched behind where it has been seen */
 
 typedef void look(sd_run *run, double t, double *values);
@@ -42,14 +43,20 @@ static int falls(const sd_modes *m, int32_t k, const double *low, const double *
 }
 
 /* Where side*value - level falls through zero between a (fa) and b (fb), by no more than `enough`; a where it is not above
- * zero there already. */
+ * zero there already, nor a moment behind. */
 static double root(sd_run *run, look *at, sd_fall fall, double a, double fa, double b, double fb)
 {
     const int32_t row = fall.row;
     const double side = fall.side, level = fall.level, enough = fall.enough;
     double *values = run->modes->values;
-    if (fa <= 0.0)
-        return a;
+    if (fa <= 0.0) { /* it may rise before it falls */
+        double behind = a + AT_ONCE * (b - a);
+        at(run, behind, values);
+        fa = side * values[row] - level;
+        if (!(a < behind && fa > 0.0))
+            return a;
+        a = behind;
+    }
     for (int i = 0; i < ITERATIONS && !(fb <= 0.0 && fb >= -enough); i++) {
         double middle = 0.5 * (a + b);
         if (!(a < middle && middle < b))
@@ -128,7 +135,7 @@ static int32_t part_of(sd_run *run, look *at, double end, double *low, double *h
 }
 
 /* Of the watches m->which, which change within low..high, those that do first, and when. */
-static int32_t first_of(sd_run *run, look *at, int32_t hits, double low, double high, double *t)
+static int32_t first_found(sd_run *run, look *at, int32_t hits, double low, double high, double *t)
 {
     sd_modes *m = run->modes;
     int32_t same = 0;
@@ -140,6 +147,30 @@ static int32_t first_of(sd_run *run, look *at, int32_t hits, double low, double 
     for (int32_t i = 0; i < hits; i++)
         if (m->found[i] <= *t + SAME * spacing(fmax(fabs(low), fabs(high))))
             m->which[same++] = m->which[i];
+    return same;
+}
+
+/* The same of all watches: where what is found first turns others may have changed before, and be back at high. */
+static int32_t first_of(sd_run *run, look *at, int32_t hits, double low, double high, double *t)
+{
+    sd_modes *m = run->modes;
+    const int32_t watches = sd_mode_now(m)->watches;
+    int32_t same = first_found(run, at, hits, low, high, t);
+    for (int more = 1; more && low < *t && *t < high;) {
+        at(run, *t, m->values);
+        int32_t fallen = 0;
+        more = 0;
+        for (int32_t k = 0; k < watches; k++)
+            more |= falls(m, k, m->low, m->values) && !falls(m, k, m->low, m->high);
+        if (!more)
+            break;
+        high = *t;
+        memcpy(m->high, m->values, (size_t)m->observed * sizeof(double));
+        for (int32_t k = 0; k < watches; k++)
+            if (falls(m, k, m->low, m->high))
+                m->which[fallen++] = k;
+        same = first_found(run, at, fallen, low, high, t);
+    }
     return same;
 }
 

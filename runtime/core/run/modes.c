@@ -174,6 +174,13 @@ static void go_on(sd_run *run, double t, double label, int32_t kind, int32_t log
     run->end_kind = sample <= m->segment + m->nothing ? SD_TRACE : 0;
     if (misled > 0.0)
         shorten(run, t, misled);
+    if (t < m->passed) {
+        *m->h_max = fmin(m->part, *m->h_max);
+        if (m->passed < *m->t_end) {
+            *m->t_end = m->passed;
+            run->end_kind = 0;
+        }
+    }
     for (int32_t i = 0; i < m->unknowns; i++)
         m->restart_d[i] = m->differential[i] ? m->rate[i] : 0.0;
     run->start_kind = kind;
@@ -245,6 +252,17 @@ static double passing(const sd_modes *m)
     return found;
 }
 
+/* Peaks that have begun at t, behind a step of so many s, are passed in parts, beside those that already are. */
+static void pass(sd_modes *m, double t, double step)
+{
+    const double passes = passing(m);
+    const int within = t < m->passed;
+    if (!isfinite(passes) || (!within && step <= passes / SHORTER))
+        return;
+    m->part = fmin(passes / SHORTER, within ? m->part : INFINITY);
+    m->passed = fmax(t + passes, within ? m->passed : t);
+}
+
 /* Whether the laws that have just turned are peaks, whose begins and ends are no rows. */
 static int only_peaks(const sd_modes *m, int32_t crossed)
 {
@@ -290,7 +308,6 @@ static int event(sd_run *run, double enough)
             m->begin = t;
             continue;
         }
-        double passes = passing(m);
         int32_t to = back(run, from);
         double step = end - run->t_from;
         int misled = one && one->strike && run->t_from == m->begun && t - run->t_from < AT_ONCE * step;
@@ -298,8 +315,8 @@ static int event(sd_run *run, double enough)
         int kind = one || !only_peaks(m, crossed) ? SD_TRACE : 0;
         sd_run_accept(run, t, kind);
         forth(run, to);
-        double parts = fmin(misled ? step : INFINITY, step > passes / SHORTER ? passes : INFINITY);
-        go_on(run, t, t, kind, one ? 1 : crossed, one ? one->entries : crossed, isfinite(parts) ? parts : 0.0);
+        pass(m, t, step);
+        go_on(run, t, t, kind, one ? 1 : crossed, one ? one->entries : crossed, misled ? step : 0.0);
         return SD_RUNNING;
     }
 }

@@ -105,6 +105,7 @@ typedef struct sd_modes {
     double last, nothing;             /* s: the event before, what is no time behind it */
     double begin;                     /* s: from here on the last step has not been looked at */
     double longest, begun;            /* s: step; of the event that the run goes on from */
+    double passed, part;              /* s: until when peaks are being passed, in steps of so much at most */
     double early, at_once;            /* part of the first step behind it, of which the dense output knows only what inertia
                                        * leads (integrate/modes.py); s: so soon behind it another one is at once */
     double *t_end, *h_max;            /* of the method */

@@ -26,6 +26,7 @@
 #define LEAST 1e-10        /* error of a step, for the next one's size */
 #define SHRUNK 1e-3        /* of the step that was tried first, below which the point that it begins at is settled */
 #define AFRESH 0.1         /* of it: what is tried from there */
+#define GIVEN 0.5          /* of a slope: what is less has given way */
 #define FAILS 12           /* matrices and stages of a step that may fail */
 
 static int step(void *rosenbrock)
@@ -99,7 +100,7 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
                           &rosenbrock->drift, &rosenbrock->begin, &rosenbrock->ee, &rosenbrock->weight, &rosenbrock->end,
                           &rosenbrock->within, &rosenbrock->within_d, &rosenbrock->inner};
     size_t number = sizeof vectors / sizeof *vectors;
-    rosenbrock->memory = calloc((number + 2 * STAGES + SD_ROSENBROCK_DENSE) * m + 4 * nnz, sizeof(double));
+    rosenbrock->memory = calloc((number + 2 * STAGES + SD_ROSENBROCK_DENSE) * m + 6 * nnz, sizeof(double));
     rosenbrock->rate_row = calloc(2 * nnz, sizeof *rosenbrock->rate_row);
     if (!rosenbrock->memory || !rosenbrock->rate_row) {
         sd_rosenbrock_free(rosenbrock);
@@ -119,6 +120,8 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
     rosenbrock->jyd = rosenbrock->jy + nnz;
     rosenbrock->g = rosenbrock->jyd + nnz;
     rosenbrock->e = rosenbrock->g + nnz;
+    rosenbrock->jy_end = rosenbrock->e + nnz;
+    rosenbrock->jyd_end = rosenbrock->jy_end + nnz;
     rosenbrock->system = system;
     rosenbrock->linear = linear;
     sd_linear_replayed(linear);
@@ -177,7 +180,7 @@ void sd_rosenbrock_start(sd_rosenbrock *rosenbrock, double t, const double *y, c
 {
     size_t size = (size_t)rosenbrock->n * sizeof *y;
     rosenbrock->t = t;
-    rosenbrock->taken = 0;
+    rosenbrock->taken = rosenbrock->sloped = 0;
     rosenbrock->tested = 0;
     for (int32_t i = 0; i < rosenbrock->n; i++)
         rosenbrock->tested += rosenbrock->test[i] >= 0;
@@ -230,8 +233,10 @@ static int linearise(sd_rosenbrock *rosenbrock)
 {
     sd_system *system = rosenbrock->system;
     double t = rosenbrock->t, *drift = rosenbrock->drift;
-    int32_t bad = sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->magnitude,
-                              rosenbrock->jy, rosenbrock->jyd);
+    int32_t bad = -1;
+    if (!rosenbrock->sloped)
+        bad = sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->magnitude, rosenbrock->jy, rosenbrock->jyd);
+    rosenbrock->sloped = 0;
     if (*system->stop)
         return SD_STOPPED;
     if (bad >= 0) {
@@ -415,9 +420,46 @@ static int laws_hold(sd_rosenbrock *rosenbrock, double *error)
     return SD_FINE;
 }
 
+/* what the end is off by the slopes there, where a law has given way within the step (a tanh that saturates): by those at its
+ * begin, which hold it, what is left of its row is next to nothing.  Slopes and factors are not the begin's then. */
+static int gives_way(sd_rosenbrock *rosenbrock, double *error, double *state)
+{
+    sd_system *system = rosenbrock->system;
+    double t = rosenbrock->t + rosenbrock->h, *y = rosenbrock->end, *yd = rosenbrock->within_d, *r = rosenbrock->inner;
+    double lead = 1.0 / (sd_rosenbrock_gamma * rosenbrock->h), *jy = rosenbrock->jy_end, *jyd = rosenbrock->jyd_end;
+    for (int32_t i = 0; i < rosenbrock->n; i++)
+        yd[i] = rosenbrock->rate[i] + rosenbrock->v[STAGES - 1][i];
+    int cause = residual(rosenbrock, t, y, yd, r);
+    if (cause != SD_FINE)
+        return cause;
+    if (sd_jacobian(system, t, y, yd, rosenbrock->magnitude, jy, jyd) >= 0)
+        return SD_NONFINITE;
+    rosenbrock->sloped = 1;
+    int32_t e = 0;
+    while (e < system->entries && !(fabs(jy[e]) < GIVEN * fabs(rosenbrock->jy[e])))
+        e++;
+    if (e == system->entries)
+        return SD_FINE;
+    for (e = 0; e < system->entries; e++)
+        rosenbrock->g[e] = jy[e] + lead * jyd[e];
+    if (sd_linear_factor(rosenbrock->linear, rosenbrock->g, rosenbrock->magnitude))
+        return SD_FINE;
+    sd_linear_solve(rosenbrock->linear, r);
+    *error = fmax(*error, norm(rosenbrock, r, rosenbrock->h, state));
+    memset(r, 0, (size_t)rosenbrock->n * sizeof *r); /* nor is the difference of both solutions what the begin's factors say */
+    const double *u = rosenbrock->u[STAGES - 1];
+    for (int32_t j = 0; j < rosenbrock->n; j++)
+        for (e = system->column[j]; e < system->column[j + 1]; e++)
+            r[system->row[e]] += (rosenbrock->jy[e] + lead * rosenbrock->jyd[e]) * u[j];
+    sd_linear_solve(rosenbrock->linear, r);
+    *error = fmax(*error, norm(rosenbrock, r, rosenbrock->h, state));
+    return SD_FINE;
+}
+
 /* factors and stages of a step, its error in `error`, of the state alone in `state`; SD_ERROR_TEST where it is too large */
 static int attempt(sd_rosenbrock *rosenbrock, double *error, double *state)
 {
+    rosenbrock->sloped = 0;
     int cause = factorise(rosenbrock);
     if (cause == SD_FINE)
         cause = take_stages(rosenbrock);
@@ -431,6 +473,8 @@ static int attempt(sd_rosenbrock *rosenbrock, double *error, double *state)
     if (rosenbrock->fixed_h > 0.0)
         return isfinite(*error) ? SD_FINE : SD_NONFINITE;
     if (cause != SD_FINE)
+        return cause;
+    if (*error < 1.0 && (cause = gives_way(rosenbrock, error, state)) != SD_FINE)
         return cause;
     *error = isfinite(*error) ? fmax(*error, LEAST) : INFINITY;
     if (!(*error < 1.0))
@@ -501,7 +545,14 @@ int sd_rosenbrock_step(sd_rosenbrock *rosenbrock)
     }
     rosenbrock->cause = SD_FINE;
     accept(rosenbrock, error);
-    if (rosenbrock->project)
+    if (rosenbrock->project) {
         project(rosenbrock, rosenbrock->project);
+        rosenbrock->sloped = 0;
+    }
+    if (rosenbrock->sloped) {
+        const size_t size = (size_t)rosenbrock->system->entries * sizeof(double);
+        memcpy(rosenbrock->jy, rosenbrock->jy_end, size);
+        memcpy(rosenbrock->jyd, rosenbrock->jyd_end, size);
+    }
     return SD_FINE;
 }

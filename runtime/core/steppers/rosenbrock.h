@@ -11,6 +11,7 @@
  * The last stage is the solution, y = Y_8 + u_8, and u_8 the difference to the embedded one of order 4: the error test.
  * It sees what follows from the state too, which no iteration brings onto its rows; where a law jumps, that jumps in a step
  * however short, which is told by its error (stays), and the error of the state decides.
+ * Slopes that hold at the begin what they do not at the end (a tanh that saturates) hide its error: then those of the end tell.
  * Values within a step: the method's own polynomial, of order 4.
  */
 #ifndef SYSDYN_ROSENBROCK_H
@@ -50,6 +51,8 @@ typedef struct sd_rosenbrock {
     double *u[SD_ROSENBROCK_STAGES], *v[SD_ROSENBROCK_STAGES], *bend[SD_ROSENBROCK_DENSE]; /* [n]; bend: of the polynomial */
     double *ee, *weight;      /* [n] ee: of the last error test, as the other methods name it */
     double *jy, *jyd, *g, *e, *memory;
+    double *jy_end, *jyd_end; /* slopes at the end of the step at hand */
+    int32_t sloped;           /* whether these are those of the last accepted point, behind a step jy and jyd are */
     int32_t *rate_row, *rate_column, rates; /* of the entries e of E that are not zero */
     /* what happened */
     int64_t steps, rejected_steps, newton_failures, taken;

@@ -119,7 +119,19 @@ class Modes(c.Structure):
         *[(name, P) for name in ["period", "next", "piece"]],
         *[
             (name, D)
-            for name in ["first", "segment", "last", "nothing", "begin", "longest", "begun", "early", "at_once"]
+            for name in [
+                "first",
+                "segment",
+                "last",
+                "nothing",
+                "begin",
+                "longest",
+                "begun",
+                "passed",
+                "part",
+                "early",
+                "at_once",
+            ]
         ],
         *[(name, P) for name in ["t_end", "h_max", "largest"]],
         *[(name, D) for name in ["small", "still"]],
