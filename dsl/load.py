@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,7 +32,7 @@ from sysdyn.dsl.rules import bound_values, checks, graph_checks, laws
 from sysdyn.dsl.rules.asked import Asked
 from sysdyn.dsl.rules.claims import exact_claims
 from sysdyn.dsl.rules.floating import floating
-from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
@@ -209,6 +209,18 @@ def _elaborated(
     elaborator.settle()
     elaborator.statements()
     return elaborator, reader
+
+
+def at_authors(network: Network, found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """What binding or the start find wrong in a library, at the author's place; the rest as it is."""
+    found, source = tuple(found), network.place.source
+    if not any(d.severity == "error" and d.place is not None and d.place.source != source for d in found):
+        return found
+    again = document(source, Report())
+    levels = [(choice.path, choice.chosen) for choice in network.levels]
+    with deep(), budget.drawn(), ex.fresh():
+        elaborator, _ = _elaborated(again, again.models[network.model], None, Report(), (), levels)
+        return tuple(told(elaborator, found))
 
 
 def asked(
