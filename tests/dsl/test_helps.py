@@ -54,7 +54,7 @@ model m {
 }
 scene s of m { time 0 s to 1 s; trace V.f }
 """)
-    assert [(d.code, d.help) for d in found] == [("E102", "V.a.f or V.b.f; of an element inside, V.seat.f")]
+    assert [(d.code, d.help) for d in found] == [("E102", "V.a.f or V.b.f; of an element inside, V.poppet.f")]
 
 
 @pytest.mark.parametrize(

@@ -304,6 +304,7 @@ scene on of boost {{ time 0 s to 10 ns; trace L.f, sw.e, m.e every 1 ns }}
 
 @pytest.mark.parametrize("volts", [400.0, -1e4, 1e5])
 @pytest.mark.parametrize("formulation", FOUR[2:])
+@pytest.mark.one_in(2)
 def test_nodes_guessed_far_from_a_charged_neighbour_behind_junctions(tmp_path, formulation, volts):
     """At 0 V below 400 V their junctions have no slope, above -10 kV no number: inverted laws say where they are."""
     trace = trace_of(tmp_path, BOOST.format(volts=volts), formulation=formulation)

@@ -73,6 +73,7 @@ NETS = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", NETS)
+@pytest.mark.one_in(2)
 def test_a_valve_at_rest_begins_to_pass(tmp_path, name, formulation):
     text, slopes, begin, vessel, area = NETS[name]
     scene = f"}}\nscene go of net {{ time 0 s to 1 s; trace T{vessel}.store.e as p }}\n"
