@@ -274,7 +274,8 @@ def _unused_levels(elaborator: Elaborator, report: Report) -> None:
     """A level for a path that is no component is a mistake, not a wish."""
     known = {space.path for space, _ in elaborator.bodies} if elaborator.levels else set[str]()
     for path, (name, place) in elaborator.levels.items():
-        if path not in known and not report.failed:
+        unread = elaborator.space.scope.is_broken(re.split(r"[.[]", path)[0]) or elaborator.files.scope.missed
+        if path not in known and not report.failed and not unread:
             near, whole = nearest(path, known), re.sub(r"\[[^]]*\]", "", path)
             help_ = f"nearest: '{near}'" if near else None
             if whole in known:

@@ -95,6 +95,8 @@ class Members(Ports):
             return Typed(ex.var(e.name, "audit"), AUDIT[e.name])
         domains = {b.domain.name: b.domain for b in self.branches if b.domain.pseudo}
         if e.name not in domains:
+            if self.scope.is_broken(e.name):
+                raise Failed
             raise self.no_member("audit", e, (*AUDIT, *domains))
         return self._ledger(domains[e.name], e)
 
