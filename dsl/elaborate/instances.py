@@ -473,10 +473,10 @@ class Instances(Inputs):
         if name not in head.branches:
             others = [other for other in (*head.branches, *head.ports) if other]
             near = nearest(name, others)
-            help_ = f"nearest: '{near}'" if near else f"it has {', '.join(others) or 'none'}"
+            said = f"nearest: '{near}'" if near else f"it has {', '.join(others) or 'none'}"
             if name in head.ports and isinstance(connection, syntax.BindAcross):
-                help_ = f"{name} = {self._text(connection.plus)}: a port is one node"
-            raise self.resolver.fail("E407", f"'{component.name}' has no branch '{name}'", connection.span, help=help_)
+                said = f"{name} = {self._text(connection.plus)}: a port is one node"
+            raise self.resolver.fail("E407", f"'{component.name}' has no branch '{name}'", connection.span, help=said)
         if name in bound:
             message = f"'{s.decl.name}: {component.name}' needs 1 connection, has {len(s.connections)}"
             nodes = [self._text(c.node) for c in s.connections if isinstance(c, syntax.Single)]
