@@ -12,7 +12,8 @@ tree = Path(sys.argv[1]).resolve()
 with tempfile.TemporaryDirectory() as folder:
     (Path(folder) / "sysdyn").mkdir()
     (Path(folder) / "sysdyn" / "dsl").symlink_to(tree / "dsl")
-    (Path(folder) / "sysdyn" / "values.py").symlink_to(tree / "cli" / "sysdyn" / "values.py")
+    for name in ("values.py", "names.py"):
+        (Path(folder) / "sysdyn" / name).symlink_to(tree / "cli" / "sysdyn" / name)
     sys.path.insert(0, folder)
     sys.dont_write_bytecode = True
     from sysdyn.dsl import load

@@ -1,5 +1,5 @@
 """`python -m sysdyn.cli`: the command line where no script is on the path."""
 
-from sysdyn.cli.main import main
+from sysdyn.entry import main
 
 main()

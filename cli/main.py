@@ -11,7 +11,7 @@ import platform
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NoReturn
 
 import click
@@ -92,8 +92,8 @@ def group() -> None:
     """
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit with its code.
+def main(arguments: Sequence[str] | None = None, *, held: Iterable[int] | None = None) -> None:
+    """Run the command line and exit with its code; held: the mask of signals that is the caller's own (`entry.py`).
 
     Most of what a command makes lives as long as it: cycles are looked for seldom, and not at its end.  The matrices of
     LAPACK are small: threads of its own cost a short command 40 ms, and change last digits.  Python would start a
@@ -103,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     vars(platform.uname()).setdefault("processor", "")
     keep()
     stand_before_numpy()
-    code = run(arguments)
+    code = run(arguments, held)
     gc.freeze()
     if arguments is not None:  # called from Python, which goes on
         sys.exit(code)
@@ -127,11 +127,13 @@ def _leave(code: int) -> NoReturn:
     os._exit(code)
 
 
-def run(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code."""
+def run(arguments: Sequence[str] | None = None, held: Iterable[int] | None = None) -> int:
+    """Run the command line; the exit code.  held: the mask of signals from here on, None: as it is."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     with _ended_like_an_interruption(), standing_streams():
         try:
+            if held is not None:
+                signal.pthread_sigmask(signal.SIG_SETMASK, held)
             code = group.main(given, prog_name="sysdyn", standalone_mode=False, default_map=_defaults(given))
             flush()
             return code if isinstance(code, int) else 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,7 +32,7 @@ from sysdyn.dsl.rules import bound_values, checks, graph_checks, laws
 from sysdyn.dsl.rules.asked import Asked
 from sysdyn.dsl.rules.claims import exact_claims
 from sysdyn.dsl.rules.floating import floating
-from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
+from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
@@ -211,6 +211,18 @@ def _elaborated(
     return elaborator, reader
 
 
+def at_authors(network: Network, found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """What binding or the start find wrong in a library, at the author's place; the rest as it is."""
+    found, source = tuple(found), network.place.source
+    if not any(d.severity == "error" and d.place is not None and d.place.source != source for d in found):
+        return found
+    again = document(source, Report())
+    levels = [(choice.path, choice.chosen) for choice in network.levels]
+    with deep(), budget.drawn(), ex.fresh():
+        elaborator, _ = _elaborated(again, again.models[network.model], None, Report(), (), levels)
+        return tuple(told(elaborator, found))
+
+
 def asked(
     document: Document,
     model: syntax.Model,
@@ -262,7 +274,8 @@ def _unused_levels(elaborator: Elaborator, report: Report) -> None:
     """A level for a path that is no component is a mistake, not a wish."""
     known = {space.path for space, _ in elaborator.bodies} if elaborator.levels else set[str]()
     for path, (name, place) in elaborator.levels.items():
-        if path not in known and not report.failed:
+        unread = elaborator.space.scope.is_broken(re.split(r"[.[]", path)[0]) or elaborator.files.scope.missed
+        if path not in known and not report.failed and not unread:
             near, whole = nearest(path, known), re.sub(r"\[[^]]*\]", "", path)
             help_ = f"nearest: '{near}'" if near else None
             if whole in known:

@@ -13,6 +13,7 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.progress import ProgressLine
+from sysdyn.cli.whole_files import named
 
 if TYPE_CHECKING:
     from sysdyn.cli.run.asked import Request
@@ -42,9 +43,7 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
     if request.output == "-" and console.as_json:
         raise UsageError("-o - and --json both want standard output")
     try:
-        ran = (
-            _to_standard_output(request, console, line) if request.output == "-" else run(request, console.report, line)
-        )
+        ran = _streamed(request, console, line) if _streams(request.output) else run(request, console.report, line)
     finally:
         line.clear()
     if ran is None:
@@ -61,20 +60,38 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
     return console.finish(ran.exit)
 
 
-def _to_standard_output(request: Request, console: Console, line: ProgressLine) -> Ran | None:
+def _streams(output: str | None) -> bool:
+    """Whether a trace is wanted where no file is: standard output, a pipe, a device."""
+    if output is None or output == "-":
+        return output == "-"
+    path = Path(output)
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
+def _streamed(request: Request, console: Console, line: ProgressLine) -> Ran | None:
     """HDF5 cannot be streamed: the trace is made in a folder of its own and copied."""
     import tempfile
 
     from sysdyn.cli.run.running import run
 
+    assert request.output is not None
     with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
         path = Path(folder) / "trace.h5"
         try:
-            return run(replace(request, output=str(path)), console.report, line)
+            ran = run(replace(request, output=str(path)), console.report, line)
+            return ran and replace(ran, outcome=replace(ran.outcome, trace=Path(request.output)))
         finally:  # what was computed before an interruption, too
             if path.is_file():
-                sys.stdout.buffer.write(path.read_bytes())
-                sys.stdout.buffer.flush()
+                _put(request.output, path.read_bytes())
+
+
+def _put(output: str, data: bytes) -> None:
+    if output == "-":
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    else:
+        with named(output):
+            Path(output).write_bytes(data)
 
 
 def _summary(ran: Ran) -> str:

@@ -18,6 +18,7 @@ from sysdyn.cli.page.document import document
 from sysdyn.cli.page.named import no_quantity
 from sysdyn.cli.page.panels import COLOURS, Floats, Panel, curve, panels_of, shortened, time_unit, unit_text
 from sysdyn.cli.page.unit_text import conversion
+from sysdyn.names import stored
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
@@ -98,7 +99,7 @@ def _link(trace: Trace, text: str) -> Link:
 
 def _coordinate(trace: Trace, text: str) -> str:
     """A coordinate as the trace spells it, or a number."""
-    name = text if text in trace.names else text.replace("/", "\u2215")
+    name = text if text in trace.names else stored(text)
     if name in trace.names:
         return name
     try:

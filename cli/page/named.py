@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sysdyn.cli.failures import UsageError
+from sysdyn.names import stored
 
 if TYPE_CHECKING:
     from sysdyn.cli.console import Console
@@ -74,7 +75,7 @@ def quantities(traces: list[Trace], wanted: list[str]) -> list[str]:
                 spelled |= {meter: meter, meter.replace(".", "/"): meter, "/" + meter.replace(".", "/"): meter}
     drawn = []
     for name in wanted:
-        found = spelled.get(name) or spelled.get(name.replace("/", "\u2215"))
+        found = spelled.get(name) or spelled.get(stored(name))
         if found is None:
             raise UsageError(no_quantity(traces[0], name, spelled, known))
         drawn.append(found)

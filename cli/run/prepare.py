@@ -14,6 +14,7 @@ from sysdyn.compiler.formulations import choose
 from sysdyn.compiler.network.pruning import Removal, pruned
 from sysdyn.compiler.pipeline import CompiledModel, compile_network
 from sysdyn.compiler.program import build
+from sysdyn.dsl import load
 from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Network
@@ -116,14 +117,14 @@ def prepare(
         formulation = (network.scene.formulation if network.scene else None) or "auto"
         place = network.scene.formulation_place if network.scene else None
     chosen, found = choose(network, formulation, place)
-    report.extend(found)
+    report.extend(load.at_authors(network, found))
     if found:
         return None
     try:
         compiled, made, backend = _compiled(network, chosen, backend, report, traced, gather)
         binding = compiled.bind()
     except ModelError as error:
-        report.extend(error.diagnostics)
+        report.extend(load.at_authors(network, error.diagnostics))
         return None
     report.extend(compiled.notes)
     structure = compiled.structure()
@@ -138,7 +139,7 @@ def _well_formed(network: Network, report: Report) -> bool:
         if not found:
             compile_network(network, formulation, "numpy").bind()
     except ModelError as error:
-        found = error.diagnostics
+        found = load.at_authors(network, error.diagnostics)
     report.extend(found)
     return not any(d.severity == "error" for d in found)
 

@@ -11,6 +11,7 @@ from sysdyn.cli.run.contradiction import inconsistent, place_of
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import Prepared, prepare
+from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.stopping import RANGE
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
@@ -55,6 +56,16 @@ def start(
 
     redundancy: error, drop or minimum_norm; None: the scene's; until: `time.monotonic()` of the limit of wall time.
     """
+    found = Report()
+    try:
+        return _started(prepared, t0, found, redundancy, until)
+    finally:
+        report.extend(load.at_authors(prepared.network, found))
+
+
+def _started(
+    prepared: Prepared, t0: float, report: Report, redundancy: str | None, until: float | None
+) -> Started | None:
     scene = prepared.network.scene
     policy = redundancy or (scene.redundancy if scene else None) or "error"
     system = System.of(describe(prepared.structure, prepared.arrays), prepared.carrier, "3")

@@ -14,6 +14,7 @@ import numpy as np
 from sysdyn.cli import whole_files
 from sysdyn.cli.sweep.kept import Done
 from sysdyn.cli.sweep.study import Case
+from sysdyn.names import stored
 
 
 def write(
@@ -63,7 +64,7 @@ def _columns(
         values = [case[name] for case in cases]
         plain = all(isinstance(v, float) for v in values)
         column = np.array(values, dtype=float if plain else object)
-        found.append((f"set.{name}".replace("/", "\u2215"), column, units.get(name)))
+        found.append((stored(f"set.{name}"), column, units.get(name)))
     number = len(cases)
     for group, label in (("end", "end"), ("least", "min"), ("most", "max")):
         found += [(f"{label}.{name}", column, units.get(name)) for name, column in done.columns(group, number)]

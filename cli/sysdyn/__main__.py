@@ -1,5 +1,5 @@
 """`python -m sysdyn`."""
 
-from sysdyn.cli.main import main
+from sysdyn.entry import main
 
 main()

@@ -136,11 +136,14 @@ def unreflectable(network: Network) -> Diagnostic | None:
     statements += [(f"{c.kind} {c.name}", (c.expression,), c.place) for c in rest]
     laws = [(f"law of {b.name}", (b.law,), b.place) for b in network.branches if b.law is not None]
     moduli = [(f"ratio of {c.first.partition('#')[0]}", (c.ratio,), c.place) for c in network.couplings]
+    lawful, at_times = {b.name for b in network.branches if b.law is not None}, {s.label for s in network.switches}
     for what, roots, place in statements:
         for node in ex.topological(roots):
             if node.op == "var" and node.data[1] in KINDS:
                 message = f"{what} is written in {node}: it has no counterpart in the complementary family"
-                return Diagnostic("E602", message, place, help_)
+                series = "; or of the flow of an element without a law in series with it (an ideal diode, a switch)"
+                beside = node.data[1] == "bf" and node.data[0] in lawful and what.partition(" ")[2] in at_times
+                return Diagnostic("E602", message, place, help_ + series if beside else help_)
     stated = {b.name for b in network.branches if b.stated}
     dissipators = {b.name for b in network.branches if b.kind == "dissipator"}  # no displacement of theirs is known
     for what, roots, place in (*laws, *moduli, *gammas):

@@ -38,7 +38,7 @@ def _told(elaborator: Elaborator, d: Diagnostic) -> Diagnostic:
 
 def _within(elaborator: Elaborator, space: Space, place: Place) -> bool:
     """Whether a place lies in the text of a space's component."""
-    if space.source is not place.source:
+    if space.source != place.source:
         return False
     body = next(body for s, body in elaborator.bodies if s is space)
     spans = [statement.span for statement, _ in body]

@@ -247,7 +247,7 @@ class FileScope:
     def _domain(self, item: syntax.Domain, scope: Scope, source: SourceText) -> Iterator[Symbol]:
         """A domain from its roles: units of effort, flow, momentum, displacement, and what is common at a node."""
         units: dict[str, Unit] = {}
-        common, pseudo = "effort", None
+        common, pseudo, before = "effort", None, len(self.report)
         for part in item.body:
             match part:
                 case syntax.DomainRole():
@@ -260,8 +260,11 @@ class FileScope:
                     pseudo = read_unit(part.unit, scope, source, self.report)
         place = Place(source, item.name.span)
         missing = [k for k in ("effort", "flow", "displacement") if k not in units]
-        if missing:
+        unread = len(self.report) > before or any(isinstance(part, syntax.Broken) for part in item.body)
+        if missing and not unread:
             self.report.error("E210", f"domain {item.name.name}: its {missing[0]} is not given", place)
+        if missing or unread:
+            scope.broken.add(item.name.name)
             return
         kinetic = "momentum" in units
         units.setdefault("momentum", si(multiply(units["effort"].dimension, dim.TIME)))

@@ -117,6 +117,11 @@ class Instances(Inputs):
                 help_ = f"from std.{library[near]} import {near}"
             self.scope.broken.add(name)
             raise self.resolver.fail("E101", f"unknown component '{name}'", s.component.span, help=help_)
+        ranges = [i for i in s.decl.indices if isinstance(i, syntax.Range)]
+        if ranges:
+            help_ = f"for i in {self.source_text(ranges[0].span)} {{ {label}[i]: ... }}"
+            said = f"'{label}' names one element here: a 'for' makes an array of them"
+            raise self.resolver.fail("E806", said, ranges[0].span, help=help_)
         before = self.scope.symbols.get(label)
         if not isinstance(before, InstanceSymbol):
             before = InstanceSymbol(label, self.place(s.decl.span))
@@ -344,6 +349,9 @@ class Instances(Inputs):
         pairs = []
         for name, text in zip(left, texts, strict=False):
             pairs.append(f"{name} = {text}" + (f" -> {next(texts, 'ground')}" if name in head.branches else ""))
+        if not ports and not head.inputs:
+            message = f"'{component.name}' has no port: nothing can be connected to '{s.decl.name}'"
+            return self.resolver.fail("E402", message, connection.span, help="port a: electrical in the component")
         message = f"'{s.decl.name}: {component.name}' is connected by name: {', '.join((*ports, *head.inputs))}"
         return self.resolver.fail("E402", message, connection.span, help=", ".join(pairs))
 
@@ -463,7 +471,12 @@ class Instances(Inputs):
         bound: set[str],
     ) -> None:
         if name not in head.branches:
-            raise self.resolver.fail("E407", f"'{component.name}' has no branch '{name}'", connection.span)
+            others = [other for other in (*head.branches, *head.ports) if other]
+            near = nearest(name, others)
+            said = f"nearest: '{near}'" if near else f"it has {', '.join(others) or 'none'}"
+            if name in head.ports and isinstance(connection, syntax.BindAcross):
+                said = f"{name} = {self._text(connection.plus)}: a port is one node"
+            raise self.resolver.fail("E407", f"'{component.name}' has no branch '{name}'", connection.span, help=said)
         if name in bound:
             message = f"'{s.decl.name}: {component.name}' needs 1 connection, has {len(s.connections)}"
             nodes = [self._text(c.node) for c in s.connections if isinstance(c, syntax.Single)]

@@ -59,17 +59,14 @@ class Statements(Declarations):
         help_ = self.resolver.missing(left.dimension, right.dimension, *within)
         raise self.resolver.fail("E208", message, where.span, help=help_)
 
-    def _wants(self, what: str, expression: syntax.Expr, dimension: Dimension, rate: bool = False) -> Node:
-        """The value of an expression in its dimension, E208; rate: of a state, where no rate of one may stand."""
+    def _wants(self, what: str, expression: syntax.Expr, dimension: Dimension, *, dynamic: bool = False) -> Node:
+        """The value of an expression in its dimension, E208; dynamic: the rate of a state."""
         value = self.resolver.scalar(expression)
         if value.dimension is not None and value.dimension != dimension:
             want, have = dim.show(dimension), dim.show(value.dimension)
             factor = dim.show(dim.quotient(dimension, value.dimension))
             message = f"{what}: {want} expected, {have} found (factor: {factor})"
-            help_ = self.resolver.missing(value.dimension, dimension, expression)
-            moved = self.scope.find((help_ or "").partition("' in place of")[0])
-            if rate and isinstance(moved, UnknownSymbol) and moved.kind == "s":
-                help_ = f"over a time: ({self.source_text(expression.span)})/(1 s), or a parameter in s"
+            help_ = self.resolver.missing(value.dimension, dimension, expression, dynamic=dynamic)
             raise self.resolver.fail("E208", message, expression.span, help=help_)
         return value.node
 
@@ -155,7 +152,7 @@ class Statements(Declarations):
             said = f"a dynamic gives the first derivative of a state, not {value.node}'"
             raise self.resolver.fail("E508", said, s.target.span, help=help_)
         rate = dim.quotient(value.dimension or NONE, dim.TIME)
-        node = self._wants(f"dynamic {value.node}'", s.value, rate, rate=True)
+        node = self._wants(f"dynamic {value.node}'", s.value, rate, dynamic=True)
         for inner in sorted(ex.variables(node), key=lambda n: n.number):
             if inner.op == "var" and inner.data[2]:
                 message = f"dynamic {value.node}' = ... contains {inner}"

@@ -381,11 +381,13 @@ class Context:
             raise self.fail("E805", f"{what} is {value.node.data:g}, no whole number", expression.span)
         return value.node
 
-    def missing(self, have: Dimension | None, want: Dimension | None, *within: syntax.Expr) -> str | None:
+    def missing(
+        self, have: Dimension | None, want: Dimension | None, *within: syntax.Expr, dynamic: bool = False
+    ) -> str | None:
         """What would make two dimensions agree (fitting.py); within: expressions of which the first has the dimension
-        `have`, the second `want`.
+        `have`, the second `want`; dynamic: the first is the rate of a state.
         """
-        return fitting.missing(Sight(self.scope, self.source, self.whole), have, want, *within)
+        return fitting.missing(Sight(self.scope, self.source, self.whole, dynamic), have, want, *within)
 
     def bare(self, expression: syntax.Expr) -> str | None:
         """The name of the one parameter among the factors of an expression that is a bare number."""

@@ -18,11 +18,14 @@ from sysdyn.values import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """Names in sight, the text that is read, parameters that count (indices, sizes: they have no unit)."""
+    """Names in sight, the text that is read, parameters that count (indices, sizes: they have no unit); dynamic: what
+    is read is the rate of a state, in which no rate of one may stand.
+    """
 
     scope: Scope
     source: SourceText
     whole: Collection[str]
+    dynamic: bool = False
 
     def written(self, e: syntax.Expr) -> str:
         """An expression as it stands in the text."""
@@ -51,21 +54,21 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
                     return f"the missing factor is in {dim.show(factor)}: '{s.name}'?"
             level = level.outer
     # a prime is forgotten more often than it is too much
-    rates = sorted(filter(None, (_rate(sight, e, factor) for e, factor in pairs)), key=lambda said: said[-2] == "'")
+    rates = [_rate(sight, e, factor, powers) for powers in (-1, 1) for e, factor in pairs]
     others = [refitted(sight.scope, e, factor) for e, factor in pairs if factor]
-    said = [*rates, *filter(None, others)]
+    said = [*filter(None, (*rates, *others))]
     if not said and within and want == NONE and have:  # a number is wanted
         text = sight.written(within[0])
         said = [f"{text}/(1 {common(have)})"] if len(text) < 40 else []
     return said[0] if said else None
 
 
-def _rate(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | None:
-    """A prime that is missing, or one too many: an expression is off by a time (or its square), and one thing in
-    it moves.
+def _rate(sight: Sight, expression: syntax.Expr, factor: Dimension, sense: int) -> str | None:
+    """A prime that is missing (sense -1), or one too many (1): an expression is off by a time (or its square), and one
+    thing in it moves.
     """
     powers = dict(factor)
-    if set(powers) != {"s"} or abs(powers["s"]) not in (1, 2):
+    if set(powers) != {"s"} or powers["s"] * sense not in (1, 2):
         return None
     primed, plain = set(), set()
     stack: list[object] = [expression]
@@ -77,11 +80,15 @@ def _rate(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | Non
             plain.add(e.name)
         elif not isinstance(e, (syntax.Member, syntax.Method)):
             stack += children(e)
-    found = primed if powers["s"] > 0 else plain
+    found = primed if sense > 0 else plain
     if len(found) != 1:
         return None
     (name,) = found
-    return f"{name} in place of {name}'?" if powers["s"] > 0 else f"{name}' in place of {name}?"
+    moved = sight.scope.find(name)
+    if sense < 0 and sight.dynamic and isinstance(moved, UnknownSymbol) and moved.kind == "s":
+        unit = "s" if powers["s"] == -1 else "s^2"
+        return f"over a time: ({sight.written(expression)})/(1 {unit}), or a parameter in {unit}"
+    return f"{name} in place of {name}'?" if sense > 0 else f"{name}' in place of {name}?"
 
 
 def bare(sight: Sight, expression: syntax.Expr) -> tuple[str, str | None] | None:

@@ -83,10 +83,7 @@ class Members(Ports):
             return self.outside(lambda: self.value(whole.symbol, e.span), whole.change, e.span)
         base = self.located(e.base)
         if base is None:
-            inner = e.base.base if isinstance(e.base, syntax.Item) else e.base
-            outer = self.located(inner.base) if isinstance(inner, syntax.Member) else None
-            if outer is not None and isinstance(outer.symbol, InstanceSymbol) and isinstance(inner, syntax.Member):
-                self._instance(outer.symbol, outer, inner)  # says what the instance lacks
+            self._lacking(e.base)
             root = _root(e.base)
             if root is not None and root.name not in self._bound and self.scope.find(root.name) is None:
                 raise self.unknown(root.name, root.span)
@@ -98,8 +95,21 @@ class Members(Ports):
             return Typed(ex.var(e.name, "audit"), AUDIT[e.name])
         domains = {b.domain.name: b.domain for b in self.branches if b.domain.pseudo}
         if e.name not in domains:
+            if self.scope.is_broken(e.name):
+                raise Failed
             raise self.no_member("audit", e, (*AUDIT, *domains))
         return self._ledger(domains[e.name], e)
+
+    def _lacking(self, e: syntax.Expr) -> None:
+        """Say what an instance on the way to a part of it lacks; nothing where it could not be made, as was said."""
+        while isinstance(e, (syntax.Member, syntax.Item)):
+            outer = self.located(e.base)
+            if outer is not None and isinstance(outer.symbol, InstanceSymbol):
+                if not outer.symbol.spaces:
+                    raise Failed
+                if isinstance(e, syntax.Member):
+                    self._instance(outer.symbol, outer, e)
+            e = e.base
 
     def _ledger(self, domain: Domain, e: syntax.Member) -> Value:
         """What the stores of a pseudo domain have gained since the start less what the other branches gave: zero."""

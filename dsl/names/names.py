@@ -209,7 +209,9 @@ class Names(Context):
 
     def _implied(self, symbol: Definition, span: syntax.Span) -> tuple[Node, ...]:
         if not all(name in self._bound for name in symbol.at):
-            raise self.fail("E101", f"'{symbol.name}' is known only inside its 'for {symbol.at[-1]}'", span)
+            help_ = f"behind its '}}' stands what is one of a kind; of all of them: sum({symbol.at[-1]} in 1..n: ...)"
+            said = f"'{symbol.name}' is known only inside its 'for {symbol.at[-1]}'"
+            raise self.fail("E101", said, span, help=help_)
         return tuple(v.node for name in symbol.at if isinstance(v := self._bound[name], Typed))
 
     def _expanded(self, symbol: ParameterSymbol | UnknownSymbol, span: syntax.Span) -> Vector:

@@ -166,7 +166,7 @@ class Recovery:
 
     def recover(self, kind: str) -> None:
         """Report a terminal that does not fit and bring the automaton to where it can go on."""
-        automaton = self.automaton
+        automaton, scanner = self.automaton, self.scanner
         if self.errors >= MAX_ERRORS:
             self._stop(f"more than {MAX_ERRORS} errors of syntax: the rest of the file is not read")
             return
@@ -175,14 +175,22 @@ class Recovery:
         if kind == "}" and body == "item" and (first or automaton.accepts("<newline>")):
             self._error(("E112", "'}' closes nothing that is open", None), self._token())
             if first:
-                self.scanner.restart(self.scanner.end, fresh=True)
+                scanner.restart(scanner.end, fresh=True)
             return
         if kind == "<end>" and automaton.accepts("}"):
             self._close_all()
             return
         if body != "item" and self._brace_is_missing():
             return
+        if body == "item" and first and self._head_is_missing():
+            return
         self._complain(kind)
+        if kind != "{" and automaton.accepts("{"):
+            from sysdyn.dsl.parser import headless
+
+            if headless.has_a_block(scanner):
+                headless.open_block(automaton, scanner.start)
+                return
         self._give_up(kind)
 
     def _complain(self, kind: str) -> None:
@@ -353,6 +361,18 @@ class Recovery:
         self._close(braces)
         scanner.restart(start, fresh=True)
         scanner.pending = True
+        return True
+
+    def _head_is_missing(self) -> bool:
+        """E107 where statements stand at the top of the file and behind them a '}': their head is read as meant."""
+        from sysdyn.dsl.parser import headless
+
+        head = headless.missing_head(self.scanner.text, self.scanner.start)
+        if head is None:
+            return False
+        said = f"statements of a {head.word} at the top of the file: the line that begins it is missing"
+        self._error(("E107", said, head.line), self._token())
+        headless.begin(self.automaton, head, _HEADS[head.word])
         return True
 
     def _close_all(self) -> None:

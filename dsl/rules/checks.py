@@ -87,12 +87,17 @@ def states(model: Elaborator, report: Report) -> None:
     given: dict[str, list[Place]] = {}
     for dynamic in model.parts.dynamics:
         given.setdefault(dynamic.state.data[0], []).append(dynamic.place)
+    told = set[Place]()
     for state in model.parts.states:
         places = given.get(state.name, [])
+        if not places and state.place in told:  # of another instance of the same component
+            continue
         if not places and state.name in model.parts.given:
             continue
         if not places:
-            help_ = f"dynamic {state.name}' = ...; what forces move is a coord {state.name}: translation"
+            told.add(state.place)
+            own = state.name.rpartition(".")[2]
+            help_ = f"dynamic {own}' = ...; what forces move is a coord {own}: translation"
             report.error("E507", f"state {state.name} has no dynamic", state.place, help=help_)
         elif len(places) > 1 and not state.shape:
             related = (Related("and here", places[1]),)

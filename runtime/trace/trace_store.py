@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sysdyn.names import stored
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Description, Floats
 from sysdyn.runtime.model.failures import TraceError
@@ -69,7 +70,7 @@ def columns_of(description: Description) -> tuple[Column, ...]:
         row = description.rows[k]
         for position in range(row.size):
             if row.stored:
-                name = row.named(position).replace("/", "\u2215")
+                name = stored(row.named(position))
                 label = row.named(position, row.label)
                 found.append(Column(name, place, row.unit, label, row.rate))
             place += 1
@@ -103,7 +104,7 @@ def _keep(group: Any, parameters: Sequence[Parameter]) -> None:
         template = templates.get(parameter.unit)
         if template is None:
             template = templates[parameter.unit] = hdf5.template(group, parameter.unit)
-        hdf5.copy(template, group, parameter.name.replace("/", "\u2215"), parameter.value)
+        hdf5.copy(template, group, stored(parameter.name), parameter.value)
 
 
 def clear(path: Path) -> None:

@@ -462,7 +462,8 @@ def test_a_name_changed_everywhere_leaves_a_model_what_it_is(model):
     declared = [*outline.items(document.tree)]
     declared += [d for i in declared if i.body for d in outline.body(document.source, i.body)]
     assert len(declared) > 10
-    for d in {d.place.span: d for d in declared}.values():
+    every = 1 if os.environ.get("SYSDYN_LONG") else 3
+    for d in [*{d.place.span: d for d in declared}.values()][::every]:
         changes = hover.renamed(document, d.place.span.start, "other_name")["changes"][document.uri]
         text = document.source.text
         for change in reversed(changes):

@@ -190,3 +190,27 @@ def test_an_interruption_while_an_object_is_taken_apart_is_not_lost(sent):
     assert process.returncode == 130
     assert out == "went on\n"
     assert said.split() == ["interrupted"]
+
+
+EARLY = """import os, signal, sys
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "click":
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+from sysdyn.entry import main
+main()
+"""
+
+
+@pytest.mark.parametrize("option", ["--quiet", "--json"])
+def test_an_interruption_while_the_command_is_imported_ends_it_as_any_other(tmp_path, option):
+    """A traceback before."""
+    command = [sys.executable, "-c", EARLY, "check", write(tmp_path, PENDULUM), option]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert ran.returncode == 130
+    if option == "--json":
+        assert json.loads(ran.stdout)["exit"] == 130
+        assert ran.stderr == ""
+    else:
+        assert ran.stderr == "interrupted\n"

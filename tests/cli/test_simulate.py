@@ -1,5 +1,7 @@
 """`sysdyn simulate`: its options, and the trace that comes of them."""
 
+import os
+import subprocess
 from pathlib import Path
 
 import h5py
@@ -363,3 +365,18 @@ def test_what_would_shorten_a_stopped_run_is_what_it_listens_to(tmp_path, capsys
     (said,) = [d for d in found["diagnostics"] if d["severity"] == "error"]
     assert said["code"] == "E934"
     assert said["help"].startswith(f"a higher limit, or {remedy}")
+
+
+def test_a_device_and_a_pipe_take_a_trace(tmp_path, capsys):
+    path = write(tmp_path, PENDULUM)
+    assert run(["simulate", path, "-o", os.devnull]) == 0
+    assert capsys.readouterr().err.rstrip().endswith(os.devnull)
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with subprocess.Popen(["cat", pipe], stdout=subprocess.PIPE) as reader:
+        assert run(["simulate", path, "-o", str(pipe), "--quiet"]) == 0
+        assert reader.stdout.read().startswith(b"\x89HDF")
+    if Path("/dev/full").exists():
+        assert run(["simulate", path, "-o", "/dev/full"]) == 5
+        assert "/dev/full: No space left on device" in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.h5"))

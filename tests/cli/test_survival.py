@@ -19,8 +19,8 @@ from sysdyn.runtime.trace.trace import Trace
 from texts import ENDLESS, PENDULUM, write
 
 LONG = bool(os.environ.get("SYSDYN_LONG"))
-KILLS = 100 if LONG else 6
-SIZES = 20 if LONG else 3
+KILLS = 100 if LONG else 4
+SIZES = 20 if LONG else 2
 DAMAGED = 1000 if LONG else 20
 
 WATCHED = """

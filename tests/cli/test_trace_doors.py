@@ -132,6 +132,7 @@ def living(path, output, *more):
 
 
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+@pytest.mark.one_in(2)
 def test_every_polite_end_keeps_the_rows_and_removes_what_was_hidden(tmp_path, monkeypatch, sent):
     monkeypatch.chdir(tmp_path)
     child = living(write(tmp_path, ENDLESS), "out.h5")

@@ -54,7 +54,7 @@ model m {
 }
 scene s of m { time 0 s to 1 s; trace V.f }
 """)
-    assert [(d.code, d.help) for d in found] == [("E102", "V.a.f or V.b.f; of an element inside, V.seat.f")]
+    assert [(d.code, d.help) for d in found] == [("E102", "V.a.f or V.b.f; of an element inside, V.poppet.f")]
 
 
 @pytest.mark.parametrize(
@@ -70,3 +70,17 @@ def test_an_element_that_delivers_power_is_led_to_its_content(law, content, line
     (active,) = check(text)
     assert (active.code, active.help[-len(line) :]) == ("E313", line)
     assert [d for d in check(text.replace(law, content)) if d.severity != "note"] == []
+
+
+@pytest.mark.parametrize(
+    ("given", "help_"),
+    [
+        ("inp = x -> ground", "inp = x: a port is one node"),
+        ("in_ = x -> ground", "nearest: 'inp'"),
+        ("foo = x -> ground", "it has inp, out"),
+    ],
+)
+def test_a_port_that_is_given_two_ends(given, help_):
+    text = "from std.mechanical import gear\nmodel m {\n  node x, y: rotation\n  A: gear(ratio = 2) %s, out = y\n}\n"
+    found = next(d for d in check(text % given) if d.severity == "error")
+    assert (found.code, found.help) == ("E407", help_)

@@ -42,7 +42,7 @@ def _stores(folder, seed, formulation):
 @pytest.mark.parametrize(
     ("seed", "charged", "formulations"),
     [
-        (17, (), FORMULATIONS),
+        pytest.param(17, (), FORMULATIONS, marks=pytest.mark.long),
         (33, (), FORMULATIONS[2:]),  # E516, and a run that stops, in the others
         pytest.param(34, (), FORMULATIONS, marks=pytest.mark.one_in(2)),
         (36, (), FORMULATIONS),
@@ -67,6 +67,7 @@ def test_stores_begin_as_guessed_in_every_formulation(seed, charged, formulation
 
 
 @pytest.mark.parametrize("seed", [4, 11, 26, 39])
+@pytest.mark.one_in(2)
 @pytest.mark.filterwarnings("ignore")
 def test_six_digits(seed, tmp_path):
     """Behind an event inductors that megaohms tie move within 1e-9 s: values between the ends of the next steps

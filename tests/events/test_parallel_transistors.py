@@ -23,7 +23,7 @@ scene s of pair {{
 
 
 @pytest.mark.parametrize("vf", [0.7, 0.5])
-@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian"])
 @pytest.mark.one_in(2)
 def test_two_body_diodes_side_by_side(tmp_path, vf, formulation):
     """Channels of 1 and 2 ohm divide 10 V sin beside 4 ohm; below, the diode with the least forward voltage holds."""

@@ -110,7 +110,7 @@ scene s of m {
 """
 
 
-@pytest.mark.parametrize("number", [3, 4, 220])
+@pytest.mark.parametrize("number", [3, 4, pytest.param(220, marks=pytest.mark.long)])
 def test_hills_of_arrays(number, tmp_path):
     """Each passes its own; more than 200 were passed over, told as met."""
     found = ran(tmp_path, SWARM, settings=(("n", str(number)),), accuracy=1e-6)

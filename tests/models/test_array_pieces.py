@@ -236,7 +236,8 @@ scene warm of m {
 """
 
 
-@pytest.mark.parametrize(("n", "k"), [(2, 2), (2, 4), (3, 3), (5, 4)])
+@pytest.mark.parametrize(("n", "k"), [(5, 4), (2, 4), (2, 2), (3, 3)])
+@pytest.mark.one_in(2)
 def test_a_grid_with_edges_and_corners_of_their_own(tmp_path, n, k):
     """What rises evenly along both indices is the mean of its neighbours everywhere."""
     (tmp_path / "m.sd").write_text(PLATE)

@@ -133,12 +133,12 @@ def test_a_grid_without_order_keeps_its_names(tmp_path):
 @pytest.mark.one_in(12)
 def test_what_is_joined_without_order_is_families_that_do_not_grow(of, effort):
     """Tables of indices tell what is joined to what: as many statements for any number of lines, each at equal cost."""
-    short, few = effort(lambda: compiled(of(160)))
-    long, many = effort(lambda: compiled(of(320)))
+    short, few = effort(lambda: compiled(of(96)))
+    long, many = effort(lambda: compiled(of(192)))
     assert len(long.family.branches) == len(short.family.branches)
     assert len(long.form.families) == len(short.form.families)
     assert len(long.text) < 1.05 * len(short.text)
-    lines = len(of(320).splitlines()) - len(of(160).splitlines())
+    lines = len(of(192).splitlines()) - len(of(96).splitlines())
     assert (many - few) / lines < 4000  # lines of Python a line of text
 
 
@@ -181,7 +181,7 @@ def test_a_chain_of_scalars_leaves_no_full_matrix():
         found = condensed(system, 0.0, zero, zero)
         return found.stepped._share.size
 
-    few, many = terms(100), terms(200)
+    few, many = terms(50), terms(100)
     assert many < 2.5 * few
 
 

@@ -25,7 +25,8 @@ def test_steep_laws_that_jump_are_rosenbrocks_first():
         assert abs(one[-1] - two[-1]) <= 1.1e-2 * max(abs(one).max(), abs(two).max()), name
 
 
-@pytest.mark.parametrize("method", ["rosenbrock", "radau", "bdf"])
+@pytest.mark.parametrize("method", ["radau", "rosenbrock", "bdf"])
+@pytest.mark.one_in(2)
 def test_the_core_turns_laws_as_the_handler_does(monkeypatch, method):
     """Events and ends are the same but for the errors of runs at this tolerance (1e-4 by radau); what the core does the
     handler is not asked.

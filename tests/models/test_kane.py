@@ -263,7 +263,7 @@ def test_the_complementary_form_has_no_multiplier_of_an_effort_constraint(tmp_pa
 
 def test_without_flow_constraint_and_quasi_velocity_the_flows_are_the_speeds(capsys):
     """Its rows are Lagrange's; `verify` and `trade` do not run one form under two names."""
-    path = str(ROOT / "models" / "seed" / "two_link_arm.sd")
+    path = str(ROOT / "models" / "seed" / "pendulum.sd")
     texts = []
     for formulation in ("lagrangian", "kane"):
         assert main(["equations", path, "--formulation", formulation, "--quiet"]) == 0

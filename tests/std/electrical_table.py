@@ -150,7 +150,6 @@ ROWS = (
             "b.e": lambda t: maximum(10 * sin(400 * t), 0),
             "D.e": lambda t: minimum(10 * sin(400 * t), 0),
         },
-        PRIMAL,
     ),
     Row(
         "npn",
@@ -219,7 +218,6 @@ ROWS = (
             "L.f": lambda t: 10 * (1 - exp(-1e3 * minimum(t, 2e-3))) * exp(-1e3 * maximum(t - 2e-3, 0)),
             "b.e": lambda t: 10.0 * (t < 2e-3),
         },
-        PRIMAL,
     ),
     Row(
         "thyristor",
@@ -233,7 +231,6 @@ ROWS = (
         {
             "b.e": lambda t: 10 * sin(100 * pi * t) * (t > 3e-3) * (t < 1e-2),
         },
-        PRIMAL,
     ),
     Row(
         "mosfet",
@@ -247,7 +244,6 @@ ROWS = (
         {
             "b.e": lambda t: maximum(10 * sin(2 * pi * t) * (1 - 0.8 * (t < 1.0)), -0.7),
         },
-        PRIMAL,
     ),
     Row(
         "pulse",

@@ -1,7 +1,7 @@
 """Flows of known response."""
 
 from numpy import arctan, cos, exp, log, maximum, minimum, sin, sqrt, vectorize, where
-from runs import PRIMAL, Row
+from runs import Row
 from scipy.optimize import brentq
 
 DRAIN = sqrt(900 * 9.8 / (0.5 * 4e7))
@@ -205,7 +205,6 @@ ROWS = (
             "o.e": lambda t: 2e5 * maximum(sin(3 * t), 0),
             "V.e": lambda t: 2e5 * minimum(sin(3 * t), 0),
         },
-        PRIMAL,
     ),
     Row(
         "relief_valve",
@@ -219,6 +218,5 @@ ROWS = (
         {
             "a.e": lambda t: where(t < 1, 1e6 * t, (1e-4 * t + 1e-3) / 1.1e-9),
         },
-        PRIMAL,
     ),
 )
