@@ -26,7 +26,7 @@
 #define LEAST 1e-10        /* error of a step, for the next one's size */
 #define SHRUNK 1e-3        /* of the step that was tried first, below which the point that it begins at is settled */
 #define AFRESH 0.1         /* of it: what is tried from there */
-#define GIVEN 0.5          /* of a slope: what is less has given way */
+#define GIVEN 0.1          /* of a slope: what is less has given way */
 #define FAILS 12           /* matrices and stages of a step that may fail */
 
 static int step(void *rosenbrock)
