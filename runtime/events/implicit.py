@@ -77,9 +77,11 @@ class Implicit:
         pair = largest[value], largest[[c.multiplier for c in own]]
         size, grows = (np.where(held, *sizes) for sizes in (pair[::-1], pair))
         answer = told @ moves
-        begin = end + answer[:, -1]
-        begin[np.abs(begin) <= ROUND_OFF * (np.abs(end) + np.abs(told) @ np.abs(moves[:, -1]))] = 0.0
-        turned = lemke(answer[:, :-1] * grows / size[:, None], begin / size)
+        begin, slopes = end + answer[:, -1], answer[:, :-1] * grows / size[:, None]
+        turned = lemke(slopes, begin / size)
+        if turned is None:  # of values that are round-off one may seem to be less than zero
+            terms = np.abs(end) + np.abs(told) @ np.abs(moves[:, -1])
+            turned = lemke(slopes, np.where(np.abs(begin) <= ROUND_OFF * terms, 0.0, begin) / size)
         if turned is None:
             return None
         active = contacts.active.copy()
