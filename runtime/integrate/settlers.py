@@ -47,6 +47,7 @@ class Settlers:
         n = system.form.written
         self.keeps: NDArray[np.bool_] = roles.state[:n]
         """Unknowns as written that carry the state."""
+        self._common = roles.common[:n]
         t, y, yd = point
         self._point = (t, y[:n], yd[:n]) if system.unknowns <= RATED else None
         self.settler = self.of("settled" if forms is not None else self.whole_form, self.keeps)
@@ -81,7 +82,8 @@ class Settlers:
         left = self._forms.settled if self._forms is not None and name == "settled" and not whole else None
         system = self.system.another(name)
         magnitude = self._sizes.magnitude[: form.written]
-        return Settler(system, (form.k_q, form.k_f), magnitude, self._sizes.time, state, left)
+        common = self._common if state is self.keeps else None
+        return Settler(system, (form.k_q, form.k_f), magnitude, self._sizes.time, state, left, common)
 
     def projection(self) -> Settler | None:
         """Of the constraints alone, onto which accepted points are moved; None where no row lets them drift."""

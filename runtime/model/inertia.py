@@ -139,6 +139,18 @@ def joined(system: System) -> NDArray[np.bool_]:
     return found
 
 
+def stored_between(system: System, common: Ints) -> Ints:
+    """Pairs [k, 2] of unknowns of one group `common` [unknowns] (-1: of none) that a store joins: the rate of the one
+    stands in the balance of the other.
+    """
+    own = own_unknown(system, "dynamics", "f")[system.pattern.row]
+    column = system.pattern.columns_of()
+    there = system.structural()[1] & (own >= 0) & (own != column)
+    there &= (common[own] >= 0) & (common[own] == common[column])
+    pairs = np.sort(np.stack([own[there], column[there]], axis=1), axis=1)
+    return np.unique(pairs, axis=0)
+
+
 def inertia(system: System, jy: Floats, jyd: Floats) -> Floats:
     """M [flows, flows] as a full matrix; no numbers where momenta do not determine their flows.
 

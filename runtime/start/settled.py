@@ -18,6 +18,7 @@ from sysdyn.runtime.condense.elimination import affine
 from sysdyn.runtime.condense.sums import numbers_of
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.inertia import stored_between
 from sysdyn.runtime.model.layout import entries_of
 from sysdyn.runtime.model.own_rows import own_rows, own_rows_of_rates
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
@@ -34,6 +35,8 @@ LARGE = 100_000
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
 RATES = ("momentum_rate", "gamma_rate", "dynamics_rate")
+DIFFERS = 2
+"""SD_DIFFERS (core/system/settle.h): an unknown whose differences from others are of the state."""
 LEFT_OUT = 3
 """SD_LEFT_OUT (core/system/settle.h): a row that no point is asked to meet."""
 HELD = 1e8
@@ -118,7 +121,7 @@ class Settler:
 
     settled: the System in form "settled"; magnitude [unknowns] of y; rate_magnitude [rates];
     state [unknowns] bool: unknowns that carry the state and should move least.  condensed: what is left of the settled
-    form; the other unknowns follow.
+    form; the other unknowns follow.  common [unknowns]: groups of which differences alone are states (`Roles.common`).
     """
 
     def __init__(
@@ -129,6 +132,7 @@ class Settler:
         time_scale: float,
         state: NDArray[np.bool_],
         condensed: Condensed | None = None,
+        common: Ints | None = None,
     ) -> None:
         self.system, self._points = settled, settled.unknowns
         self._left = settled if condensed is None else condensed
@@ -142,12 +146,24 @@ class Settler:
         self._sort = settled.once(("sorts", *self._key), self._sorts)
         self._state = np.zeros(self._moves, dtype=np.bool_)
         self._state[:n] = state
+        self._part = self._state.astype(np.int8)
+        self._pairs = np.zeros((0, 2), dtype=np.int32)
+        if common is not None and (common >= 0).any():
+            self._by_differences(common, np.arange(n) if condensed is None else condensed.kept)
         self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
         self.scale = np.concatenate([magnitude, magnitude[self.rates] / time_scale])
         self.linear: Any = None
         if self._moves <= LATER:
             self._provide()
         self._allocate()
+
+    def _by_differences(self, common: Ints, kept: Ints) -> None:
+        """Of groups whose members are all kept the differences over each store carry the state."""
+        gone = np.delete(common, kept)
+        common = np.where(np.isin(common, gone), np.int32(-1), common)
+        place = numbers_of(common.size, kept)
+        self._pairs = np.ascontiguousarray(place[stored_between(self.system, common)], dtype=np.int32)
+        self._part[: self._n][common[kept] >= 0] = DIFFERS
 
     def _saddle(self) -> tuple[Pattern, list[Ints]]:
         """Pattern of [D G^T; G -eps] and the places of the parts."""
@@ -166,6 +182,8 @@ class Settler:
             Places(rd, xd),
             Places(diagonal_x, diagonal_x),
             Places(diagonal_r, diagonal_r),
+            Places(*self._pairs.T),
+            Places(*self._pairs.T[::-1]),
         ]
         found, slots = compress(number, number, parts)
         for k in (2, 3):
@@ -192,7 +210,7 @@ class Settler:
 
     def _provide(self) -> None:
         """The factors of the saddle-point matrix, and where its parts stand."""
-        self.pattern, self._slots = self.system.once(("saddle", *self._key), self._saddle)
+        self.pattern, self._slots = self.system.once(("saddle", *self._key, self._pairs.tobytes()), self._saddle)
         self._order = self.system.once(("saddle order", *self._key, self._state.tobytes()), self._saddle_order)
         self.linear = self._order.linear(self.pattern)
 
@@ -211,7 +229,7 @@ class Settler:
 
     def _placed(self) -> None:
         """What the core is told of them."""
-        names = ("slot_y", "slot_y_t", "slot_yd", "slot_yd_t", "slot_x", "slot_r")
+        names = ("slot_y", "slot_y_t", "slot_yd", "slot_yd_t", "slot_x", "slot_r", "slot_pair", "slot_pair_t")
         for name, slot in zip(names, self._slots, strict=True):
             setattr(self.core.contents, name, lib.pointer(slot))
 
@@ -234,8 +252,9 @@ class Settler:
         if not self.core:
             raise MemoryError
         core = self.core.contents
-        core.state, core.follows = lib.pointer(self._state), FREE**2
+        core.state, core.follows = lib.pointer(self._part), FREE**2
         core.rate = lib.pointer(self.rates)
+        core.pair, core.pairs = lib.pointer(self._pairs), len(self._pairs)
         if self.linear is None:
             self._wanted = lib.PROVIDE(self._provided())
             core.provide = c.cast(self._wanted, c.c_void_p)

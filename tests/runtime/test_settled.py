@@ -3,6 +3,7 @@
 import chain_model as chain
 import numpy as np
 import pytest
+import small_models as models
 from sysdyn.runtime.integrate.integrate import Integration, Request
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.carrier import load
@@ -146,3 +147,30 @@ def test_links_that_turn_ask_for_no_other_pivots():
     made = settler.linear.contents
     assert made.factorisations >= 41
     assert made.pivotings == 1
+
+
+@pytest.mark.parametrize("off", [1e-6, 0.3])
+def test_a_floating_store_keeps_its_difference_and_not_what_its_ends_are_at(off):
+    """A capacitor (1) from x to y, 100 and 1 S from these to 90 V and to ground: both ends at which it holds 7 V are
+    known in closed form; a point whose ends are off by as much each finds back, one off in its difference has it."""
+    manifest, binding, module = models.small(
+        "x y",
+        "(f_x - f_y)**2/2",
+        content="100*(f_x - 90)**2/2 + f_y**2/2",
+        initial={"f_x": (7.0 + 8300.0 / 101.0, True)},
+    )
+    system = System(manifest, binding, load(module), "2")
+    state = consistent_start(system, 0.0)
+    integration = Integration(system, state, Request(0.1, np.array([0.1]), index=2))
+    found, n = integration.settler, system.form.written
+    found.core.contents.slack = found.core.contents.still = 0.0
+    x, y = map([system.name(k) for k in range(n)].index, ("f_x", "f_y"))
+    point, rates = integration.y[:n].copy(), integration.yd[:n].copy()
+    for apart, moved in ((7.0, (off, off)), (7.0 + off, (off, 0.0)), (7.0 - off, (0.0, off))):
+        low = 100.0 * (90.0 - apart) / 101.0  # 100 (90 - f_x) = f_y
+        at = point.copy()
+        at[[x, y]] = 83.0 * 100.0 / 101.0 + np.array([7.0, 0.0]) + moved
+        settled, _, fine = found.settle(0.0, at, rates)
+        assert fine
+        assert abs(settled[x] - settled[y] - apart) < 1e-10
+        assert abs(settled[y] - low) < 1e-10

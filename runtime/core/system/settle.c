@@ -2,13 +2,12 @@
 #include "system/settle.h"
 #include "system/condensed.h"
 #include "system/settle_basis.h"
+#include "system/settle_room.h"
+#include "system/settle_saddle.h"
 
-#include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#define EPSILON 1e-14   /* of redundant rows */
 #define ITERATIONS 6
 #define PATIENT 40      /* of the last attempt: an exponential is climbed down a step at a time */
 #define EXACT 4e-15     /* scaled residual that counts as round-off */
@@ -22,133 +21,7 @@
 #define REFUSALS 3      /* of the basis in a row, behind which it is tried once in AGAIN points alone, and */
 #define AGAIN 16        /* behind SD_BASIS_OUT of them not any more */
 #define BEYOND 1e3      /* times the point that was found, from which a magnitude was that of an iterate */
-#define SMALL_POINT 20000 /* unknowns and rates up to which room for slopes is kept */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
-
-sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
-{
-    sd_settle *settle = calloc(1, sizeof *settle);
-    if (!settle)
-        return NULL;
-    size_t m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1, steep = system->scales > 0 ? n : 0;
-    settle->memory = calloc(m + 2 * n + steep, sizeof(double));
-    settle->taken = linear ? calloc((size_t)linear->entries + 1, sizeof(double)) : NULL;
-    if (!settle->memory || (linear && !settle->taken)) {
-        sd_settle_free(settle);
-        return NULL;
-    }
-    settle->system = system;
-    settle->linear = linear;
-    settle->unknowns = system->unknowns;
-    settle->rates = rates;
-    settle->rows = system->rows;
-    settle->hold = 1.0;
-    settle->row_scale = settle->memory;
-    settle->scale = settle->row_scale + m;
-    settle->met = settle->scale + n;
-    settle->usual = settle->met + n;
-    settle->matrix = settle->taken;
-    return settle;
-}
-
-/* room for one point: lent by the caller, or its own from then on; 0: no memory */
-static int provide_work(sd_settle *settle)
-{
-    const sd_system *system = settle->system;
-    size_t m = (size_t)settle->rows + 1, n = (size_t)(settle->unknowns + settle->rates) + 1;
-    size_t kept = system->left ? (size_t)system->unknowns + 8 : 0, all = 2 * m + 2 * n + 2 * kept;
-    double *next = settle->lent && settle->lent_room >= all ? settle->lent : settle->work;
-    if (!next && !(next = settle->work = malloc(all * sizeof *next)))
-        return 0;
-    settle->r = next;
-    settle->x0 = settle->r + m;
-    settle->step = settle->x0 + n; /* unknowns, rates and rows; a basis is chosen there before it steps */
-    settle->room = settle->step + n + m;
-    if (settle->basis)
-        sd_sparse_lend(settle->basis, settle->step);
-    return 1;
-}
-
-/* room for the best point of an iteration without a basis: its own from then on; 0: no memory */
-static int provide_best(sd_settle *settle)
-{
-    if (!settle->x)
-        settle->x = malloc(((size_t)(settle->unknowns + settle->rates) + 1) * sizeof *settle->x);
-    return settle->x != NULL;
-}
-
-static void free_slopes(sd_settle *settle)
-{
-    free(settle->jy);
-    free(settle->basis_column);
-    settle->jy = settle->jyd = settle->basis_value = NULL;
-    settle->basis_column = settle->basis_row = NULL;
-}
-
-/* room for slopes, and for what a basis takes of them; 0: no memory */
-static int provide_slopes(sd_settle *settle)
-{
-    size_t entries = (size_t)settle->system->entries + 1, rows = (size_t)settle->rows + 1;
-    size_t basis = settle->basis ? (size_t)settle->basis_entries + 1 : 0;
-    if (settle->jy)
-        return 1;
-    settle->jy = malloc((2 * entries + basis) * sizeof *settle->jy);
-    settle->basis_column = basis ? malloc((rows + basis) * sizeof *settle->basis_column) : NULL;
-    if (!settle->jy || (basis && !settle->basis_column)) {
-        free_slopes(settle);
-        return 0;
-    }
-    settle->jyd = settle->jy + entries;
-    settle->basis_value = settle->jyd + entries;
-    settle->basis_row = settle->basis_column + rows;
-    return 1;
-}
-
-/* of a large one lets go of it: rows of linear laws take new slopes once in many steps */
-static void leave_slopes(sd_settle *settle)
-{
-    if (settle->unknowns + settle->rates > SMALL_POINT)
-        free_slopes(settle);
-}
-
-int sd_settle_take(sd_settle *settle, sd_linear *linear)
-{
-    settle->taken = calloc((size_t)linear->entries + 1, sizeof(double));
-    if (!settle->taken)
-        return 2;
-    settle->linear = linear;
-    settle->matrix = settle->taken;
-    return 0;
-}
-
-void sd_settle_free(sd_settle *settle)
-{
-    if (!settle)
-        return;
-    free(settle->taken);
-    sd_sparse_free(settle->basis);
-    free_slopes(settle);
-    free(settle->work);
-    free(settle->x);
-    free(settle->memory);
-    free(settle);
-}
-
-int sd_settle_widen(sd_settle *settle, const int32_t *order, int32_t determined)
-{
-    settle->determined = determined;
-    free_slopes(settle); /* room for more is wanted */
-    return sd_settle_basis_new(settle, order);
-}
-
-void sd_settle_rest(sd_settle *settle)
-{
-    if (settle->unknowns + settle->rates <= SMALL_POINT)
-        return;
-    free(settle->work);
-    free(settle->x);
-    settle->work = settle->x = NULL;
-}
 
 /* largest scaled residual at (t, x) */
 static double measure(sd_settle *settle, double t, const double *y, const double *yd)
@@ -170,76 +43,11 @@ static double measure(sd_settle *settle, double t, const double *y, const double
     return worst;
 }
 
-/* Slopes at (t, y, yd) in scaled unknowns, and row scales from the magnitudes of the terms.  met: the point is one of
- * the motion, with which magnitudes grow; an iterate may be anywhere.  0: no memory. */
-static int slopes(sd_settle *settle, double t, const double *y, const double *yd, int met)
-{
-    sd_system *system = settle->system;
-    int32_t n = settle->unknowns, rates = settle->rates;
-    settle->ready = SD_BY_NONE;
-    if (!provide_slopes(settle))
-        return 0;
-    sd_jacobian(system, t, y, yd, settle->scale, settle->jy, settle->jyd);
-    memset(settle->row_scale, 0, (size_t)settle->rows * sizeof(double));
-    for (int32_t j = 0; j < n + rates && met; j++) {
-        double size = fabs(j < n ? y[j] : yd[settle->rate[j - n]]);
-        if (size > settle->scale[j] && isfinite(size))
-            settle->scale[j] = size;
-    }
-    for (int32_t j = 0; j < n; j++) /* scale of yd at [step] for the moment */
-        settle->step[j] = 0.0;
-    for (int32_t k = 0; k < rates; k++)
-        settle->step[settle->rate[k]] = settle->scale[n + k];
-    for (int32_t j = 0; j < n; j++)
-        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++) {
-            settle->jy[e] *= settle->scale[j];
-            settle->jyd[e] *= settle->step[j];
-            settle->row_scale[system->row[e]] += fabs(settle->jy[e]) + fabs(settle->jyd[e]);
-        }
-    for (int32_t i = 0; i < settle->rows; i++)
-        settle->row_scale[i] = settle->sort[i] == SD_LEFT_OUT   ? 0.0
-                               : settle->row_scale[i] > 0.0 ? 1.0 / settle->row_scale[i]
-                                                            : 1.0;
-    return 1;
-}
-
-/* the saddle-point matrix and its factors at (t, y, yd) */
-static int factorise(sd_settle *settle, double t, const double *y, const double *yd)
-{
-    sd_system *system = settle->system;
-    int32_t n = settle->unknowns, rates = settle->rates;
-    if ((!settle->linear && settle->provide()) || !slopes(settle, t, y, yd, 1))
-        return 1;
-    memset(settle->matrix, 0, (size_t)settle->linear->entries * sizeof(double));
-    for (int32_t e = 0; e < system->entries; e++) {
-        double scale = settle->row_scale[system->row[e]];
-        double a = settle->jy[e] * scale, b = settle->jyd[e] * scale;
-        if (settle->slot_y[e] >= 0) {
-            settle->matrix[settle->slot_y[e]] += a;
-            settle->matrix[settle->slot_y_t[e]] += a;
-        }
-        if (settle->slot_yd[e] >= 0) {
-            settle->matrix[settle->slot_yd[e]] += b;
-            settle->matrix[settle->slot_yd_t[e]] += b;
-        }
-    }
-    leave_slopes(settle);
-    for (int32_t j = 0; j < n + rates; j++)
-        settle->matrix[settle->slot_x[j]] += settle->state[j] ? settle->hold : settle->follows;
-    for (int32_t i = 0; i < settle->rows; i++)
-        settle->matrix[settle->slot_r[i]] -= EPSILON;
-    if (sd_first_bad(settle->linear->entries, settle->matrix) >= 0 ||
-        sd_linear_factor(settle->linear, settle->matrix, NULL))
-        return 1;
-    settle->ready = SD_BY_MATRIX;
-    return 0;
-}
-
 /* the basis at (t, y, yd), an iterate */
 static int choose(sd_settle *settle, double t, const double *y, const double *yd)
 {
-    int failed = !slopes(settle, t, y, yd, 0) || sd_settle_choose(settle);
-    leave_slopes(settle);
+    int failed = !sd_settle_slopes(settle, t, y, yd, 0) || sd_settle_choose(settle);
+    sd_settle_leave_slopes(settle);
     return failed;
 }
 
@@ -250,12 +58,12 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
     double limit = fmax(EXACT, settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
     /* near a law's flat place round-off leaves much; of steep ones the saddle-point matrix makes more */
     double bound = settle->system->scales > 0 ? FINE : CLOSE;
-    int fresh = settle->ready != SD_BY_BASIS, failed = fresh && !slopes(settle, t, y, yd, 1);
+    int fresh = settle->ready != SD_BY_BASIS, failed = fresh && !sd_settle_slopes(settle, t, y, yd, 1);
     double before = failed ? INFINITY : measure(settle, t, y, yd);
     settle->drift = settle->constraints;
     if (fresh && !failed) {
         failed = before > limit && sd_settle_choose(settle); /* a point that holds as it comes asks for none */
-        leave_slopes(settle);
+        sd_settle_leave_slopes(settle);
     }
     for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
         if (before <= limit && (m == 0 || moved < SMALL))
@@ -286,32 +94,6 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
     return 0;
 }
 
-/* One Gauss-Newton step of x = (y, chosen yd); the largest moves of all and of the state, in magnitudes.  The state is drawn
- * to where it came from, what follows from it only held where it is: so in the end it exerts no pull. */
-static double move(sd_settle *settle, double *y, double *yd, double *state)
-{
-    int32_t n = settle->unknowns, moves = n + settle->rates;
-    double largest = 0.0;
-    *state = 0.0;
-    for (int32_t j = 0; j < moves; j++) {
-        double now = j < n ? y[j] : yd[settle->rate[j - n]];
-        settle->step[j] = settle->state[j] ? -settle->hold * (now - settle->x0[j]) / settle->scale[j] : 0.0;
-    }
-    for (int32_t i = 0; i < settle->rows; i++)
-        settle->step[moves + i] = -settle->r[i] * settle->row_scale[i];
-    sd_linear_solve(settle->linear, settle->step);
-    for (int32_t j = 0; j < n; j++)
-        y[j] += settle->step[j] * settle->scale[j];
-    for (int32_t k = 0; k < settle->rates; k++)
-        yd[settle->rate[k]] += settle->step[n + k] * settle->scale[n + k];
-    for (int32_t j = 0; j < moves; j++) {
-        largest = fmax(largest, fabs(settle->step[j]));
-        if (settle->state[j])
-            *state = fmax(*state, fabs(settle->step[j]));
-    }
-    return largest;
-}
-
 /* x := (y, chosen yd) */
 static void take(const sd_settle *settle, const double *y, const double *yd, double *x)
 {
@@ -331,7 +113,7 @@ static void put(const sd_settle *settle, const double *x, double *y, double *yd)
 /* The iteration from (y, yd) towards what is nearest to x0; the best point met, its residual in `best`, is left in x. */
 static void iterate(sd_settle *settle, double t, double *y, double *yd, int most, double *best)
 {
-    int fresh = settle->ready != SD_BY_MATRIX, failed = fresh && factorise(settle, t, y, yd);
+    int fresh = settle->ready != SD_BY_MATRIX, failed = fresh && sd_settle_factorise(settle, t, y, yd);
     double moved = 0.0, pulled = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
     double still = settle->hold == 1.0 ? settle->still : 0.0; /* one that is held stays where it is */
     *best = before;
@@ -340,7 +122,7 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
     for (int m = 0; m < most && !failed && !*settle->system->stop; m++) {
         if ((moved < SMALL || pulled < still) && before <= fmax(EXACT, settle->enough))
             break;
-        moved = move(settle, y, yd, &pulled);
+        moved = sd_settle_move(settle, y, yd, &pulled);
         double now = measure(settle, t, y, yd);
         if (!(now <= CLOSE))
             settle->contracted = fmax(settle->contracted, before > 0.0 && isfinite(now) ? now / before : INFINITY);
@@ -358,7 +140,7 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
         if (fresh && m > 0 && stays && moved < STILL) /* what is left no move takes away: the next would be the same */
             break;
         if (now > CONTRACTS * before && now > fmax(EXACT, settle->enough)) {
-            failed = factorise(settle, t, y, yd);
+            failed = sd_settle_factorise(settle, t, y, yd);
             fresh = 1;
         }
         before = now;
@@ -418,9 +200,9 @@ static int holds(sd_settle *settle, double t, const double *y, const double *yd,
         }
     }
     if (grown) {
-        if (!slopes(settle, t, y, yd, 0))
+        if (!sd_settle_slopes(settle, t, y, yd, 0))
             return 0;
-        leave_slopes(settle);
+        sd_settle_leave_slopes(settle);
         best = measure(settle, t, y, yd);
     }
     return best <= limit || (measure(settle, t, y, yd), settle->own <= limit);
@@ -429,10 +211,14 @@ static int holds(sd_settle *settle, double t, const double *y, const double *yd,
 /* whether the state is further from where it was than it may be */
 static int strays(const sd_settle *settle)
 {
-    if (settle->most > 0.0)
-        for (int32_t j = 0; j < settle->unknowns; j++)
-            if (settle->state[j] && fabs(settle->x[j] - settle->x0[j]) > settle->most * settle->scale[j])
-                return 1;
+    if (settle->most <= 0.0)
+        return 0;
+    for (int32_t j = 0; j < settle->unknowns; j++)
+        if (settle->state[j] == SD_CARRIES && fabs(settle->x[j] - settle->x0[j]) > settle->most * settle->scale[j])
+            return 1;
+    for (int32_t k = 0; k < settle->pairs; k++)
+        if (fabs(sd_settle_parted(settle, k, settle->x, settle->x0)) > settle->most)
+            return 1;
     return 0;
 }
 
@@ -455,7 +241,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
         }
         put(settle, settle->x0, y, yd);
     }
-    if (!provide_best(settle)) {
+    if (!sd_settle_provide_best(settle)) {
         settle->failures++;
         return 1;
     }
@@ -520,7 +306,7 @@ static void follow_kept(const sd_settle *settle, const double *z, const double *
 /* the same for a point with all unknowns of the system that this one is condensed from */
 static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
 {
-    if (!provide_work(settle))
+    if (!sd_settle_provide_point(settle))
         return 1;
     if (!settle->system->left)
         return settle_unknowns(settle, t, y, yd);
@@ -532,7 +318,7 @@ static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
 
 int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd)
 {
-    if (settle->calls == settle->failures || settle->seen || settle->system->left || !provide_work(settle))
+    if (settle->calls == settle->failures || settle->seen || settle->system->left || !sd_settle_provide_point(settle))
         return 0;
     int holds = measure(settle, t, y, yd) <= fmax(FINE, settle->enough);
     if (holds)
@@ -542,7 +328,7 @@ int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd)
 
 int sd_settle_meets(sd_settle *settle, double t, double *y, double *yd)
 {
-    if (settle->calls == settle->failures || settle->seen || !provide_work(settle))
+    if (settle->calls == settle->failures || settle->seen || !sd_settle_provide_point(settle))
         return 0;
     const int condensed = settle->system->left != NULL;
     double *zd = yd, *z = condensed ? gather_kept(settle, y, yd, &zd) : y;

@@ -19,7 +19,12 @@
 #include "linear/sparse.h"
 
 /* Of a condensed system the kept unknowns are moved; the others follow, and so do their rates. */
+/* what an unknown is of the state: nothing, one of it, one whose differences from others (`pair`) are of it: what floating
+ * stores hold, each difference with the weight 1; what their ends have in common follows */
+enum { SD_STATELESS, SD_CARRIES, SD_DIFFERS };
 enum { SD_OTHER, SD_CONSTRAINT, SD_RATE, SD_LEFT_OUT };
+
+enum { SD_BY_NONE, SD_BY_MATRIX, SD_BY_BASIS }; /* what is ready */
 
 typedef struct sd_settle {
     sd_system *system;
@@ -29,7 +34,10 @@ typedef struct sd_settle {
     const int32_t *slot_y, *slot_y_t;     /* [entries] places of dF/dy in the matrix and its transpose, -1: none */
     const int32_t *slot_yd, *slot_yd_t;   /* [entries] the same of dF/dyd */
     const int32_t *slot_x, *slot_r;       /* [unknowns + rates], [rows] diagonal */
-    const char *state;               /* [unknowns + rates] 1: carries the state, which has the weight 1 */
+    const char *state;               /* [unknowns + rates] SD_STATELESS ... */
+    const int32_t *pair;             /* [pairs][2] unknowns of which stores know the difference */
+    const int32_t *slot_pair, *slot_pair_t; /* [pairs] its place in the matrix and its transpose */
+    int32_t pairs;
     double follows;                  /* weight of the others: almost nothing */
     double *scale;                   /* [unknowns + rates] magnitudes */
     const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE; SD_LEFT_OUT */

@@ -144,8 +144,12 @@ class Settle(c.Structure):
                 "slot_x",
                 "slot_r",
                 "state",
+                "pair",
+                "slot_pair",
+                "slot_pair_t",
             ]
         ],
+        ("pairs", I),
         ("follows", D),
         *[(name, P) for name in ["scale", "sort"]],
         ("k_q", P),
