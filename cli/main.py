@@ -20,36 +20,46 @@ from sysdyn.cli.memory_limit import stand_before_numpy
 from sysdyn.cli.streams import flush, standing_streams
 from sysdyn.dsl.model.collecting import keep
 
-COMMANDS = {
-    "animate": "Play a trace: points that move, curves with a mark.",
-    "check": "Check models: everything that needs no time integration.",
-    "compile": "Write the residual module and its manifest.",
-    "diff": "Compare two traces.",
-    "doctor": "Look at the machine: compiler, cache, versions, a small run.",
-    "equations": "Print the equations as a book does.",
-    "equilibrium": "States of rest and their stability.",
-    "explain": "Say what a diagnostic code means.",
-    "fmt": "Bring model texts into the canonical layout.",
-    "golden": "Golden traces of a project: record, check, accept, list.",
-    "help": "Explain a topic of the language: units, tables, scenes, events, ...",
-    "import": "Write a SPICE netlist as a model text.",
-    "linearize": "Matrices, eigenvalues, poles and zeros about a state.",
-    "list": "List the names of a model: parameters, what can be traced, scenes, levels.",
-    "lsp": "Serve an editor: findings, layout, hover, completion.",
-    "new": "Begin a project: model, scenes, golden trace, CI file.",
-    "plot": "Draw quantities of a trace.",
-    "reduce": "Find what a scene does not need, and leave it out.",
-    "report": "Write one page about a model and its run.",
-    "simulate": "Run a scene: text in, trace out.",
-    "std": "Show the standard library, or a component of it.",
-    "sweep": "Run a scene many times, with other numbers.",
-    "trade": "Measure what accuracy costs, and name the cheapest setting.",
-    "verify": "Compare the formulations and methods of a scene.",
+ROOMS = {
+    "manual": {
+        "doctor": "Look at the machine: compiler, cache, versions, a small run.",
+        "explain": "Say what a diagnostic code means.",
+        "help": "Explain a topic of the language: units, tables, scenes, events, ...",
+        "lsp": "Serve an editor: findings, layout, hover, completion.",
+        "new": "Begin a project: model, scenes, golden trace, CI file.",
+        "std": "Show the standard library, or a component of it.",
+    },
+    "model": {
+        "check": "Check models: everything that needs no time integration.",
+        "compile": "Write the residual module and its manifest.",
+        "equations": "Print the equations as a book does.",
+        "fmt": "Bring model texts into the canonical layout.",
+        "import": "Write a SPICE netlist as a model text.",
+        "list": "List the names of a model: parameters, what can be traced, scenes, levels.",
+    },
+    "simulation": {
+        "equilibrium": "States of rest and their stability.",
+        "linearize": "Matrices, eigenvalues, poles and zeros about a state.",
+        "reduce": "Find what a scene does not need, and leave it out.",
+        "simulate": "Run a scene: text in, trace out.",
+        "sweep": "Run a scene many times, with other numbers.",
+        "trade": "Measure what accuracy costs, and name the cheapest setting.",
+        "verify": "Compare the formulations and methods of a scene.",
+    },
+    "trace": {
+        "animate": "Play a trace: points that move, curves with a mark.",
+        "diff": "Compare two traces.",
+        "golden": "Golden traces of a project: record, check, accept, list.",
+        "plot": "Draw quantities of a trace.",
+        "report": "Write one page about a model and its run.",
+    },
 }
+"""Of `cli/commands`: the commands of each, and what they do."""
+COMMANDS = {name: does for commands in ROOMS.values() for name, does in commands.items()}
 
 
 class Group(click.Group):
-    """Knows its commands by name; imports `sysdyn.cli.commands.<name>_command` when it is called."""
+    """Knows its commands by name; imports `sysdyn.cli.commands.<room>.<name>_command` when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in the order of the alphabet."""
@@ -57,9 +67,10 @@ class Group(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command of that name."""
-        if cmd_name not in COMMANDS:
+        room = next((room for room, commands in ROOMS.items() if cmd_name in commands), None)
+        if room is None:
             return None
-        module = importlib.import_module(f"sysdyn.cli.commands.{cmd_name}_command")
+        module = importlib.import_module(f"sysdyn.cli.commands.{room}.{cmd_name}_command")
         found = module.command
         assert isinstance(found, click.Command)
         return found

@@ -9,11 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysdyn.dsl.elaborate import stopping, switches
 from sysdyn.dsl.elaborate.authors import told
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
-from sysdyn.dsl.elaborate.scenes import SceneReader
+from sysdyn.dsl.elaborate.scenes import stopping
+from sysdyn.dsl.elaborate.scenes.scenes import SceneReader
+from sysdyn.dsl.elaborate.statements import switches
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
@@ -37,7 +38,7 @@ from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
 if TYPE_CHECKING:
-    from sysdyn.dsl.elaborate.listing import Instance, Readable
+    from sysdyn.dsl.elaborate.scenes.listing import Instance, Readable
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,7 +245,7 @@ def listing(
     levels: Sequence[tuple[str, str]] = (),
 ) -> Listing | None:
     """What a model offers: parameters with values, names that can be read, components; None where it has errors."""
-    from sysdyn.dsl.elaborate.listing import instances, readable  # no run asks for it
+    from sysdyn.dsl.elaborate.scenes.listing import instances, readable  # no run asks for it
 
     with deep(), budget.drawn():
         try:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime.accuracy.options import Options, own_tolerances
-from sysdyn.runtime.integrate.ledgers import Balance
+from sysdyn.runtime.integrate.rows.ledgers import Balance
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.values import dataclass

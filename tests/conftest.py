@@ -27,7 +27,7 @@ def _one_cache(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def _here(monkeypatch):
     """Work stays in this process unless a test asks for more of them: a clock would choose, and patches stay behind."""
-    monkeypatch.setattr("sysdyn.cli.run.crew.PAYS", 1e6)
+    monkeypatch.setattr("sysdyn.cli.run.many.crew.PAYS", 1e6)
 
 
 @pytest.fixture

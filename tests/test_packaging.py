@@ -34,7 +34,7 @@ def test_every_room_is_typed():
 
 def test_sources_of_the_core_are_listed():
     (module,) = SETUP["ext-modules"]
-    core = {path.relative_to(ROOT).as_posix(): path for path in (ROOT / "runtime" / "core").glob("*/*.[ch]")}
+    core = {path.relative_to(ROOT).as_posix(): path for path in (ROOT / "runtime" / "core").rglob("*.[ch]")}
     included = re.findall(r'#include "([\w/]+\.c)"', "".join(path.read_text() for path in core.values()))
     twice = {f"runtime/core/{name}" for name in included}
     assert set(module["sources"]) == {path for path in core if path.endswith(".c")}

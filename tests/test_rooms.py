@@ -13,6 +13,8 @@ from sysdyn.cli.main import run
 ROOT = Path(__file__).resolve().parents[1]
 TOPS = ("dsl", "compiler", "runtime", "cli")
 ROOMS = sorted(init.parent for top in TOPS for init in (ROOT / top).rglob("__init__.py"))
+CORE = ROOT / "runtime" / "core"
+OF_THE_CORE = sorted({path.parent for room in ("linear", "run", "steppers") for path in (CORE / room).rglob("*.c")})
 STEP = re.compile(r"`([a-z_/]+\.py)`: `([\w.]+)`")
 
 MODEL = """
@@ -27,7 +29,7 @@ scene swing of spring { time 0 s to 1 s; trace x every 0.1 s }
 """
 
 
-@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize("room", [*ROOMS, *OF_THE_CORE], ids=lambda room: room.relative_to(ROOT).as_posix())
 def test_every_room_has_a_page_of_files_that_exist(room):
     text = (room / "README.md").read_text(encoding="utf-8")
     assert text.startswith(f"# {room.name}: ")
@@ -42,10 +44,15 @@ def test_every_room_has_a_page_of_files_that_exist(room):
 def test_each_room_of_the_core_includes_only_those_above_it():
     core = ROOT / "runtime" / "core"
     order = re.findall(r"^\| `(\w+)/` \|", (core / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
-    assert {path.parent.name for path in core.glob("*/*.[ch]")} == set(order)
-    for path in core.glob("*/*.[ch]"):
+    assert {path.relative_to(core).parts[0] for path in core.rglob("*.[ch]")} == set(order)
+    for path in core.rglob("*.[ch]"):
         for room in re.findall(r'^#include "(\w+)/', path.read_text(encoding="utf-8"), re.MULTILINE):
-            assert order.index(room) <= order.index(path.parent.name), path
+            assert order.index(room) <= order.index(path.relative_to(core).parts[0]), path
+
+
+def test_no_room_holds_more_files_than_one_takes_in():
+    for room in [*ROOMS, *OF_THE_CORE]:
+        assert sum(path.is_file() and path.suffix in {".py", ".c", ".h"} for path in room.iterdir()) <= 24, room
 
 
 def test_nothing_but_the_rooms_stands_at_the_top():

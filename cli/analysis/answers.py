@@ -15,7 +15,7 @@ from sysdyn.cli.analysis.asked import Found
 from sysdyn.cli.analysis.linear import Linear, linearised
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.page.columns import aligned
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear import responses

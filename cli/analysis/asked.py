@@ -9,17 +9,17 @@ from functools import partial
 from typing import Any
 
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request, options_of, rest, stops, turning
 from sysdyn.cli.run.events import plan
-from sysdyn.cli.run.flat_laws import impossible
 from sysdyn.cli.run.prepare import Prepared, prepare
-from sysdyn.cli.run.starting import Started, start
-from sysdyn.cli.run.targets import Target
-from sysdyn.cli.run.verdict import stopped
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request, options_of, rest, stops, turning
+from sysdyn.cli.run.request.targets import Target
+from sysdyn.cli.run.start.flat_laws import impossible
+from sysdyn.cli.run.start.starting import Started, start
+from sysdyn.cli.run.verdict.verdict import stopped
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.stopping import unwatched
+from sysdyn.dsl.elaborate.scenes.stopping import unwatched
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.calculus import moving, rate_name, time_derivative
 from sysdyn.dsl.model.network import Network

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sysdyn.cli.analysis.asked import Found, contents, own_inputs
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.targets import Target
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.binding.sensitivity import FIRST, LAST, Sensitivity
 from sysdyn.dsl.model.expression import variables

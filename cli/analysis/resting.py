@@ -10,8 +10,8 @@ import numpy as np
 from sysdyn.cli.analysis.asked import Found, compiled, of_nodes
 from sysdyn.cli.analysis.linear import linearised, loose_of
 from sysdyn.cli.analysis.states import at, resting
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.targets import still
+from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.targets import still
 from sysdyn.dsl.model.units import Unit, quantity
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy.options import Progress

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.cli.analysis.asked import Found, Inputs, arrived, begun, compiled, of_contents
-from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.targets import Target
+from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.events.start import eventful_start

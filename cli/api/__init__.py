@@ -18,10 +18,10 @@ from sysdyn.api.compiled import Module, compile_model, known, shown
 from sysdyn.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.analysis.resting import Equilibrium
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.checking import checked
-from sysdyn.cli.run.loaded import Loaded, text_of
+from sysdyn.cli.run.check.checking import checked
+from sysdyn.cli.run.many.loaded import Loaded, text_of
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import Ran, run
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.cli.sweep.opened import Sweep

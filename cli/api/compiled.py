@@ -14,11 +14,11 @@ from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tabl
 from sysdyn.cli.export.naming import elements
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import FORMULATIONS, INDICES
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.flat_laws import impossible
-from sysdyn.cli.run.loaded import KEPT, place_of
+from sysdyn.cli.run.many.loaded import KEPT, place_of
 from sysdyn.cli.run.prepare import prepare
-from sysdyn.cli.run.starting import start
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.start.flat_laws import impossible
+from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl import load as load_
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report

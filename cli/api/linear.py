@@ -12,7 +12,7 @@ from sysdyn.cli.analysis.linear import inputs_of, linearised
 from sysdyn.cli.analysis.resting import Equilibrium, equilibria
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 

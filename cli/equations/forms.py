@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from sysdyn.cli.analysis.asked import begun
 from sysdyn.cli.analysis.linear import inputs_of, linearised
-from sysdyn.cli.run.asked import Request
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.targets import Target
+from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.compiler.equations.book import (
     CO_WORDS,
     WORDS,

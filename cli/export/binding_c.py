@@ -23,13 +23,14 @@ HERE = Path(__file__).parent
 CORE = Path(core.__path__[0])
 ASSEMBLY = ("system/model.h", "linear/lanes.h", "system/assembly.h", "system/assembly.c")
 ALGEBRA = (
-    "linear/number.h", "linear/sums.h", "linear/elimination.h", "linear/machine_code.h", "linear/linear.h",
-    "linear/matrix.h", "linear/sparse.h", "linear/fronts.h", "linear/front_lanes.h",
-    "system/settle.h", "steppers/stepper.h", "steppers/underlying.h",
-    "linear/sums.c", "linear/machine_code.c", "linear/elimination_order.c", "linear/elimination.c", "linear/linear.c",
-    "linear/blocks.h", "linear/dense_rest.h", "linear/told.h", "linear/chains.h",
-    "linear/substitute.h", "linear/pivots.h", "linear/sparse.c", "linear/front_pattern.c", "linear/fronts.c",
-    "steppers/straight_slopes.c", "steppers/underlying.c",
+    "linear/number.h", "linear/sums.h", "linear/elimination/elimination.h", "linear/elimination/machine_code.h",
+    "linear/linear.h", "linear/sparse/matrix.h", "linear/sparse/sparse.h", "linear/sparse/fronts.h",
+    "linear/sparse/front_lanes.h", "system/settle.h", "steppers/stepper.h", "steppers/explicit/underlying.h",
+    "linear/sums.c", "linear/elimination/machine_code.c", "linear/elimination/elimination_order.c",
+    "linear/elimination/elimination.c", "linear/linear.c", "linear/sparse/blocks.h", "linear/sparse/dense_rest.h",
+    "linear/sparse/told.h", "linear/sparse/chains.h", "linear/sparse/substitute.h", "linear/sparse/pivots.h",
+    "linear/sparse/sparse.c", "linear/sparse/front_pattern.c", "linear/sparse/fronts.c",
+    "steppers/explicit/straight_slopes.c", "steppers/explicit/underlying.c",
 )  # fmt: skip
 A_LINE = 16
 """Numbers in a line."""

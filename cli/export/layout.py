@@ -6,7 +6,7 @@ import numpy as np
 from sysdyn.cli.export.starts import start_tables
 from sysdyn.cli.export.tables import NOTHING, Call, Group, Output, State, Tables, assembled
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.starting import Started
+from sysdyn.cli.run.start.starting import Started
 from sysdyn.compiler.binding.following import Following, following
 from sysdyn.compiler.binding.following import Group as Formulas
 from sysdyn.compiler.forms import descriptor

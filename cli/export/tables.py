@@ -86,7 +86,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Index form 0: the differential unknowns of the full layout, and what is solved for (core/steppers/underlying.h).
+    """Index form 0: the differential unknowns of the full layout, and what is solved for (`underlying.h` of the core).
 
     column, row: pattern of dF/dy + cj dF/dyd, from the components of the matrix.
     """

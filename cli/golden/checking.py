@@ -17,7 +17,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.golden.book import Golden
 from sysdyn.cli.golden.runs import Run, Stopped, between, run
 from sysdyn.cli.golden.structures import changed
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.recorded import Recorded

@@ -9,7 +9,7 @@ from sysdyn.cli.golden.book import Golden
 from sysdyn.cli.golden.checking import INPUT_OUTPUT, SOLVER, Case, Mutant, check, mutate, request_of
 from sysdyn.cli.golden.recording import Recorded, Refused, record
 from sysdyn.cli.golden.runs import Stopped
-from sysdyn.cli.run.crew import Lost, each
+from sysdyn.cli.run.many.crew import Lost, each
 from sysdyn.runtime.comparison.verdict import Incomparable
 from sysdyn.values import dataclass
 

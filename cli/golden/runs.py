@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.failures import OF_CLAIMS, OF_RUNS
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request, options_of
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request, options_of
 from sysdyn.cli.run.running import Ran, integrate, ready
-from sysdyn.cli.run.starting import as_written
+from sysdyn.cli.run.start.starting import as_written
 from sysdyn.compiler.model import energies
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report

@@ -13,7 +13,7 @@ from typing import Any
 
 from sysdyn.cli.console import ROUTINE
 from sysdyn.cli.failures import classify
-from sysdyn.cli.run.checking import Checked, file_checked
+from sysdyn.cli.run.check.checking import Checked, file_checked
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report, shortened
 from sysdyn.dsl.text.source import UNSAVED, real
 
@@ -121,7 +121,7 @@ def serve(pipe: Connection) -> None:
     """What the process does: answer each text with its findings until nobody asks any more."""
     os.dup2(2, 1)  # standard output belongs to the protocol
     sys.stdout = sys.stderr
-    from sysdyn.cli.run import prepare, scene_numbers, starting  # noqa: F401 (nobody waits for them yet)
+    from sysdyn.cli.run.start import starting  # noqa: F401 (nobody waits for them yet)
 
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while True:

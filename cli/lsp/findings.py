@@ -51,7 +51,7 @@ def actions(document: Document, found: Sequence[Diagnostic], asked: Span, only: 
             if any(s.start <= asked.end and asked.start <= s.end for s in spans):
                 listed.append(_action(document, _title(d.edit), "quickfix", [d.edit], [diagnostic(d)]))
     if fixes and _wanted("source.fixAll", only):
-        from sysdyn.cli.run.mending import apart
+        from sysdyn.cli.run.check.mending import apart
 
         edits = [d.edit for d in apart(fixes) if d.edit is not None]
         listed.append(_action(document, "All safe changes (check --fix)", "source.fixAll", edits, []))

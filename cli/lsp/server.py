@@ -11,7 +11,7 @@ from sysdyn import __version__
 from sysdyn.cli.lsp import completion, findings, hover, outline, positions, wire
 from sysdyn.cli.lsp.checker import Accounts, Checker, shown
 from sysdyn.cli.lsp.documents import Document, Documents
-from sysdyn.cli.run.checking import Checked
+from sysdyn.cli.run.check.checking import Checked
 from sysdyn.dsl.text.diagnostics import Diagnostic
 from sysdyn.dsl.text.source import Span
 

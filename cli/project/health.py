@@ -139,7 +139,7 @@ def _runs() -> Iterator[Finding]:
 
 
 def _run(backend: str) -> Finding:
-    from sysdyn.cli.run.asked import Request
+    from sysdyn.cli.run.request.asked import Request
     from sysdyn.cli.run.running import run
     from sysdyn.dsl.text.diagnostics import Report
 

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.report.balance import Part, observed, shares
-from sysdyn.cli.run.asked import Request, of_these_alone, options_of
 from sysdyn.cli.run.prepare import prepare
+from sysdyn.cli.run.request.asked import Request, of_these_alone, options_of
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate, ready
-from sysdyn.cli.run.targets import Target
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.runtime.accuracy.options import Progress

@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from sysdyn.cli.reduce.activity import Activity
-from sysdyn.cli.run.targets import Target
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.dsl.model.network import Branch, Network
 from sysdyn.dsl.text.diagnostics import SourceText
 from sysdyn.dsl.tree import syntax

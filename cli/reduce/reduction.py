@@ -18,10 +18,10 @@ import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.reduce import edits
 from sysdyn.cli.reduce.activity import Activities, activities
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import ACCURACY, Request, check_tolerances, options_of
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import ACCURACY, Request, check_tolerances, options_of
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate, ready
-from sysdyn.cli.run.targets import Target
 from sysdyn.cli.trade.errors import error_of
 from sysdyn.dsl import load
 from sysdyn.dsl.format.format import format_text

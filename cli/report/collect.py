@@ -10,12 +10,12 @@ from dataclasses import replace
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.report.balance import Share, observed, shares
 from sysdyn.cli.report.study import Study, sources_of
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request, check_tolerances, of_these_alone, options_of
 from sysdyn.cli.run.prepare import Prepared, prepare
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request, check_tolerances, of_these_alone, options_of
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate
-from sysdyn.cli.run.starting import start
-from sysdyn.cli.run.targets import Target
+from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl import load
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report

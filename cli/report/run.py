@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
-from sysdyn.cli.run.starting import described
+from sysdyn.cli.run.start.starting import described
 from sysdyn.compiler.binding.certificate import certificate
 from sysdyn.runtime.model.description import BESIDE
 from sysdyn.runtime.structure.order import freedom

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from sysdyn.cli.equations.mathml import Typesetter
 from sysdyn.cli.report.balance import Share
 from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran
-from sysdyn.cli.run.starting import Started
-from sysdyn.cli.run.targets import Target
+from sysdyn.cli.run.start.starting import Started
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.text.source import SourceText

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.starting import Started
+from sysdyn.cli.run.start.starting import Started
 from sysdyn.compiler.binding.sampled import Points, Sample, SampledRows
 from sysdyn.compiler.forms.descriptor import Block
 from sysdyn.runtime.model.scales import group_maximum, magnitudes

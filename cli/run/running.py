@@ -10,17 +10,17 @@ from typing import Any
 
 from sysdyn import __version__
 from sysdyn.cli.failures import OF_RUNS, UsageError
-from sysdyn.cli.run import lock, targets
-from sysdyn.cli.run.asked import Request, check_tolerances, default_output, options_of, rest, stops, turning
 from sysdyn.cli.run.events import plan, zeno
-from sysdyn.cli.run.expectations import Claim, judge
-from sysdyn.cli.run.flat_laws import impossible
-from sysdyn.cli.run.memory import keep_pages
+from sysdyn.cli.run.many.memory import keep_pages
 from sysdyn.cli.run.module_check import check_module
 from sysdyn.cli.run.prepare import Prepared, prepare
-from sysdyn.cli.run.starting import Started, start
-from sysdyn.cli.run.targets import Target
-from sysdyn.cli.run.verdict import author_place, differences, stopped, verdict
+from sysdyn.cli.run.request import lock, targets
+from sysdyn.cli.run.request.asked import Request, check_tolerances, default_output, options_of, rest, stops, turning
+from sysdyn.cli.run.request.targets import Target
+from sysdyn.cli.run.start.flat_laws import impossible
+from sysdyn.cli.run.start.starting import Started, start
+from sysdyn.cli.run.verdict.expectations import Claim, judge
+from sysdyn.cli.run.verdict.verdict import author_place, differences, stopped, verdict
 from sysdyn.compiler.forms.kane import repeats
 from sysdyn.dsl import load
 from sysdyn.dsl.model import budget

@@ -12,7 +12,7 @@ from sysdyn.cli.spice.netlist import Card, Unreadable, value
 from sysdyn.cli.spice.windings import Cores, component, coupled
 from sysdyn.cli.spice.writing import names, quantity
 from sysdyn.dsl.elaborate.files import exported
-from sysdyn.dsl.elaborate.instances import BUILTINS
+from sysdyn.dsl.elaborate.instances.instances import BUILTINS
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 

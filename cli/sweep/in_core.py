@@ -1,4 +1,4 @@
-"""Cases of a sweep run in the core without Python between them, where the model allows it: see cli/run/in_core.py."""
+"""Cases of a sweep run in the core without Python between them, where the model allows it (cli/run/many/in_core.py)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.run.in_core import InCore
-from sysdyn.cli.run.loaded import Loaded
+from sysdyn.cli.run.many.in_core import InCore
+from sysdyn.cli.run.many.loaded import Loaded
 from sysdyn.cli.sweep.kept import Block
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report

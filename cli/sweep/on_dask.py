@@ -20,8 +20,8 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.crew import DEATHS
+from sysdyn.cli.run.many.crew import DEATHS
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.sweep.kept import Item, Kept
 from sysdyn.cli.sweep.one_run import Runner, Task
 from sysdyn.cli.sweep.workers import Answer, Chunk, Queue, answer

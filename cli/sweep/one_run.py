@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.loaded import Loaded
+from sysdyn.cli.run.many.loaded import Loaded
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import Ran, finding
 from sysdyn.cli.sweep.axes import CHOICES
 from sysdyn.cli.sweep.in_core import Cases, thinned

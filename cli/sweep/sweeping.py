@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from sysdyn import __version__
 from sysdyn.cli.failures import plain
-from sysdyn.cli.run import lock
-from sysdyn.cli.run.asked import Request, instants_of, model_digest
+from sysdyn.cli.run.request import lock
+from sysdyn.cli.run.request.asked import Request, instants_of, model_digest
 from sysdyn.cli.sweep import results
 from sysdyn.cli.sweep.axes import CHOICES, Axis, Evaluate, axis
 from sysdyn.cli.sweep.journal import Journal

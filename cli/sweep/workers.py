@@ -16,8 +16,8 @@ from dataclasses import field
 from itertools import islice
 from multiprocessing.connection import Connection
 
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.crew import DEATHS, Crew, Serve
+from sysdyn.cli.run.many.crew import DEATHS, Crew, Serve
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.sweep.kept import Item, Kept
 from sysdyn.cli.sweep.one_run import Runner, Task
 from sysdyn.values import dataclass

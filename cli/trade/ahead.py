@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.crew import Lost, as_ready
+from sysdyn.cli.run.many.crew import Lost, as_ready
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.trade.measuring import Limits, bench_of
 from sysdyn.cli.trade.search import FIRST, Search, tolerance
 from sysdyn.cli.trade.traded import Combination, Measured, Runs

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from sysdyn import __version__
-from sysdyn.cli.run import lock
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request import lock
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.trade.traded import Combination, Measured, Reference, Runs
 from sysdyn.compiler.program import cache
 from sysdyn.dsl.text.diagnostics import SourceText

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.failures import OF_CLAIMS, UsageError
 from sysdyn.cli.options import TRIED
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import ACCURACY, Request, options_of
 from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import ACCURACY, Request, options_of
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, begin, finding, ready, run_from
-from sysdyn.cli.run.starting import Started
-from sysdyn.cli.run.targets import Target
+from sysdyn.cli.run.start.starting import Started
 from sysdyn.cli.trade.errors import error_of
 from sysdyn.cli.trade.traded import INDICES, Combination, Measured, Refusal
 from sysdyn.cli.trade.work import counted, of_rows

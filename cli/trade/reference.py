@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.crew import Beside
+from sysdyn.cli.run.many.crew import Beside
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.trade.errors import error_of
 from sysdyn.cli.trade.measuring import Bench, Limits, Said, bench_of
 from sysdyn.cli.trade.traded import Combination, Reference

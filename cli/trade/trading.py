@@ -12,9 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request, check_tolerances
-from sysdyn.cli.run.crew import company
+from sysdyn.cli.run.many.crew import company
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request, check_tolerances
 from sysdyn.cli.trade.ahead import Asked, ahead
 from sysdyn.cli.trade.journal import journal as journal_of
 from sysdyn.cli.trade.measuring import Bench, Limits

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.cli.run.prepare import Prepared, prepare
-from sysdyn.cli.run.starting import Started
+from sysdyn.cli.run.start.starting import Started
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.names import stored

@@ -18,12 +18,12 @@ from pathlib import Path
 
 from sysdyn.cli.failures import OF_CLAIMS, OF_RUNS, UsageError
 from sysdyn.cli.options import EVERY
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import ACCURACY, Request, check_tolerances, options_of
-from sysdyn.cli.run.crew import Lost, each
+from sysdyn.cli.run.many.crew import Lost, each
 from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import ACCURACY, Request, check_tolerances, options_of
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, finding, integrate, ready
-from sysdyn.cli.run.targets import Target
 from sysdyn.cli.verify.agreement import Bounds, Gap, horizon
 from sysdyn.cli.verify.twins import Twins, free_quantities, twins
 from sysdyn.cli.verify.verified import Refusal, Run, Verified, disagreements, worst

@@ -12,15 +12,15 @@ from dataclasses import replace
 from functools import partial
 from itertools import groupby
 
-from sysdyn.dsl.elaborate.declarations import DECLARED
-from sysdyn.dsl.elaborate.elements import Pending
 from sysdyn.dsl.elaborate.files import FileScope
-from sysdyn.dsl.elaborate.head import Body
-from sysdyn.dsl.elaborate.instances import Instances
-from sysdyn.dsl.elaborate.moulds import Likeness, law_of_cast, required_of
+from sysdyn.dsl.elaborate.instances.elements import Pending
+from sysdyn.dsl.elaborate.instances.head import Body
+from sysdyn.dsl.elaborate.instances.instances import Instances
+from sysdyn.dsl.elaborate.instances.moulds import Likeness, law_of_cast, required_of
+from sysdyn.dsl.elaborate.instances.port_efforts import NotSaidError, conjugate_of
 from sysdyn.dsl.elaborate.parts import flatten
-from sysdyn.dsl.elaborate.port_efforts import NotSaidError, conjugate_of
-from sysdyn.dsl.elaborate.statements import STATEMENTS
+from sysdyn.dsl.elaborate.statements.declarations import DECLARED
+from sysdyn.dsl.elaborate.statements.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Branch, Derived, Dynamic, Initial, Loop, Observation, State, loop_indices
 from sysdyn.dsl.model.rewriting import expressions

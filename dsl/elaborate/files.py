@@ -10,7 +10,7 @@ from functools import cache
 from itertools import count
 from pathlib import Path
 
-from sysdyn.dsl.elaborate.bundles import Bundles
+from sysdyn.dsl.elaborate.instances.bundles import Bundles
 from sysdyn.dsl.elaborate.tables import read_table
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.dependence import in_order

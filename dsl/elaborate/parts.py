@@ -8,7 +8,7 @@ from dataclasses import field
 from functools import partial
 from typing import Any
 
-from sysdyn.dsl.elaborate.casts import Cast
+from sysdyn.dsl.elaborate.instances.casts import Cast
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -101,7 +101,7 @@ class NetworkBuilder:
     discretes: set[str] = field(default_factory=set)
     events: list[Event] = field(default_factory=list)
     switches: list[Switch] = field(default_factory=list)
-    drafts: list[Any] = field(default_factory=list)  # of switches (elaborate/events.py)
+    drafts: list[Any] = field(default_factory=list)  # of switches (elaborate/statements/events.py)
     event_drafts: list[Any] = field(default_factory=list)  # of events in a `for`
     watched: list[Observation] = field(default_factory=list)  # what events and switches read
     requirements: list[Requirement | CastRequirement] = field(default_factory=list)

@@ -116,7 +116,7 @@ class Context:
         self.awaken: Callable[[InstanceSymbol], None] = lambda symbol: None  # elaborates an instance now
         self.given: Callable[[Node], Node] = lambda node: node  # an index with the sizes that are given
         self.sizes_read = False  # numbers of sizes say what something means
-        self.taken: Callable[..., Node]  # what an instance takes in at an end (elaborate/port_efforts.py)
+        self.taken: Callable[..., Node]  # what an instance takes in at an end (elaborate/instances/port_efforts.py)
         self.constraints: dict[str, list[Constraint]] = {}
         self._quantities: dict[tuple[int, int, str, str], tuple[Scope, Typed]] = {}  # by scope (held), number, unit
         self._values: dict[tuple[Definition, bool], Value | None] = {}

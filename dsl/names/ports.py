@@ -1,7 +1,7 @@
 """Ports: `M.shaft.e`, `X.p[2].f`, `energy_through(M.shaft)`: what a component takes in there.
 
 Received: a path to a port and its quantity; handed on: an expression of what is inside, made by `taken`
-(elaborate/port_efforts.py).
+(elaborate/instances/port_efforts.py).
 """
 
 from __future__ import annotations

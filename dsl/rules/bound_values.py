@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
-from sysdyn.dsl.elaborate.events import Draft
+from sysdyn.dsl.elaborate.statements.events import Draft
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex

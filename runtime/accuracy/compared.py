@@ -15,7 +15,7 @@ from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.accuracy.pairs import Sampled
 from sysdyn.runtime.accuracy.quantities import Quantities
 from sysdyn.runtime.integrate.request import COMPARED, RELAXING, TRACE, Finished
-from sysdyn.runtime.integrate.round_off import LeftOpen, left_open
+from sysdyn.runtime.integrate.weights.round_off import LeftOpen, left_open
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System

@@ -16,21 +16,21 @@ import numpy as np
 from sysdyn.runtime.condense.condensed import Condensed, Forms, condensed
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.causes import NEWTON, failure, placed
-from sysdyn.runtime.integrate.corners import Corners, serves
 from sysdyn.runtime.integrate.creeping import Creeping
-from sysdyn.runtime.integrate.crossing import cross
-from sysdyn.runtime.integrate.driver import Driver, Sink
+from sysdyn.runtime.integrate.jumps.corners import Corners, serves
+from sysdyn.runtime.integrate.jumps.crossing import cross
+from sysdyn.runtime.integrate.jumps.pieces import Pieces
+from sysdyn.runtime.integrate.jumps.segments import segments
 from sysdyn.runtime.integrate.methods import Method
-from sysdyn.runtime.integrate.metric import kinematic_scale
 from sysdyn.runtime.integrate.origin import Origin
-from sysdyn.runtime.integrate.pieces import Pieces
 from sysdyn.runtime.integrate.request import LONGEST, ON_UNDERLYING, Finished, Request, Statistics
-from sysdyn.runtime.integrate.segments import segments
-from sysdyn.runtime.integrate.settlers import Settlers
-from sysdyn.runtime.integrate.sizes import Sizes
-from sysdyn.runtime.integrate.told import Told
+from sysdyn.runtime.integrate.rows.driver import Driver, Sink
+from sysdyn.runtime.integrate.rows.settlers import Settlers
 from sysdyn.runtime.integrate.underlying import Underlying
-from sysdyn.runtime.integrate.unknown_roles import Roles, general_rates, roles
+from sysdyn.runtime.integrate.weights.metric import kinematic_scale
+from sysdyn.runtime.integrate.weights.sizes import Sizes
+from sysdyn.runtime.integrate.weights.told import Told
+from sysdyn.runtime.integrate.weights.unknown_roles import Roles, general_rates, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import confirmed, group_maxima

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from sysdyn.runtime.integrate.factors import Factors
 from sysdyn.runtime.integrate.underlying import Accelerations, underlying_form
-from sysdyn.runtime.integrate.unknown_roles import Roles, general_rates, roles, without_rate
+from sysdyn.runtime.integrate.weights.unknown_roles import Roles, general_rates, roles, without_rate
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import magnitudes, unresolved
 from sysdyn.runtime.model.system import LARGE, System

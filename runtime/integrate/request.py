@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.plan import Happened, Plan
-from sysdyn.runtime.integrate.ledgers import Balance, Ledgers
+from sysdyn.runtime.integrate.rows.ledgers import Balance, Ledgers
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.values import dataclass
@@ -36,7 +36,7 @@ class Request:
     rosenbrock (index at most 1), dopri or energy (form 0);
     fixed_step [s]: no error test (bdf with max_order 1: the implicit Euler method); h_max
     [s]: longest step, None: LONGEST of the span; stops [s] ascending: instants at which a step ends and the
-    integration restarts (segments.py); least_norm: rows hold the least multipliers of redundant constraints;
+    integration restarts (jumps/segments.py); least_norm: rows hold the least multipliers of redundant constraints;
     stiff_steps: dopri and energy give up
     where stability holds it to more steps than these, dopri also where a system that is much faster than its motion
     takes it more than spare_steps and those it took (0: never); settled_to: scaled residual that will do for rows
@@ -44,7 +44,7 @@ class Request:
     audit's members too;
     condense: what constant sums define leaves the system (condense/);
     stages: of radau, in the first step and at most, None: chosen;
-    opening: of dopri, rosenbrock: first step as an earlier run found it fit (core/steppers/dopri.h), 0: chosen;
+    opening: of dopri, rosenbrock: first step as an earlier run found it fit (steppers/explicit/dopri.h), 0: chosen;
     unstrained: it is given up where Newton fails in every second step (cause strained);
     apart: part of a step; instants within it that are nearer to the row before are passed over;
     extrema: what is observed is looked at within steps for its least and largest values.
@@ -82,7 +82,7 @@ class Request:
 
     @property
     def tolerance(self) -> float:
-        """What the error test compares with: radau's estimate is of a lower order (core/steppers/radau.h)."""
+        """What the error test compares with: radau's estimate is of a lower order (core/steppers/radau/radau.h)."""
         return 0.1 * self.rtol ** (2.0 / 3.0) if self.method == "radau" else self.rtol
 
     @property

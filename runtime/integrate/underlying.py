@@ -1,4 +1,4 @@
-"""The underlying ordinary differential equation of a model, from its blocks in the core (core/steppers/underlying.h).
+"""The underlying ordinary differential equation of a model, from its blocks (core/steppers/explicit/underlying.h).
 
 `Underlying` owns the core's structure: the matrix [M A^T; A 0] as entries of dF/dy and dF/dy' of form 0, the rows of
 the constraints in the places of their derivatives.  The equation exists where that matrix is regular (`undetermined` is
@@ -30,7 +30,7 @@ from sysdyn.runtime.structure.levels import undifferentiated
 from sysdyn.values import dataclass
 
 SMALL = 32
-"""Unknowns up to which the core judges the matrix first (core/linear/dense.h)."""
+"""Unknowns up to which the core judges the matrix first (core/linear/dense/dense.h)."""
 DENSE = 300
 """Unknowns up to which the matrix is judged by its singular values."""
 NONE = np.zeros(0, dtype=np.int32)
@@ -40,7 +40,7 @@ _DERIVED = {"phi": "phi_acceleration", "phi_rate": "phi_acceleration", "psi": "p
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What of form 0 is solved for the slopes (core/steppers/underlying.h).
+    """What of form 0 is solved for the slopes (core/steppers/explicit/underlying.h).
 
     unknown, rate [solved]; column [unknowns]; pattern, source, from_rate [entries] of the matrix, order of its columns;
     direct: it does not depend on what is solved for; silent: calls whose dF/dy does not stand in the matrix; applied:

@@ -39,7 +39,7 @@ from sysdyn.runtime.trace.keeping import Held
 from sysdyn.runtime.trace.trace import Parameter, Trace
 
 MOST = 48
-"""Instants of comparison that are taken of a run's steps, at most twice that (core/run/many.c)."""
+"""Instants of comparison that are taken of a run's steps, at most twice that (core/run/many/many.c)."""
 COUNTS = 1e-9
 """Of the largest entry of a row: what is less is round-off, or may as well vanish."""
 MARGIN, LOOSER = 0.1, 3.0

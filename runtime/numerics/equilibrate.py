@@ -12,7 +12,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
 SMALL = 32
-"""Rows and columns up to which the core does it (core/linear/dense.h): calls cost more than arithmetic."""
+"""Rows and columns up to which the core does it (core/linear/dense/dense.h): calls cost more than arithmetic."""
 SWEEPS = 8
 """The distance to one is halved in its logarithm by each: 1e200 becomes 6."""
 

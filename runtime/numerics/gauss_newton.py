@@ -103,7 +103,7 @@ def _numbered(places: Any, used: Mask) -> Any:
 
 
 def _graded(a: Floats, aim: Floats, step: Floats, noise: Floats | None = None, doubt: Floats | None = None) -> int:
-    """What core/linear/graded.h answers."""
+    """What core/linear/dense/graded.h answers."""
     failed: int = lib.core.sd_graded(*a.shape, *map(lib.pointer, (a, aim, noise, step, doubt)))
     if failed < 0:
         raise MemoryError
@@ -188,7 +188,7 @@ class _Linear:
         return rows, columns, values
 
     def determined(self, u: Floats, r: Floats, *, beside: bool) -> Floats | None:
-        """The same where the rows, as they are, determine the step (core/linear/graded.h); None where they do not."""
+        """The same where the rows, as they are, determine the step (linear/dense/graded.h); None where they do not."""
         a, columns = self._full()
         step, stands = np.zeros(u.size), np.zeros(u.size, dtype=bool)
         stands[columns] = True

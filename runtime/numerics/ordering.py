@@ -220,7 +220,7 @@ def least_fill(pattern: Pattern, ahead: Pattern | None = None) -> tuple[Ints, in
 
 
 def _large(pattern: Pattern, ahead: Pattern | None = None) -> tuple[Ints, int]:
-    """The same by approximate degrees, in the core (core/linear/order.h), and what it fills at most."""
+    """The same by approximate degrees, in the core (core/linear/order/order.h), and what it fills at most."""
     found, filled = np.zeros(pattern.unknowns, dtype=np.int32), np.zeros(1, dtype=np.int64)
     answers = lib.pointer(found), lib.pointer(filled)
     places = pattern.column, pattern.row, *((None, None) if ahead is None else (ahead.column, ahead.row))

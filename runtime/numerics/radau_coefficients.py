@@ -1,4 +1,4 @@
-"""The coefficients of Radau IIA of 3, 5 and 7 stages, with 60 digits, and core/steppers/radau_coefficients.c of them.
+"""The coefficients of Radau IIA of 3, 5 and 7 stages, with 60 digits, and `radau_coefficients.c` made of them.
 
 The stages lie at the roots of P_s - P_{s-1} (Legendre, on [0, 1]; the last one is 1), A integrates Lagrange's
 polynomials of these nodes, so A satisfies C(s) and, with the weights b (its last row), D(s-1) and B(2s-1).  Hairer &
@@ -204,13 +204,13 @@ def _method(stages: int) -> str:
 
 
 def text() -> str:
-    """core/steppers/radau_coefficients.c."""
+    """core/steppers/radau/radau_coefficients.c."""
     head = [
-        "/* Coefficients of Radau IIA with 3, 5 and 7 stages (see steppers/radau.h).",
+        "/* Coefficients of Radau IIA with 3, 5 and 7 stages (see steppers/radau/radau.h).",
         " *",
         " * Written by numerics/radau_coefficients.py, which says what they are; not by hand.",
         " */",
-        '#include "steppers/radau.h"',
+        '#include "steppers/radau/radau.h"',
         "",
         "const sd_radau_method sd_radau_methods[SD_METHODS] = {",
     ]

@@ -1,4 +1,4 @@
-"""A large sparse matrix whose pattern is symmetric, factorised by the core (core/linear/sparse.h).
+"""A large sparse matrix whose pattern is symmetric, factorised by the core (core/linear/sparse/sparse.h).
 
 Columns are eliminated in an order of least fill of A + A^T, and each row pivots in its own column wherever its entry
 will do: of 4650 masses joined at random the factors take a third of the time of an order for any pivots.

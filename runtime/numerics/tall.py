@@ -1,7 +1,7 @@
 """Rows of a large sparse matrix, as many as unknowns or more: what they determine, and what they leave open.
 
-By factors of the rows themselves (core/linear/tall.h).  Matrices are shape [rows, unknowns] and entries (i, j, v), the
-rows of size one.
+By factors of the rows themselves (core/linear/dense/tall.h).  Matrices are shape [rows, unknowns] and entries
+(i, j, v), the rows of size one.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def _substituted(columns: Columns, aim: Floats, found: Floats) -> int:
 def _factored(
     columns: Columns, aim: Floats | None, found: Floats | None, idle: Ints | None = None, along: Floats | None = None
 ) -> int:
-    """Of core/linear/tall.h."""
+    """Of core/linear/dense/tall.h."""
     pattern, arrays = columns.pattern, (*columns.arrays(), tall_order(columns.pattern), idle)
     limits, answers = (PIVOT, FILLED * pattern.entries), (aim, found, along)
     places, last = ([lib.pointer(item) for item in some] for some in (arrays, answers))

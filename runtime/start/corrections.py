@@ -1,4 +1,4 @@
-"""What rows determine by corrections that vanish: small coefficients count beside large ones (core/linear/graded.h).
+"""What rows determine by corrections that vanish: small coefficients count beside large ones (linear/dense/graded.h).
 
 Volts that a leak of megohms ties are lost in the steps of a search, whose rows hold to the round-off of kiloamperes.
 """

@@ -1,7 +1,7 @@
 """Redundant constraints: found at several consistent points, left out, or given the least multipliers.
 
 The rows of J = [Phi_q; Psi_f] are looked at in the order written: one that depends on those kept before it is left out:
-J^T, eliminated in that order, has no pivot in its column (J of any size: core/linear/tall.h).
+J^T, eliminated in that order, has no pivot in its column (J of any size: core/linear/dense/tall.h).
 A row is redundant where it depends on them at the start and at three seeded consistent points nearby; where the rank is
 smaller at the start alone, the configuration is singular (language, section 5).
 In a system a left-out row reads "its multiplier = 0": the motion is that of the others.

@@ -28,7 +28,7 @@ from sysdyn.values import dataclass
 
 DENSE = 300
 SMALL = 32
-"""Unknowns up to which the core looks at a pencil first (core/linear/dense.h)."""
+"""Unknowns up to which the core looks at a pencil first (core/linear/dense/dense.h)."""
 MAX_INDEX = 6
 ROUSED = 1e-2
 """Slopes of steep laws, as part of the largest term of their row, where only structure is asked."""

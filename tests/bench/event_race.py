@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 from sysdyn.api import simulate
-from sysdyn.runtime.integrate import pieces
+from sysdyn.runtime.integrate.jumps import pieces
 
 SAMPLES = 200
 WANTED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)

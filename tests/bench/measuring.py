@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request, options_of, stops
 from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request, options_of, stops
+from sysdyn.cli.run.request.sizes import sizes
 from sysdyn.cli.run.running import ready, rest
-from sysdyn.cli.run.sizes import sizes
-from sysdyn.cli.run.starting import start
+from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure

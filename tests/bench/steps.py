@@ -22,10 +22,10 @@ from unittest.mock import patch
 
 sys.path.insert(0, str(Path(__file__).parent))
 from measuring import MODELS
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request, options_of
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request, options_of
 from sysdyn.cli.run.running import ready
-from sysdyn.cli.run.starting import start
+from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.integrate.integrate import Integration

@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.loaded import Loaded
+from sysdyn.cli.run.many.loaded import Loaded
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.sweep.in_core import Cases
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.many.asked import NotApplicableError

@@ -115,7 +115,7 @@ def test_exit_codes(tmp_path, capsys):
 
 
 def test_a_fault_is_told_from_the_users_mistakes(tmp_path, capsys, monkeypatch):
-    from sysdyn.cli.run import targets
+    from sysdyn.cli.run.request import targets
 
     def broken(*_):
         raise ZeroDivisionError("inside")
@@ -126,7 +126,7 @@ def test_a_fault_is_told_from_the_users_mistakes(tmp_path, capsys, monkeypatch):
 
 
 def test_interruption(tmp_path, capsys, monkeypatch):
-    from sysdyn.cli.run import targets
+    from sysdyn.cli.run.request import targets
 
     def interrupted(*_):
         raise KeyboardInterrupt
@@ -137,7 +137,7 @@ def test_interruption(tmp_path, capsys, monkeypatch):
 
 
 def test_strict_counts_warnings(tmp_path, capsys, monkeypatch):
-    from sysdyn.cli.run import checking
+    from sysdyn.cli.run.check import checking
     from sysdyn.dsl import load
 
     path = write(tmp_path, PENDULUM)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from sysdyn.cli.analysis.asked import compiled
 from sysdyn.cli.main import run
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.compiler.equations import matrices
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import BLOCKS, classes, equations

@@ -5,7 +5,7 @@ import json
 import pytest
 from schema import CHECK, EDIT, conforms, envelope
 from sysdyn.cli.main import run
-from sysdyn.cli.run.mending import mended
+from sysdyn.cli.run.check.mending import mended
 from sysdyn.dsl.text import codes
 from sysdyn.dsl.text.diagnostics import SourceText
 

@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.report import balance
-from sysdyn.cli.run.expectations import judge, watch
-from sysdyn.cli.run.starting import holds
+from sysdyn.cli.run.start.starting import holds
+from sysdyn.cli.run.verdict.expectations import judge, watch
 from sysdyn.cli.sweep.kept import Block, Done, Kept
 from sysdyn.cli.sweep.results import write
 from sysdyn.cli.verify.verified import Run, Verified, disagreements, worst

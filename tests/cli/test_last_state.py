@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from sysdyn.cli.run.last_state import LastState
 from sysdyn.cli.run.prepare import prepare
+from sysdyn.cli.run.verdict.last_state import LastState
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report

@@ -82,7 +82,7 @@ def test_the_scene_wins(tmp_path, statement, how):
     text = PENDULUM.replace("time 0 s to 1 s", f"time 0 s to 1 s\n  {statement}")
     write(tmp_path, text)
     path = Path(f"{file}.lock")
-    from sysdyn.cli.run.lock import hashes
+    from sysdyn.cli.run.request.lock import hashes
     from sysdyn.dsl import load
     from sysdyn.dsl.text.diagnostics import Report
 

@@ -12,7 +12,7 @@ from sysdyn.cli.lsp import hover, outline, positions
 from sysdyn.cli.lsp.documents import Document
 from sysdyn.cli.lsp.wire import BadMessage, Inbox
 from sysdyn.cli.main import run
-from sysdyn.cli.run.targets import all_targets
+from sysdyn.cli.run.request.targets import all_targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.parser.parse import expected

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sysdyn.cli.analysis.asked import compiled
 from sysdyn.cli.main import run
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.compiler.equations.matrices import NoSuchEquations, rows_of
 from sysdyn.compiler.equations.port_hamiltonian import port_hamiltonian
 from sysdyn.compiler.forms.momenta import momentum

@@ -12,8 +12,8 @@ from sysdyn.cli.main import run
 from sysdyn.cli.reduce import activity
 from sysdyn.cli.reduce.activity import variation
 from sysdyn.cli.reduce.sankey import flows
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.comparison.arrays import arrays_of
 from sysdyn.runtime.comparison.compare import compare

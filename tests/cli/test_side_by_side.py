@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.cli.run import crew
+from sysdyn.cli.run.many import crew
 from texts import PENDULUM, run_json
 
 MODELS = Path(__file__).parents[2] / "models"

@@ -16,8 +16,9 @@ from sysdyn.cli.page import curves
 from sysdyn.cli.page.source_text import block, highlighted
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.report.text import section
-from sysdyn.cli.run import memory, module_check
-from sysdyn.cli.run.contradiction import inconsistent
+from sysdyn.cli.run import module_check
+from sysdyn.cli.run.many import memory
+from sysdyn.cli.run.start.contradiction import inconsistent
 from sysdyn.cli.spice import sources
 from sysdyn.cli.spice.writing import Unreadable
 from sysdyn.cli.streams import Closed, standing_streams

@@ -14,7 +14,7 @@ import pytest
 from sysdyn import api
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.main import run
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.sweep import workers
 from sysdyn.cli.sweep.axes import Axis, axis
 from sysdyn.cli.sweep.journal import Journal

@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.loaded import Loaded
+from sysdyn.cli.run.many.loaded import Loaded
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.sweep.in_core import Cases
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.dsl.text.diagnostics import Report

@@ -16,7 +16,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from sysdyn.api import load
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.sweep import workers
 from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.one_run import Runner

@@ -18,7 +18,7 @@ import pytest
 from schema import NUMBER, conforms, envelope
 from sysdyn import api
 from sysdyn.cli.main import run
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import run as simulate
 from sysdyn.cli.trade.search import tolerance
 from sysdyn.cli.trade.traded import Combination, Measured, cheapest, frontier

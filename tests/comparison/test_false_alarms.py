@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 from sysdyn.cli.compare.diffing import common, differences, headline
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.sizes import sizes
 from sysdyn.cli.run.running import Ran, run
-from sysdyn.cli.run.sizes import sizes
 from sysdyn.cli.verify.twins import free_quantities
 from sysdyn.cli.verify.verification import METHODS, REFUSALS, TIMES
 from sysdyn.dsl.text.diagnostics import Report

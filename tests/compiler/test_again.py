@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.loaded import Loaded
+from sysdyn.cli.run.many.loaded import Loaded
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.compiler.binding.again import again
 from sysdyn.dsl.model import expression as ex
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from sysdyn.cli.commands.compile_command import STAGES
+from sysdyn.cli.commands.model.compile_command import STAGES
 from sysdyn.cli.main import run
 from sysdyn.compiler.network.reflection import relabelled
 from sysdyn.compiler.network.verify import BrokenNetworkError, verify_network

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import ready
 from sysdyn.compiler.binding.pulses import pulses
 from sysdyn.dsl.model import expression as ex

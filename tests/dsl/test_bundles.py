@@ -2,7 +2,7 @@
 
 import pytest
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.slices import element_of, ranges_of
+from sysdyn.dsl.elaborate.scenes.slices import element_of, ranges_of
 from sysdyn.dsl.format.format_expressions import format_expression
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.text.diagnostics import Report, SourceText

@@ -5,8 +5,8 @@ import json
 import pytest
 from sysdyn.cli.console import Console
 from sysdyn.cli.main import run
-from sysdyn.cli.run.checking import checked
-from sysdyn.cli.run.targets import all_targets
+from sysdyn.cli.run.check.checking import checked
+from sysdyn.cli.run.request.targets import all_targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text import codes

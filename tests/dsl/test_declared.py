@@ -4,12 +4,12 @@ from contextlib import suppress
 
 import pytest
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.casts import cast_of
-from sysdyn.dsl.elaborate.declarations import DECLARED, Declarations
 from sysdyn.dsl.elaborate.elaborate import Elaborator
-from sysdyn.dsl.elaborate.elements import Elements
 from sysdyn.dsl.elaborate.files import FileScope
-from sysdyn.dsl.elaborate.parameters import Parameters
+from sysdyn.dsl.elaborate.instances.casts import cast_of
+from sysdyn.dsl.elaborate.instances.elements import Elements
+from sysdyn.dsl.elaborate.statements.declarations import DECLARED, Declarations
+from sysdyn.dsl.elaborate.statements.parameters import Parameters
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate

@@ -2,9 +2,9 @@
 
 import pytest
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.head import Body
-from sysdyn.dsl.elaborate.level_ports import level_ports
-from sysdyn.dsl.elaborate.levels import elsewhere
+from sysdyn.dsl.elaborate.instances.head import Body
+from sysdyn.dsl.elaborate.instances.level_ports import level_ports
+from sysdyn.dsl.elaborate.instances.levels import elsewhere
 from sysdyn.dsl.elaborate.tables import read_table
 from sysdyn.dsl.format.format_expressions import format_expression, format_unit
 from sysdyn.dsl.format.format_statements import statement_pieces

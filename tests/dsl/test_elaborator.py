@@ -2,13 +2,13 @@
 
 import pytest
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.connections import Ends
 from sysdyn.dsl.elaborate.elaborate import Elaborator
-from sysdyn.dsl.elaborate.events import Draft
 from sysdyn.dsl.elaborate.files import FileScope
-from sysdyn.dsl.elaborate.instances import BUILTINS
+from sysdyn.dsl.elaborate.instances.connections import Ends
+from sysdyn.dsl.elaborate.instances.instances import BUILTINS
 from sysdyn.dsl.elaborate.parts import NetworkBuilder, declared, flatten
-from sysdyn.dsl.elaborate.statements import STATEMENTS
+from sysdyn.dsl.elaborate.statements.events import Draft
+from sysdyn.dsl.elaborate.statements.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS

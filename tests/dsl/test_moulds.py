@@ -4,7 +4,7 @@ import random
 
 import pytest
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.moulds import Likeness, Moulds
+from sysdyn.dsl.elaborate.instances.moulds import Likeness, Moulds
 from sysdyn.dsl.model.network_text import show
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 

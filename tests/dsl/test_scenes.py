@@ -4,9 +4,9 @@ from fractions import Fraction
 
 import pytest
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.listing import Instance, Readable, instances, readable
-from sysdyn.dsl.elaborate.scenes import SceneReader
-from sysdyn.dsl.elaborate.unit_variables import _solved
+from sysdyn.dsl.elaborate.instances.unit_variables import _solved
+from sysdyn.dsl.elaborate.scenes.listing import Instance, Readable, instances, readable
+from sysdyn.dsl.elaborate.scenes.scenes import SceneReader
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate

@@ -9,7 +9,7 @@ import pytest
 from exported import COMPILER, MODELS, Outside, compiled, module
 from sysdyn import api
 from sysdyn.cli.main import run
-from sysdyn.cli.run.sizes import sizes
+from sysdyn.cli.run.request.sizes import sizes
 
 C = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 FORMS = ("3", "2", "2v", "1")
@@ -87,9 +87,9 @@ def api_scenes(model):
 def formed_of(model, index, backend, scene, settings):
     """The runtime's own system of a model's form."""
     from sysdyn.cli.export.layout import choose
-    from sysdyn.cli.run import targets
     from sysdyn.cli.run.prepare import prepare
-    from sysdyn.cli.run.starting import start
+    from sysdyn.cli.run.request import targets
+    from sysdyn.cli.run.start.starting import start
     from sysdyn.dsl import load
     from sysdyn.dsl.model import expression as ex
     from sysdyn.dsl.text.diagnostics import Report

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from reduced import ROOT, load
 from sysdyn.cli.analysis.asked import begun, compiled
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.dsl.text.diagnostics import Report
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sysdyn.cli.main import run
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.sizes import sizes
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.sizes import sizes
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate

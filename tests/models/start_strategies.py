@@ -10,10 +10,10 @@ from collections import Counter
 
 from reduced import ROOT
 from sysdyn.cli.options import EVERY
-from sysdyn.cli.run import targets
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import ready
-from sysdyn.cli.run.starting import start
+from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.decoding import decode

@@ -13,7 +13,7 @@ from model_runs import trace_of
 from reduced import ROOT, load
 from sysdyn.cli.analysis.asked import compiled
 from sysdyn.cli.main import run
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.forms.descriptor import BESIDE
 from sysdyn.compiler.model.mirror import letter

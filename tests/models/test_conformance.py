@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from sysdyn.api import check, simulate
 from sysdyn.cli.main import run
-from sysdyn.cli.run import starting
+from sysdyn.cli.run.start import starting
 from sysdyn.runtime.model.failures import InconsistentStart
 
 PRIMAL = ("lagrangian", "hamiltonian")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sysdyn.api import simulate
 from sysdyn.runtime.events.handler import Handler
-from sysdyn.runtime.integrate import pieces
+from sysdyn.runtime.integrate.jumps import pieces
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "events"))
 from random_events import FAMILIES, drawn

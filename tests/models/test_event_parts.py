@@ -14,7 +14,7 @@ from sysdyn.runtime.events.impacts import Impacts
 from sysdyn.runtime.events.plan import Assignment, Happened
 from sysdyn.runtime.events.succession import Succession
 from sysdyn.runtime.integrate.integrate import Integration
-from sysdyn.runtime.integrate.modes import serves, told_of
+from sysdyn.runtime.integrate.jumps.modes import serves, told_of
 from sysdyn.runtime.integrate.request import Request
 
 G = 9.81

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from sysdyn.cli.run.asked import Request
-from sysdyn.cli.run.loaded import Loaded
+from sysdyn.cli.run.many.loaded import Loaded
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.sweep.kept import Block
 from sysdyn.cli.sweep.one_run import Runner
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.api import simulate
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy import runs

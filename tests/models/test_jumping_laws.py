@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from sysdyn import api
 from sysdyn.runtime.events.handler import Handler
-from sysdyn.runtime.integrate import pieces
 from sysdyn.runtime.integrate.integrate import Integration
+from sysdyn.runtime.integrate.jumps import pieces
 
 TUBE = Path(__file__).parents[2] / "models" / "benchmark" / "tube.sd"
 BASIS = 2

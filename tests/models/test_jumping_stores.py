@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from model_runs import FOUR
 from sysdyn import api
-from sysdyn.runtime.integrate import pieces
+from sysdyn.runtime.integrate.jumps import pieces
 
 MASS = """\
 model m {

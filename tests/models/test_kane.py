@@ -6,7 +6,7 @@ from reduced import ROOT, load
 from scipy.integrate import solve_ivp
 from sysdyn.api import simulate
 from sysdyn.cli.main import run as main
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace

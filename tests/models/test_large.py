@@ -69,7 +69,8 @@ run(sys.argv[1:])
 CROSSED = """
 import ctypes, sys
 from sysdyn.cli.main import run
-from sysdyn.runtime.integrate import integrate, sizes
+from sysdyn.runtime.integrate import integrate
+from sysdyn.runtime.integrate.weights import sizes
 
 class Info(ctypes.Structure):
     _fields_ = [(f"field{k}", ctypes.c_size_t) for k in range(10)]
@@ -171,7 +172,7 @@ def test_the_end_of_a_run_takes_few_bytes_a_section(tmp_path):
 OPENED = """
 import sys, tracemalloc
 from sysdyn.cli.main import run
-from sysdyn.runtime.integrate import round_off
+from sysdyn.runtime.integrate.weights import round_off
 from sysdyn.runtime.integrate.integrate import Integration
 
 whole = Integration.run
@@ -201,7 +202,7 @@ def test_what_round_off_leaves_open_takes_few_bytes_a_section(tmp_path):
 OWN = """
 import ctypes
 import numpy as np
-from sysdyn.cli.run import memory
+from sysdyn.cli.run.many import memory
 from sysdyn.dsl.model import collecting
 from sysdyn.runtime.model import core_library as lib
 

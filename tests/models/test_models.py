@@ -9,8 +9,8 @@ import pytest
 from model_runs import trace_of
 from reduced import ROOT
 from sysdyn.cli.main import run
-from sysdyn.cli.run import targets
 from sysdyn.cli.run.prepare import prepare
+from sysdyn.cli.run.request import targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report

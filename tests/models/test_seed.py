@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from changed import CHANGED, EXTREME, STIFF
 from reduced import ROOT, load, solution
-from sysdyn.cli.run.asked import Request
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace

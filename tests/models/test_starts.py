@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from start_strategies import strategies
 from sysdyn import api
 from sysdyn.cli.options import EVERY
-from sysdyn.cli.run.starting import SOUGHT, sought
+from sysdyn.cli.run.start.starting import SOUGHT, sought
 from sysdyn.dsl.text.diagnostics import ModelError
 from sysdyn.runtime.start.strategies import STRATEGIES
 from sysdyn.runtime.trace.trace import Trace

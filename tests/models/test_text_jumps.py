@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sysdyn.api import simulate
 from sysdyn.runtime.events.handler import Handler
-from sysdyn.runtime.integrate import pieces
+from sysdyn.runtime.integrate.jumps import pieces
 
 PULSED = """from std.electrical import switch, diode, resistor, inductor, voltage
 model m {

@@ -19,11 +19,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from sysdyn.cli.run import module_check, running, targets
-from sysdyn.cli.run.asked import Request, options_of
+from sysdyn.cli.run import module_check, running
 from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.request import targets
+from sysdyn.cli.run.request.asked import Request, options_of
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import integrate, ready
-from sysdyn.cli.run.targets import Target
 from sysdyn.compiler.program import build
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report

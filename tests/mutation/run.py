@@ -221,7 +221,7 @@ def verified(model: str) -> tuple[int | str, set[str]]:
 def print_of(model: str) -> str:
     """A digest of all that verify makes runs of: lowered network, energies, form and program in every formulation."""
     get = importlib.import_module
-    running, targets = get("sysdyn.cli.run.running"), get("sysdyn.cli.run.targets")
+    running, targets = get("sysdyn.cli.run.running"), get("sysdyn.cli.run.request.targets")
     ex = get("sysdyn.dsl.model.expression")
     load, pipeline = get("sysdyn.dsl.load"), get("sysdyn.compiler.pipeline")
     choose, said = get("sysdyn.compiler.formulations").choose, get("sysdyn.dsl.text.diagnostics")

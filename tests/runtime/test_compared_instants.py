@@ -5,10 +5,10 @@ import pytest
 from sysdyn.runtime.accuracy.common_instants import MANY, MOST, Thinned, common, joined, known, late_by
 from sysdyn.runtime.accuracy.options import Options, WrongOption, instants
 from sysdyn.runtime.accuracy.pairs import Sampled, apart, difference
-from sysdyn.runtime.integrate.ledgers import Balance
 from sysdyn.runtime.integrate.request import COMPARED, TRACE
-from sysdyn.runtime.integrate.round_off import LeftOpen
-from sysdyn.runtime.integrate.unknown_roles import Roles, without_rate
+from sysdyn.runtime.integrate.rows.ledgers import Balance
+from sysdyn.runtime.integrate.weights.round_off import LeftOpen
+from sysdyn.runtime.integrate.weights.unknown_roles import Roles, without_rate
 from sysdyn.runtime.judgement import Estimate, allowed, cancelled, judge
 from sysdyn.runtime.model.failures import RowLabel
 

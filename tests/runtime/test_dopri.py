@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.accuracy.options import Options
-from sysdyn.runtime.integrate import settlers
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import Request
+from sysdyn.runtime.integrate.rows import settlers
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.core_library import ROW_HEAD
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure

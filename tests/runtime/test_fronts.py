@@ -1,4 +1,4 @@
-"""Factors by fronts (runtime/core/linear/fronts.h) of grids, which fill: solutions by their residuals."""
+"""Factors by fronts (runtime/core/linear/sparse/fronts.h) of grids, which fill: solutions by their residuals."""
 
 import numpy as np
 import pytest

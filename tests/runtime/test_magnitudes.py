@@ -7,8 +7,8 @@ import pytest
 import small_models as models
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import Request
-from sysdyn.runtime.integrate.told import UNPULLED, Told
-from sysdyn.runtime.integrate.unknown_roles import roles
+from sysdyn.runtime.integrate.weights.told import UNPULLED, Told
+from sysdyn.runtime.integrate.weights.unknown_roles import roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.scales import ROUND_OFF, confirmed, group_maximum, largest_of_group, noise, unresolved

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.accuracy.options import Options
-from sysdyn.runtime.integrate import corners, methods
+from sysdyn.runtime.integrate import methods
 from sysdyn.runtime.integrate.integrate import Integration
+from sysdyn.runtime.integrate.jumps import corners
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.core_library import ROW_HEAD

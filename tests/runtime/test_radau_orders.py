@@ -22,7 +22,7 @@ def complex_array(field):
 
 
 def test_the_table_is_what_its_generator_writes():
-    assert (CORE / "steppers" / "radau_coefficients.c").read_text() == radau_coefficients.text()
+    assert (CORE / "steppers" / "radau" / "radau_coefficients.c").read_text() == radau_coefficients.text()
 
 
 @pytest.mark.parametrize(("place", "s"), [(0, 3), (1, 5), (2, 7)])

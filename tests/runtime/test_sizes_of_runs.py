@@ -12,7 +12,7 @@ from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.accuracy.pairs import Sampled
 from sysdyn.runtime.accuracy.quantities import Quantities
 from sysdyn.runtime.integrate.request import Finished, Statistics
-from sysdyn.runtime.integrate.sizes import Sizes
+from sysdyn.runtime.integrate.weights.sizes import Sizes
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.trace.trace_store import Column

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.integrate.factors import Factors
-from sysdyn.runtime.integrate.least_norm import LeastNorm
 from sysdyn.runtime.integrate.methods import Method
-from sysdyn.runtime.integrate.metric import kinematic_scale
-from sysdyn.runtime.integrate.round_off import left_open
-from sysdyn.runtime.integrate.unknown_roles import roles
+from sysdyn.runtime.integrate.rows.least_norm import LeastNorm
+from sysdyn.runtime.integrate.weights.metric import kinematic_scale
+from sysdyn.runtime.integrate.weights.round_off import left_open
+from sysdyn.runtime.integrate.weights.unknown_roles import roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import ContractError

@@ -10,7 +10,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 from sysdyn.runtime.accuracy.options import Options
-from sysdyn.runtime.integrate.segments import segments
+from sysdyn.runtime.integrate.jumps.segments import segments
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.simulate import simulate
 from sysdyn.runtime.trace.trace import Trace

@@ -31,7 +31,7 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs += [("Watch", "sd_watch"), ("Collocation", "sd_collocation")]
     headers = [
         f'#include "{path.relative_to(CORE)}"'
-        for path in sorted(CORE.glob("*/*.h"))
+        for path in sorted(CORE.rglob("*.h"))
         if path.name not in ("complex_linear.h", "threads.h")
     ]
     lines = [*headers, "#include <stddef.h>", "#include <stdio.h>", "int main(void) {"]

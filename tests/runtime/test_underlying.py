@@ -10,9 +10,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "compiler"))
 
 from catalogue import load, network, state
-from sysdyn.cli.run.asked import Request as Simulation
 from sysdyn.cli.run.generated import module_of
 from sysdyn.cli.run.prepare import Prepared
+from sysdyn.cli.run.request.asked import Request as Simulation
 from sysdyn.cli.run.running import run
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x

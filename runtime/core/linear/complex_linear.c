@@ -1,14 +1,14 @@
-/* The factorisation of linear.c, elimination.c, sparse.c and fronts.c for complex matrices. */
+/* The factorisation of linear.c, elimination/elimination.c, sparse/sparse.c and sparse/fronts.c for complex matrices. */
 #define SD_COMPLEX
-#include "linear/sparse.c"
+#include "linear/sparse/sparse.c"
 
-#include "linear/front_pattern.c"
+#include "linear/sparse/front_pattern.c"
 
-#include "linear/fronts.c"
+#include "linear/sparse/fronts.c"
 
-#include "linear/elimination_order.c"
+#include "linear/elimination/elimination_order.c"
 
-#include "linear/elimination.c"
+#include "linear/elimination/elimination.c"
 
 #include "linear/linear.c"
 

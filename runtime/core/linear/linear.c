@@ -1,7 +1,7 @@
 /* Scaling, dense LU and the choice between dense and sparse: see linear.h. */
 #include "linear/linear.h"
 #include "linear/lanes.h"
-#include "linear/sparse.h"
+#include "linear/sparse/sparse.h"
 
 #include <math.h>
 #include <stdlib.h>

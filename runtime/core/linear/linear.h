@@ -10,7 +10,7 @@
 #ifndef SYSDYN_LINEAR_H
 #define SYSDYN_LINEAR_H
 
-#include "linear/elimination.h"
+#include "linear/elimination/elimination.h"
 #include "linear/number.h"
 
 #include <stddef.h>
@@ -85,7 +85,7 @@ int sd_linear_factor_sum(sd_linear *linear);
 void sd_linear_rest(sd_linear *linear);
 /* set to 0: the next factorisation chooses its pivots anew, and nothing is known of those before */
 int32_t *sd_linear_pivoted(sd_linear *linear);
-/* small matrices, of which there will be many, are eliminated by a list of operations (elimination.h) where it serves; the
+/* small matrices, of which there will be many, are eliminated by a list of operations (elimination/elimination.h) where it serves; the
  * pivots of others are chosen as before */
 void sd_linear_replayed(sd_linear *linear);
 /* The cells of `elimination` (which keeps one order) hold new factors, made by who runs its lists himself.  1: they are healthy, and

@@ -1,6 +1,6 @@
 /* The numbers of a factorisation: double, or double complex where SD_COMPLEX is defined.
  *
- * linear.c, elimination.c, sparse.c and fronts.c are written once and compiled twice; complex_linear.c gives the complex ones
+ * linear.c, elimination/elimination.c, sparse/sparse.c and sparse/fronts.c are written once and compiled twice; complex_linear.c gives the complex ones
  * names of their own.
  */
 #ifndef SYSDYN_NUMBER_H

@@ -1,7 +1,7 @@
 /* Lists of sums of products over numbered places: what an elimination does, whatever its numbers are, and other straight passes.
  *
  * A place is one of up to SD_ARRAYS arrays, which follow each other.  Who runs a list says where they stand: an interpreter
- * (elimination.c), or machine code (machine_code.h).
+ * (elimination/elimination.c), or machine code (elimination/machine_code.h).
  */
 #ifndef SYSDYN_SUMS_H
 #define SYSDYN_SUMS_H

@@ -7,9 +7,9 @@
 #include <string.h>
 #include <time.h>
 
-#include "run/corners.h"
-#include "run/quadratures.h"
-#include "run/watched.h"
+#include "run/events/corners.h"
+#include "run/meters/quadratures.h"
+#include "run/events/watched.h"
 #include "system/condensed.h"
 
 #define POLL 4  /* steps between two looks at the clock */

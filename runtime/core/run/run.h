@@ -14,9 +14,9 @@
 #define SYSDYN_RUN_H
 
 #include "system/least_norm.h"
-#include "run/extrema.h"
-#include "run/ledgers.h"
-#include "run/modes.h"
+#include "run/meters/extrema.h"
+#include "run/meters/ledgers.h"
+#include "run/events/modes.h"
 #include "system/settle.h"
 #include "steppers/stepper.h"
 

@@ -1,7 +1,7 @@
 #include "start/search.h"
 
-#include "linear/dense.h"
-#include "linear/graded.h"
+#include "linear/dense/dense.h"
+#include "linear/dense/graded.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -13,7 +13,7 @@ typedef struct sd_expanded {
     double *z;                        /* [2 room] a point of kept ones; NULL: it stands in what the method has spare */
     size_t room;
     double *y;                        /* all unknowns of the last point, of steep laws; NULL */
-    double *met, *magnitude;          /* [unknowns] of all, which grow with each step as in bdf.h; NULL: they do not */
+    double *met, *magnitude;          /* [unknowns] of all, which grow with each step as in bdf/bdf.h; NULL: they do not */
 } sd_expanded;
 
 /* unknowns: of the full system; NULL without memory */

@@ -1,6 +1,7 @@
 /* What the driver of an integration asks of a method: steps, values within the last step, a start.
  *
- * Every method (bdf.h, radau.h, dopri.h, energy.h) holds one of these about itself; run.c knows methods by nothing else.
+ * Every method (bdf/bdf.h, radau/radau.h, explicit/dopri.h, energy/energy.h) holds one of these about itself;
+ * run.c knows methods by nothing else.
  */
 #ifndef SYSDYN_STEPPER_H
 #define SYSDYN_STEPPER_H

@@ -16,7 +16,7 @@
 
 #include "system/assembly.h"
 #include "linear/linear.h"
-#include "linear/sparse.h"
+#include "linear/sparse/sparse.h"
 
 /* Of a condensed system the kept unknowns are moved; the others follow, and so do their rates. */
 /* what an unknown is of the state: nothing, one of it, one whose differences from others (`pair`) are of it: what floating
@@ -73,7 +73,7 @@ typedef struct sd_settle {
     double drift;                    /* norm of the constraint rows before the last call moved the point */
     double contracted;               /* largest residual beside the one before it, of the steps of the last call */
     double floor;                    /* residual that fresh factors have left: what old ones leave need not be less */
-    const int8_t *told;              /* [rows] 1: constant sums, which points between steps keep (integrate/bare.py); NULL: none */
+    const int8_t *told;              /* [rows] 1: constant sums, which points between steps keep (integrate/rows/bare.py); NULL: none */
 } sd_settle;
 
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates);

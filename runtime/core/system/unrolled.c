@@ -2,7 +2,7 @@
  *
  * Before the blocks: kept unknowns to their places, eliminated ones, rates, rows := 0.  Behind them: rows to theirs, rows q' - f.
  * The sums are those of the loops, in their order: digits do not depend on who computes them. */
-#include "linear/machine_code.h"
+#include "linear/elimination/machine_code.h"
 #include "linear/number.h"
 #include "system/condensed.h"
 

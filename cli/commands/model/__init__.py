@@ -1,0 +1,1 @@
+"""Commands about a model as it is written."""

@@ -1,0 +1,154 @@
+"""`sysdyn simulate`: text in, trace out."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import chosen, solved
+from sysdyn.cli.progress import ProgressLine
+from sysdyn.cli.whole_files import named
+
+if TYPE_CHECKING:
+    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.running import Ran
+
+SHOWN = 4
+"""Conserved quantities that the summary lists."""
+
+
+@with_console("simulate")
+@click.argument("file")
+@chosen
+@solved
+@click.option("--until", metavar="T", help="End of the run; an expression, a bare number in s.")
+@click.option("--at", metavar="T1,T2,...", help="Instants that the trace holds too.")
+@click.option("-o", "output", metavar="TRACE.h5", help="Default: <stem>-<scene>.h5 here.")
+@click.option("--accuracy-check", is_flag=True, help="A second run by another method must agree.")
+@click.option("--no-timings", is_flag=True, help="Leave wall and CPU times out of the trace.")
+def command(console: Console, progress: str, no_timings: bool, **options: Any) -> int:
+    """Simulate a scene of FILE and write its trace."""
+    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.running import run
+    from sysdyn.cli.run.start.starting import described, shortened, sought
+
+    line = ProgressLine("never" if console.quiet else progress)
+    request = Request(timings=not no_timings, **options)
+    if request.output == "-" and console.as_json:
+        raise UsageError("-o - and --json both want standard output")
+    try:
+        ran = _streamed(request, console, line) if _streams(request.output) else run(request, console.report, line)
+    finally:
+        line.clear()
+    if ran is None:
+        return console.unable()
+    console.result = _result(ran)
+    found = sought(ran.started.state)
+    for text in (*shortened(described(ran.started.state)), *([found] if found else []), *ran.outcome.warnings):
+        console.say(text)
+    if ran.outcome.judgement is not None and not ran.outcome.met:
+        for claim in ran.claims:
+            found = "" if claim.value is None else f": {claim.value:.9g} at {claim.time:.9g} s"
+            console.say(f"expect {claim.text}{found} (of a run that is not met: not judged)")
+    console.say(_summary(ran))
+    return console.finish(ran.exit)
+
+
+def _streams(output: str | None) -> bool:
+    """Whether a trace is wanted where no file is: standard output, a pipe, a device."""
+    if output is None or output == "-":
+        return output == "-"
+    path = Path(output)
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
+def _streamed(request: Request, console: Console, line: ProgressLine) -> Ran | None:
+    """HDF5 cannot be streamed: the trace is made in a folder of its own and copied."""
+    import tempfile
+
+    from sysdyn.cli.run.running import run
+
+    assert request.output is not None
+    with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
+        path = Path(folder) / "trace.h5"
+        try:
+            ran = run(replace(request, output=str(path)), console.report, line)
+            return ran and replace(ran, outcome=replace(ran.outcome, trace=Path(request.output)))
+        finally:  # what was computed before an interruption, too
+            if path.is_file():
+                _put(request.output, path.read_bytes())
+
+
+def _put(output: str, data: bytes) -> None:
+    if output == "-":
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    else:
+        with named(output):
+            Path(output).write_bytes(data)
+
+
+def _summary(ran: Ran) -> str:
+    o = ran.outcome
+    s, t = o.statistics, o.timings
+    estimate = "" if o.error_estimate is None else f", estimated error {o.error_estimate:.1e}"
+    estimate = ", estimated error below round-off" if o.below_round_off else estimate
+    form = {"None": "not known"} | ({"2": "2 (stabilised)"} if ran.started.facts.index == 3 else {})
+    method = f"{o.method} ({o.reason})" if o.reason else o.method
+    how = (ran.prepared.formulation, method, f"index {form.get(str(o.index), o.index)}", ran.prepared.backend)
+    balance = _last(o.samples.energy)  # a draft that an interruption left has none
+    audited = f"energy balance {balance:.2e} J, " if math.isfinite(balance) else ""
+    began = ran.started.state.t
+    span = f"{o.reached:g} s" if began == 0.0 else f"{began:.12g} s to {o.reached:.12g} s"
+    lines = [
+        f"{ran.target.name}: {', '.join(how)}",
+        f"  {span} in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
+        f"  {audited}constraints {_last(o.samples.constraints):.1e}",
+        *(f"  {text}" for text in _conserved(ran)),
+        f"  {o.trace}{'' if o.final else ' (not final)'}{'' if o.met or not o.final else ' (not met)'}",
+    ]
+    return "\n".join(lines)
+
+
+def _conserved(ran: Ran) -> list[str]:
+    """A line on each of the first quantities that should keep their value."""
+    found = ran.outcome.judgement.conserved if ran.outcome.judgement else ()
+    lines = [f"conserved: {b.title}, {b.value:.1e} of {b.turnover:.3g} {b.unit}" for b in found[:SHOWN]]
+    return [*lines, f"conserved: {len(found) - SHOWN} more, see --json"] if len(found) > SHOWN else lines
+
+
+def _last(values: Any) -> float:
+    return float(values[-1]) if len(values) else float("nan")
+
+
+def _result(ran: Ran) -> dict[str, Any]:
+    from sysdyn.cli.run.start.starting import described
+
+    o = ran.outcome
+    return {
+        "trace": str(o.trace),
+        "final": o.final,
+        "reached": o.reached,
+        "formulation": ran.prepared.formulation,
+        "method": o.method,
+        "index": o.index,
+        "start_strategy": ran.started.state.strategy,
+        "statistics": o.statistics,
+        "timings": o.timings,
+        "error_estimate": o.error_estimate,
+        "below_round_off": o.below_round_off,
+        "met": o.met,
+        "judged": list(o.judgement.judged) if o.judgement else [],
+        "not_met": [missed.to_json() for missed in o.judgement.not_met] if o.judgement else [],
+        "conserved": o.judgement.kept() if o.judgement else [],
+        "expects": [{"text": c.text, "ok": c.ok, "value": c.value, "time": c.time} for c in ran.claims],
+        "moved": described(ran.started.state),
+        "warnings": list(o.warnings),
+        "failure": ran.failure,
+    }

@@ -1,0 +1,283 @@
+"""`sysdyn verify`: one scene in every formulation that can express it and by two methods, in one table."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import INTERRUPTED, SOLVER, worst
+from sysdyn.cli.options import chosen, side_by_side, solved
+from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.progress import ProgressLine
+
+if TYPE_CHECKING:
+    from sysdyn.cli.verify.agreement import Gap
+    from sysdyn.cli.verify.verified import Run, Verified
+
+
+@with_console("verify")
+@click.argument("file")
+@chosen
+@solved
+@click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
+@click.option("--at", metavar="T1,T2,...", help="Instants that are compared too.")
+@click.option("-o", "output", metavar="DIR", help="Keep the traces there, as FORMULATION-METHOD.h5.")
+@side_by_side
+@click.option("--full", is_flag=True, help="Do not take reduced sizes from the ci.toml above FILE's folder.")
+@click.option("--no-timings", is_flag=True, help="Leave CPU times out.")
+def command(
+    console: Console, progress: str, no_timings: bool, full: bool, jobs: int | None, output: str | None, **options: Any
+) -> int:
+    """Run a scene of FILE in every formulation that can express it, by two methods, and compare the traces.
+
+    The methods are bdf and radau; where the scene or --method names another, that one and bdf.
+
+    Two runs agree where every traced quantity differs by less than 10 x accuracy x its nominal magnitude, up to the
+    horizon: the instant at which the reference differs by that much from its own run at a tenth of the accuracy.
+    --formulation and --method choose the reference; limits hold for each run.  Exit 1 where runs disagree, 3 where a
+    ledger of a run is off or the solver stops; what the scene expects is listed, and never decides.  Formulations run
+    side by side where that pays, with equal results.
+    """
+    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.sizes import sizes
+    from sysdyn.cli.verify.verification import verify
+
+    line = ProgressLine("never" if console.quiet else progress)
+    request = Request(timings=not no_timings, **options)
+    path, reduced = (Path(), ()) if full else sizes(request.file)
+    given = {name for name, _ in request.settings}
+    reduced = tuple((name, value) for name, value in reduced if name not in given)
+    if reduced:
+        console.say(f"sizes of {path.parent.name}/{path.name}: {', '.join(f'{n} = {v}' for n, v in reduced)}")
+    request = replace(request, settings=(*reduced, *request.settings))
+    folder = None if output is None else Path(output)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    try:
+        found = verify(request, console.report, folder, line, jobs)
+    finally:
+        line.clear()
+    if found is None:
+        return console.unable()
+    console.result = _result(found, keep=output is not None, timings=not no_timings)
+    console.results(_table(found, timings=not no_timings))
+    code = _judged(found, console)
+    if found.interrupted:
+        console.complain("interrupted: these are the runs so far", INTERRUPTED)
+        code = worst((code, INTERRUPTED))
+    return console.finish(code)
+
+
+def _judged(found: Verified, console: Console) -> int:
+    """Says what is wrong; the exit code."""
+    from sysdyn.cli.run.start.starting import shortened
+
+    code = 0
+    for text in _complaints(found):
+        console.complain(text, 1)
+        code = 1
+    for text in shortened(_doubts(found)):
+        console.complain(text, SOLVER)
+        code = SOLVER
+    for text in shortened(_unbalanced(found)):
+        console.complain(text, SOLVER)
+        code = SOLVER
+    for text in _warnings(found):
+        console.say(text)
+    for run in found.failures:
+        console.complain(f"{run.name}: {run.failure}", SOLVER, run.finding)
+        code = SOLVER
+    if not found.compared:
+        why = "; ".join(f"{name}: {reason}" for name, reason in found.left_out) or "the scene traces nothing"
+        console.complain(f"there is nothing to compare ({why}); 'trace NAME, ...' in the scene", SOLVER)
+        return SOLVER
+    if found.beyond is not None and not found.horizon > found.span[0]:
+        text = f"{found.beyond.variable} of {found.by} differs at two accuracies from the start on"
+        console.complain(f"the traces cannot be compared: {text}; a smaller --accuracy", SOLVER)
+        return SOLVER
+    return code
+
+
+def _complaints(found: Verified) -> list[str]:
+    from sysdyn.cli.run.start.starting import shortened
+
+    pairs = []
+    for d in found.disagreements:
+        if d.doubted:
+            continue
+        pairs.append(f"{d.one.name} and {d.other.name} disagree: {_apart(d.gap)}")
+    carriers = [
+        f"{' and '.join(t.backends)} disagree in {t.formulation}: row {t.row} by {t.difference:.1e} of itself"
+        for t in found.twins
+        if not t.agree
+    ]
+    return [*shortened(pairs), *carriers]
+
+
+def _doubts(found: Verified) -> list[str]:
+    """Differences from runs that are not met by their own estimate: nothing is known from them."""
+    return [
+        f"{' and '.join(run.name for run in d.doubted)}: not met by its own estimate, and apart from "
+        f"{(d.one if d.other in d.doubted else d.other).name}: {_apart(d.gap)}"
+        for d in found.disagreements
+        if d.doubted
+    ]
+
+
+def _unbalanced(found: Verified) -> list[str]:
+    """Ledgers that are off, a line each."""
+    return [
+        f"{run.name}: the {m.what} ledger is off by {m.value:.2g} {m.unit}, {m.limit:.2g} {m.unit} is allowed, "
+        f"most at {m.element}"
+        for run in found.runs
+        for m in run.unbalanced
+    ]
+
+
+def _apart(gap: Gap) -> str:
+    a, b = gap.values
+    worst = f"{gap.variable} is {a:.6g} and {b:.6g} at {gap.time:.6g} s, {gap.ratio:.3g} times what is allowed"
+    return worst if gap.first in (None, gap.time) else f"{worst} (first at {gap.first:.6g} s)"
+
+
+def _warnings(found: Verified) -> list[str]:
+    """Warnings of the runs, each once with the runs that have it."""
+    names: dict[str, list[str]] = {}
+    for run in (*found.runs, found.finer):
+        unmet = ("the accuracy asked for was not reached by its own estimate",) if run.inaccurate else ()
+        for text in (*run.outcome.warnings, *unmet):
+            names.setdefault(text, []).append(run.name)
+    return [f"{', '.join(dict.fromkeys(runs))}: {text}" for text, runs in names.items()]
+
+
+def _table(found: Verified, *, timings: bool) -> str:
+    """The table, with what stands above and below it."""
+    from sysdyn.cli.verify.verification import TIMES
+
+    head = ["formulation", "method", "index", "accuracy", "steps", "CPU ms", "estimate", "energy J", "constraints"]
+    rows = [[*head, "apart", "worst", "at s"]]
+    for run, gap in zip((*found.runs, found.finer), found.worst, strict=True):
+        rows.append([*_cells(run), *_gap_cells(run, gap, found)])
+    if not timings:
+        rows = [[cell for k, cell in enumerate(row) if k != 5] for row in rows]
+    accuracy, (t0, t1) = found.runs[0].accuracy, found.span
+    lines = [f"{found.name}: {t0:g} s to {t1:g} s, apart in units of {TIMES:g} x {accuracy:g} x nominal"]
+    columns = len(rows[0])
+    lines.append(aligned(rows, right={*range(2, columns)} - {columns - 2}))
+    lines += _refused(found)
+    lines += [f"not compared: {name}: {reason}" for name, reason in found.left_out]
+    if found.twins:
+        apart = max(found.twins, key=lambda t: t.difference)
+        lines.append(f"residuals of {' and '.join(apart.backends)}: {apart.difference:.1e} apart")
+    return "\n".join([*lines, _horizon(found), _verdict(found)])
+
+
+def _refused(found: Verified) -> list[str]:
+    """Formulations left out, those with one reason together."""
+    reasons: dict[str, list[str]] = {}
+    for r in found.refusals:
+        reason = r.reason.removeprefix(f"not expressible in {r.formulation}: ").removeprefix(f"{r.formulation} of ")
+        text = "not supported yet" if r.code == "E608" else f"{r.code} {reason}"
+        reasons.setdefault(text, []).append(r.formulation)
+    return [f"not in {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+
+
+def _cells(run: Run) -> list[str]:
+    o = run.outcome
+    estimate = "-" if o.error_estimate is None else f"{o.error_estimate:.1e}"
+    effort = [str(o.statistics["steps"]), f"{1e3 * o.timings['cpu_integrate_s']:.3g}"]
+    meters = [f"{run.energy:.1e}", f"{run.constraints:.1e}"]
+    return [run.formulation, run.method, o.index, f"{run.accuracy:.0e}", *effort, estimate, *meters]
+
+
+def _gap_cells(run: Run, gap: Gap | None, found: Verified) -> list[str]:
+    first = "the reference" if run is found.runs[0] else ""
+    if run.failure:
+        return ["-", ", ".join(filter(None, (first, "stopped early"))), f"{run.outcome.reached:.4g}"]
+    if first:
+        return ["-", first, "-"]
+    return ["-", "-", "-"] if gap is None else [f"{gap.ratio:.2g}", gap.variable, f"{gap.time:.4g}"]
+
+
+def _horizon(found: Verified) -> str:
+    if found.beyond is None:
+        return f"horizon: {found.horizon:g} s"
+    what = f"then {found.beyond.variable} of {found.by} differs at two accuracies"
+    return f"horizon: {max(found.horizon, found.span[0]):g} s of {found.span[1]:g} s, {what}"
+
+
+def _verdict(found: Verified) -> str:
+    ended = [run for run in found.runs if not run.failure]
+    number = len(ended)
+    if any(not d.doubted for d in found.disagreements) or not all(t.agree for t in found.twins):
+        return f"{number} runs: they disagree"
+    if found.disagreements:
+        return f"{number} runs, of which some are not met: the others agree"
+    if len(ended) == len(found.runs):
+        return f"{number} runs agree on {len(found.compared)} quantities"
+    stopped = f"{len(found.runs) - number} of {len(found.runs)} runs stopped early"
+    if number < 2:
+        return f"{stopped}: nothing is known from them"
+    return f"{stopped}: the other {number} agree on {len(found.compared)} quantities"
+
+
+def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
+    runs = [
+        _run_object(run, gap, keep=keep, timings=timings)
+        for run, gap in zip((*found.runs, found.finer), found.worst, strict=True)
+    ]
+    return {
+        "runs": runs,
+        "disagreements": [
+            {
+                "runs": [{"formulation": r.formulation, "method": r.method} for r in (d.one, d.other)],
+                **_gap_object(d.gap),
+            }
+            for d in found.disagreements
+        ],
+        "horizon": found.horizon,
+        "compared": list(found.compared),
+        "not_compared": [{"variable": name, "reason": reason} for name, reason in found.left_out],
+        "not_expressible": [{"formulation": r.formulation, "code": r.code, "reason": r.reason} for r in found.refusals],
+        "backends": [
+            {"formulation": t.formulation, "difference": t.difference, "row": t.row, "ok": t.agree} for t in found.twins
+        ],
+    }
+
+
+def _run_object(run: Run, gap: Gap | None, *, keep: bool, timings: bool) -> dict[str, Any]:
+    o = run.outcome
+    return {
+        "formulation": run.formulation,
+        "method": run.method,
+        "index": o.index,
+        "accuracy": run.accuracy,
+        "final": o.final,
+        "reached": o.reached,
+        "statistics": o.statistics,
+        "timings": o.timings if timings else {},
+        "error_estimate": o.error_estimate,
+        "energy": run.energy,
+        "met": not run.unbalanced and o.final,
+        "not_met": [m.to_json() for m in run.unbalanced],
+        "constraints": run.constraints,
+        "worst": None if gap is None else _gap_object(gap),
+        "expects": [{"text": text, "ok": ok} for text, ok in run.expects],
+        "warnings": list(o.warnings),
+        "failure": run.failure,
+        "diagnostic": run.finding,
+        "trace": str(o.trace) if keep else None,
+    }
+
+
+def _gap_object(gap: Gap) -> dict[str, Any]:
+    return {
+        "variable": gap.variable,
+        "time": gap.time,
+        "first": gap.first,
+        "ratio": gap.ratio,
+        "values": list(gap.values),
+    }

@@ -1,0 +1,64 @@
+"""`sysdyn report`: one self-contained page about a model under a scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import chosen, solved
+from sysdyn.cli.progress import ProgressLine
+
+
+@with_console("report")
+@click.argument("file")
+@chosen
+@solved
+@click.option("--until", metavar="T", help="End of the run; an expression, a bare number in s.")
+@click.option("--at", metavar="T1,T2,...", help="Instants that the traces hold too.")
+@click.option("-o", "output", metavar="FILE.html", help="Default: <stem>-<scene>.html here.")
+def command(console: Console, progress: str, output: str | None, **options: Any) -> int:
+    """Write one page about a scene of FILE: text, network, laws, equations, run, energy balance.
+
+    The page loads nothing and works offline. Without a time span in the scene nothing is run.
+    """
+    if output == "-" and console.as_json:
+        raise UsageError("-o - and --json both want standard output")
+    if output not in (None, "-") and Path(str(output)).suffix.lower() not in (".html", ".htm"):
+        raise UsageError(f"'{output}': a report is an .html")
+    from sysdyn.cli.commands.trace.diff_command import write
+    from sysdyn.cli.report.collect import collect
+    from sysdyn.cli.report.page import page
+    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.dsl.model import expression as ex
+
+    line = ProgressLine("never" if console.quiet else progress)
+    request = Request(**options)
+    with ex.fresh():
+        try:
+            study = collect(request, console.report, line)
+        finally:
+            line.clear()
+        if study is None:
+            return console.unable()
+        text = page(study)
+    target = output or _default(request.file, study.network.scene.name if study.network.scene else "")
+    write(target, text)
+    console.say(f"{target}: {study.target.name}, {len(text) / 1e3:.0f} kB")
+    console.result = {
+        "report": target,
+        "formulation": study.prepared.formulation,
+        "dof": study.started.facts.dof,
+        "index": study.started.facts.index,
+        "final": None if study.ran is None else study.ran.outcome.final,
+        "met": None if study.ran is None else study.ran.outcome.met,
+        "failure": None if study.ran is None else study.ran.failure,
+    }
+    return console.finish(0 if study.ran is None else study.ran.exit)
+
+
+def _default(file: str, scene: str) -> str:
+    stem = "model" if file == "-" else Path(file).stem
+    return f"{stem}-{scene}.html" if scene else f"{stem}.html"

@@ -1,0 +1,1 @@
+"""One text run often: in memory, in the core, in processes."""

@@ -1,0 +1,1 @@
+"""The consistent start in the author's words."""

@@ -1,0 +1,320 @@
+"""The consistent start as the author should see it: what was moved, what stands in the way (E903, E505, E510, E519)."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from sysdyn.cli.run.events import plan
+from sysdyn.cli.run.prepare import Prepared, prepare
+from sysdyn.cli.run.start.contradiction import inconsistent, place_of
+from sysdyn.cli.run.verdict.last_state import LastState
+from sysdyn.dsl import load
+from sysdyn.dsl.elaborate.scenes.stopping import RANGE
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.evaluation import evaluate
+from sysdyn.dsl.model.network import Expectation
+from sysdyn.dsl.model.units import quantity
+from sysdyn.dsl.text.diagnostics import Related, Report
+from sysdyn.runtime.events.start import eventful_start
+from sysdyn.runtime.model.description import describe
+from sysdyn.runtime.model.failures import InconsistentStart, SolverFailure
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.rank import NotFiniteError
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.structure.implicit import undetermined
+from sysdyn.runtime.structure.inertia import negative_inertia
+from sysdyn.runtime.structure.order import order_and_manifold
+from sysdyn.runtime.structure.structure import Structure, structure
+from sysdyn.values import dataclass
+
+SOUGHT = {
+    "rows_as_written": "down steep laws, from the equations without their derivatives",
+    "homotopy": "along what fades of the misses at the guess",
+    "between": "from where what nothing is said of lies between its neighbours",
+    "perturbed_guess": "from a point beside the guess",
+    "largest_scales": "in the largest scales that the equations propose",
+}
+"""What the summary says of a start by its strategy (runtime/start); nothing of the plain one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """A model at its start."""
+
+    system: System
+    state: ConsistentState
+    facts: Structure
+
+
+def start(
+    prepared: Prepared, t0: float, report: Report, redundancy: str | None = None, until: float | None = None
+) -> Started | None:
+    """The consistent start and the structural facts there; None where the report says what is in the way.
+
+    redundancy: error, drop or minimum_norm; None: the scene's; until: `time.monotonic()` of the limit of wall time.
+    """
+    found = Report()
+    try:
+        return _started(prepared, t0, found, redundancy, until)
+    finally:
+        report.extend(load.at_authors(prepared.network, found))
+
+
+def _started(
+    prepared: Prepared, t0: float, report: Report, redundancy: str | None, until: float | None
+) -> Started | None:
+    scene = prepared.network.scene
+    policy = redundancy or (scene.redundancy if scene else None) or "error"
+    system = System.of(describe(prepared.structure, prepared.arrays), prepared.carrier, "3")
+    try:
+        with np.errstate(all="ignore"):  # what overflows is seen as no number
+            state = eventful_start(system, t0, plan(prepared, system), until)
+            facts = structure(system, state)
+            implicit = undetermined(system, state, facts)
+    except InconsistentStart as error:
+        _refused(prepared, t0, error, report)
+        return None
+    except NotFiniteError:
+        _steep(prepared, system, t0, report)
+        return None
+    except SolverFailure:
+        _late(prepared, "while the start is sought", "a higher limit, or guesses nearer to a start", report)
+        return None
+    _structural(prepared, system, state, facts if not implicit else replace(facts, undetermined=()), policy, report)
+    _inertia(prepared, system, state, report)
+    for name in implicit:
+        place = next(
+            (u.place for u in prepared.network.unknowns if u.name == name.partition("[")[0]), prepared.network.place
+        )
+        report.error("E505", f"the gammas do not determine {name} at the start: their slope in it vanishes", place)
+    _statics(prepared, system, state, facts, report)
+    if until is not None and time.monotonic() > until:
+        _late(prepared, "before the run begins", "a higher limit", report)
+        return None
+    return Started(system, state, facts)
+
+
+def _late(prepared: Prepared, when: str, remedy: str, report: Report) -> None:
+    """Report that nothing is left of the wall time."""
+    text = f"the limit of wall time is reached {when}: there is no trace"
+    report.error("E934", text, prepared.network.place, help=remedy)
+
+
+def _refused(prepared: Prepared, t0: float, error: InconsistentStart, report: Report) -> None:
+    """Report why there is no start; of gathered elements at the lines of the author, as `compile_network` does."""
+    if prepared.compiled.written is not None:
+        found = Report()
+        one_by_one = prepare(
+            prepared.network, Report(), formulation=prepared.formulation, backend="numpy", gather=False
+        )
+        if one_by_one is not None and start(one_by_one, t0, found) is None:
+            report.extend(found)
+            return
+    inconsistent(prepared, t0, error, report)
+
+
+def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None:
+    """The model as written at its start, in the same formulation where that can express it; None where it has none."""
+    for formulation in (prepared.formulation, "auto"):
+        whole = prepare(prepared.whole, Report(), formulation=formulation, backend="numpy")
+        if whole is not None:
+            break
+    else:
+        return None
+    system = System(whole.structure, whole.arrays, whole.carrier)
+    try:
+        with np.errstate(all="ignore"):
+            state = eventful_start(system, t0, plan(whole, system))
+            return whole, Started(system, state, structure(system, state))
+    except (InconsistentStart, NotFiniteError):
+        return None
+
+
+def described(state: ConsistentState) -> list[str]:
+    """What the start moved, a line each."""
+    return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in state.moved]
+
+
+def sought(state: ConsistentState) -> str:
+    """How the start was found, where Newton's method from the guesses was not enough; else nothing."""
+    return SOUGHT.get(state.strategy, "") and f"the start was found {SOUGHT[state.strategy]} ({state.strategy})"
+
+
+def shortened(lines: list[str]) -> list[str]:
+    """The first few of many lines."""
+    return lines if len(lines) <= 6 else [*lines[:5], f"... {len(lines) - 5} more of these"]
+
+
+def _steep(prepared: Prepared, system: System, t0: float, report: Report) -> None:
+    """E519: the rows at the start, or their slopes, are no numbers."""
+    from sysdyn.cli.run.verdict.culprit import undefined_at_start  # of mistakes alone
+
+    found = undefined_at_start(prepared, system, t0)
+    if found is not None:
+        help_ = "initial values at which it is defined, or a law that is defined there"
+        report.error("E519", f"at the start {found[0]}", found[1], help=help_)
+        return
+    message = "the slopes of the equations are no numbers at the start: values beyond 1e308, or a root at zero?"
+    report.error("E519", message, prepared.network.place, help="look at the sizes of parameters and initial values")
+
+
+def _structural(
+    prepared: Prepared, system: System, state: ConsistentState, facts: Structure, policy: str, report: Report
+) -> None:
+    if facts.singular:
+        near = facts.rank
+        message = f"the initial configuration is singular: rank {near - facts.singular}, {near} nearby"
+        lost = LastState(prepared, system, state.t, state.y).dependent()
+        message += f": {', '.join(c.name for c in lost)} depend on each other there" if lost else ""
+        where = lost[-1].place if lost else prepared.network.place
+        report.error("E512", message, where, help="move the guess off the dead centre")
+    if facts.redundant and policy != "error":
+        return
+    if facts.redundant:
+        # the last one written is the one too many, unless a library has it
+        places = [(place_of(prepared, label), label.label) for label, _ in facts.dependent]
+        own = [p for p in places if p[0].source is prepared.network.place.source]
+        where = max(own or places, key=lambda p: p[0].span.start)[0] if places else prepared.network.place
+        beside = [Related(f"{name} belongs to it", p) for p, name in places if p != where]
+        group = ", ".join(f"{label.label} ({weight:+.3g})" for label, weight in facts.dependent)
+        plural = "s" if facts.redundant > 1 else ""
+        message = f"{facts.redundant} redundant constraint{plural}: dependent group {group}"
+        report.error("E509", message, where, related=beside)
+    elif facts.index is None and facts.undetermined and not facts.singular:  # a singular one does not tell multipliers
+        names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
+        message = f"the equations do not determine {names}"
+        report.error(
+            "E516", message, prepared.network.place, help="inertia, stiffness, dissipation or a constraint is missing"
+        )
+
+
+def _without_primal_rows(prepared: Prepared) -> bool:
+    """Whether rows are other than the balances of the text's coordinates, with a multiplier a constraint."""
+    return prepared.formulation.startswith("co_") or prepared.formulation.endswith("kane")
+
+
+def _inertia(prepared: Prepared, system: System, state: ConsistentState, report: Report) -> None:
+    """E321: T* without a minimum leaves the motion undetermined forward in time (springs may be unstable).
+
+    Asked of the balances of coordinates: another formulation of the text has them.
+    """
+    if _without_primal_rows(prepared):
+        return
+    found = negative_inertia(system, state)
+    if found is None:
+        return
+    name, value = found
+    family = name.partition("[")[0].rstrip("'").removesuffix(".f")
+    places = {c.name: c.place for c in prepared.network.coordinates} | {
+        b.name: b.place for b in prepared.network.branches
+    }
+    places |= {n.name: n.place for n in prepared.network.nodes}
+    energies = [e.place for e in prepared.network.energies if e.function in ("T*", "T")]
+    where = energies[0] if len(energies) == 1 else places.get(family, prepared.network.place)
+    negative = [
+        p for p in prepared.network.parameters if np.ndim(v := prepared.binding.values.get(p.name, 0)) == 0 and v < 0
+    ]
+    read = {n.data for e in prepared.network.energies for n in ex.topological([e.expression]) if n.op == "param"}
+    guilty = [p for p in negative if p.name in read]
+    shown = ", ".join(f"{p.name} = {quantity(prepared.binding.values[p.name], p.unit)}" for p in guilty)
+    what = f"the inertia along {name} is negative: {shown or f'{value:g} in SI units'}; T* has no minimum"
+    related = tuple(Related("negative", p.place) for p in guilty)
+    report.error("E321", what, where, related=related)
+
+
+def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: Structure, report: Report) -> None:
+    """`expect static`: claims about counts (E909).
+
+    Claims of a model hold in each of its scenes: where there is a Lagrangian formulation, that is counted.
+    """
+    if prepared.left_out and prepared.network.statics:
+        written = as_written(prepared, state.t)
+        if written is None:
+            text = "claims about counts are of the whole model, a part of which has no start: 'check' says why"
+            report.note("N608", text, prepared.network.statics[0].place)
+            return
+        prepared, (system, state, facts) = written[0], (written[1].system, written[1].state, written[1].facts)
+    facts = counted_as(prepared, state.t, facts) if prepared.network.statics else facts
+    known = {
+        "coordinates": facts.coordinates,
+        "m1": facts.m1,
+        "m2": facts.m2,
+        "dof": facts.dof,
+        "configuration_dof": facts.configuration_dof,
+        "redundant": facts.redundant,
+        "index": facts.index,
+    }
+    if any(n.data in ("static order", "static manifold") for c in prepared.network.statics for n in _names(c)):
+        tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
+        counted = order_and_manifold(system, state, tangible)
+        watched = sum(RANGE in s.name for s in prepared.network.states)
+        known |= {"order": counted[0] - watched, "manifold": counted[1]} if counted else {}
+    for claim in prepared.network.statics:
+        _static(prepared, claim, known, report)
+
+
+def counted_as(prepared: Prepared, t0: float, facts: Structure) -> Structure:
+    """The facts with the counts of the Lagrangian formulation, where the present one leaves rows out (Kane's)."""
+    return replace(_primal(prepared, t0) or facts, index=facts.index) if _without_primal_rows(prepared) else facts
+
+
+def _primal(prepared: Prepared, t0: float) -> Structure | None:
+    """The facts of the Lagrangian formulation; None where there is none."""
+    silent = Report()
+    primal = prepare(prepared.network, silent, formulation="lagrangian", backend=prepared.backend)
+    if primal is None:
+        return None
+    system = System(primal.structure, primal.arrays, primal.carrier)
+    try:
+        return structure(system, eventful_start(system, t0, plan(primal, system)))
+    except InconsistentStart:
+        return None
+
+
+def _names(claim: Expectation) -> list[ex.Node]:
+    return [n for n in ex.topological([claim.left, claim.right]) if n.op == "param"]
+
+
+def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None], report: Report) -> None:
+    missing = []
+
+    def lookup(node: ex.Node) -> float:
+        name = node.data if node.op == "param" and not node.args else ""
+        if name.startswith("static "):
+            value = known.get(name.removeprefix("static "))
+            if value is None:
+                missing.append(name.removeprefix("static "))
+            return float("nan") if value is None else float(value)
+        return prepared.binding.evaluate(node)
+
+    left, right, within = evaluate([claim.left, claim.right, claim.within or ex.const(0.0)], lookup)
+    if missing:
+        message = f"static quantity '{missing[0]}' is not known for this model (too large, or undetermined)"
+        report.note("N608", message, claim.place)
+    elif not holds(claim.operator, left, right, within):
+        unit = "" if claim.unit.text == "1" else f" {claim.unit.text}"
+        found = f"found {left:.9g}{unit} and {right:.9g}{unit}"
+        report.error("E909", f"expect failed: {claim.text.removeprefix('expect ')}, {found}", claim.place)
+
+
+def holds(operator: str, left: float, right: float, within: float) -> bool:
+    """Whether left op right, a tolerance granted to the author's side."""
+    return bool(where_holds(operator, np.float64(left), np.float64(right), np.float64(within)))
+
+
+def where_holds(operator: str, left: Any, right: Any, within: Any) -> Any:
+    """The same of arrays, sample by sample."""
+    match operator:
+        case "==":
+            return np.abs(left - right) <= within
+        case "!=":
+            return np.abs(left - right) > within
+        case "<" | "<=":
+            loose = (operator == "<=") | (within != 0.0)
+            return np.where(loose, left <= right + within, left < right)
+        case _:
+            loose = (operator == ">=") | (within != 0.0)
+            return np.where(loose, left >= right - within, left > right)

@@ -1,0 +1,1 @@
+"""What a finished or a stopped run says of itself."""

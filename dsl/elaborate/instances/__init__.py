@@ -1,0 +1,1 @@
+"""Labels: elements, components, what connects them."""

@@ -1,0 +1,1 @@
+"""Scenes: what is asked of a model."""

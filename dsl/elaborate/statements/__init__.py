@@ -1,0 +1,1 @@
+"""Statements of a body: names, equations, events."""

@@ -1,0 +1,238 @@
+"""Declarations: coordinates, implicit unknowns, states, nodes, inputs, lets and outputs, labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+
+from sysdyn.dsl.elaborate.statements import events
+from sysdyn.dsl.elaborate.statements.parameters import Parameters
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Coordinate, Initial, Loop, NodeFamily, State, Unknown
+from sysdyn.dsl.model.units import NONE, Dimension, si
+from sysdyn.dsl.names.context import Use
+from sysdyn.dsl.names.failures import Failed
+from sysdyn.dsl.names.symbols import (
+    BundleNode,
+    BundleSymbol,
+    ConstraintSymbol,
+    Definition,
+    DomainSymbol,
+    Family,
+    NodeSymbol,
+    PortSymbol,
+    UnknownSymbol,
+    Vector,
+    nearest,
+)
+from sysdyn.dsl.text.diagnostics import Related, Report
+from sysdyn.dsl.tree import syntax
+
+DECLARED = (
+    syntax.Coord,
+    syntax.Implicit,
+    syntax.State,
+    syntax.Node,
+    syntax.Let,
+    syntax.Output,
+    syntax.Quasi,
+    syntax.Constraint,
+    syntax.Discrete,
+)
+"""Statements that bring names into a scope by `declare`."""
+
+
+class Declarations(Parameters):
+    """Brings the names of a space into scope."""
+
+    def __init__(self, report: Report) -> None:
+        super().__init__(report)
+        self._begun: dict[tuple[Node, tuple[Loop, ...], int], Initial] = {}  # by target, loops, depth
+
+    def declare(self, statement: syntax.Statement) -> None:
+        """One declaration; statements of other kinds are passed over."""
+        match statement:
+            case syntax.Coord():
+                self._coordinates(statement)
+            case syntax.Implicit():
+                unit = self.unit(statement.unit)
+                for decl in statement.decls:
+                    family = self.current.family(decl.name, self.shape(decl))
+                    self._unknown(decl, "e", family, unit.dimension, None, False)
+                    self.parts.unknowns.append(Unknown(family.name, family.whole, unit, self.place(decl.span)))
+                    if statement.init is not None:
+                        self._own_initial(decl, "e", family, unit.dimension, statement.init)
+            case syntax.State():
+                self._state(statement)
+            case syntax.Node():
+                self._nodes(statement)
+            case syntax.Let() | syntax.Output() | syntax.Quasi():
+                self._definition(statement)
+            case syntax.Constraint():
+                decl = statement.decl
+                family = self.current.family(decl.name)
+                self.enter(ConstraintSymbol(decl.name, statement.kind, family, self.place(decl.span)))
+            case syntax.Discrete():
+                events.discrete(self, statement)
+
+    def _unknown(
+        self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, domain: DomainSymbol | None, co: bool
+    ) -> None:
+        self.enter(UnknownSymbol(decl.name, kind, family, dimension, domain, co, self.place(decl.span)))
+
+    def _nodes(self, statement: syntax.Node) -> None:
+        """Nodes, and the members of a bundle of them."""
+        bundle = self.scope.find(statement.domain.name)
+        if isinstance(bundle, BundleSymbol):
+            if statement.init is not None:
+                message = "a bundle has no single initial value"
+                raise self.resolver.fail("E207", message, statement.init.span, help="init name.member.q = ...")
+            for decl in statement.decls:
+                self.enter(self._bundle(decl, decl.name, bundle))
+            return
+        domain = self.domain(statement.domain)
+        for decl in statement.decls:
+            symbol = self._node(decl, decl.name, domain)
+            self.enter(symbol)
+            if statement.init is not None:
+                effort = domain.common == "effort"
+                unit = domain.effort if effort else domain.displacement
+                self._own_initial(decl, "ne" if effort else "nq", symbol.family, unit.dimension, statement.init)
+
+    def _bundle(self, decl: syntax.Decl, name: str, bundle: BundleSymbol) -> BundleNode:
+        """The nodes of a bundle, of those within it too; name: the path to it."""
+        members: dict[str, NodeSymbol | PortSymbol | BundleNode] = {}
+        for member, kind in bundle.members:
+            inner = f"{name}.{member}"
+            if isinstance(kind, BundleSymbol):
+                members[member] = self._bundle(decl, inner, kind)
+            else:
+                members[member] = self._node(decl, inner, kind)
+        return BundleNode(name, members, self.place(decl.span))
+
+    def _node(self, decl: syntax.Decl, name: str, domain: DomainSymbol) -> NodeSymbol:
+        family = self.current.family(name, self.shape(decl))
+        place = self.place(decl.span)
+        self.parts.nodes.append(NodeFamily(family.name, family.whole, domain, place))
+        return NodeSymbol(name, family, domain, place)
+
+    def _coordinates(self, statement: syntax.Coord) -> None:
+        """Coordinates with their rates and conjugates; cocoord: momenta are the positions."""
+        domain = self.domain(statement.domain)
+        co = statement.kind == "cocoord"
+        own, rate = (domain.momentum, domain.effort) if co else (domain.displacement, domain.flow)
+        conjugate, effort = (domain.displacement, domain.flow) if co else (domain.momentum, domain.effort)
+        for decl in statement.decls:
+            family = self.current.family(decl.name, self.shape(decl))
+            self._unknown(decl, "q", family, own.dimension, domain, co)
+            place = self.place(decl.span)
+            self.parts.coordinates.append(
+                Coordinate(
+                    family.name, family.whole, co, own, rate, conjugate, effort, statement.tangible, place, domain
+                )
+            )
+            if statement.init is not None:
+                self._own_initial(decl, "q", family, own.dimension, statement.init)
+
+    def _own_initial(
+        self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, init: syntax.Initial
+    ) -> None:
+        """The initial value in a declaration: for all elements of the family, in a `for` for those of its variables."""
+        message = f"'{decl.name}' is in {dim.show(dimension)} but starts at {{}}"
+        outer = len(self.resolver.loops)
+        with ExitStack() as stack:
+            at = tuple(
+                self.looped(index) or ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", *bounds)).index)
+                for k, (index, bounds) in enumerate(zip(decl.indices, family.shape, strict=True))
+            )
+            target = ex.var(family.name, kind, *family.prefix, *at)
+            for one, value, loops in self.values_at_start(target, init.value, dimension, message, outer):
+                self.add_initial(Initial(one, value, init.kind == "fixed", loops, self.place(init.span)))
+
+    def values_at_start(
+        self, target: Node, written: syntax.Expr, dimension: Dimension, message: str, outer: int
+    ) -> Iterator[tuple[Node, Node, tuple[Loop, ...]]]:
+        """What begins with which value, under which loops: the elements over the loops behind the first `outer` with
+        one value for all, or by a list with one for each.
+        """
+        found, loops = self.resolver.resolve(written), self.resolver.loops
+        if not isinstance(found, Vector) or len(loops) != outer + 1:
+            one = self.resolver.one_number(found, written)
+            yield target, self.resolver.fitting(one, written, dimension, "E207", message), loops
+            return
+        own, items = loops[-1], found.items
+        name = str(target).partition("[")[0]
+        self.resolver.uses.append(
+            Use((own.first, own.last), own.last, loops[:outer], name, self.place(written.span), len(items))
+        )
+        for k, item in enumerate(items):
+            at = {ex.index(own.index): ex.add(own.first, ex.const(k))}
+            value = self.resolver.fitting(item, written, dimension, "E207", message)
+            yield ex.substitute(target, at), ex.substitute(value, at), loops[:outer]
+
+    def add_initial(self, initial: Initial, override: bool = False) -> None:
+        """Enter an initial value; override: of a scene.  What stands further outside goes before (language, 34)."""
+        path = self.current.path
+        initial = replace(initial, depth=0 if override else 2 + path.count(".") if path else 1)
+        before = self._begun.setdefault((initial.target, initial.loops, initial.depth), initial)
+        if before is not initial:
+            related = (Related("first here", before.place),)
+            message = f"'{initial.target}' gets its initial value twice"
+            self.report.error("E106", message, initial.place, help="one of the two", related=related)
+            raise Failed
+        self.parts.initials.append(initial)
+
+    def _state(self, statement: syntax.State) -> None:
+        """A dynamic variable; its unit is said, or that of its initial value."""
+        decl = statement.decl
+        unit = self.unit(statement.unit) if statement.unit else None
+        if unit is None:
+            value = None if statement.value is None else self.resolver.resolve(statement.value)
+            first = value.items[0] if isinstance(value, Vector) else value
+            unit = si((first.dimension or NONE) if first is not None else NONE)
+        family = self.current.family(decl.name, self.shape(decl))
+        self._unknown(decl, "s", family, unit.dimension, None, False)
+        self.parts.states.append(State(family.name, family.whole, unit, self.place(decl.span)))
+        if statement.value is not None:
+            init = syntax.Initial("fixed", statement.value, statement.value.span)
+            self._own_initial(decl, "s", family, unit.dimension, init)
+
+    def _definition(self, statement: syntax.Let | syntax.Output | syntax.Quasi) -> None:
+        """let, output, quasi: resolved when they are read first."""
+        decl = statement.decl
+        kind = {syntax.Let: "let", syntax.Output: "output", syntax.Quasi: "quasi"}[type(statement)]
+        dimension = self.unit(statement.unit).dimension if isinstance(statement, syntax.Quasi) else None
+        at: tuple[str, ...] = ()
+        implied = False
+        if decl.indices and not any(isinstance(i, syntax.Range) for i in decl.indices):
+            at = tuple(i.name for i in decl.indices if isinstance(i, syntax.Name))
+            if len(at) != len(decl.indices):
+                raise self.resolver.fail(
+                    "E806", f"'{decl.name}' is declared by its loop variables", decl.span, help="let x[i] = ..."
+                )
+        elif decl.indices and not isinstance(statement.value, syntax.Array):
+            help_ = f"for i in ... {{ {kind} {decl.name}[i] = ... }}"
+            raise self.resolver.fail(
+                "E806", f"the elements of '{decl.name}' are given by one formula", decl.span, help=help_
+            )
+        elif self.resolver.bound_loops():
+            at, implied = tuple(self.resolver.bound_loops()), True
+        place = self.place(decl.span)
+        if kind == "quasi":
+            self.parts.quasis.append(self.current.family(decl.name).name)
+        self.enter(Definition(decl.name, kind, statement.value, at, dimension, self.current, place, decl.span, implied))
+
+    def domain(self, word: syntax.Word) -> DomainSymbol:
+        """The domain of that name; E202."""
+        symbol = self.scope.find(word.name)
+        if isinstance(symbol, DomainSymbol):
+            return symbol
+        domains = [n for n in self.scope.names() if isinstance(self.scope.find(n), DomainSymbol)]
+        near = nearest(word.name, domains)
+        if self.scope.is_broken(word.name):
+            raise Failed
+        help_ = f"'{near}'" if near else f"one of {', '.join(domains)}"
+        raise self.resolver.fail("E202", f"'{word.name}' is not a domain", word.span, help=help_)

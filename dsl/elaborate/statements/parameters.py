@@ -1,0 +1,203 @@
+"""Parameters of a model or component: units, defaults, arguments, in the order of their dependence."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+from sysdyn.dsl.elaborate.instances.head import Body
+from sysdyn.dsl.elaborate.parts import ElaborationContext, declared
+from sysdyn.dsl.model import dimensions as dim
+from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.dependence import in_order
+from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.network import Parameter, Shape
+from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
+from sysdyn.dsl.names.calls import walk
+from sysdyn.dsl.names.failures import Failed
+from sysdyn.dsl.names.symbols import ParameterSymbol, Typed, Vector
+from sysdyn.dsl.names.unit_reading import read_unit
+from sysdyn.dsl.parser.notes import PREDEFINED
+from sysdyn.dsl.text.diagnostics import Place, Related
+from sysdyn.dsl.tree import syntax
+from sysdyn.values import dataclass
+
+Stated = tuple[syntax.Param, tuple[syntax.For, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """As written, its value and place where the instance stands; bare: the parameter that it is, one without a unit."""
+
+    written: syntax.Expr
+    value: Typed | Vector
+    bare: str | None
+    place: Place
+
+
+class Parameters(ElaborationContext):
+    """Declares parameters."""
+
+    def declare_parameters(self, body: Body, given: dict[str, Argument]) -> None:
+        """Parameters in the order of their dependence (the default of one may name another); given: arguments."""
+        said = len(self.report)
+        order = body.order if body.order is not None else self._by_dependence(self._first(body))
+        if len(self.report) == said:  # what is wrong is told of each instance
+            body.order = order
+        for statement, loops in order:
+            try:
+                with self.inside(loops) if loops else nullcontext():
+                    self._is_of_constants(body, statement, statement.decl.name in given)
+                    self._parameter(statement, given.get(statement.decl.name))
+            except Failed:
+                self.scope.broken.add(statement.decl.name)
+
+    def _first(self, body: Body) -> dict[str, Stated]:
+        """The parameters of a body by their names; E106 where there are two of one."""
+        found: dict[str, Stated] = {}
+        for statement, loops in body.of(syntax.Param):
+            assert isinstance(statement, syntax.Param)
+            name = statement.decl.name
+            if name in found:
+                related = (Related("first declared here", self.place(found[name][0].decl.span)),)
+                self.report.error(
+                    "E106", f"'{name}' is declared twice", self.place(statement.decl.span), related=related
+                )
+                continue
+            found[name] = (statement, loops)
+        return found
+
+    def _by_dependence(self, found: dict[str, Stated]) -> tuple[Stated, ...]:
+        """The parameters, those that others name before these; E105."""
+        needs = {name: _names_in(*stated) & found.keys() for name, stated in found.items()}
+        order, circles = in_order(found, lambda name: sorted(needs[name]))
+        for circle in circles:
+            names = " or ".join(f"'{name}'" for name in circle[:-1])
+            text, span = f"circular definition: {' -> '.join(circle)}", found[circle[-2]][0].span
+            self.report.error("E105", text, self.place(span), help=f"a value of its own for {names}")
+            self.scope.broken |= set(circle)
+        return tuple(found[name] for name in order)
+
+    def _parameter(self, statement: syntax.Param, given: Argument | None) -> None:
+        decl = statement.decl
+        place = self.place(decl.span)
+        unit = self.unit(statement.unit) if statement.unit else None
+        shape = self.shape(decl)
+        family = self.current.family(decl.name, shape)
+        own = self.resolver.loops[len(self.current.loops) :]
+        if own and not decl.indices:
+            raise self.resolver.fail("E806", f"'{decl.name}' needs its loop variable: {decl.name}[i]", decl.span)
+        values: tuple[Node, ...] = ()
+        truth = False
+        if statement.value is not None and given is None:
+            value = self.resolver.resolve(statement.value)
+            values, unit, truth = self._values(statement, statement.value, value, unit, shape)
+        elif given is not None:
+            if unit is None and statement.value is not None:  # the default fixes the dimension
+                unit = self._values(statement, statement.value, self.resolver.resolve(statement.value), None, shape)[1]
+            values, unit, truth = self._values(statement, given.written, given.value, unit, shape, given)
+        if unit is None:
+            help_ = f"param {decl.name} = 3 N/m, or param {decl.name}: N/m where somebody else sets it"
+            raise self.resolver.fail("E207", f"'{decl.name}' has neither a unit nor a default", decl.span, help=help_)
+        around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
+        indices = (*around, *(loop.index for loop in own))
+        self.enter(ParameterSymbol(decl.name, family, unit.dimension, truth, place))
+        self.parts.parameters[family.name] = Parameter(family.name, family.whole, unit, values, indices, place)
+
+    def _values(
+        self,
+        statement: syntax.Param,
+        written: syntax.Expr,
+        value: Typed | Vector,
+        unit: Unit | None,
+        shape: Shape,
+        given: Argument | None = None,
+    ) -> tuple[tuple[Node, ...], Unit, bool]:
+        """Nodes of a default or an argument, and the unit that it fixes where none is declared."""
+        items = value.items if isinstance(value, Vector) else (value,)
+        for item in items:
+            self._is_run_constant(item.node, statement, given)
+        if not self.fills(value, shape):
+            message = f"'{statement.decl.name}' has {len(items)} values, which do not fit its shape"
+            help_ = None if shape or not isinstance(value, Vector) else f"param {statement.decl.name}[1..{len(items)}]"
+            if given is not None:
+                help_ = None if shape else "one value"
+            raise self._wrong("E805", message, statement, given, help=help_)
+        what = "default" if written is statement.value else "argument"
+        known = [i.dimension for i in items if i.dimension is not None]
+        dimension = unit.dimension if unit is not None else (known[0] if known else NONE)
+        for item in items:
+            if item.dimension is not None and item.dimension != dimension:
+                have, want = dim.show(item.dimension), dim.show(dimension)
+                is_ = "dimensionless" if have == "dimensionless" else f"in {have}"
+                message = f"'{statement.decl.name}' is declared {want} but its {what} is {is_}"
+                if unit is None:
+                    message = f"the values of '{statement.decl.name}' differ: {want} and {have}"
+                help_ = self._with_unit(written, unit) if have == "dimensionless" else None
+                help_ = help_ or self.resolver.missing(item.dimension, dimension, written)
+                code = "E207" if what == "default" else "E214"
+                if code == "E214":
+                    name = self.current.path or self.current.component
+                    want = unit.text if unit is not None else want
+                    message = f"argument {statement.decl.name} of '{name}' is {is_}, wants {want}"
+                    if help_ is None and isinstance(written, syntax.Name) and have != "dimensionless":
+                        help_ = f"'{written.name}' is {is_}, {want} is wanted"
+                    bare = given.bare if given is not None else None
+                    if bare is not None and help_ is None and have == "dimensionless":
+                        help_ = f"'{bare}' is a number without unit; in {want} it fits"
+                raise self._wrong(code, message, statement, given, help=help_)
+        truth = isinstance(value, Typed) and value.truth
+        nodes = tuple(i.node for i in items)
+        if truth:
+            nodes = (ex.conditional(nodes[0], ex.const(1.0), ex.const(0.0)),)
+        return nodes, unit or self._default_unit(written, dimension), truth
+
+    def _with_unit(self, value: syntax.Expr, unit: Unit | None) -> str | None:
+        return f"write '{value.text} {unit.text}'" if isinstance(value, syntax.Number) and unit else None
+
+    def _default_unit(self, value: syntax.Expr, dimension: Dimension) -> Unit:
+        if isinstance(value, syntax.Negative):
+            value = value.operand
+        if isinstance(value, syntax.Quantity):
+            found = read_unit(value.unit, self.scope, self.resolver.source, self.report)
+            if found is not None:
+                return found
+        return si(dimension)
+
+    def _is_run_constant(self, node: Node, statement: syntax.Param, given: Argument | None) -> None:
+        for inner in ex.topological([node]):
+            if inner.op in ("var", "time"):
+                message = f"parameter '{statement.decl.name}' depends on '{inner}': a parameter is a constant"
+                vary = f"numbers and parameters alone; 'input {statement.decl.name}' could vary"
+                raise self._wrong("E807", message, statement, given, help=None if given is None else vary)
+
+    def _is_of_constants(self, body: Body, statement: syntax.Param, given: bool) -> None:
+        """E807: a default that names what the body declares beside parameters, all of which are known before it."""
+        if given or statement.value is None:
+            return
+        names = [n for n in walk(statement.value) if isinstance(n, syntax.Name) and n.name not in PREDEFINED]
+        names = [n for n in names if self.scope.find(n.name) is None]
+        if not names:
+            return
+        own = {n.index.name for n in walk(statement.value) if isinstance(n, syntax.Reduction)}
+        others = {d.name for other, _ in body if not isinstance(other, syntax.Param) for d in declared(other)}
+        for name in names:
+            if name.name in others - own - self.resolver.sight().keys():
+                what = statement.decl.name
+                message = f"parameter '{what}' depends on '{name.name}': a parameter is a constant"
+                help_ = f"let {what} = ..., which may vary"
+                raise self.resolver.fail("E807", message, name.span, help=help_)
+
+    def _wrong(
+        self, code: str, message: str, statement: syntax.Param, given: Argument | None, help: str | None
+    ) -> Failed:
+        """Report an error in a default, or in what an instance gives instead; raise what is returned."""
+        if given is None:
+            return self.resolver.fail(code, message, (statement.value or statement.decl).span, help=help)
+        where = Related(f"in component '{self.current.component}'", self.place(statement.decl.span))
+        return self.resolver.fail(code, message, given.place, help=help, related=(where,))
+
+
+def _names_in(statement: syntax.Param, loops: tuple[syntax.For, ...]) -> set[str]:
+    bounds = [bound for loop in loops for bound in (loop.lower, loop.upper)]
+    roots: list[object] = [statement.value, *statement.decl.indices, *bounds]
+    return {n.name for r in roots if r is not None for n in walk(r) if isinstance(n, syntax.Name)}  # type: ignore[arg-type]

@@ -1,0 +1,494 @@
+#include "linear/order/order.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define DENSE 10.0 /* times the root of their number: rows that long say little of the order, columns that long go last */
+#define NONE (-1)
+
+/* Rows that are left, the merged ones behind; columns by score in lists that begin at `first`. */
+typedef struct {
+    int32_t columns, rows, made;        /* rows: room for numbers of rows; made: numbers given */
+    int64_t *start;                     /* [rows + 1] of each row in `member` */
+    int32_t *length;                    /* [rows]; 0: it is gone */
+    int32_t *member;                    /* [room] columns of the rows, one row behind the other */
+    int64_t used, room, filled;         /* filled: lengths of the merged rows */
+    int32_t *of, *own, *count;          /* rows of each column: of[own[c] .. own[c] + count[c]] */
+    int32_t *score, *next, *before, *first; /* [columns]; first [columns + 1] */
+    int32_t *mark, *rest;               /* [columns]; [rows] members of a row outside the pivot's */
+    int32_t *seen;                      /* [rows] at which pivot `rest` was begun */
+    char *done;                         /* [columns] */
+    const int32_t *ahead, *behind;      /* columns that wait for c: behind[ahead[c] .. ahead[c + 1]]; NULL: none do */
+    int32_t *waits;                     /* [columns] for how many each does */
+} graph;
+
+static void enlist(graph *g, int32_t c, int32_t score)
+{
+    g->score[c] = score;
+    g->before[c] = NONE;
+    g->next[c] = g->first[score];
+    if (g->first[score] != NONE)
+        g->before[g->first[score]] = c;
+    g->first[score] = c;
+}
+
+static void delist(graph *g, int32_t c)
+{
+    if (g->before[c] != NONE)
+        g->next[g->before[c]] = g->next[c];
+    else
+        g->first[g->score[c]] = g->next[c];
+    if (g->next[c] != NONE)
+        g->before[g->next[c]] = g->before[c];
+}
+
+/* rows that are gone, and columns that are done, leave their room */
+static void compact(graph *g)
+{
+    int64_t to = 0;
+    for (int32_t r = 0; r < g->made; r++) {
+        int64_t from = g->start[r], end = from + g->length[r];
+        g->start[r] = to;
+        for (; from < end; from++)
+            if (!g->done[g->member[from]])
+                g->member[to++] = g->member[from];
+        g->length[r] = (int32_t)(to - g->start[r]);
+    }
+    g->used = to;
+}
+
+static int enough(graph *g, int64_t more)
+{
+    if (g->used + more <= g->room)
+        return 1;
+    compact(g);
+    if (g->used + more <= g->room - g->room / 8)
+        return 1;
+    int64_t room = 2 * (g->used + more);
+    int32_t *member = realloc(g->member, (size_t)room * sizeof *member);
+    if (!member)
+        return 0;
+    g->member = member;
+    g->room = room;
+    return 1;
+}
+
+/* the rows of column c become one, without c; 0: no memory */
+static int merge(graph *g, int32_t c, int32_t pivot)
+{
+    int64_t most = 0;
+    for (int32_t k = 0; k < g->count[c]; k++)
+        most += g->length[g->of[g->own[c] + k]];
+    if (!enough(g, most))
+        return 0;
+    int32_t new = g->made++;
+    int64_t begin = g->used, end = begin;
+    for (int32_t k = 0; k < g->count[c]; k++) {
+        int32_t r = g->of[g->own[c] + k];
+        for (int64_t at = g->start[r]; at < g->start[r] + g->length[r]; at++) {
+            int32_t j = g->member[at];
+            if (!g->done[j] && g->mark[j] != pivot) {
+                g->mark[j] = pivot;
+                g->member[end++] = j;
+            }
+        }
+        g->length[r] = 0;
+    }
+    g->start[new] = begin;
+    g->length[new] = (int32_t)(end - begin);
+    g->filled += end - begin;
+    g->used = end;
+    return 1;
+}
+
+/* degrees of the columns of the newest row */
+static void rescore(graph *g, int32_t pivot, int32_t left)
+{
+    int32_t new = g->made - 1;
+    int64_t begin = g->start[new], end = begin + g->length[new];
+    for (int64_t at = begin; at < end; at++) {
+        int32_t j = g->member[at], kept = 0;
+        for (int32_t k = 0; k < g->count[j]; k++) {
+            int32_t r = g->of[g->own[j] + k];
+            if (!g->length[r])
+                continue;
+            g->of[g->own[j] + kept++] = r;
+            if (g->seen[r] != pivot) {
+                g->seen[r] = pivot;
+                g->rest[r] = g->length[r];
+            }
+            g->rest[r]--;
+        }
+        g->count[j] = kept;
+    }
+    for (int64_t at = begin; at < end; at++) {
+        int32_t j = g->member[at], kept = 0;
+        int64_t score = g->length[new] - 1;
+        for (int32_t k = 0; k < g->count[j]; k++) {
+            int32_t r = g->of[g->own[j] + k];
+            if (g->rest[r] <= 0) { /* all of it stands in the new row */
+                g->length[r] = 0;
+                continue;
+            }
+            score += g->rest[r];
+            g->of[g->own[j] + kept++] = r;
+        }
+        g->of[g->own[j] + kept++] = new; /* it was in one of the rows that are gone */
+        g->count[j] = kept;
+        score = score < left ? score : left;
+        if (g->waits[j]) {
+            g->score[j] = (int32_t)score;
+            continue;
+        }
+        delist(g, j);
+        enlist(g, j, (int32_t)score);
+    }
+}
+
+/* column c is done: what waited for it alone is listed; the least score of that, or the one given */
+static int32_t release(graph *g, int32_t c, int32_t least)
+{
+    for (int32_t k = g->ahead ? g->ahead[c] : 0; g->ahead && k < g->ahead[c + 1]; k++) {
+        int32_t j = g->behind[k];
+        if (--g->waits[j] || g->done[j])
+            continue;
+        enlist(g, j, g->score[j]);
+        least = g->score[j] < least ? g->score[j] : least;
+    }
+    return least;
+}
+
+/* All that is left stands in one row, from `begin` on: the last of its columns comes first, each time anew, but for what
+ * waits for some of them */
+static void end_with(const graph *g, int64_t begin, int32_t left, int32_t *order)
+{
+    for (int waiting = 0; waiting < 2; waiting++)
+        for (int32_t k = left; k-- > 0;)
+            if ((g->waits[g->member[begin + k]] > 0) == waiting)
+                *order++ = g->member[begin + k];
+}
+
+/* order [last]: the columns that are listed, in the order of their elimination.  0; -1: no memory */
+static int eliminate(graph *g, int32_t *order, int32_t last)
+{
+    int32_t least = 0, place = 0;
+    for (int32_t pivot = 0;; pivot++) {
+        while (least <= g->columns && g->first[least] == NONE)
+            least++;
+        if (least > g->columns)
+            return 0;
+        int32_t c = g->first[least];
+        delist(g, c);
+        g->done[c] = 1;
+        order[place++] = c;
+        /* a row that is gone since stands in no list but the column's */
+        int32_t kept = 0;
+        for (int32_t k = 0; k < g->count[c]; k++)
+            if (g->length[g->of[g->own[c] + k]])
+                g->of[g->own[c] + kept++] = g->of[g->own[c] + k];
+        g->count[c] = kept;
+        if (!kept) {
+            least = release(g, c, least);
+            continue;
+        }
+        if (!merge(g, c, pivot))
+            return -1;
+        int32_t left = g->length[g->made - 1];
+        if (place + left == last) { /* it stands in for all rows */
+            g->filled += (int64_t)left * (left - 1) / 2;
+            end_with(g, g->start[g->made - 1], left, order + place);
+            return 0;
+        }
+        rescore(g, pivot, g->columns - 1);
+        for (int64_t at = g->start[g->made - 1]; at < g->start[g->made - 1] + g->length[g->made - 1]; at++)
+            if (!g->waits[g->member[at]] && g->score[g->member[at]] < least)
+                least = g->score[g->member[at]];
+        least = release(g, c, least);
+    }
+}
+
+int sd_column_order(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const int32_t *ahead,
+                    const int32_t *behind, int32_t *order, int64_t *filled)
+{
+    size_t n = (size_t)columns, entries = (size_t)column[columns], m = (size_t)rows + n;
+    graph g = {.columns = columns, .rows = rows + columns, .made = rows, .ahead = ahead,
+               .behind = behind, .room = (int64_t)(entries + entries / 2 + 64)};
+    g.start = calloc(m + 1, sizeof *g.start);
+    g.length = calloc(m + 1, sizeof *g.length);
+    g.member = malloc((size_t)g.room * sizeof *g.member);
+    g.of = malloc((entries + 1) * sizeof *g.of);
+    g.own = malloc(8 * (n + 2) * sizeof *g.own);
+    g.seen = malloc(2 * (m + 1) * sizeof *g.seen);
+    g.done = calloc(n + 1, 1);
+    int failed = -1;
+    if (g.start && g.length && g.member && g.of && g.own && g.seen && g.done) {
+        g.count = g.own + n + 2;
+        g.score = g.count + n + 2;
+        g.next = g.score + n + 2;
+        g.before = g.next + n + 2;
+        g.first = g.before + n + 2;
+        g.mark = g.first + n + 2;
+        g.waits = g.mark + n + 2;
+        memset(g.waits, 0, n * sizeof *g.waits);
+        g.rest = g.seen + m + 1;
+        for (size_t k = 0; k < n + 2; k++)
+            g.first[k] = g.mark[k] = NONE;
+        for (size_t k = 0; k < m; k++)
+            g.seen[k] = NONE;
+        int32_t last = columns, long_row = (int32_t)fmax(16.0, DENSE * sqrt((double)columns));
+        int32_t long_column = (int32_t)fmax(16.0, DENSE * sqrt((double)rows));
+        for (int32_t c = 0; c < columns; c++) {
+            if (column[c + 1] - column[c] > long_column) {
+                g.done[c] = 1;
+                continue;
+            }
+            for (int32_t k = ahead ? ahead[c] : 0; ahead && k < ahead[c + 1]; k++)
+                g.waits[behind[k]]++;
+            for (int32_t e = column[c]; e < column[c + 1]; e++)
+                g.length[row[e]]++;
+        }
+        for (int32_t r = 0; r < rows; r++) {
+            if (g.length[r] > long_row)
+                g.length[r] = 0;
+            g.start[r + 1] = g.start[r] + g.length[r];
+        }
+        g.used = g.start[rows];
+        memset(g.rest, 0, (size_t)rows * sizeof *g.rest);
+        for (int32_t c = 0, at = 0; c < columns; c++) {
+            g.own[c] = at;
+            for (int32_t e = column[c]; e < column[c + 1] && !g.done[c]; e++) {
+                int32_t r = row[e];
+                if (!g.length[r])
+                    continue;
+                g.of[at++] = r;
+                g.member[g.start[r] + g.rest[r]++] = c;
+            }
+            g.count[c] = at - g.own[c];
+        }
+        for (int32_t c = columns - 1; c >= 0; c--) {
+            if (g.done[c]) {
+                order[--last] = c;
+                continue;
+            }
+            int64_t score = 0;
+            for (int32_t k = 0; k < g.count[c]; k++)
+                score += g.length[g.of[g.own[c] + k]] - 1;
+            g.score[c] = (int32_t)(score < columns ? score : columns);
+            if (!g.waits[c])
+                enlist(&g, c, g.score[c]);
+        }
+        failed = eliminate(&g, order, last);
+        *filled = g.filled;
+    }
+    free(g.start);
+    free(g.length);
+    free(g.member);
+    free(g.of);
+    free(g.own);
+    free(g.seen);
+    free(g.done);
+    return failed;
+}
+
+int32_t sd_peel(int32_t rows, int32_t columns, int32_t entries, const int32_t *row, const int32_t *column,
+                const double *value, double least, int32_t *peeled)
+{
+    size_t m = (size_t)rows, n = (size_t)columns, e = (size_t)entries;
+    int32_t *room = calloc(2 * n + m + e + 4, sizeof *room);
+    int64_t *sum = calloc(n + 1, sizeof *sum);
+    if (!room || !sum) {
+        free(room);
+        free(sum);
+        return -1;
+    }
+    /* count of each column, sum of the numbers of its entries: of the one that is left, its number */
+    int32_t *count = room, *of_row = count + n + 1, *list = of_row + m + 2, *stack = list + e;
+    int32_t waiting = 0, left = rows;
+    for (int32_t k = 0; k < entries; k++) {
+        of_row[row[k] + 1]++;
+        count[column[k]]++;
+        sum[column[k]] += k;
+    }
+    for (int32_t r = 0; r < rows; r++)
+        of_row[r + 1] += of_row[r];
+    for (int32_t k = entries; k-- > 0;)
+        list[--of_row[row[k] + 1]] = k;
+    /* of_row[r + 1] is now where row r begins */
+    memset(peeled, 0, m * sizeof *peeled);
+    for (int32_t c = 0; c < columns; c++)
+        if (count[c] == 1)
+            stack[waiting++] = c;
+    while (waiting) {
+        int32_t c = stack[--waiting];
+        if (count[c] != 1)
+            continue;
+        int32_t k = (int32_t)sum[c], r = row[k];
+        if (peeled[r] || !(fabs(value[k]) >= least))
+            continue;
+        peeled[r] = 1;
+        left--;
+        int32_t end = r + 2 <= rows ? of_row[r + 2] : entries;
+        for (int32_t at = of_row[r + 1]; at < end; at++) {
+            int32_t j = column[list[at]];
+            sum[j] -= list[at];
+            if (--count[j] == 1)
+                stack[waiting++] = j;
+        }
+    }
+    free(sum);
+    free(room);
+    return left;
+}
+
+/* What a matching is made in: column [n + 1], row: the pattern; across [m + 1], of_row: the same by rows; matched [n], of [m]:
+ * the partner of each column and row; free_rows [n], free_columns [m]: partners that are left; looks: entries looked at */
+typedef struct {
+    int32_t rows, columns;
+    const int32_t *column, *row;
+    int32_t *across, *of_row, *matched, *of, *free_rows, *free_columns, *stack;
+    int64_t looks;
+    int32_t waiting;
+} Matching;
+
+/* Matches column c with row r.  Columns and rows that one partner is left for wait on the stack, rows as -1 - r */
+static void match(Matching *g, int32_t c, int32_t r)
+{
+    g->matched[c] = r;
+    g->of[r] = c;
+    g->looks += g->column[c + 1] - g->column[c] + g->across[r + 1] - g->across[r];
+    for (int32_t k = g->column[c]; k < g->column[c + 1]; k++)
+        if (--g->free_columns[g->row[k]] == 1 && g->of[g->row[k]] == NONE)
+            g->stack[g->waiting++] = -1 - g->row[k];
+    for (int32_t k = g->across[r]; k < g->across[r + 1]; k++)
+        if (--g->free_rows[g->of_row[k]] == 1 && g->matched[g->of_row[k]] == NONE)
+            g->stack[g->waiting++] = g->of_row[k];
+}
+
+/* Matches column c with a row that is left for it, where there is one: of those the one with the fewest columns */
+static void match_column(Matching *g, int32_t c)
+{
+    int32_t best = NONE;
+    for (int32_t k = g->column[c]; k < g->column[c + 1]; k++) {
+        int32_t r = g->row[k];
+        if (g->of[r] == NONE && (best == NONE || g->free_columns[r] < g->free_columns[best]))
+            best = r;
+    }
+    g->looks += g->column[c + 1] - g->column[c];
+    if (best != NONE)
+        match(g, c, best);
+}
+
+/* What must be so, first: partners that are the only one left, and only then a choice (Karp & Sipser, FOCS 1981) */
+static void match_what_must(Matching *g)
+{
+    for (int32_t c = 0; c < g->columns; c++)
+        if (g->free_rows[c] == 1)
+            g->stack[g->waiting++] = c;
+    for (int32_t r = 0; r < g->rows; r++)
+        if (g->free_columns[r] == 1)
+            g->stack[g->waiting++] = -1 - r;
+    for (int32_t next = 0; next < g->columns || g->waiting;) {
+        int32_t k = g->waiting ? g->stack[--g->waiting] : next++;
+        if (k >= 0) {
+            if (g->matched[k] == NONE)
+                match_column(g, k);
+        } else if (g->of[-1 - k] == NONE) {
+            int32_t r = -1 - k;
+            g->looks += g->across[r + 1] - g->across[r];
+            for (int32_t at = g->across[r]; at < g->across[r + 1] && g->of[r] == NONE; at++)
+                if (g->matched[g->of_row[at]] == NONE)
+                    match(g, g->of_row[at], r);
+        }
+    }
+}
+
+/* Searches a path from the column `root` to a row that is free, by columns that no other search of this pass has seen, and
+ * turns it.  room: cheap, at, came, path [columns], seen [rows] := root of the search that came there, `pass` or above.  1: found */
+static int augment(Matching *g, int32_t root, int32_t pass, int32_t *const room[5])
+{
+    int32_t *cheap = room[0], *at = room[1], *came = room[2], *path = room[3], *seen = room[4], depth = 0, end = NONE;
+    const int32_t *column = g->column, *row = g->row;
+    path[0] = root;
+    at[root] = column[root];
+    while (depth >= 0) {
+        int32_t c = path[depth], next = NONE;
+        for (; cheap[c] < column[c + 1] && g->of[row[cheap[c]]] != NONE; cheap[c]++)
+            g->looks++;
+        if (cheap[c] < column[c + 1]) {
+            end = row[cheap[c]];
+            break;
+        }
+        while (at[c] < column[c + 1] && next == NONE) {
+            int32_t r = row[at[c]++];
+            g->looks++;
+            if (seen[r] != pass) {
+                seen[r] = pass;
+                next = r;
+            }
+        }
+        if (next == NONE) {
+            depth--;
+            continue;
+        }
+        came[depth] = next;
+        path[++depth] = g->of[next];
+        at[path[depth]] = column[path[depth]];
+    }
+    for (int32_t d = depth; d >= 0; d--) { /* each column of the path takes the row of the next one */
+        g->of[end] = path[d];
+        g->matched[path[d]] = end;
+        end = d ? came[d - 1] : NONE;
+    }
+    return depth >= 0;
+}
+
+int32_t sd_match(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, int32_t given, int32_t *matched,
+                 int64_t *looks)
+{
+    size_t n = (size_t)columns, m = (size_t)rows, e = (size_t)column[columns];
+    int32_t *room = calloc(4 * n + 4 * m + e + 3, sizeof *room);
+    if (!room)
+        return -1;
+    Matching g = {.rows = rows, .columns = columns, .column = column, .row = row, .matched = matched};
+    g.across = room;
+    g.of_row = g.across + m + 2;
+    g.of = g.of_row + e;
+    g.free_columns = g.of + m;
+    g.free_rows = g.free_columns + m;
+    g.stack = g.free_rows + n; /* [n + m]: each waits once, and those with one partner from the start */
+    int32_t *const search[5] = {g.free_rows, g.stack + n + m, g.stack + 2 * n + m, g.stack, g.free_columns};
+    for (size_t k = 0; k < e; k++)
+        g.free_columns[row[k]]++;
+    for (int32_t r = 0; r < rows; r++) {
+        g.of[r] = NONE;
+        g.across[r + 2] = g.across[r + 1] + g.free_columns[r];
+    }
+    for (int32_t c = 0; c < columns; c++) {
+        matched[c] = given ? matched[c] : NONE;
+        if (matched[c] != NONE)
+            g.of[matched[c]] = c;
+        g.free_rows[c] = column[c + 1] - column[c];
+        for (int32_t k = column[c]; k < column[c + 1]; k++)
+            g.of_row[g.across[row[k] + 1]++] = c;
+    }
+    if (!given)
+        match_what_must(&g);
+    /* what a choice has left over: passes of disjoint searches, the last of which finds nothing (Pothen & Fan 1990) */
+    memcpy(search[0], column, n * sizeof *column);
+    for (int32_t r = 0; r < rows; r++)
+        search[4][r] = NONE;
+    int32_t pass = 0;
+    for (int32_t more = 1; more; pass++) {
+        more = 0;
+        for (int32_t c = 0; c < columns; c++)
+            if (matched[c] == NONE)
+                more += augment(&g, c, pass, search);
+    }
+    int32_t found = 0;
+    for (int32_t c = 0; c < columns; c++)
+        found += matched[c] != NONE;
+    *looks = g.looks;
+    free(room);
+    return found;
+}

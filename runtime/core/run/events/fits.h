@@ -1,0 +1,61 @@
+/* Whether a mode is what the values v [rows] of its switching functions and multipliers say at a point. */
+#ifndef SYSDYN_FITS_H
+#define SYSDYN_FITS_H
+
+#include "run/events/modes.h"
+
+#include <math.h>
+
+#define FALLEN 1e-4 /* of what else counts as zero, and of the height of its flight: a gap closes again below it */
+
+/* what a row is that is zero but for round-off */
+static inline double sd_mode_zero(const sd_modes *m, int32_t row)
+{
+    return m->small * m->largest[row];
+}
+
+/* the gap in flight whose value a row is, -1: none */
+static inline int32_t sd_mode_thrown(const sd_modes *m, int32_t row)
+{
+    for (int32_t k = 0; k < m->contacts && m->flying; k++)
+        if (m->thrown[k] && m->contact[k].value == row)
+            return k;
+    return -1;
+}
+
+/* what a watched row may fall by unseen: behind an impact nearly nothing, for bounces become small */
+static inline double sd_mode_least(const sd_modes *m, int32_t row)
+{
+    int32_t k = sd_mode_thrown(m, row);
+    return k < 0 ? sd_mode_zero(m, row) : FALLEN * fmin(sd_mode_zero(m, row), m->height[k]);
+}
+
+/* the value at which it begins: that of a flight, else zero */
+static inline double sd_mode_level(const sd_modes *m, int32_t row)
+{
+    int32_t k = sd_mode_thrown(m, row);
+    return k < 0 ? 0.0 : m->level[k];
+}
+
+static inline const sd_mode *sd_mode_now(const sd_modes *m)
+{
+    return m->now == SD_OWN ? &m->own : &m->mode[m->now];
+}
+
+/* Whether the inequalities that a transition turns, which touches none, could not have stayed as they were: what would
+ * hold and open alike at this instant (a diode that conducts beside a capacitor) stays. */
+int sd_mode_decided(const sd_modes *m, const sd_mode *from, const sd_transition *one, const double *v);
+
+/* Whether every relation is on the side given, coming from `before`. */
+int sd_mode_sides_fit(const sd_modes *m, const double *side, const double *before, const double *v);
+
+/* Whether every contact, law and relation is as the present mode says, relations coming from `before`. */
+int sd_mode_fits(const sd_modes *m, const double *before, const double *v);
+
+/* Whether no size shows first at the point behind an event: nothing begins to move there (integrate/weights/sizes.py). */
+int sd_mode_sized(const sd_modes *m);
+
+/* The same of a point that the state may have been assigned: nor has an unknown grown so that round-off leaves more of it. */
+int sd_mode_ordinary(const sd_modes *m);
+
+#endif

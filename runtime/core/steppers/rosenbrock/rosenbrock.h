@@ -1,0 +1,71 @@
+/* Rodas5P: a Rosenbrock-Wanner method of order 5 with eight stages, stiffly accurate, for F(t, y, yd) = 0 of index 1.
+ *
+ * Sources: G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within the Julia
+ * Differential Equations package, BIT Numerical Mathematics 63 (2023) 27; E. Hairer, G. Wanner, Solving Ordinary Differential
+ * Equations II, Springer 1996, sections IV.7 and VI.3 (implicit equations (3.18): y' = z, 0 = F(t, y, z)).
+ * A step solves eight linear systems with one matrix and no iteration.  With J = dF/dy, E = dF/dyd and T = dF/dt at the last
+ * accepted point, u_i and v_i what stage i adds to y and to z = y':
+ *   (J + E / (gamma h)) u_i = -F(t + c_i h, Y_i, Z_i) + E (Z_i + s_i) - d_i h T,     v_i = u_i / (gamma h) - Z_i - s_i
+ *   Y_i = y + sum_(j<i) a_ij u_j,   Z_i = z + sum_(j<i) a_ij v_j,   s_i = sum_(j<i) C_ij u_j / h
+ * E may depend on y; what occurs undifferentiated follows from its own rows, whose remainders the next step takes in.
+ * The last stage is the solution, y = Y_8 + u_8, and u_8 the difference to the embedded one of order 4: the error test.
+ * It sees what follows from the state too, which no iteration brings onto its rows; where a law jumps, that jumps in a step
+ * however short, which is told by its error (stays), and the error of the state decides.
+ * Slopes that hold at the begin what they do not at the end (a tanh that saturates) hide its error: then those of the end tell.
+ * Values within a step: the method's own polynomial, of order 4.
+ */
+#ifndef SYSDYN_ROSENBROCK_H
+#define SYSDYN_ROSENBROCK_H
+
+#include "system/assembly.h"
+#include "linear/linear.h"
+#include "steppers/stepper.h"
+
+#define SD_ROSENBROCK_STAGES 8
+#define SD_ROSENBROCK_DENSE 3
+
+extern const double sd_rosenbrock_gamma;
+extern const double sd_rosenbrock_a[SD_ROSENBROCK_STAGES][SD_ROSENBROCK_STAGES];
+extern const double sd_rosenbrock_coupling[SD_ROSENBROCK_STAGES][SD_ROSENBROCK_STAGES]; /* C */
+extern const double sd_rosenbrock_c[SD_ROSENBROCK_STAGES], sd_rosenbrock_d[SD_ROSENBROCK_STAGES];
+extern const double sd_rosenbrock_dense_weight[SD_ROSENBROCK_DENSE][SD_ROSENBROCK_STAGES];
+
+typedef struct sd_rosenbrock {
+    sd_system *system;
+    sd_linear *linear;
+    int32_t n, tested;
+    double rtol, t_end, h_max, fixed_h;
+    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
+    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
+    double *met;              /* [n] max |y| */
+    const int8_t *test, *power;   /* [n] as in bdf/bdf.h; what is left out there is tested too where power is 0 */
+    double opening;           /* over rtol^(1/5): the first step as an earlier run found it fit, 0: chosen; then as this one does */
+    /* state of the integration */
+    double t, h, h_used, h_accepted, error_accepted, h_refused, error_refused;
+    int32_t rejected;
+    double *phi, *yd;         /* [n] the last accepted point */
+    double *last;             /* [n] the one before it */
+    double *y, *rate, *drift; /* [n] Y_i, Z_i, T */
+    double *begin;            /* [n] F at the last accepted point */
+    double *end, *within, *within_d, *inner; /* [n] the end of the step at hand; a point within, its correction */
+    double *u[SD_ROSENBROCK_STAGES], *v[SD_ROSENBROCK_STAGES], *bend[SD_ROSENBROCK_DENSE]; /* [n]; bend: of the polynomial */
+    double *ee, *weight;      /* [n] ee: of the last error test, as the other methods name it */
+    double *jy, *jyd, *g, *e, *memory;
+    double *jy_end, *jyd_end; /* slopes at the end of the step at hand */
+    int32_t sloped;           /* whether these are those of the last accepted point, behind a step jy and jyd are */
+    int32_t *rate_row, *rate_column, rates; /* of the entries e of E that are not zero */
+    /* what happened */
+    int64_t steps, rejected_steps, newton_failures, taken;
+    int32_t cause, bad_row, bad_column;
+    sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */
+    sd_settle *settle;        /* of steep laws: moves a point that no step goes on from onto all rows; or NULL */
+    sd_stepper stepper;
+} sd_rosenbrock;
+
+sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear);
+void sd_rosenbrock_free(sd_rosenbrock *rosenbrock);
+sd_stepper *sd_rosenbrock_stepper(sd_rosenbrock *rosenbrock);
+void sd_rosenbrock_start(sd_rosenbrock *rosenbrock, double t, const double *y, const double *yd, double h);
+int sd_rosenbrock_step(sd_rosenbrock *rosenbrock);
+
+#endif

@@ -1,0 +1,132 @@
+"""What the core needs to know of a gap that closes in flight: the equations of its impulse (core/run/events/strike.c).
+
+They are those of start/instant.py, of unknowns that move and of impulses that act, where they are as many as these: no
+dry friction tells an impulse, and inertia leaves no flow open.  Momenta follow from flows that are assigned by their
+rows alone.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.events.handler import Handler
+from sysdyn.runtime.model import core_library as lib
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.held_rows import multiplier_row
+from sysdyn.runtime.model.patterns import Places, compress
+from sysdyn.runtime.model.system import System
+
+MOST = 60
+"""Unknowns and impulses of an impact, which are eliminated as a full matrix."""
+
+Mask = NDArray[np.bool_]
+
+
+def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Balance | None:
+    """The impulse of contact k, which alone holds, as at a point; None where the core cannot tell it."""
+    assert handler.restart is not None
+    system, contact = handler.restart.settler.system, handler.plan.contacts[k]
+    active = handler.contacts.active.copy()
+    handler.contacts.active[:] = np.arange(active.size) == k
+    handler.contacts.apply()
+    try:
+        reactions = system.are("kappa", "mu")
+        there, acts = np.ones(system.rows, dtype=bool), reactions.copy()
+        there[system.held[0]] = acts[system.held[1]] = False
+        behind = (system.of_groups("phi_rate", "psi") & there) | system.of_groups("momentum", "gamma")
+        told = system.of_groups("gamma")[system.pattern.row] & reactions[system.pattern.columns_of()]
+        if told.any():
+            return None
+        first = {(group, family): row for group, family, row in system.form.groups}
+        family, position = handler.contacts.switches.places[contact.number]
+        row = int(first["phi_rate", multiplier_row(system.description, family)]) + position
+        found = Balance(system, (t, y, yd), (behind, system.of_groups("dynamics")), (system.are("f", "p", "e"), acts))
+        place = handler.contacts.multiplier[k]
+        return found.of_gap(k, row, place, contact.restitution) if found.ready else None
+    finally:
+        handler.contacts.active[:] = active
+        handler.contacts.apply()
+
+
+def of_momenta(system: System, t: float, y: Floats, yd: Floats) -> Balance | None:
+    """How momenta follow from flows; None where their rows leave some open."""
+    none = np.zeros(system.unknowns, dtype=bool)
+    rows = system.of_groups("momentum"), np.zeros(system.rows, dtype=bool)
+    found = Balance(system, (t, y, yd), rows, (system.are("p"), none))
+    return found if found.ready else None
+
+
+class Balance:
+    """Equations of unknowns that move and impulses that act, laid out for the core; it frees what it made.
+
+    at: t, y, yd; rows: behind the instant, integrated over it [rows]; unknowns: those that move, those with impulses
+    [unknowns].  ready: whether they are as many.
+    """
+
+    def __init__(
+        self, system: System, at: tuple[float, Floats, Floats], rows: tuple[Mask, Mask], unknowns: tuple[Mask, Mask]
+    ) -> None:
+        self.ready, self._linear, (behind, over), (moves, acts) = False, None, rows, unknowns
+        row, column, slopes = system.pattern.row, system.pattern.columns_of(), system.jacobian(*at)
+        parts = [behind[row] & moves[column], over[row] & moves[column], over[row] & acts[column]]
+        entries = np.concatenate([np.flatnonzero(part) for part in parts])
+        rated = np.repeat([0, 1, 0], [int(part.sum()) for part in parts])
+        some = entries[np.where(rated, slopes[1][entries], slopes[0][entries]) != 0.0]
+        own, columns = np.unique(row[some]), np.unique(column[some])
+        columns = np.append(columns[moves[columns]], columns[acts[columns]])
+        if not 0 < columns.size == own.size <= MOST:
+            return
+        held = system._held
+        self.core = lib.Strike(system=c.addressof(system.core), contact=-1, row=-1, own=-1, n=own.size)
+        self.core.moves, self._columns = int(moves[columns].sum()), columns
+        self.core.held = lib.Held(held[0].size, held[4].size, *map(lib.pointer, held))
+        self._keep: list[Any] = [held]
+        self._laid_out(system, (own, columns, over[own]), entries, rated)
+        self.ready = True
+
+    def of_gap(self, k: int, row: int, multiplier: int, restitution: float) -> Balance | None:
+        """The same of contact k: its row of flows, the place of its multiplier; None where that has no impulse."""
+        core, places = self.core, np.flatnonzero(self._columns == multiplier)
+        if not places.size:
+            return None
+        core.contact, core.row, core.own, core.restitution = k, row, int(places[0]), restitution
+        return self
+
+    @property
+    def address(self) -> int:
+        """Of the core's structure."""
+        return c.addressof(self.core)
+
+    def _laid_out(self, system: System, lines: tuple[Any, Any, Mask], entries: Any, rated: Any) -> None:
+        """The matrix, where its entries stand in the system, room; lines: rows, columns, rows that are integrated."""
+        own, columns, integral = lines
+        n, core = own.size, self.core
+        number = np.full(system.rows, -1), np.full(system.unknowns, -1)
+        number[0][own] = number[1][columns] = np.arange(n)
+        i, j = number[0][system.pattern.row[entries]], number[1][system.pattern.columns_of()[entries]]
+        take = (i >= 0) & (j >= 0)
+        pattern, (slots,) = compress(n, n, [Places(i[take], j[take])])
+        slot, which = np.zeros((2, pattern.entries), dtype=np.int32)
+        slot[slots], which[slots] = entries[take], rated[take]
+        integers = [
+            np.ascontiguousarray(item, dtype=np.int32)
+            for item in (columns, own, integral, pattern.column, pattern.row, slot, which)
+        ]
+        sizes = [system.pattern.entries, system.pattern.entries, system.rows, pattern.entries, n, n, n]
+        room = [np.zeros(size + 8) for size in sizes]
+        names = ["unknown", "of_row", "integral", "column", "row_of", "slot", "rated"]
+        names += ["jy", "jyd", "r", "value", "scale", "x", "impulse"]
+        for name, item in zip(names, [*integers, *room], strict=True):
+            setattr(core, name, lib.pointer(item))
+        self._keep += [integers, room]
+        self._linear = lib.core.sd_linear_new(n, core.column, core.row_of, None)
+        if not self._linear:
+            raise MemoryError
+        core.linear = c.addressof(self._linear.contents)
+
+    def __del__(self) -> None:
+        if getattr(self, "_linear", None):
+            lib.core.sd_linear_free(self._linear)

@@ -1,0 +1,117 @@
+"""Which rows hold at a point of a run, and what moves a point onto them: at rows, between steps, behind a jump."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.condense.condensed import Forms
+from sysdyn.runtime.condense.elimination import steady
+from sysdyn.runtime.integrate.request import Request
+from sysdyn.runtime.integrate.weights.sizes import Sizes
+from sysdyn.runtime.integrate.weights.unknown_roles import Roles
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.restart import Restart, still
+from sysdyn.runtime.start.settled import Settler, flows_open
+
+PROJECTED = ("1", "0")
+"""Forms whose rows let the constraints drift: accepted points are moved onto them."""
+SLACK = 0.1
+"""Of the tolerance: what rows within a step may move of the state, in magnitudes, and need not be the least change,
+where constraints are constant sums: their unknowns are interpolated differently (radau_dense.c).  Of curved ones
+the least change takes out most of the error between steps (a parallelogram by dopri: 25 times).  Where laws are steep
+what follows shares the change, and the iteration nears the least one slowly (a tube of water: six solutions where rows
+hold after one).
+"""
+RATED = 5_000
+"""Unknowns up to which a point behind a jump is asked for flows that are open.  With the rates of all balances that
+of a larger net is dear to find (a driven grid of 35 x 35: 20 s): its loops of stores are left as rows leave them.
+"""
+
+
+class Settlers:
+    """point: t (s), y, yd [unknowns] of the start; settler: of the rows of the method's points."""
+
+    def __init__(
+        self,
+        system: System,
+        forms: Forms | None,
+        request: Request,
+        sizes: Sizes,
+        roles: Roles,
+        point: tuple[float, Floats, Floats],
+    ) -> None:
+        self.system, self._forms, self._request, self._sizes = system, forms, request, sizes
+        n = system.form.written
+        self.keeps: NDArray[np.bool_] = roles.state[:n]
+        """Unknowns as written that carry the state."""
+        self._common = roles.common[:n]
+        t, y, yd = point
+        self._point = (t, y[:n], yd[:n]) if system.unknowns <= RATED else None
+        self.settler = self.of("settled" if forms is not None else self.whole_form, self.keeps)
+        # where constraints come and go what is left of a zero counts
+        still = 0.0 if request.switched else SLACK * request.tolerance
+        sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
+        # of steep laws what follows shares a move of the state
+        slack = still if system.form.scales else SLACK * request.tolerance if sums else 0.0
+        # the least change shares what is open: flows between contacts, potentials where all laws are faint
+        flat = bool(request.events) and self.whole_form == "rated"
+        self.settler.by_basis(slack, determined=request.switched or flat)
+        self.settler.core.contents.still = still
+        self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
+
+    @cached_property
+    def whole_form(self) -> str:
+        """All rows that hold at a point, with every unknown: where events change them any flow may be open."""
+        system = self.system
+        if "dynamics_rate" not in system.description.blocks:
+            return "settled"
+        turning = bool(self._request.events)
+        if self._request.switched:
+            return "rated"
+        if self._point is None:
+            return "rated" if turning else "settled"
+        settled = system.another("settled")
+        return "rated" if flows_open(settled, *self._point, self.keeps, turning=turning) else "settled"
+
+    def of(self, name: str, state: NDArray[np.bool_], *, whole: bool = False) -> Settler:
+        """Of the rows of a form; whole: with every unknown, whatever leaves the runs."""
+        form = self.system.form
+        left = self._forms.settled if self._forms is not None and name == "settled" and not whole else None
+        system = self.system.another(name)
+        magnitude = self._sizes.magnitude[: form.written]
+        common = self._common if state is self.keeps else None
+        return Settler(system, (form.k_q, form.k_f), magnitude, self._sizes.time, state, left, common)
+
+    def projection(self) -> Settler | None:
+        """Of the constraints alone, onto which accepted points are moved; None where no row lets them drift."""
+        if self.system.form.name not in PROJECTED:
+            return None
+        return self.of("constraints", np.ones(self.system.form.written, dtype=bool))
+
+    @cached_property
+    def restart(self) -> Restart:
+        """Finds consistent points behind jumps, with every unknown."""
+        settler = self.settler
+        if self._forms is not None:
+            settler = self.of(self.whole_form, self.keeps, whole=True)
+            settler.by_basis(0.0, determined=True)
+        return Restart(settler, self.keeps)
+
+    def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
+        """y, yd [unknowns as written] behind a jump at t (s), of the text or a law; where no state jumps, what is left
+        of the unknowns tells.  None where no point was found.
+        """
+        if self._forms is not None and self.whole_form == "settled":
+            found = still(self.settler, t, (y, yd), self.keeps, self._sizes.magnitude[: self.keeps.size])
+            if found is not None:
+                return found
+        return self.restart.across(t, y if self._forms is None else self._forms.completed(t, y), yd)
+
+    def rest(self) -> None:
+        """Of a large system: lets go of the room in which points behind a jump were settled."""
+        self.settler.rest()
+        if "restart" in self.__dict__:
+            self.restart.settler.rest()

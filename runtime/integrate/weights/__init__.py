@@ -1,0 +1,1 @@
+"""What the tolerances of a run are relative to."""
