@@ -149,7 +149,7 @@ class Settler:
         self._part = self._state.astype(np.int8)
         self._pairs = np.zeros((0, 2), dtype=np.int32)
         if common is not None and (common >= 0).any():
-            self._by_differences(common, np.arange(n) if condensed is None else condensed.kept)
+            self._by_differences(common, np.arange(n, dtype=np.int32) if condensed is None else condensed.kept)
         self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
         self.scale = np.concatenate([magnitude, magnitude[self.rates] / time_scale])
         self.linear: Any = None
