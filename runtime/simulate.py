@@ -5,7 +5,7 @@ Receives manifest, binding, carrier and options; hands back an `Outcome`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
 from sysdyn.runtime.trace.trace import Trace
+from sysdyn.runtime.trace.trace_store import columns_of
 from sysdyn.values import dataclass
 
 NO_FURTHER = 1.0 + 1e-6
@@ -361,12 +362,23 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     if finished.unsettled and not options.events:
         some = "1 row does" if finished.unsettled == 1 else f"{finished.unsettled} rows do"
         warnings = (*warnings, f"{some} not meet the equations: what stands there is the integrator's own")
+    warnings += tuple(_floating(finished.open, written.description))
     estimate = achieved.error_estimate if achieved is not None else None
     lost = tuple(cancelled(runs.quantities.terms(finished.largest), writer.seen(), options.accuracy, estimate))
     below = achieved is not None and achieved.below_round_off
     told = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
     told |= {"steps": finished.statistics.steps, "extrema": _extrema(runs)}
     return outcome(True, options.t_end, achieved, None, **told)
+
+
+def _floating(open_: Mapping[int, tuple[str, ...]], description: Description) -> Iterator[str]:
+    """What is said of traced quantities that floated between contacts."""
+    traced = {column.name: open_[column.place] for column in columns_of(description) if column.place in open_}
+    for between in dict.fromkeys(traced.values()):
+        names = ", ".join(name for name, of in traced.items() if of == between)
+        choice = "what is traced then is one of many values that fit (a small resistance in series, or a large one to"
+        choice += " ground, determines it)"
+        yield f"at times {', '.join(between)} leave {names} open: {choice}"
 
 
 def _extrema(runs: Runs) -> dict[str, tuple[float, float]]:

@@ -1,7 +1,8 @@
 """The Python face of sysdyn for notebooks and scripts: `load`, `simulate`, `Trace`, `compile_model`, `check`.
 
 They call what the commands call.  Findings of a model that cannot be used are raised as `ModelError`, wrong usage as
-`UsageError`, a solver that stops as `SolverFailure`, a run that is not met as `NotMet`; notes and warnings stay silent.
+`UsageError`, a solver that stops as `SolverFailure`, a run that is not met as `NotMet`; of what a run says of its
+results is warned, notes of the text stay silent.
 """
 
 from __future__ import annotations
@@ -88,6 +89,8 @@ def _handed(ran: Ran | None, report: Report, unmet: str) -> Trace:
     if ran.outcome.failure is not None:
         raise ran.outcome.failure
     trace = ran.outcome.traced
+    for text in ran.outcome.warnings:
+        warnings.warn(text, stacklevel=3)
     if ran.outcome.judgement is not None and not ran.outcome.met:
         found = NotMet(trace, ran.outcome.judgement.not_met, report.diagnostics)
         if unmet == "raise":

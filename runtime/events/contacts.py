@@ -50,6 +50,8 @@ class Contacts:
         self.open: frozenset[int] = frozenset()
         self.through: set[int] = set()  # frictions whose value goes through zero
         self.reversed: set[int] = set()  # those that have turned back, as long as one active set is sought
+        # idle ones that stand against their guard, for something would be open else (determined.py)
+        self.spared: frozenset[int] = frozenset()
         self.time = 0.0
         places = self.switches.places
         kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
@@ -122,6 +124,7 @@ class Contacts:
     def begin(self) -> None:
         """Nothing holds and nothing slips: where a start is sought from."""
         self.active[:] = False
+        self.spared = frozenset()
         for contact in self.contacts:
             if contact.sense >= 0:
                 self.p[contact.sense] = 0.0
@@ -220,14 +223,25 @@ class Contacts:
             test = _TESTS.get(contact.kind, Contacts._unilateral)
             if contact.kind == "follows" or k in self.frozen:
                 continue
-            if contact.kind == "guarded":
-                if bool(values[contact.guard]) != bool(self.active[k]):
+            if self.against(k, values):
+                if not (k in self.spared and self.idle(k, values)):
                     yield k
-            elif self.bar(k, values):
-                if self.active[k]:
-                    yield k
+            elif contact.kind == "guarded" or self.barred[k]:
+                continue
             elif test(self, k, contact, values, self._impulse_on(k, impulses)):
                 yield k
+
+    def against(self, k: int, values: Floats) -> bool:
+        """Whether a contact stands otherwise than its guard says."""
+        contact = self.contacts[k]
+        if contact.kind == "guarded":
+            return bool(values[contact.guard]) != bool(self.active[k])
+        return self.bar(k, values) and bool(self.active[k])
+
+    def idle(self, k: int, values: Floats) -> bool:
+        """Whether a contact does nothing, whatever its guard says: it bears nothing, and its value is zero."""
+        rows = self.contacts[k].value, self.contacts[k].multiplier
+        return all(abs(values[row]) <= self.observer.zero(row) for row in rows)
 
     def _impulse_on(self, k: int, impulses: Floats) -> float:
         """That of a contact; of friction in the plane its size."""

@@ -19,7 +19,7 @@ from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting, Settle
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.equilibrate import equilibrated
+from sysdyn.runtime.numerics.equilibrate import equilibrated, factors
 from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
 
 DENSE = 300
@@ -64,6 +64,19 @@ class Determined:
     def nullity(self, t: float, y: Floats, yd: Floats) -> int:
         """How many directions the equations with the present active set leave open."""
         return self._open(t, y, yd)[0]
+
+    def directions(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, list[int]]:
+        """What the equations with the present active set leave open [directions, unknowns as written], and the
+        contacts that have to do with it.
+        """
+        number, part, _ = self._open(t, y, yd) if self._system.unknowns <= DENSE else (0, np.zeros(0), None)
+        if not number:
+            return np.zeros((0, 0)), []
+        system, n = self._system, self._system.form.written
+        jy, jyd = (system.dense(slopes) for slopes in system.jacobian(t, y[:n], yd[:n]))
+        row, column = factors(jy, jyd)
+        right = decomposed((jy + GENERIC * jyd) * row[:, None] * column)[2]
+        return (right[len(right) - number :] * column)[:, :n], np.flatnonzero(part > NOTHING).tolist()
 
     def _open(self, t: float, y: Floats, yd: Floats) -> tuple[int, Floats, NDArray[np.bool_]]:
         """The same; how much the row of each contact has to do with it [contacts]: what has nothing closes nothing; the
@@ -110,7 +123,7 @@ class Determined:
     ) -> Iterator[tuple[Point, int]]:
         """Points of neighbouring active sets that fit too and leave less open."""
         contacts, (open_, turned) = self.contacts, what
-        values, before = contacts.observer(t, *point), contacts.state()
+        values, before, spared = contacts.observer(t, *point), contacts.state(), contacts.spared
         _, part, told = self._open(t, *point)
         # of equal shares the first counts, not what round-off makes the larger
         shares = np.argsort(-np.round(part, ALIKE), kind="stable").tolist()
@@ -118,17 +131,21 @@ class Determined:
         zero = {k: abs(values[(row := contacts.contacts[k].value)]) <= contacts.observer.zero(row) for k in order}
         for pivots, small in ((False, True), (True, True), (False, False)):
             for k in sorted(order, key=lambda k: k in turned):
-                if zero[k] != small or k in contacts.frozen or not (small or contacts.contacts[k].kind == "psi"):
+                if zero[k] != small or k in contacts.frozen:
+                    continue
+                if not (small or contacts.contacts[k].kind in ("psi", "guarded")):
                     continue
                 for turn in self._turns(k, values):
                     turn()
                     contacts.apply()
+                    contacts.spared = spared | {k}
                     found = self._near(t, point, settle, pivots=pivots)
                     if found is not None and self._goes_on(k, (point, found), None if small else told):
                         less = self.nullity(t, *found)
                         if less < open_:
                             yield found, less
                     contacts.become(before)
+                    contacts.spared = spared
 
     def _lowest_first(self, t: float, point: Point, order: list[int]) -> list[int]:
         """Contacts by the index of the set in which one is turned: of diodes that may hold a node the one that is there
@@ -184,7 +201,7 @@ class Determined:
         is loaded, while others hold its bodies.
         """
         contacts, contact = self.contacts, self.contacts.contacts[k]
-        if contact.kind in ("psi", "phi"):
+        if contact.kind in ("psi", "phi", "guarded"):
             yield lambda: contacts.flip(k, values)
         elif contact.kind == "friction" and contacts.active[k]:
             loaded = np.copysign(1.0, values[contact.multiplier])

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.bounces import Bounce, thrown
+from sysdyn.runtime.events.choices import Choices
 from sysdyn.runtime.events.conditions import Round, holds, with_momenta
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
@@ -76,6 +77,7 @@ class Handler:
         self.contacts = Contacts(plan, system, self.observer, self.p)
         self.determined = Determined(self.contacts)
         self.succession = Succession(plan, self.contacts, self.determined)
+        self.choices = Choices(self.contacts, self.determined)
         self.passes = np.inf
         """How long (s) a peak takes that began at the last event; inf: none did."""
         self.kinks, self.turns = Kinks(plan.kinks, self.observer, self.p), Turns(plan, self.observer, self.succession)
@@ -169,6 +171,7 @@ class Handler:
         if drives is not None:
             raise SolverFailure("drives", t, 0.0, drives)
         self.turns.seen(t, (y, yd))
+        self.choices.begin(t, y, yd)
         self.truth = self._true()
         due, anew = self.due(t), self.kinks.begin(values)
         if due:
@@ -252,6 +255,7 @@ class Handler:
         flight and opened again, where that is all, else -1; soon (s): sooner than that the same shall be asked again.
         """
         self._count(t)
+        self.choices.end(t, y, yd)
         free = self._free()
         self.simple, self.struck, self.rounds, self.soon = True, -1, [], 0.0
         said, stood = self._words(), self.kinks.state()
@@ -389,6 +393,7 @@ class Handler:
             cause = "complementarity" if drives is None else "drives"
             raise SolverFailure(cause, t, 0.0, drives or ", ".join(error.names)) from error
         self._renew(t, *found)
+        self.choices.begin(t, *found)
         if anew:
             self._bounce(t, *found)
         self._note(t, said, {*touched, *self.succession.impacts.closed})

@@ -388,6 +388,10 @@ class Integration:
             opening=method.opening if self.request.method in OPENED else 0.0,
             extrema=self.driver.extrema,
         )
+        if self.pieces is not None:
+            n = self.system.form.written
+            y, yd = last()
+            found = replace(found, open=self.pieces.floating(method.t, y[:n], yd[:n]))
         if spent and self.system.unknowns > LARGE:
             del method
             self._leave_method()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,7 +117,8 @@ class Finished:
     terms of their expressions; cpu [s]; ledgers: what came of them is read of the run that is kept; beyond: the largest
     unknown of a row within a step, in magnitudes that it has at steps; last: what gives y and yd at its end
     [unknowns], the largest |y| of each kind and unit; opening: for the next run's request; extrema: least and largest
-    values within steps [2, observed] (infinite where there are none), where these were looked into.
+    values within steps [2, observed] (infinite where there are none), where these were looked into;
+    open: rows of block observe that nothing determined at times, and the contacts between which they floated.
     """
 
     reached: float
@@ -131,6 +133,7 @@ class Finished:
     last: tuple[Callable[[], tuple[Floats, Floats]], Floats] | None = None
     opening: float = 0.0
     extrema: Floats | None = None
+    open: dict[int, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def balances(self) -> tuple[Balance, ...]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from model_runs import attempt, trace_of
+from model_runs import trace_of
 from sysdyn.api import simulate
 
 W = 100.0 * np.pi
@@ -291,13 +291,15 @@ scene s of twice {
 """
 
 
-def test_closed_switches_side_by_side_are_named_with_a_remedy(tmp_path):
-    ran, report = attempt(tmp_path, TWICE)
-    assert ran.exit == 3
-    (found,) = [d for d in report if d.severity == "error"]
-    assert found.code == "E931"
-    assert "T" in found.message
-    assert found.help.startswith("constraints that hold at one time may say the same twice: leave one out")
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+def test_closed_switches_side_by_side_discharge_a_capacitor_and_their_shares_are_a_choice(tmp_path, formulation):
+    """From 0.4 s on both say the same (E931 before)."""
+    with pytest.warns(UserWarning, match=r"at times S.blocks, T.blocks leave S.f open: .* one of many"):
+        trace = run(TWICE.replace("trace C.e", "trace C.e, S.f, R.e"), tmp_path, formulation)
+    exact = 10.0 * np.exp(-np.maximum(trace.time - 0.2, 0.0) / 0.1)
+    assert np.abs(trace["C.e"].values - exact).max() < 1e-4
+    closed = (np.abs(trace.time - 0.2) > 1e-9) & (trace.time > 0.2)
+    assert np.abs(trace["R.e"].values - exact)[closed].max() < 1e-4
 
 
 HALF_WAVE = """

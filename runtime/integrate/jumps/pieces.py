@@ -105,6 +105,12 @@ class Pieces:
         self._told()
         return tuple(self.handler.happened)
 
+    def floating(self, t: float, y: Floats, yd: Floats) -> dict[int, tuple[str, ...]]:
+        """Rows of block observe that nothing determined at times, at the end of a run; y, yd [unknowns as written]."""
+        self._told()
+        self.handler.choices.end(t, y, yd)
+        return self.handler.choices.found
+
     def _fire(self, t: float, before: tuple[Floats, Floats], due: list[int], which: list[Watched]) -> Point | None:
         """What the handler says, which the core learns."""
         handler, modes = self.handler, self.modes
