@@ -181,8 +181,10 @@ class Determined:
         if told is None:
             return self.contacts.contacts[k].hold < 0 or _same(yd, other_d, self._moves, NOTHING)
         flows = self._moves & told
-        size = np.abs(y[: flows.size][flows]).max(initial=0.0) / self.contacts.time if self.contacts.time > 0.0 else 0.0
-        return _same(y, other, flows, SAME) and _same(yd, other_d, flows & self._rated, SAME, size)
+        least = self.contacts.observer.zero(self.contacts.contacts[k].value) / SAME  # what is less is no flow
+        time = self.contacts.time
+        size = np.abs(y[: flows.size][flows]).max(initial=least) / time if time > 0.0 else 0.0
+        return _same(y, other, flows, SAME, least) and _same(yd, other_d, flows & self._rated, SAME, size)
 
     @cached_property
     def _moves(self) -> NDArray[np.bool_]:

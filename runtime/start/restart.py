@@ -41,7 +41,7 @@ def _held(
     """The point settled at t with the state held as far as it may be (None: it does not settle), and what moves."""
     settler.core.contents.ready = 0
     found, rate, done = settler.held(t, *point)
-    return (found, rate) if done else None, ~(np.abs(found - point[0]) <= STILL * magnitude)
+    return (found, rate) if done else None, ~(settler.of_state(found - point[0]) <= STILL * magnitude)
 
 
 class Restart:
@@ -105,7 +105,7 @@ class Restart:
         found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
         if done and self._stays(found, y, magnitude):
             return found, rate, impulse
-        if quickly or unmet(self.settler, t, y, yd, self.state):
+        if quickly or unmet(self.settler, t, y, yd, self.settler.alone(self.state)):
             return None
         # what follows is sought from where it was: impulses move it along slopes that steep laws had before the jump
         searched = self._search(t, np.where(self.state, y, before), yd)
@@ -113,7 +113,7 @@ class Restart:
 
     def _stays(self, found: Floats, y: Floats, magnitude: Floats) -> bool:
         """Whether the state is where the balances of the instant put it; one that moves besides is no answer."""
-        return bool((np.abs(found - y) <= SLACK * magnitude)[self.state].all())
+        return bool((self.settler.of_state(found - y) <= SLACK * magnitude)[self.state].all())
 
     def _kept(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats] | None:
         """The point settled without a move of the state, searched from flows and efforts of either sign and several

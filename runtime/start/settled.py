@@ -147,7 +147,7 @@ class Settler:
         self._state = np.zeros(self._moves, dtype=np.bool_)
         self._state[:n] = state
         self._part = self._state.astype(np.int8)
-        self._pairs = np.zeros((0, 2), dtype=np.int32)
+        self._pairs = self._between = np.zeros((0, 2), dtype=np.int32)
         if common is not None and (common >= 0).any():
             self._by_differences(common, np.arange(n, dtype=np.int32) if condensed is None else condensed.kept)
         self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
@@ -162,8 +162,25 @@ class Settler:
         gone = np.delete(common, kept)
         common = np.where(np.isin(common, gone), np.int32(-1), common)
         place = numbers_of(common.size, kept)
-        self._pairs = np.ascontiguousarray(place[stored_between(self.system, common)], dtype=np.int32)
+        self._between = stored_between(self.system, common)
+        self._pairs = np.ascontiguousarray(place[self._between], dtype=np.int32)
         self._part[: self._n][common[kept] >= 0] = DIFFERS
+
+    def of_state(self, change: Floats) -> Floats:
+        """How far the state has moved at each unknown [unknowns as written] by a change of these: where differences
+        carry it, the largest of them.
+        """
+        found = np.abs(change)
+        found[self._between] = 0.0
+        for one, other in (self._between.T, self._between.T[::-1]):
+            np.maximum.at(found, one, np.abs(change[one] - change[other]))
+        return found
+
+    def alone(self, state: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Of a state [unknowns as written] what carries it by itself."""
+        found = state.copy()
+        found[self._between] = False
+        return found
 
     def _saddle(self) -> tuple[Pattern, list[Ints]]:
         """Pattern of [D G^T; G -eps] and the places of the parts."""
