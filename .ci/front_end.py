@@ -12,7 +12,7 @@ tree = Path(sys.argv[1]).resolve()
 with tempfile.TemporaryDirectory() as folder:
     (Path(folder) / "sysdyn").mkdir()
     (Path(folder) / "sysdyn" / "dsl").symlink_to(tree / "dsl")
-    for name in ("values.py", "names.py"):
+    for name in ("initials.py", "values.py", "names.py"):
         (Path(folder) / "sysdyn" / name).symlink_to(tree / "cli" / "sysdyn" / name)
     sys.path.insert(0, folder)
     sys.dont_write_bytecode = True

@@ -2,8 +2,9 @@
 import.
 
 The standard decorator writes the methods of every class as text and compiles it whenever it is imported: of 300 classes
-that took 40 % of the start of a command.  Here `__init__` is compiled once for each number of fields, and the names of
-a class are put in; what else a value needs is shared.  Classes that ask for more are left to the standard decorator.
+that took 40 % of the start of a command.  Here `__init__` stands written for each number of fields (`initials.py`), and
+the names of a class are put in; what else a value needs is shared.  Classes that ask for more are left to the
+standard decorator.
 """
 
 from __future__ import annotations
@@ -12,10 +13,11 @@ import copy
 import dataclasses
 from collections.abc import Callable
 from dataclasses import MISSING
-from functools import cache
 from operator import attrgetter
-from types import CodeType, FunctionType
+from types import FunctionType
 from typing import TYPE_CHECKING, Any
+
+from sysdyn.initials import INITIALS
 
 SPECIAL = ("ClassVar", "InitVar", "KW_ONLY")
 """Kinds of fields that are left to the standard decorator."""
@@ -33,17 +35,6 @@ _CHANGING.frozen = False
 """Options of a value whose fields may be set again."""
 _NEW = object()
 """Stands where a field's value is made anew for each value."""
-
-
-@cache
-def _setting(count: int, after: bool) -> CodeType:
-    """`__init__` of a value of so many fields, set each by its slot; after: `__post_init__` follows."""
-    names = [f"a{k}" for k in range(count)]
-    lines = [f"_a{k}(self, a{k})" for k in range(count)] + ["_after(self)"] * after
-    made: dict[str, Any] = {}
-    exec(f"def __init__({', '.join(['self', *names])}):\n " + "\n ".join(lines), made)  # noqa: S102 (numbers alone)
-    code: CodeType = made["__init__"].__code__
-    return code
 
 
 def _setter(store: Callable[..., None], factory: Callable[[], Any]) -> Callable[..., None]:
@@ -107,7 +98,8 @@ def _plain(cls: type, options: dict[str, bool]) -> bool:
         options.keys() <= {"frozen", "slots", "eq", "repr"}
         and options.get("slots", False)
         and cls.__bases__ == (object,)
-        and bool(cls.__annotations__)
+        and 0 < len(cls.__annotations__) <= len(INITIALS)
+        and not hasattr(cls, "__post_init__")
         and all(_usual(value) for value in vars(cls).values() if isinstance(value, dataclasses.Field))
         and not any(kind in str(written) for written in cls.__annotations__.values() for kind in SPECIAL)
     )
@@ -165,13 +157,13 @@ def _made(cls: type, *, slots: bool, frozen: bool = False, eq: bool = True, repr
 def _initial(made: Any, names: tuple[str, ...], defaults: dict[str, Any]) -> FunctionType:
     """`__init__` of a class with slots."""
     first = [_first(default) for default in defaults.values()]
-    head, after = len(names) - len(first), getattr(made, "__post_init__", None)
-    code = _setting(len(names), after is not None)
-    code = code.replace(co_varnames=("self", *names), co_qualname=f"{made.__qualname__}.__init__")
-    known = {f"_a{k}": vars(made)[name].__set__ for k, name in enumerate(names)} | {"_after": after}
+    head = len(names) - len(first)
+    code = INITIALS[len(names) - 1].__code__
+    code = code.replace(co_varnames=("self", *names), co_name="__init__", co_qualname=f"{made.__qualname__}.__init__")
+    known = {f"s{k}": vars(made)[name].__set__ for k, name in enumerate(names)}
     for k, value in enumerate(first, head):
         if value is _NEW:
-            known[f"_a{k}"] = _setter(known[f"_a{k}"], defaults[names[k]].default_factory)
+            known[f"s{k}"] = _setter(known[f"s{k}"], defaults[names[k]].default_factory)
     init = FunctionType(code, known, "__init__", tuple(first))
     init.__annotations__ = made.__annotations__ | {"return": None}
     return init

@@ -13,6 +13,8 @@ from sysdyn.dsl.model.functions import FUNCTIONS
 from sysdyn.dsl.parser.shapes import OTHERS, SHAPES
 
 # fmt: off
+BLOCKS = ("model", "component", "scene", "domain", "bundle")
+"""Items of a file that have a block."""
 MODEL_WORDS = frozenset(
     {
         "param", "node", "port", "branch", "input", "output", "quasi", "coord", "cocoord", "implicit",

@@ -9,20 +9,23 @@ from __future__ import annotations
 import re
 
 from sysdyn.dsl.parser.automaton import Automaton
-from sysdyn.dsl.parser.complaints import MODEL_WORDS, SCENE_WORDS
-from sysdyn.dsl.parser.lexing import Bracket, Scanner
+from sysdyn.dsl.parser.complaints import BLOCKS, MODEL_WORDS, SCENE_WORDS
+from sysdyn.dsl.parser.lexing import BLANK, COMMENT, NAME, TEXT, Bracket, Scanner
 from sysdyn.values import dataclass
 
-_MARKS = re.compile(
-    r"#[^\r\n]*|\"[^\"\r\n]*\"|([{}])|^[ \t]*(?:(model|component|scene|domain|bundle)[ \t]+\w|(\w+))", re.M
-)
+_BEGIN = rf"^{BLANK}*+"
+_MARKS = re.compile(rf"{COMMENT}|{TEXT}|([{{}}])|{_BEGIN}(?:({'|'.join(BLOCKS)}){BLANK}++\w|({NAME}))", re.M)
 """What counts braces: these outside comments and texts, heads of items, first words of lines."""
-_MODEL = re.compile(r"^[ \t]*model[ \t]+(\w+)", re.M)
-_OF = re.compile(r"^[ \t]*scene[ \t]+\w+[ \t]+of[ \t]+(\w+)", re.M)
-_COMPONENT = re.compile(r"^[ \t]*component[ \t]+(\w+)", re.M)
-_IMPORTED = re.compile(r"^[ \t]*from[ \t]+[\w.]+[ \t]+import[ \t]+([\w, \t\r\n]+?)(?=\r?\n[ \t]*\w+[ \t:\[]|#|$)", re.M)
-_ELEMENT = re.compile(r"(?:^|[{;])[ \t]*\w+(?:\[[^\]\r\n]*\])?[ \t]*:[ \t]*([^\W\d]\w*)(?:\.\w+)?[ \t]*\(", re.M)
-_BUILTINS = frozenset({"kinetic", "potential", "dissipator", "effort", "flow", "transformer", "gyrator"})
+_MODEL = re.compile(rf"{_BEGIN}model{BLANK}++({NAME})", re.M)
+_OF = re.compile(rf"{_BEGIN}scene{BLANK}++{NAME}{BLANK}++of{BLANK}++({NAME})", re.M)
+_COMPONENT = re.compile(rf"{_BEGIN}component{BLANK}++({NAME})", re.M)
+_IMPORTED = re.compile(
+    rf"{_BEGIN}from{BLANK}++[\w.]++{BLANK}++import{BLANK}++((?:\s*+{NAME}{BLANK}*+,)*\s*+{NAME})", re.M
+)
+_ELEMENT = re.compile(
+    rf"(?:^|[{{;]){BLANK}*+{NAME}(?:\[[^\]\r\n]*+\])?{BLANK}*+:{BLANK}*+({NAME})(?:\.{NAME})?{BLANK}*+\(", re.M
+)
+BUILTINS = frozenset({"kinetic", "potential", "dissipator", "effort", "flow", "transformer", "gyrator"})
 _OF_COMPONENTS = frozenset({"port", "branch", "law", "level", "lossless"})
 _OF_SCENES = SCENE_WORDS - MODEL_WORDS
 
@@ -64,8 +67,8 @@ def missing_head(text: str, start: int) -> Head | None:
     lost = [m for m in asked if m[1] not in models]
     if lost and not words & _OF_COMPONENTS:
         return Head("model", lost[0].span(1), f"model {lost[0][1]} {{")
-    known = {m[1] for m in _COMPONENT.finditer(text)} | _BUILTINS
-    known |= {name for m in _IMPORTED.finditer(text) for name in re.findall(r"\w+", m[1])}
+    known = {m[1] for m in _COMPONENT.finditer(text)} | BUILTINS
+    known |= {name for m in _IMPORTED.finditer(text) for name in re.findall(NAME, m[1])}
     used = [m for m in _ELEMENT.finditer(text) if m[1] not in known]
     return Head("component", used[0].span(1), f"component {used[0][1]} {{") if used else None
 

@@ -28,10 +28,13 @@ CONTINUES = frozenset(
 
 # groups are not possessive: Python up to 3.11.4 loses its place where such a group begins and fails (gh-106052)
 _NUMBER = r"[0-9]++(?:\.[0-9]++)?(?:[eE][+-]?[0-9]++)?"
-_NAME = r"[^\W\d]\w*+"
-_FACTOR = rf"{_NAME}(?:\^-?[0-9]++)?"
+NAME = r"[^\W\d]\w*+"
+COMMENT = r"#[^\r\n]*+"
+TEXT = r"\"[^\"\r\n]*+\""
+BLANK = r"[ \t]"
+_FACTOR = rf"{NAME}(?:\^-?[0-9]++)?"
 _TOKEN = re.compile(
-    rf"[ \t]*+(?:({_NAME})|({_NUMBER})|(;|[\r\n][ \t\r\n]*+)|(#[^\r\n]*+)|(\"[^\"\r\n]*+\")"
+    rf"{BLANK}*+(?:({NAME})|({_NUMBER})|(;|[\r\n][ \t\r\n]*+)|({COMMENT})|({TEXT})"
     r"|(->|:=|==|!=|<=|>=|\.\.|[-+*/^=<>~:,.()\[\]{}'$]))"
 )
 _UNIT = re.compile(
@@ -41,14 +44,14 @@ _UNIT = re.compile(
 _GLUED = re.compile(rf"{_FACTOR}(?:[./]{_FACTOR})*")
 _INDEX = re.compile(r"[0-9]v")
 _FUNCTION = re.compile(r"(?:T\*|V\*|T|V|D|G)(?![\w*])")
-_BLANK = re.compile(r"[ \t]*+")
+_BLANK = re.compile(rf"{BLANK}*+")
 _WORDS = (
     "param|node|port|branch|input|output|quasi|coord|cocoord|implicit|state|discrete|dynamic|let|law|energy|content"
     "|work|phi|psi|gamma|init|when|every|for|level|require|expect|time|set|trace|accuracy|formulation|solver"
     "|redundancy|limit|from|domain|bundle|unit|const|fn|table|component|model|scene"
 )
 _STATEMENT = re.compile(rf"(?:{_WORDS})[ \t]++\w")
-_PERHAPS = re.compile(rf"(?:{_WORDS})[ \t]++[-(]|lossless[ \t]*+[\r\n]|{_NAME}[ \t]*+:|\}}")
+_PERHAPS = re.compile(rf"(?:{_WORDS})[ \t]++[-(]|lossless[ \t]*+[\r\n]|{NAME}[ \t]*+:|\}}")
 """How a statement begins, for the guess that a line which continues another was not meant to:
 two words side by side are one for certain, the rest only where it is not indented further."""
 _CLOSING = {")": "(", "]": "[", "}": "{"}

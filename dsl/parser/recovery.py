@@ -13,7 +13,7 @@ import re
 from sysdyn.dsl.parser import complaints
 from sysdyn.dsl.parser.automaton import MAX_NESTING, Automaton
 from sysdyn.dsl.parser.complaints import Complaint
-from sysdyn.dsl.parser.lexing import RESERVED, Bracket
+from sysdyn.dsl.parser.lexing import BLANK, NAME, RESERVED, Bracket
 from sysdyn.dsl.parser.notes import MAX_TERMS
 from sysdyn.dsl.parser.shapes import SHAPES
 from sysdyn.dsl.text.diagnostics import Related
@@ -29,10 +29,10 @@ MAX_ERRORS = 100
 _MOST_BRACES = 10
 """Open blocks that are named at the end of a text; more say nothing new."""
 
-_WORD = re.compile(r"[^\W\d]\w*+")
+_WORD = re.compile(NAME)
 _TARGET = re.compile(r"[\w.]+(?:\[[^\]\n]*\])?'?[ \t]*+")
 """What stands before the sign of an assignment."""
-_BLANK = re.compile(r"[ \t]*+")
+_BLANK = re.compile(rf"{BLANK}*+")
 _GAP = re.compile(r"\s*+(#[^\n]*+)?")
 _UNLABELLED = frozenset({"law", "energy", "content", "work", "init", "let", "dynamic", "require", "expect"})
 _ELEMENT = re.compile(r":[ \t]*+[\w.]+[ \t]*+\(")
@@ -40,7 +40,7 @@ _BEHIND = frozenset({"on", "within", "every", "while", "restitution", "to", "as"
 """Terminals that stand in no bracket, but may stand behind one."""
 
 _SLIPS = RESERVED | {"=", "==", ":="}
-_OUTERMOST = frozenset({"model", "component", "scene", "domain", "bundle", "from"})
+_OUTERMOST = frozenset({*complaints.BLOCKS, "from"})
 _HEADS = {
     "model": ("model", "<name>"),
     "component": ("component", "<name>"),

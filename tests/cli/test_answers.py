@@ -5,12 +5,12 @@ import json
 import h5py
 import numpy as np
 import pytest
+from linearized import ALL, CLOSE, RLC, alike, linear, values
 from scipy import signal
 from scipy.io import loadmat
 from scipy.linalg import eig
 from sysdyn import api
 from sysdyn.cli.main import run
-from test_linearize import ALL, CLOSE, RLC, alike, linear, values
 from texts import run_json, write
 
 R, L, C = 3.0, 0.5, 0.02

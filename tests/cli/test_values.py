@@ -7,6 +7,7 @@ import pickle
 
 import pytest
 from sysdyn import values
+from sysdyn.initials import INITIALS
 
 
 @values.dataclass(frozen=True, slots=True)
@@ -16,10 +17,6 @@ class Ours:
     a: int
     b: str = "x"
     c: tuple[int, ...] = ()
-
-    def __post_init__(self) -> None:
-        if self.a < 0:
-            raise ValueError("a")
 
     @property
     def twice(self) -> int:
@@ -79,8 +76,6 @@ def test_wrong_calls_name_what_is_wrong():
         Ours()
     with pytest.raises(TypeError, match="unexpected keyword argument 'd'"):
         Ours(1, d=2)
-    with pytest.raises(ValueError, match="a"):
-        Ours(-1)
     with pytest.raises(TypeError, match="without a default"):
 
         @values.dataclass(frozen=True, slots=True)
@@ -133,3 +128,26 @@ def test_other_kinds_are_the_standard_decorators_own():
         key: int
 
     assert Ordered(1) < Ordered(2)
+
+    @values.dataclass(frozen=True, slots=True)
+    class Positive:
+        a: int
+
+        def __post_init__(self) -> None:
+            if self.a < 0:
+                raise ValueError("a")
+
+    assert Positive(1).a == 1
+    with pytest.raises(ValueError, match="a"):
+        Positive(-1)
+
+
+@pytest.mark.parametrize("count", range(1, len(INITIALS) + 2))
+def test_each_argument_is_the_field_of_its_place_and_of_its_name(count):
+    """As far as `__init__` stands written, and one field beyond, where the standard decorator takes over."""
+    names = [f"field{k}" for k in range(count)]
+    made = values.dataclass(type("Many", (), {"__annotations__": dict.fromkeys(names, int)}), frozen=True, slots=True)
+    by_place, by_name = made(*range(count)), made(**{name: k for k, name in reversed([*enumerate(names)])})
+    assert [getattr(by_place, name) for name in names] == list(range(count))
+    assert by_place == by_name
+    assert made.__init__.__name__ == "__init__"

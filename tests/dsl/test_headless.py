@@ -2,6 +2,8 @@
 
 import pytest
 from sysdyn.api import check
+from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
+from sysdyn.dsl.parser.headless import BUILTINS
 
 TEXT = """from std.electrical import resistor, voltage
 component part {
@@ -73,3 +75,17 @@ FOLLOWING = {
 def test_what_follows_from_a_slip_is_not_told(old):
     new, codes = FOLLOWING[old]
     assert [d.code for d in check(TEXT.replace(old, new))] == codes
+
+
+def test_what_needs_no_component_is_what_names_hold():
+    assert {*ONE_PORTS, *TWO_PORTS} == BUILTINS
+
+
+@pytest.mark.parametrize("names", ["resistor, voltage, part", "resistor,\n  voltage,\n  part"])
+def test_what_is_imported_is_no_component_that_is_missing(names, tmp_path):
+    """The lost head is that of `lag`: `part` comes from elsewhere, whether its name stands on the first line or not."""
+    first, part, rest = TEXT.partition(TEXT[TEXT.index("component part") : TEXT.index("component lag")])
+    text = first.replace("from std.electrical import resistor, voltage", f"from other import {names}") + rest
+    (found, *_) = [d for d in check(text.replace("component lag {\n", "")) if d.code == "E107"]
+    assert found.help == "component lag {"
+    assert part

@@ -44,7 +44,7 @@ def _stores(folder, seed, formulation):
     [
         pytest.param(17, (), FORMULATIONS, marks=pytest.mark.long),
         (33, (), FORMULATIONS[2:]),  # E516, and a run that stops, in the others
-        pytest.param(34, (), FORMULATIONS, marks=pytest.mark.one_in(2)),
+        (34, (), FORMULATIONS),
         (36, (), FORMULATIONS),
         (23, (0.0, 137.732733), FORMULATIONS),
         (5, (0.0, 0.0, 200.787371, 0.0, 200.787371), FORMULATIONS[2:]),
@@ -53,6 +53,7 @@ def _stores(folder, seed, formulation):
         (149, (), FORMULATIONS[2:]),
     ],
 )
+@pytest.mark.one_in(2)
 @pytest.mark.filterwarnings("ignore")
 def test_stores_begin_as_guessed_in_every_formulation(seed, charged, formulations, tmp_path):
     """But where an ideal source charges one through its diodes (23).  17 began with 9445 A in coils and 40 kV, 33 with

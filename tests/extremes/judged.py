@@ -9,7 +9,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from cases import Case, Family
+from case import Case, Family
 from running import ran
 
 RIGHT = 3.0

@@ -82,7 +82,7 @@ model m {
   work (if %s then 30 N else 0 N) on x
   init x' = 1 m/s
 }
-scene s of m { time 0 s to 2 s; trace x, x' as v }
+scene s of m { time 0 s to 0.6 s; trace x, x' as v }
 """
 
 

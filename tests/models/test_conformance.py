@@ -3,6 +3,7 @@
 Each case: a claim of the page, a text, quantities with what they are at t (s), formulations that can express it.
 """
 
+from functools import cache
 from math import cos, exp, sin, sqrt
 
 import numpy as np
@@ -23,9 +24,13 @@ EXACT, CLOSE = 1e-9, 1e-5
 
 
 def solved(rates, start, end, **read):
-    """Quantities of an ordinary differential equation, by another solver."""
-    sol = solve_ivp(rates, (0, end), start, dense_output=True, rtol=1e-11, atol=1e-14, method="DOP853").sol
-    return {name: (lambda t, of=of: of(t, sol(t))) for name, of in read.items()}
+    """Quantities of an ordinary differential equation, by another solver, which runs when one of them is asked for."""
+
+    @cache
+    def sol():
+        return solve_ivp(rates, (0, end), start, dense_output=True, rtol=1e-11, atol=1e-14, method="DOP853").sol
+
+    return {name: (lambda t, of=of: of(t, sol()(t))) for name, of in read.items()}
 
 
 def oscillating(t):

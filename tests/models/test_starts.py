@@ -88,7 +88,7 @@ guess over its range (arrays)."""
 @pytest.mark.parametrize(("sort", "number"), [("scalar", 1000), ("others", 1000), ("bare", 1000), ("arrays", 500)])
 def test_random_networks_partly_said_begin_with_the_contents_of_the_closed_form(sort, number):
     """In all formulations; what is fixed in contradiction has no start in any."""
-    seeds = (*range(number if os.environ.get("SYSDYN_LONG") else 1 if sort == "arrays" else 4), *HARD[sort])
+    seeds = (*range(number if os.environ.get("SYSDYN_LONG") else 1 if sort == "arrays" else 3), *HARD[sort])
     verdicts = {seed: judged(seed, sort) for seed in seeds}
     differ = {seed: verdict for seed, verdict in verdicts.items() if verdict not in {"agree", "refused"}}
     assert not differ

@@ -1,0 +1,42 @@
+"""Small rooms of the command line by themselves."""
+
+from types import SimpleNamespace
+
+import pytest
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.memory_limit import LEAST, TooLittle
+from sysdyn.cli.page.named import destination, label, quantities
+
+
+def test_a_process_without_room_for_numpy_is_told_how_much_it_takes():
+    with pytest.raises(MemoryError, match=r"numpy needs 166 MB, 64 MB are allowed"):
+        TooLittle(64 * 1024**2).find_spec("numpy")
+    assert TooLittle(LEAST - 1).find_spec("json") is None
+
+
+def test_a_picture_is_called_as_its_trace_and_goes_where_it_is_asked():
+    console = SimpleNamespace(as_json=False)
+    assert label("runs/pendulum-swing.h5") == "pendulum-swing"
+    assert label("-") == "stdin"
+    assert str(destination("runs/a.h5", None, console, (".png", ".svg"), "a plot")) == "a.png"
+    assert str(destination("a.h5", "b.SVG", console, (".png", ".svg"), "a plot")) == "b.SVG"
+    with pytest.raises(UsageError, match=r"a plot is one of \.png, \.svg"):
+        destination("a.h5", "b.pdf", console, (".png", ".svg"), "a plot")
+
+
+class Kept(dict):
+    """A trace of names alone."""
+
+    path = "t.h5"
+
+    @property
+    def names(self):
+        return [name for name in self if not name.startswith("audit")]
+
+
+def test_quantities_are_those_asked_for_each_once_and_meters_by_either_spelling():
+    trace = Kept.fromkeys(["x", "v", "audit.energy"])
+    assert quantities([trace], ["v", "audit/energy", "audit.energy", "x", "v"]) == ["v", "audit.energy", "x"]
+    assert set(quantities([trace], [])) == {"x", "v"}
+    with pytest.raises(UsageError, match=r"t\.h5 has no quantity 'w'; (nearest|there are)"):
+        quantities([trace], ["w"])
