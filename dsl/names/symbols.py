@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 from typing import Any
 
@@ -299,11 +299,16 @@ class Scope:
     """Whether a name of a statement that could not be read was asked for."""
     read: dict[tuple[str, int], Unit] | None = None
     """Units that were read here, by their text and the number of those declared then."""
+    announced: dict[str, list[Callable[[], None]]] = field(default_factory=dict)
+    """What enters an element of this level that is written further below, by its name."""
 
     def find(self, name: str) -> Symbol | None:
         """The symbol of that name, nearest level first."""
         scope: Scope | None = self
         while scope is not None:
+            if name in scope.announced and name not in scope.symbols:
+                for enter in scope.announced.pop(name):
+                    enter()
             if name in scope.symbols:
                 return scope.symbols[name]
             scope = scope.outer

@@ -88,7 +88,8 @@ class Succession:
                 self.contacts.turn(k, values)
         self.contacts.apply()
         found = self.determined.fit(t, y, yd, restart.struck, touched)
-        if self._tied(t, found, touched if self.contacts.state() == stood else ()):
+        still = touched if self.contacts.state() == stood else ()
+        if self._tied(t, found, still) or self._beside_idle(t, found, stood):
             found = self._ahead(t, found, self.contacts.state()) or found
         if not self._impacts:
             self._follows[stood, tuple(touched)] = self.contacts.state()
@@ -188,6 +189,21 @@ class Succession:
         slips = [c for c, sticks in zip(self.plan.contacts, stick, strict=True) if c.kind == "friction" and not sticks]
         idle = any(abs(values[c.value]) <= zero(c.value) and abs(values[c.rate]) <= zero(c.rate) for c in slips)
         return idle or any(c.kind != "phi" or abs(values[c.rate]) <= zero(c.rate) for c in contacts)
+
+    def _beside_idle(self, t: float, point: Point, stood: tuple[float, ...]) -> bool:
+        """Whether something opened beside a one-way flow that was open and carries nothing, nor begins to: where all of
+        a bridge blocks one diode holds its load, and hands it on to another when the source goes through zero.  Both
+        open is a set that fits at that very instant alone.  (Not so of their duals, which hold: `_later` moves what
+        stands for a flow there by its rate at t, and of a flow at rest that is none.)
+        """
+        values, zero = self.observer(t, *point), self.observer.zero
+        idle = opened = False
+        for k, c in enumerate(self.plan.contacts):
+            if c.kind == "psi" and not c.dual and not self.contacts.active[k]:
+                held = stood[k] != 0.0
+                opened |= held
+                idle |= not held and all(abs(values[row]) <= zero(row) for row in (c.value, c.rate))
+        return opened and idle
 
     def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
         """The point with the active set that fits a little later, None where none differs.

@@ -91,7 +91,8 @@ class Integration:
         system.trim(LARGE)  # what is made now stays, and little of it fits where something was let go
         self._stepper()
         keeps = self.settlers.keeps
-        self.driver = Driver(system, request, self.method, self.settler, keeps, self.start_rate, self._drift())
+        told = self.start_rate, self._drift(), self.sizes.magnitude
+        self.driver = Driver(system, request, self.method, self.settler, keeps, *told)
         if self.forms is not None:
             self.driver.unread = np.asarray(self.forms.settled.unread, dtype=np.int32)
         if self.method.name == "rosenbrock" and system.form.scales and self.forms is None:

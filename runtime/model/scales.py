@@ -157,6 +157,16 @@ def group_maxima(system: System, values: Floats) -> Floats:
     return largest
 
 
+def round_off_beside(system: System, magnitude: Floats) -> Floats:
+    """What is left of a zero beside the largest unknown of its unit [observed values]."""
+    description, largest = system.description, dict[str, float]()
+    for (_, unit), most in zip(kinds_and_units(system), group_maxima(system, magnitude), strict=False):
+        largest[unit] = max(float(most), largest.get(unit, 0.0))
+    rows = [description.rows[k] for k in description.rows_of("observe")]
+    sizes = [ROUND_OFF * largest.get(row.unit, 0.0) for row in rows]
+    return np.repeat(np.array(sizes, dtype=np.float64), [row.size for row in rows])
+
+
 def largest_of_group(group: NDArray[np.integer], values: Floats) -> Floats:
     """Of each value the largest of its group [values]; zero at least.  Groups lie in stretches, for families do."""
     if not group.size:

@@ -56,3 +56,23 @@ def test_many_units_in_turn():
     units = "".join(f"unit u{i} = 1 u{i + 1}\n" for i in range(1500))
     text = "unit u1500 = 1 m\nmodel m { coord x: translation = 1 u0; energy T* = 1/2*(1 kg)*x'^2 }\n"
     assert check(units + text) == []
+
+
+READER = "P{0}: low_pass(tau = 1 s, u = R{0}.f)"
+ELEMENTS = {
+    "": ("La: kinetic(p = 1 mH*f) a -> b", "R: dissipator(e = 1 ohm*f) b -> c", "C: effort(e = 0 V) c -> ground"),
+    "[i]": ("La: kinetic(p = 1 mH*f) a -> b", "R[1]: dissipator(e = 1 ohm*f) b -> c",
+            "for i in 2..3 { R[i]: dissipator(e = 2 ohm*f) c -> ground }"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("at", ["", "[i]"])
+def test_an_input_may_read_an_element_that_follows(at):
+    """What `$u` is of a component is told by an element below it as by one above."""
+    reader = READER.format(at)
+    reader = f"for i in 1..3 {{ {reader} }}" if at else reader
+    nodes = ("node a, b: electrical", "node c: electrical", "V: effort(e = 1 V) a -> ground")
+    elements = ELEMENTS[at]
+    for lines in ((*nodes, *elements, reader), (*nodes, reader, *elements)):
+        body = "\n  ".join(lines)
+        assert check(f"from std.control import low_pass\nmodel m {{\n  {body}\n}}\n") == []

@@ -86,6 +86,7 @@ class Instances(Inputs):
                 self.scope.broken.add(statement.decl.name)
         for do in waiting:
             do()
+        self.scope.announced.clear()
 
     def _unfinished(self, body: Body) -> list[int]:
         """Elements whose connections stand, indented, on a line that could not be read: nothing is said of them."""
@@ -103,7 +104,7 @@ class Instances(Inputs):
         symbol = self.scope.component(name)
         label = s.decl.name
         if symbol is None and name in BUILTINS and len(s.component.names) == 1:
-            return lambda: self.each([(s, loops)], self._builtin)
+            return self._once(label, lambda: self.each([(s, loops)], self._builtin))
         if isinstance(symbol, Unsupported):
             raise Failed
         if symbol is None:
@@ -131,6 +132,22 @@ class Instances(Inputs):
             self.report.error("E106", f"'{label}' is declared twice", self.place(s.decl.span), related=related)
             raise Failed
         return self._wait(before, s, loops, symbol)
+
+    def _once(self, label: str, enter: Callable[[], None]) -> Callable[[], None]:
+        """What enters an element in its turn, or before it when an instance above reads it."""
+        here, done = self.current, list[bool]()
+
+        def elaborate() -> None:
+            if not done:
+                done.append(True)
+                enter()
+
+        def early() -> None:
+            with self.entering(here):
+                elaborate()
+
+        self.scope.announced.setdefault(label, []).append(early)
+        return elaborate
 
     def _wait(
         self, symbol: InstanceSymbol, s: syntax.Instance, loops: tuple[syntax.For, ...], component: ComponentSymbol

@@ -111,7 +111,7 @@ static int relaxes(const sd_run *run, double t, double *row)
     double h = run->t_to - run->t_from, since = t - run->t_from, most = 0.0;
     for (int32_t i = 0; i < run->observed; i++) {
         const double apart = fabs(rate[i] - run->slope[i]);
-        if (run->largest[i] > 0.0 && isfinite(apart)) /* what is no number is said elsewhere */
+        if (run->largest[i] > run->nothing[i] && isfinite(apart)) /* what is no number is said elsewhere */
             most = fmax(most, apart / run->largest[i]);
     }
     if (!(most * h > run->swift))

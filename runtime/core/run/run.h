@@ -83,6 +83,7 @@ typedef struct sd_run {
     double t_to;                      /* end of what counts of the last step */
     const double *magnitude;          /* [n] of the unknowns at steps; NULL: not looked at */
     double beyond;                    /* largest |unknown| of a row within a step, in these magnitudes */
+    const double *nothing;            /* [observed] what is round-off beside others of its unit */
     const double *projected;          /* drift of the last step before the method itself projected it; NULL: it does not */
     sd_modes *modes;                  /* NULL: every event goes to its handler */
     struct sd_corners *corners;       /* NULL: every jump of a text without events goes to Python */

@@ -231,6 +231,7 @@ class Pieces:
                 self.handler.side[:], self.handler.truth = sides, truth  # what changed within it has not yet
                 self._again(core.t_from, step, sink)
                 return time.process_time() - began
+            self.handler.observer.know(run.driver.largest())  # what it has met in this flight, whose ends are zeros
             with run.settler.exactly():
                 before = self._point(t)
                 which += self._met(t, before, which)

@@ -16,6 +16,7 @@ from sysdyn.runtime.integrate.rows.least_norm import LeastNorm
 from sysdyn.runtime.integrate.rows.ledgers import Ledgers
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.scales import round_off_beside
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.settled import Settler
 
@@ -58,6 +59,7 @@ class Driver:
         keeps: NDArray[np.bool_],
         start_rate: Floats,
         drift: int | None,
+        magnitude: Floats,
     ) -> None:
         self.system = system
         self.observed = system.observed_rows("observe")[1]
@@ -88,6 +90,8 @@ class Driver:
         self._extrema(request)
         run.rough = request.settled_to
         run.swift = SWIFT * request.rtol
+        self._nothing = round_off_beside(system, magnitude)
+        run.nothing = lib.pointer(self._nothing)
         run.bare = int(not request.audited and shows(system, keeps))
         run.told = CREDIT if not request.audited and self._follows_sums(settler, keeps) else 0
         unread = not request.audited and request.events is None and self._unread

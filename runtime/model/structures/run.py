@@ -242,6 +242,7 @@ class Run(c.Structure):
         ("t_to", D),
         ("magnitude", P),
         ("beyond", D),
+        ("nothing", P),
         ("projected", P),
         ("modes", P),
         ("corners", P),
