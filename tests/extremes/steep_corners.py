@@ -20,11 +20,20 @@ PER_RUN = 400
 
 @dataclass(frozen=True)
 class Turn:
-    """Where `at` (t, y) rises through zero in mode `of`, the motion goes on in mode `to`."""
+    """Where `at` (t, y) rises through zero in mode `of`, the motion goes on in mode `to`; rests: the state that is zero
+    then.
+    """
 
     of: int
     at: Callable
     to: int
+    rests: int | None = None
+
+    def after(self, y):
+        """The mode behind it, of a state that is changed in place."""
+        if self.rests is not None:
+            y[self.rests] = 0.0
+        return self.to
 
 
 @dataclass(frozen=True)
@@ -45,46 +54,41 @@ class Motion:
     turns: tuple[Turn, ...] = ()
     instants: dict = field(default_factory=dict)
 
-    def truth(self, times, rtol):
-        """Traced quantities [names, k] at instants (s) in ascending order."""
-        y, t, mode = np.array(self.y, float), 0.0, self.mode
-        found, known = np.zeros((y.size, len(times))), 0
-        ends = [*sorted(x for x in self.instants if 0.0 < x < self.end), self.end]
-        for end in ends:
-            if t in self.instants and self.instants[t] is not None:
+    def truth(self, rtol):
+        """times (s, ascending) -> traced quantities [names, k] there."""
+        y, t, mode, pieces, begins = np.array(self.y, float), 0.0, self.mode, [], []
+        for end in [*sorted(x for x in self.instants if 0.0 < x < self.end), self.end]:
+            if self.instants.get(t) is not None:
                 mode = self.instants[t]
             while t < end:
+                for turn in [turn for turn in self.turns if turn.of == mode and turn.at(t, y) > 0.0]:
+                    mode = turn.after(y)
                 turns = [turn for turn in self.turns if turn.of == mode]
-                for turn in [x for x in turns if x.at(t, y) > 0.0]:  # behind an instant at once
-                    mode = turn.to
-                    turns = [x for x in self.turns if x.of == mode]
-                events = [self._event(turn) for turn in turns]
                 here = solve_ivp(
-                    self.rates, (t, end), y, "LSODA", args=(mode,), events=events, dense_output=True, rtol=rtol,
-                    atol=rtol * 1e-3 * np.maximum(np.abs(y), self._sizes), max_step=(self.end / PER_RUN),
+                    self.rates, (t, end), y, "LSODA", args=(mode,), events=[_event(turn) for turn in turns],
+                    dense_output=True, rtol=rtol, atol=1e-5 * rtol, max_step=self.end / PER_RUN,
                 )  # fmt: skip
                 assert here.success, here.message
-                last = here.t[-1]
-                upto = np.searchsorted(times, last, side="right") if last < self.end else len(times)
-                if upto > known:
-                    found[:, known:upto] = here.sol(np.minimum(times[known:upto], last))
-                known, y, t = max(known, upto), here.y[:, -1].copy(), last
+                begins.append(t)
+                pieces.append(here.sol)
+                y, t = here.y[:, -1].copy(), float(here.t[-1]) if here.status == 1 else end
                 if here.status == 1:
-                    mode = next(turn.to for turn, hit in zip(turns, here.t_events, strict=True) if hit.size)
-                    t = min(end, np.nextafter(t, np.inf))
-        return np.atleast_2d(self.read(found))
+                    mode = next(turn for turn, hit in zip(turns, here.t_events, strict=True) if hit.size).after(y)
 
-    @property
-    def _sizes(self):
-        return np.ones(len(self.y)) * 1e-2
+        def at(times):
+            place = np.maximum(np.searchsorted(begins, times, side="left") - 1, 0)
+            found = [pieces[k](times[place == k]) for k in range(len(pieces)) if (place == k).any()]
+            return np.atleast_2d(self.read(np.concatenate(found, axis=1)))
 
-    @staticmethod
-    def _event(turn):
-        def crosses(t, y, mode):
-            return turn.at(t, y)
+        return at
 
-        crosses.terminal, crosses.direction = True, 1.0
-        return crosses
+
+def _event(turn):
+    def crosses(t, y, mode):
+        return turn.at(t, y)
+
+    crosses.terminal, crosses.direction = True, 1.0
+    return crosses
 
 
 def drawn(number):
@@ -278,7 +282,7 @@ def ideal_bridges(dice):
             return lambda t, y: sense * v * np.sin(w * t) - y[0]
 
         turns = (Turn(0, driven(1), 1), Turn(0, driven(-1), -1))
-        turns += (Turn(1, lambda t, y: -y[1], 0), Turn(-1, lambda t, y: y[1], 0))
+        turns += (Turn(1, lambda t, y: -y[1], 0, 1), Turn(-1, lambda t, y: y[1], 0, 1))
         y, read, instants = [0.0, 0.0], lambda y: y, {}
     traced = {"vc": "C.e"} | ({"i": "L.f"} if coil else {})
     rest = {"rates": rates, "y": y, "read": read, "instants": instants, "turns": turns, "mode": 1 if coil else 0}
@@ -338,7 +342,7 @@ def converters(dice):
 
     instants = {0.0: 1} | {k * period: 1 for k in range(1, cycles)} | {(k + duty) * period: 0 for k in range(cycles)}
     rest = {"rates": rates, "y": [0.0, 0.0], "read": lambda y: y, "instants": instants}
-    rest["turns"] = (Turn(0, lambda t, y: -y[0], 2),)
+    rest["turns"] = (Turn(0, lambda t, y: -y[0], 2, 0),)
     head = ("from std.electrical import resistor, inductor, capacitor, voltage, switch, pwm, diode",)
     return head, body, {"i": "L.f", "vc": "C.e"}, float(f"{cycles * period:.9g}"), rest
 
