@@ -71,10 +71,10 @@ UNSEEN = 0.5
 ALIKE = 1.1
 """Times the steps of the coarser run: with no more than that events hold most, where both are as far off."""
 AT_EVENTS, SLOW, STALLS = 0.2, 0.5, 0.5
-"""Where events happen: the power that is told (of 475 such pairs of steep laws and corners 14 were over 1.5 times what was
-told by the credit, one with that); a power measured, below which no smaller tolerance is credited, for knocks make of
-errors what they make of phases; part of the difference before from which on a pair has not shown that errors fall, and
-the next one is not believed on its own (play: 0.17, 0.18, 0.0055 of runs that were 0.016 off)."""
+"""Where events happen: the power by which is told (of 475 such pairs 14 were over 1.5 times what the credit told, one
+what this does); a power measured, below which no smaller tolerance is credited, for knocks make of errors what they
+make of phases; part of the difference before, from which on a pair does not show that errors fall, and the next is not
+believed on its own (play: 0.17, 0.18, 0.0055 of runs that were 0.016 off)."""
 SURE = 2.0
 """Of what is told, the safety at least."""
 LAST, BY_CHANCE = 10.0, 1.5
@@ -179,10 +179,10 @@ def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
 class _Estimate:
     """The estimate of the last of two runs, and the power with which the errors fall.
 
-    over: beside what was asked, as it mostly is; apart: what is told, relative, which hardly ever is less than it, but no
-    more than what was asked where that is met; alone: no pair before says how errors fall; stalled: the pair before did
-    not show that they do; root: a quantity ends as a root of the state: what tolerances do for it comes before shorter
-    steps.
+    over: beside what was asked, as it mostly is; apart: what is told, relative, hardly ever less than it is, but no
+    more than what was asked where that is met; alone: no pair before says how errors fall; stalled: the pair before
+    did not show that they do; root: a quantity ends as a root of the state: what tolerances do for it comes before
+    shorter steps.
     """
 
     def __init__(self, law: Law, target: Floats) -> None:
@@ -219,7 +219,7 @@ class _Estimate:
         elif self._before is not None:
             over_before, step_before = self._before
             self._stalls = fine.jumps and over > STALLS * over_before
-            slow = fine.jumps and 0.0 < over and over > over_before * 10.0 ** (-SLOW * step_before)
+            slow = fine.jumps and over > 0.0 and over > over_before * 10.0 ** (-SLOW * step_before)
             if over > over_before or slow:
                 shrink, slow = 1.0, True  # no convergence seen: no credit for the smaller tolerance
             elif over > 0.0 and np.isfinite(over_before):
@@ -243,7 +243,7 @@ class _Estimate:
         return apart
 
     def _told(self, step: float, coarse: Sampled, fine: Sampled) -> float:
-        """Error of the finer run over its difference from the coarser one, at most; step: decades of their tolerances."""
+        """Error of the finer run over its difference from the coarser one, at most; step: decades of tolerance."""
         law = self.law
         power = min(law.sure, AT_EVENTS) if fine.jumps else law.sure
         ratio = max(10.0 ** (-power * step), law.far**power, (fine.steps / max(coarse.steps, 1)) ** -STEPPED)

@@ -30,8 +30,9 @@ class Law:
     ratio: of the tolerances of the first two runs; loosest: tolerance of a draft; most: steps with which the gain
     grows; far: of the tolerance of the run before, beyond which nothing more is credited; little: the most that is left
     of a tolerance that missed where no power is measured yet, for another miss costs a run; safety: of its estimates;
-    sure: the power by which the error is told (real errors beyond 1.5 times that: none of 370 pairs of steep laws, 24 by
-    the credit); short: the most that is credited to runs of less than SHORT steps; least: of a tolerance, the estimate at least;
+    sure: the power by which the error is told (of 370 pairs of steep laws none was over 1.5 times that, 24 by the
+    credit); short: the most that is credited to runs of less than SHORT steps; least: of a tolerance, the estimate at
+    least;
     order: power of the steps with which errors fall at least, as far as is credited (0: they are not counted);
     fastest: power beyond which differences fall by chance alone;
     brief: runs of less than LENGTHY steps that have nothing in common, or would have to be as fine as DEAR, are left to

@@ -44,10 +44,10 @@ class Sampled:
     [quantities] against which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it
     is zero; left_open(): the same by the equations, for two runs that share no digit of one; between [instants,
     quantities]: what no difference counts more than, but for what it is beyond `jump` [quantities], the largest at an
-    event, between an event of this run and the same one of the run before it (None: no instant is); late [instants, quantities]: what the dense
-    output of each value moves by within the time tolerance (TIMING): on a steep front no more is asked; there: values
-    and late at instants of its own, for the run behind it (None: those are the same); jumps:
-    events happened; passed [instants, 2]: where a first step behind a restart passes over
+    event, between an event of this run and the same one of the run before it (None: no instant is); late [instants,
+    quantities]: what the dense output of each value moves by within the time tolerance (TIMING): on a steep front no
+    more is asked; there: values and late at instants of its own, for the run behind it (None: those are the same);
+    jumps: events happened; passed [instants, 2]: where a first step behind a restart passes over
     what relaxes at once, how many times as long it is, and the most that this may be, of its largest; zeros elsewhere.
     """
 

@@ -250,7 +250,7 @@ def ideal_bridges(dice):
     rs, coil = float(f"{_log(dice, 0.003, 0.05) * r:.4g}"), dice.random() < 0.5
     c, h = float(f"{_log(dice, 0.1, 20) / (r * hz):.4g}"), float(f"{_log(dice, 0.005, 0.1) * r / hz:.4g}")
     body = [
-        f"node s, x, a, p, m: electrical",
+        "node s, x, a, p, m: electrical",
         f"V: voltage(v = {v} V*sin(2*pi*{hz} Hz*t)) s -> b",
         f"R: resistor(R = {rs!r} ohm) s -> x",
     ]

@@ -32,7 +32,7 @@ WALL = "60 s"
 
 @dataclass(frozen=True)
 class Told:
-    """One run: error real and told, of the largest value of the quantity that is furthest off; "" or why there is none."""
+    """One run: error real and told, of the largest value of what is furthest off; refused: why there is none."""
 
     motion: Motion
     way: str
