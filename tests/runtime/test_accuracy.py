@@ -69,8 +69,8 @@ def test_steps_that_events_hold_say_nothing_of_the_tolerance(jumps, steps):
 
 @pytest.mark.parametrize("jumps", [True, False])
 def test_what_is_told_is_no_less_than_runs_with_events_differ_by(jumps):
-    """Of 475 pairs of steep laws and corners 14 were over 1.5 times off what their tolerances told, up to 13 times; but no
-    more is told than what was asked, where that is met.
+    """Of 475 pairs of steep laws and corners 14 were over 1.5 times off what tolerances told, up to 13 times; but
+    no more is told than what was asked, where that is met.
     """
 
     def run(tolerance, longest):
