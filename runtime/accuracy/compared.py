@@ -39,11 +39,13 @@ class Compared:
         """A run begins."""
         self._rows: list[Floats] = []
         self._traced: list[Floats] = []
+        self._jump, self._last = np.zeros(self._observed), np.zeros((0, lib.ROW_HEAD + 2 * self._observed))
         self._thinned = Thinned()
         self._with_events = Thinned(min(max(VALUES // max(self._observed, 1), MOST), MANY))
 
     def take(self, rows: Floats, kind: Ints) -> None:
         """Keeps what runs are compared by: rows at the instants of the run before, and its own, thinned."""
+        self._take_jumps(rows)
         if self.options.every is None:
             for thinned in (self._thinned, self._with_events):
                 thinned.take(rows[(kind & TRACE) > 0])
@@ -53,6 +55,15 @@ class Compared:
             self._traced.append(traced[known[at] == traced[:, 0]])
         if (kind & COMPARED).any():
             self._rows.append(rows[(kind & COMPARED) > 0])
+
+    def _take_jumps(self, rows: Floats) -> None:
+        """Rows before and behind an event stand at one instant."""
+        rows = np.concatenate([self._last, rows])
+        self._last = rows[-1:].copy()
+        same = np.flatnonzero(np.diff(rows[:, 0]) == 0.0)
+        if same.size:
+            values = rows[:, lib.ROW_HEAD : lib.ROW_HEAD + self._observed]
+            self._jump = np.fmax(self._jump, np.abs(values[same + 1] - values[same]).max(axis=0))
 
     def sampled(self, tolerance: float, finished: Finished, quantities: Quantities) -> Sampled:
         """Of the run that has ended; the next is compared at its instants."""
@@ -72,9 +83,10 @@ class Compared:
         open_ = partial(self._open_quantities, finished, quantities)
         sizes, steps = quantities.of_run(finished), finished.statistics.steps
         between = self._between(rows, finished, quantities)
+        jump = np.append(self._jump[quantities.places], np.full(len(quantities.meters), np.inf))
         passed = np.where(rows[:, 1:2].astype(np.int32) & RELAXING, rows[:, 2:4], 0.0)
         found = Sampled(
-            tolerance, values, sizes, steps, noise, open_, between, late, there, bool(finished.events), passed
+            tolerance, values, sizes, steps, noise, open_, between, late, there, jump, bool(finished.events), passed
         )
         self.samplings = (*self.samplings[-1:], found)
         return found

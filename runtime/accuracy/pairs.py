@@ -43,11 +43,11 @@ class Sampled:
     """What a run hands to the comparison.  values [instants, quantities] at the instants of the run before it; largest
     [quantities] against which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it
     is zero; left_open(): the same by the equations, for two runs that share no digit of one; between [instants,
-    quantities]: what no difference counts more than, between an event of this run and the same one of the run before it
-    (None: no instant is); late [instants, quantities]: what the dense
-    output of each value moves by within the time tolerance (TIMING): on a steep front no more is asked; there: values
-    and late at instants of its own, for the run behind it (None: those are the same); jumps:
-    events happened; passed [instants, 2]: where a first step behind a restart passes over
+    quantities]: what no difference counts more than, but for what it is beyond `jump` [quantities], the largest at an
+    event, between an event of this run and the same one of the run before it (None: no instant is); late [instants,
+    quantities]: what the dense output of each value moves by within the time tolerance (TIMING): on a steep front no
+    more is asked; there: values and late at instants of its own, for the run behind it (None: those are the same);
+    jumps: events happened; passed [instants, 2]: where a first step behind a restart passes over
     what relaxes at once, how many times as long it is, and the most that this may be, of its largest; zeros elsewhere.
     """
 
@@ -60,6 +60,7 @@ class Sampled:
     between: Floats | None = None
     late: Floats | float = 0.0
     there: tuple[Floats, Floats | float] | None = None
+    jump: Floats | float = np.inf
     jumps: bool = False
     passed: Floats | None = None
 
@@ -74,13 +75,13 @@ def apart(coarse: Sampled, fine: Sampled) -> Floats:
     one of them has must be between values that the other one takes about there.  At the end, where a quantity grows
     without bound (x' = x^2 at its pole), its rate allows any difference, but only one of them has been so far.  Between
     the instants of one event in both, a value on one side of a jump is no error of one on the other: what counts is how
-    far it moves meanwhile.
+    far it moves meanwhile, and all that is more than the jump.
     """
     values, late = coarse.own
     late = np.minimum(np.fmax(np.fmax(late, fine.late), 0.0), LARGEST)  # no number: no time tolerance
     over = np.fmax(_outside(values, fine.values, late), _outside(fine.values, values, late))
     over = np.fmax(over, 0.0 * fine.values * values)
-    return over if fine.between is None else np.minimum(over, fine.between)
+    return over if fine.between is None else np.fmax(np.minimum(over, fine.between), over - fine.jump)
 
 
 def _outside(values: Floats, others: Floats, late: Floats) -> Floats:

@@ -110,8 +110,24 @@ def test_what_relaxes_at_once_behind_an_event_is_followed(tmp_path):
     found = simulate(file, output=tmp_path / "a.h5", rtol=2.5e-6, method="radau")
     other = simulate(file, output=tmp_path / "b.h5", rtol=1e-8, method="bdf")
     times = [[e.time for e in one.events if e.element == "E15.one_way"][-1] for one in (found, other)]
-    assert times[0] == pytest.approx(times[1], abs=1e-10)
-    assert np.abs(voltage(found) - voltage(other)).max() < 3e-5 * np.abs(voltage(other)).max()
+    assert times[0] == pytest.approx(times[1], abs=1e-9)  # half a relaxation of the leak
+    assert np.abs(voltage(found) - voltage(other)).max() < 5e-6 * np.abs(voltage(other)).max()
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_what_follows_from_states_by_a_leak_tells_no_event_by_their_slopes(tmp_path):
+    """Two coils whose currents differ by that of a megohm: potentials that followed from what slopes left between them
+    put events up to 37 us late, of 134 in the place of 64, and voltages 1e-3 to 1e-4 off at tolerances to 1e-8.
+    """
+    file = tmp_path / "m.sd"
+    file.write_text(Circuit(40).text)
+    other = simulate(file, output=tmp_path / "b.h5", method="bdf", rtol=1e-7)
+    found = simulate(file, output=tmp_path / "a.h5", method="radau", rtol=1e-6)
+    assert len(found.events) < 1.2 * len(other.events)
+    assert np.abs(voltage(found) - voltage(other)).max() < 2e-5 * np.abs(voltage(other)).max()
+    asked = simulate(file, output=tmp_path / "a.h5")
+    assert asked.met
+    assert np.abs(voltage(asked) - voltage(other)).max() < 5e-5 * np.abs(voltage(other)).max()
 
 
 @pytest.mark.one_in(4)

@@ -61,9 +61,40 @@ def test_steps_that_events_hold_say_nothing_of_the_tolerance(jumps, steps):
         errors.append(100.0 * tolerance)
         return replace(sampled(tolerance, [1.0, 0.5 + errors[-1]], steps if len(errors) > 1 else 90), jumps=jumps)
 
-    achieved = control(run, np.array([1.0]), LAW, first=1e-6)
+    achieved = control(run, np.array([7e-4]), LAW, first=1e-6)
     held = jumps and steps == 90
-    assert (achieved.error_estimate > errors[0] - errors[1]) is held
+    assert (achieved.runs > 2) is held
+    assert achieved.met
+
+
+@pytest.mark.parametrize("jumps", [True, False])
+def test_what_is_told_is_no_less_than_runs_with_events_differ_by(jumps):
+    """Of 475 pairs of steep laws and corners 14 were over 1.5 times off what tolerances told, up to 13 times; but
+    no more is told than what was asked, where that is met.
+    """
+
+    def run(tolerance, longest):
+        return replace(sampled(tolerance, [1.0, 0.5 + 100.0 * tolerance]), jumps=jumps)
+
+    for asked in (1.0, 7e-4):
+        achieved = control(run, np.array([asked]), LAW, first=1e-6)
+        assert achieved.met
+        assert achieved.runs == 2
+        assert achieved.error_estimate > 3.0 * 1e-4  # of an error of 1e-4
+        assert achieved.error_estimate <= asked
+        assert (achieved.error_estimate > 9e-4) is (jumps and asked == 1.0)
+
+
+def test_runs_with_events_that_differ_as_before_are_not_believed_by_one_that_does_not():
+    """Teeth with play: 0.17, 0.18, then 0.0055 of runs that were 0.016 off, told as 0.0012."""
+    values = iter([0.0, 0.17, -0.01, -0.0155])
+
+    def run(tolerance, longest):
+        return replace(sampled(tolerance, [1.0, 0.5 + next(values, 0.0)], 200), jumps=True)
+
+    achieved = control(run, np.array([1e-2]), LAWS["radau"])
+    assert achieved.met
+    assert achieved.runs > 5
 
 
 @pytest.mark.parametrize(("doubted", "runs"), [(False, 2), (True, 3)])

@@ -1,5 +1,7 @@
 """At which instants runs are compared, and what is said of what they miss, on rows made by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from sysdyn.runtime.accuracy.common_instants import MANY, MOST, Thinned, common, joined, known, late_by
@@ -177,6 +179,8 @@ def test_what_an_event_is_late_by_counts_where_values_move():
     fine = Sampled(1e-6, np.array([[0.0, 0.0], [1.0009, 1.0], [3.0, 1.0]]), np.ones(2), 20, between=moved)
     assert apart(coarse, fine)[1] == pytest.approx([9e-4, 0.0])
     assert difference(coarse, fine, np.full(2, 1e-3)) == pytest.approx((9e-4, 0.9))
+    turned = replace(fine, values=fine.values + np.array([[0.0], [0.05], [0.0]]), jump=np.array([0.0, 1.0]))
+    assert apart(coarse, turned)[1] == pytest.approx([0.0509, 0.05])  # of what does not jump all counts, else the rest
 
 
 def test_an_instant_that_rounds_beyond_the_end_is_the_end():

@@ -166,7 +166,8 @@ void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd
     radau->h_used = radau->h_before = 0.0;
     radau->error_accepted = 0.0;
     radau->growth = SD_GROWTH;
-    radau->longest = 0.0;
+    radau->longest = radau->follows = 0.0;
+    radau->behind = radau->steps > 0;
     radau->pressed = radau->balances;
     radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = radau->strained = radau->turned = 0;
     sd_radau_leave_below(radau, radau->linear->idle ? SD_LEAST_PIVOT : 0.0);

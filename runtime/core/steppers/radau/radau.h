@@ -74,6 +74,9 @@ typedef struct sd_radau {
     double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size;
     double growth;            /* of the next step at most where laws are steep */
     double longest;           /* step accepted */
+    double follows;           /* behind a restart: tolerances by which what follows moves where slopes move the state by one
+                               * (radau_dense.c); 0: not known yet */
+    int32_t behind;           /* a restart */
     int32_t balances;         /* balances are steep: in rates, whose round-off grows as steps shrink */
     int32_t pressed;          /* a steep law lets no length of step do: corrections are shortened at once */
     int32_t ready, old_jacobian, rejected;

@@ -3,10 +3,13 @@
 #include "steppers/radau/radau.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define BULGES 32 /* places at which its largest is sought */
 #define MANY 100.0 /* unknowns up to which each is asked for what the error test asks of all */
+#define TELLS 1e-3 /* tolerances by which slopes move an unknown, from which on what follows tells how it does */
+#define FOLLOWS 100.0 /* times as many by which what follows may move with it: then a state is no state for rows */
 
 void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1])
 {
@@ -188,14 +191,55 @@ static double most_off(const sd_radau *radau)
     return radau->system->scales > 0 ? 1.0 : fmax(1.0, sqrt((double)radau->n / MANY));
 }
 
-/* Slopes lead no unknown that they would take further off the polynomial of the stages than the step's error may be: there
- * they are of a motion before, or what a stiff law makes of the point's own error. */
+/* where slopes are asked what they make of the step: of more stages the first gap is the one that slopes bend */
+static double place_of(const sd_radau *radau, int k, int looks)
+{
+    return radau->t - radau->h_used * (1.0 - (looks > 1 ? k / 3.0 : 0.5 * radau->used->c[0]));
+}
+
+/* How many tolerances what follows from the state (a node's potential, of two coils that a leak of megohms ties) moves where
+ * slopes move the state by one; 0: they do not move it.  The polynomials of the stages have all linear rows in common, those
+ * that slopes lead do not: what follows would be what is left between them. */
+static double followed(sd_radau *radau, sd_settle *settle)
+{
+    const size_t n = (size_t)radau->n;
+    double t = place_of(radau, 1, 2), moved = 0.0, most = 0.0;
+    double *of = malloc(3 * n * sizeof *of), *y = of + n, *rate = y + n;
+    if (!of)
+        return 1.0;
+    for (int led = 0; led < 2; led++) {
+        of_stages(radau, t, 0, y, rate);
+        if (led)
+            of_slopes(radau, t, y, rate);
+        else
+            of_stages(radau, t, 1, y, rate);
+        for (size_t i = 0; i < n && led; i++)
+            if (radau->led[i])
+                moved = fmax(moved, fabs(y[i] - radau->ee[i]) * sd_radau_weight(radau, (int32_t)i));
+        if (!led)
+            memcpy(radau->ee, y, n * sizeof *y);
+        if ((led && moved < TELLS) || sd_settle_point(settle, t, y, rate)) {
+            free(of);
+            return 0.0;
+        }
+        if (!led)
+            memcpy(of, y, n * sizeof *y);
+    }
+    for (size_t i = 0; i < n; i++)
+        if (!radau->smooth[i])
+            most = fmax(most, fabs(y[i] - of[i]) * sd_radau_weight(radau, (int32_t)i));
+    free(of);
+    return most / moved;
+}
+
+/* Slopes lead no unknown that they would take further off the polynomial of the stages than the step's error may be, nor
+ * what follows from it: there they are of a motion before, or what a stiff law makes of the point's own error. */
 static void mistrust(sd_radau *radau)
 {
-    const int looks = radau->used->stages > 3 ? 1 : 2; /* of more stages the first gap is the one that slopes bend */
-    const double most = most_off(radau);
+    const int looks = radau->used->stages > 3 ? 1 : 2;
+    const double most = most_off(radau) / (radau->follows > FOLLOWS ? radau->follows : 1.0);
     for (int k = 1; k <= looks; k++) {
-        double t = radau->t - radau->h_used * (1.0 - (looks > 1 ? k / 3.0 : 0.5 * radau->used->c[0]));
+        double t = place_of(radau, k, looks);
         of_stages(radau, t, 1, radau->y, radau->rate);
         memcpy(radau->ee, radau->y, (size_t)radau->n * sizeof(double));
         of_slopes(radau, t, radau->y, radau->rate);
@@ -223,8 +267,11 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle)
                     radau->slope[k][i] = radau->rate[i];
         radau->refined[k] = 1;
     }
-    if (!(radau->fixed_h > 0.0)) /* whose error is nobody's wish */
-        mistrust(radau);
+    if (radau->fixed_h > 0.0) /* whose error is nobody's wish */
+        return;
+    if (radau->follows == 0.0 && radau->taken > 0 && radau->behind && !settle->seen && settle->unknowns == radau->n)
+        radau->follows = followed(radau, settle);
+    mistrust(radau);
 }
 
 int sd_radau_astray(sd_radau *radau)

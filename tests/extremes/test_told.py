@@ -1,0 +1,43 @@
+"""A slice of the random motions with steep laws and corners; the whole is `python tests/extremes/told.py`."""
+
+import numpy as np
+import pytest
+from steep_corners import FAMILIES, drawn
+from told import told
+
+
+@pytest.mark.parametrize(
+    ("number", "formulation", "accuracy"),
+    [
+        (0, "hamiltonian", 1e-5),  # 2.1 times what was told
+        (1, "co_lagrangian", 1e-2),  # 2.7
+        pytest.param(21, "co_lagrangian", 1e-2, marks=pytest.mark.long),  # 6.5, and 4.2 times what was asked
+        (41, "lagrangian", 1e-3),  # 4.0
+        (48, "co_lagrangian", 1e-2),  # 3.8
+    ],
+)
+def test_no_more_is_left_open_than_is_told(number, formulation, accuracy, tmp_path):
+    found = told(tmp_path, drawn(number), formulation, accuracy, "auto", [])
+    assert not found.refused
+    assert found.met
+    assert not found.defect, str(found)
+
+
+@pytest.mark.parametrize("number", range(len(FAMILIES)), ids=[family.__name__ for family in FAMILIES])
+@pytest.mark.one_in(3)
+def test_every_family_is_met_as_told(number, tmp_path):
+    motion, truth = drawn(number), []
+    for accuracy in (1e-2, 1e-3):
+        found = told(tmp_path, motion, "lagrangian", accuracy, "auto", truth)
+        assert not found.refused
+        assert found.met
+        assert not found.defect, str(found)
+
+
+def test_truths_at_two_tolerances_agree_and_are_the_same_for_ever():
+    motion = drawn(5)
+    times = np.linspace(0.0, motion.end, 50)
+    loose, fine = (motion.truth(rtol)(times) for rtol in (1e-9, 1e-12))
+    assert np.abs(loose - fine).max() < 1e-7 * np.abs(fine).max()
+    assert drawn(5).text == motion.text
+    assert len({drawn(k).text for k in range(90)}) == 90
