@@ -63,7 +63,9 @@ class Compared:
         same = np.flatnonzero(np.diff(rows[:, 0]) == 0.0)
         if same.size:
             values = rows[:, lib.ROW_HEAD : lib.ROW_HEAD + self._observed]
-            self._jump = np.fmax(self._jump, np.abs(values[same + 1] - values[same]).max(axis=0))
+            with np.errstate(invalid="ignore"):  # of values without bound
+                jump = np.abs(values[same + 1] - values[same])
+            self._jump = np.fmax(self._jump, jump.max(axis=0))
 
     def sampled(self, tolerance: float, finished: Finished, quantities: Quantities) -> Sampled:
         """Of the run that has ended; the next is compared at its instants."""

@@ -193,6 +193,7 @@ scene flows of resting {
 """
 
 
+@pytest.mark.filterwarnings("ignore:.*not meet the equations")
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 def test_a_valve_at_rest_beside_others_that_pass(tmp_path, formulation):
     """What it passes is a root of time: it has no rate at first, and Newton's steps reach its zero as powers of two."""
@@ -336,6 +337,7 @@ NETS = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:.*not meet the equations")
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize(

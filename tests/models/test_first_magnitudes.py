@@ -79,6 +79,7 @@ FAST = """coord y: translation = 0.5 m
 """
 
 
+@pytest.mark.filterwarnings("ignore:at times")
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.one_in(4)

@@ -9,6 +9,8 @@
 #define BULGES 32 /* places at which its largest is sought */
 #define MANY 100.0 /* unknowns up to which each is asked for what the error test asks of all */
 #define TELLS 1e-3 /* tolerances by which slopes move an unknown, from which on what follows tells how it does */
+#define TOLD 1.0   /* tolerances that what follows moves by: less tells nothing, and does no harm */
+#define FINE 1e-10   /* below it flows near round-off of displacements are told by slopes alone (a valve's chamber) */
 #define FOLLOWS 100.0 /* times as many by which what follows may move with it: then a state is no state for rows */
 
 void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1])
@@ -229,7 +231,7 @@ static double followed(sd_radau *radau, sd_settle *settle)
         if (!radau->smooth[i])
             most = fmax(most, fabs(y[i] - of[i]) * sd_radau_weight(radau, (int32_t)i));
     free(of);
-    return most / moved;
+    return most > TOLD ? most / moved : 0.0;
 }
 
 /* Slopes lead no unknown that they would take further off the polynomial of the stages than the step's error may be, nor
@@ -269,7 +271,8 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle)
     }
     if (radau->fixed_h > 0.0) /* whose error is nobody's wish */
         return;
-    if (radau->follows == 0.0 && radau->taken > 0 && radau->behind && !settle->seen && settle->unknowns == radau->n)
+    const int asked = radau->follows == 0.0 && radau->taken > 0 && radau->behind && radau->rtol >= FINE;
+    if (asked && !settle->seen && settle->unknowns == radau->n)
         radau->follows = followed(radau, settle);
     mistrust(radau);
 }
