@@ -89,8 +89,10 @@ class Succession:
         self.contacts.apply()
         found = self.determined.fit(t, y, yd, restart.struck, touched)
         still = touched if self.contacts.state() == stood else ()
-        if self._tied(t, found, still) or self._beside_idle(t, found, stood):
+        if self._tied(t, found, still):
             found = self._ahead(t, found, self.contacts.state()) or found
+        elif not stalled and self._beside_idle(t, found, stood):  # twice at an instant would go round in a circle
+            found = self._handed_on(t, found)
         if not self._impacts:
             self._follows[stood, tuple(touched)] = self.contacts.state()
         return self._closed(t, found), True
@@ -189,6 +191,15 @@ class Succession:
         slips = [c for c, sticks in zip(self.plan.contacts, stick, strict=True) if c.kind == "friction" and not sticks]
         idle = any(abs(values[c.value]) <= zero(c.value) and abs(values[c.rate]) <= zero(c.rate) for c in slips)
         return idle or any(c.kind != "phi" or abs(values[c.rate]) <= zero(c.rate) for c in contacts)
+
+    def _handed_on(self, t: float, point: Point) -> Point:
+        """The same with the active set that fits a little later, where that fits at t too."""
+        here = self.contacts.state()
+        ahead = self._ahead(t, point, here)
+        if ahead is not None and self.contacts.fits(t, ahead[0], (*ahead, np.zeros_like(ahead[0]))):
+            return ahead
+        self.contacts.become(here)
+        return point
 
     def _beside_idle(self, t: float, point: Point, stood: tuple[float, ...]) -> bool:
         """Whether something opened beside a one-way flow that was open and carries nothing, nor begins to: where all of
