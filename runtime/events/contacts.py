@@ -124,11 +124,19 @@ class Contacts:
     def begin(self) -> None:
         """Nothing holds and nothing slips: where a start is sought from."""
         self.active[:] = False
-        self.spared = frozenset()
         for contact in self.contacts:
             if contact.sense >= 0:
                 self.p[contact.sense] = 0.0
         self.apply()
+
+    def obey(self, values: Floats) -> None:
+        """What guards say holds or is not there, whatever stood against them; values: of the observer."""
+        self.spared = frozenset()
+        for k, contact in enumerate(self.contacts):
+            if contact.kind == "guarded":
+                self.active[k] = bool(values[contact.guard])
+            elif self.bar(k, values):
+                self.active[k] = False
 
     def take(self, switches: NDArray[np.bool_]) -> None:
         """The active set of the switches as it is given."""

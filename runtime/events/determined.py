@@ -72,10 +72,8 @@ class Determined:
         number, part, _ = self._open(t, y, yd) if self._system.unknowns <= DENSE else (0, np.zeros(0), None)
         if not number:
             return np.zeros((0, 0)), []
-        system, n = self._system, self._system.form.written
-        jy, jyd = (system.dense(slopes) for slopes in system.jacobian(t, y[:n], yd[:n]))
-        row, column = factors(jy, jyd)
-        right = decomposed((jy + GENERIC * jyd) * row[:, None] * column)[2]
+        n = self._system.form.written
+        _, _, right, column = _pencil(self._system, *self._system.jacobian(t, y[:n], yd[:n]))
         return (right[len(right) - number :] * column)[:, :n], np.flatnonzero(part > NOTHING).tolist()
 
     def _open(self, t: float, y: Floats, yd: Floats) -> tuple[int, Floats, NDArray[np.bool_]]:
@@ -88,8 +86,7 @@ class Determined:
             jy, jyd = system.jacobian(t, y[:n], yd[:n])
             if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
                 return 0, np.zeros(len(key)), np.ones(n, dtype=bool)
-            e, b = equilibrated(system.dense(jyd), system.dense(jy))
-            left, sigma, right = decomposed(b + GENERIC * e)
+            left, sigma, right, _ = _pencil(system, jy, jyd)
             some = count(sigma, CERTAIN)
             part, told = np.zeros(len(key)), np.linalg.norm(right[some:, :n], axis=0) <= NOTHING
             if some < sigma.size:
@@ -232,6 +229,16 @@ def _index_of(e: Floats, b: Floats) -> int:
     ways = (e / size[:, None] + b / np.where(rates, size * fast * close, 1.0)[:, None] for close in CLOSE)
     near, far = (float(decomposed(m)[1].min(initial=1.0)) for m in ways)
     return round(float(np.log(near / far) / np.log(CLOSE[1] / CLOSE[0]))) if min(near, far) > 0.0 else FAR
+
+
+def _pencil(system: System, jy: Floats, jyd: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Left vectors, singular values and right ones (`decomposed`) of dF/dy + GENERIC dF/dyd [entries], equilibrated,
+    and the factors of its columns.
+    """
+    e, b = system.dense(jyd), system.dense(jy)
+    row, column = factors(e, b)
+    scaled = row[:, None] * (b + GENERIC * e) * column[None, :]
+    return *decomposed(scaled), column
 
 
 def _same(a: Floats, b: Floats, which: NDArray[np.bool_], part: float, size: float = 0.0) -> bool:

@@ -171,12 +171,7 @@ class _Starts:
         """Nothing holds but what the text says."""
         contacts = self.contacts
         contacts.begin()
-        values = contacts.observer(self._t, self._zeros, self._zeros)
-        for k, contact in enumerate(contacts.contacts):
-            if contact.kind == "guarded":
-                contacts.active[k] = bool(values[contact.guard])
-            else:
-                contacts.bar(k, values)
+        contacts.obey(contacts.observer(self._t, self._zeros, self._zeros))
 
     def fitted(self, held: Floats | None = None, near: ConsistentState | None = None) -> ConsistentState:
         """A state whose set fits; NoActiveSetError.  held: the point that a first set is told from; near: which point

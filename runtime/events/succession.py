@@ -274,10 +274,5 @@ class Succession:
             raise self._restart.failure(t, error) from error
 
     def _guards(self, t: float, y: Floats, yd: Floats) -> None:
-        values, self.contacts.spared = self.observer(t, y, yd), frozenset()
-        for k, contact in enumerate(self.plan.contacts):
-            if contact.kind == "guarded":
-                self.contacts.active[k] = bool(values[contact.guard])
-            elif self.contacts.bar(k, values):
-                self.contacts.active[k] = False
+        self.contacts.obey(self.observer(t, y, yd))
         self.contacts.apply()
