@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import mpmath
 import numpy as np
-from case import POWERS, Case, Family
+from case import POWERS, Case, Family, in_units
 
 
 def linear(matrix, start, t):
@@ -57,13 +57,7 @@ def oscillators() -> Iterator[Family]:
         "length": lambda s: (dict(base, a=s), 6.0),
         "time": lambda s: (dict(base, b=0.2 / s, k=4.0 / s**2), 6.0 * s),
     }
-    for unit, change in scaled.items():
-        cases = []
-        for k in POWERS:
-            values, until = change(10.0**k)
-            for formulation in ("lagrangian", "hamiltonian"):
-                cases.append(Case(f"{unit} 1e{k} {formulation}", k, values, until, {"formulation": formulation}))
-        yield Family(f"oscillator, unit of {unit}", "lg of the factor", OSCILLATOR, damped, tuple(cases))
+    yield from in_units("oscillator", OSCILLATOR, damped, scaled)
     tolerances = tuple(
         Case(f"accuracy 1e-{k} {method}", -k, base, 6.0, {"method": method}, 10.0**-k)
         for k in range(1, 14)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import mpmath
 import numpy as np
-from case import POWERS, Case, Family
+from case import Case, Family, in_units
 from linear_cases import LEVER, levered
 from scipy.integrate import solve_ivp
 
@@ -109,13 +109,7 @@ def pendulums() -> Iterator[Family]:
         "length": lambda s: (dict(base, l=s, g=9.81 * s, x_0=0.6 * s, y_0=-0.8 * s), 3.0),
         "time": lambda s: (dict(base, g=9.81 / s**2), 3.0 * s),
     }
-    for unit, change in scaled.items():
-        cases = []
-        for k in POWERS:
-            values, until = change(10.0**k)
-            for formulation in ("lagrangian", "hamiltonian"):
-                cases.append(Case(f"{unit} 1e{k} {formulation}", k, values, until, {"formulation": formulation}))
-        yield Family(f"pendulum, unit of {unit}", "lg of the factor", plain, swung, tuple(cases))
+    yield from in_units("pendulum", plain, swung, scaled)
     top = tuple(
         Case(f"1e-{k} rad from the top, {method}", -k, dict(base, x_0=10.0**-k, y_0=1.0),
              (np.log(10.0) * k + 3.0) / np.sqrt(9.81), {"method": method})
