@@ -18,6 +18,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
+from sysdyn.runtime.numerics.rank import decomposed
 
 DENSE = 300
 """Unknowns up to which matrices are full; of larger models nothing is told."""
@@ -139,7 +140,7 @@ def _solved(matrix: Floats, right: Floats) -> tuple[Floats | None, Floats]:
     """
     row, column = (factor[:, None] for factor in factors(matrix))
     even = row * matrix * column.T
-    left, sigma, _ = np.linalg.svd(even)
+    left, sigma, _ = decomposed(even)
     if not sigma[-1:].min(initial=1.0) > REGULAR:
         return None, np.abs(left[:, -1])
     found: Floats = column * np.linalg.solve(even, row * right)

@@ -50,10 +50,12 @@ def least_norm(
     *,
     spent: bool = False,
     idle: Mask | None = None,
+    again: bool = False,
 ) -> Floats:
     """The u of least norm with A u = aim; A [rows, unknowns] by its entries (row, column, value).  spent: nobody else
     needs values and aim, which are overwritten; of a large matrix the room counts, and the caller holds no entries
-    either.  idle: unknowns of which nobody asks for the least where rows leave them open.
+    either.  idle: unknowns of which nobody asks for the least where rows leave them open.  again: the same small matrix
+    is asked about many times.
     """
     i, j, v = entries
     del entries
@@ -72,7 +74,7 @@ def least_norm(
             return only
         i, j, v = columns.entries()
     tried: list[tuple[float, Floats]] = []
-    for way in _DENSE if max(shape) <= SINGULAR_VALUES else _SPARSE:
+    for way in (_AGAIN if again else _DENSE) if max(shape) <= SINGULAR_VALUES else _SPARSE:
         found = way(shape, (i, j, v), aim)
         missed = largest_product(add_product(i, j, v, found, -aim), back)
         if not missed > small:
@@ -93,7 +95,7 @@ def least_measured(entries: tuple[Any, Any, Floats], aim: Floats, scale: Floats)
     v, most = entries[2][take], np.zeros(columns.size)
     np.maximum.at(most, j, np.abs(v))
     unit = np.where(np.isnan(scale[columns]), 1.0 / most, scale[columns])
-    x[columns] = unit * least_norm((rows.size, columns.size), (i, j, v * unit[j]), aim[rows])
+    x[columns] = unit * least_norm((rows.size, columns.size), (i, j, v * unit[j]), aim[rows], again=True)
     return x
 
 
@@ -145,6 +147,18 @@ def _singular_values(shape: tuple[int, int], entries: tuple[Any, Any, Floats], a
     return least_squares(a, aim, RANK)
 
 
+def _of_known(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
+    """The same by the decomposition that is remembered, and once more for what that misses."""
+    i, j, v = entries
+    a = np.zeros(shape)
+    np.add.at(a, (i, j), v)
+    left, sigma, right = decomposed(a)
+    k = count(sigma, RANK)
+    left, sigma, right = left[:, :k].T, sigma[:k], right[:k].T
+    found = right @ ((left @ aim) / sigma)
+    return np.asarray(found + right @ ((left @ (aim - a @ found)) / sigma))
+
+
 def _of_one_size(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
     """The same where columns of one size say which rows are redundant: a change that the metric takes for nothing may
     be the only one that meets a row.
@@ -193,5 +207,6 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
 
 
 _DENSE: tuple[_Way, ...] = (_singular_values, _of_one_size)
+_AGAIN: tuple[_Way, ...] = (_of_known, _of_one_size)
 _SPARSE: tuple[_Way, ...] = (_saddle_point, _to_the_rank)
 """What is tried until the rows hold."""

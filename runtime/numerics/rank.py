@@ -8,12 +8,14 @@ above that, and below the conditioning of a model that a double can be trusted w
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.numerics.equilibrate import SMALL
 
 TOLERANCE = 1e-9
@@ -21,6 +23,8 @@ TOLERANCE = 1e-9
 CERTAIN = 1e-12
 """The same where a model is refused for it: what is above may be a true, if bad, conditioning."""
 
+REMEMBERED, DECOMPOSITIONS = 120, 256
+"""Rows and columns of a matrix whose decomposition is kept, and of how many: 90 MB at most, 15 of fifty unknowns."""
 DOUBT = 10.0
 """Times that an estimate of a condition, which in sums is n times that of singular values at most, may be too small;
 counter-examples are made by hand (Higham, SIAM Rev. 29, 1987)."""
@@ -31,9 +35,22 @@ class NotFiniteError(ArithmeticError):
 
 
 def decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:
-    """U [m, m], singular values [min(m, n)] (falling), v^T [n, n] of a matrix [m, n].  NotFiniteError."""
+    """U [m, m], singular values [min(m, n)] (falling), v^T [n, n] of a matrix [m, n]; read-only.  NotFiniteError."""
     if not np.isfinite(matrix).all():
         raise NotFiniteError
+    if max(matrix.shape) > REMEMBERED:
+        return _decomposed(matrix)
+    return _remembered(np.ascontiguousarray(matrix, dtype=np.float64).tobytes(), *matrix.shape)
+
+
+@functools.lru_cache(maxsize=DECOMPOSITIONS)
+def _remembered(data: bytes, m: int, n: int) -> tuple[Floats, Floats, Floats]:
+    """The same of the numbers of a matrix: those of a linear network come again with every set of its switches."""
+    u, sigma, vt = _decomposed(np.frombuffer(data).reshape(m, n))
+    return read_only(u), read_only(sigma), read_only(vt)
+
+
+def _decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:
     try:
         u, sigma, vt = np.linalg.svd(matrix)
     except np.linalg.LinAlgError:  # LAPACK's fast algorithm gives up on a few finite matrices

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.numerics import least_change as module
 from sysdyn.runtime.numerics.gauss_newton import Problem, least_residual, solve, stepped
-from sysdyn.runtime.numerics.least_change import in_order, least_norm
+from sysdyn.runtime.numerics.least_change import in_order, least_measured, least_norm
 from sysdyn.runtime.numerics.work import EACH, EVALUATION, GRANTED, ITERATIONS, OutOfTimeError, Work
 
 
@@ -161,3 +161,15 @@ def test_round_off_beside_a_level_is_no_row_of_the_rest():
         i, j = np.nonzero(a)
         level = np.array([True, True, False])
         np.testing.assert_allclose(in_order((3, 3), (i, j, a[i, j]), aim, [level]), [0.3, 0.7, 2.0], rtol=1e-9)
+
+
+def test_the_least_measured_is_that_of_the_pseudoinverse_to_round_off():
+    """Of rows that depend on each other, in columns of sizes 1e-6 to 1e6, asked again with another aim."""
+    random = np.random.default_rng(5)
+    matrix, scale = random.standard_normal((6, 9)), 10.0 ** np.linspace(-6.0, 6.0, 9)
+    matrix[5] = matrix[0] + matrix[1]
+    entries = *np.indices(matrix.shape).reshape(2, -1), (matrix / scale).ravel()
+    for seed in (1, 2):
+        aim = matrix @ np.random.default_rng(seed).standard_normal(9)
+        found = least_measured(entries, aim, scale) / scale
+        assert np.abs(found - np.linalg.pinv(matrix, 1e-10) @ aim).max() < 1e-14 * np.abs(aim).max()
