@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.impacts import UNSEEN, Impacts
+from sysdyn.runtime.events.memory import Memory
 from sysdyn.runtime.events.pivoting import NoActiveSetError, Settle
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
@@ -38,7 +39,7 @@ class Succession:
         self.determined, self.impacts = determined, Impacts(contacts, plan.rest)
         self.restart: Restart | None = None
         self.blow = False
-        self._follows: dict[tuple[tuple[float, ...], tuple[int, ...]], tuple[float, ...]] = {}
+        self._memory = Memory(contacts)
         self._impacts = any(c.kind in ("phi", "planar") for c in plan.contacts)
 
     @property
@@ -76,7 +77,7 @@ class Succession:
         self.contacts.through.clear()
         self._guards(t, y, yd)
         stood = self.contacts.state()
-        known = None if stalled else self._remembered(t, (y, yd), (stood, tuple(touched)))
+        known = None if stalled else self._remembered(t, (y, yd), stood, touched)
         if known is not None:
             return known, False
         y = self.impacts.after(t, y, yd, self._strike, restart.instant.system, blow=self.blow)
@@ -94,7 +95,7 @@ class Succession:
         elif not stalled and self._beside_idle(t, found, stood):  # twice at an instant would go round in a circle
             found = self._handed_on(t, found)
         if not self._impacts:
-            self._follows[stood, tuple(touched)] = self.contacts.state()
+            self._memory.learn(stood, touched, self.contacts.state())
         return self._closed(t, found), True
 
     def _let_through(self, k: int, t: float, y: Floats, yd: Floats) -> None:
@@ -152,9 +153,9 @@ class Succession:
         y, yd, done = self._restart.settler.moved(t, *point)
         return (y, yd) if done else point
 
-    def _remembered(self, t: float, point: Point, key: tuple[tuple[float, ...], tuple[int, ...]]) -> Point | None:
+    def _remembered(self, t: float, point: Point, stood: tuple[float, ...], touched: Sequence[int]) -> Point | None:
         """The point with the active set that followed when this happened before, where it fits; None where not."""
-        after = self._follows.get(key)
+        after = self._memory.followed(stood, touched)
         if after is None:
             return None
         before = self.contacts.active.copy(), self.p.copy()
@@ -162,7 +163,7 @@ class Succession:
         found = self._restart.struck(t, *point)
         if found is not None:
             fits = self.contacts.fits(t, point[0], found)
-            fits = fits and (bool(key[1]) or self._decided(before[0], self.observer(t, *found[:2])))
+            fits = fits and (bool(touched) or self._decided(before[0], self.observer(t, *found[:2])))
             if fits and self.determined.leaves(t, *found[:2]) == 0:
                 return found[0], found[1]
         self.contacts.active[:], self.p[:] = before
