@@ -374,7 +374,8 @@ def control(
 
 
 def _finer(run: Run, last: Sampled, tolerance: float, longest: float, law: Law, *, compared: bool) -> Sampled | None:
-    """A run with a smaller tolerance; where it fails half the way to it, while that is worth a run.
+    """A run with a smaller tolerance; where it fails half the way to it, while that is worth a run, or once a little
+    further: at an event Newton's method fails by chance.
 
     compared: there is an estimate without it; else its failure is raised.
     """
@@ -386,10 +387,12 @@ def _finer(run: Run, last: Sampled, tolerance: float, longest: float, law: Law, 
             tried += 1
             if _limited(failure) or (not compared and tried == len(RETRIED)):
                 raise
+            by_chance = tried == 1 and failure.cause == "newton"
         if not compared:  # there is nothing to hand back yet: as coarse as will do, else a little finer
             coarse = law.ratio * last.tolerance
             tolerance = coarse if tolerance < WORTH * coarse and tried == 1 else WORTH * tolerance
             continue
-        tolerance = float(np.sqrt(tolerance * last.tolerance))
-        if tolerance > WORTH * last.tolerance:
+        between = float(np.sqrt(tolerance * last.tolerance))
+        if between > WORTH * last.tolerance and not by_chance:
             return None
+        tolerance = between if between <= WORTH * last.tolerance else WORTH * tolerance

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sysdyn.runtime.accuracy.control import TAME, Lighter, control
+from sysdyn.runtime.accuracy.control import TAME, WORTH, Lighter, control
 from sysdyn.runtime.accuracy.laws import LAWS, STEEP, law_of
 from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, left_at_rest
 from sysdyn.runtime.integrate.request import LONGEST
@@ -135,6 +135,22 @@ def test_a_finer_run_that_fails_is_tried_half_the_way(wall, half):
     assert achieved.tolerance == min(done) >= wall
     assert len(done) == (3 if half else 2)
     assert achieved.error_estimate >= 100.0 * achieved.tolerance
+
+
+def test_a_finer_run_that_fails_by_chance_is_tried_a_little_further():
+    """At an event, where half the way is no run worth its price: a rectifier was not met by 1.02 of what was asked."""
+    tried = []
+
+    def run(tolerance, longest):
+        tried.append(tolerance)
+        if len(tried) == 3:
+            raise SolverFailure("newton", 0.0, 1e-18)
+        return sampled(tolerance, [1.0, 0.5 + (3e-4 if len(tried) == 1 else 0.0)])
+
+    achieved = control(run, np.array([1e-4]), LAW)
+    assert achieved.met
+    assert len(tried) == 4
+    assert tried[3] == pytest.approx(WORTH * tried[2])
 
 
 def test_behind_a_strained_draft_comes_a_tame_one():
