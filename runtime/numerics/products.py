@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 
 PIECE = 1 << 14
 """Numbers of which products are made at a time."""
@@ -40,3 +40,11 @@ def largest_product(x: Floats, y: Floats) -> float:
 def pieces(size: int) -> Iterator[slice]:
     """Of an array of a large model, worked through without a second one as long."""
     return (slice(k, k + PIECE) for k in range(0, size, PIECE))
+
+
+def linked(chosen: NDArray[np.bool_], of: Ints, at: Ints, size: int) -> NDArray[np.bool_]:
+    """Places [size] among `at` [entries] of those entries whose places `of` [entries] are chosen."""
+    found = np.zeros(size, dtype=bool)
+    for k in range(0, of.size, PIECE):
+        found[at[k : k + PIECE][chosen[of[k : k + PIECE]]]] = True
+    return found

@@ -28,7 +28,7 @@ from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
-from sysdyn.runtime.numerics.products import add_sizes
+from sysdyn.runtime.numerics.products import add_sizes, linked
 from sysdyn.runtime.numerics.work import Work
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.runtime.start.residue import Residue
@@ -198,7 +198,7 @@ class Starter:
         arithmetic leaves of a zero (`sin(pi)`) is one.
         """
         said = np.abs(self.guess) > WRITTEN * self.largest_alike(self.guess)
-        bound = np.bincount(self.columns, ~self.reading(self.free)[self.rows], self.free.size) > 0.0
+        bound = linked(~self.reading(self.free), self.rows, self.columns, self.free.size)
         return ~self.free & ~bound & said
 
     def residual(self, t: float, x: Floats) -> Floats:
@@ -256,7 +256,7 @@ class Starter:
 
     def reading(self, unknowns: Mask) -> Mask:
         """Rows [rows] that read some of these unknowns."""
-        return np.asarray(np.bincount(self.rows, unknowns[self.columns], self.settled.rows) > 0.0)
+        return linked(unknowns, self.columns, self.rows, self.settled.rows)
 
     def groups(self, *names: str) -> Mask:
         """Rows of the named groups; read-only."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.numerics.equilibrate import equilibrated, factors, sparse_factors
 from sysdyn.runtime.numerics.points import distinct, normal, uniform
-from sysdyn.runtime.numerics.products import add_product
+from sysdyn.runtime.numerics.products import PIECE, add_product, linked
 from sysdyn.runtime.numerics.rank import (
     TOLERANCE,
     NotFiniteError,
@@ -170,3 +170,13 @@ def test_a_matrix_by_its_entries_times_a_vector_is_added_to_what_is_there():
         np.array([0, 1], dtype=np.int32)[::-1], np.array([0, 0]), np.array([1, 2]), np.arange(6.0)[3::2], np.zeros(2)
     )
     assert found.tolist() == [6.0, 3.0]
+
+
+@pytest.mark.parametrize("entries", [0, 7, PIECE, 2 * PIECE + 3])
+def test_rows_with_entries_in_chosen_columns_are_those_of_the_products_with_them(entries):
+    """Of places in 32 bits, in pieces: as a product of the pattern with ones in the chosen columns is not zero."""
+    random = np.random.default_rng(entries)
+    rows, columns = (random.integers(0, n, entries, dtype=np.int32) for n in (50_000, 4_000))
+    chosen = random.random(4_000) < 0.1
+    product = np.bincount(rows, chosen[columns].astype(float), 50_000)
+    assert (linked(chosen, columns, rows, 50_000) == (product > 0.0)).all()

@@ -6,7 +6,7 @@
 #include <malloc.h>
 #endif
 
-#define OWN_PAGES (1 << 22) /* bytes */
+#define OWN_PAGES (1 << 20) /* bytes */
 #define OWNERS 65536        /* arrays at most: glibc's own bound */
 
 /* Hands memory that was let go back to the machine: between the stages of a large run little of it would fit.  huge: from

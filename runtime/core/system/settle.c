@@ -62,7 +62,8 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
     double before = failed ? INFINITY : measure(settle, t, y, yd);
     settle->drift = settle->constraints;
     if (fresh && !failed) {
-        failed = before > limit && sd_settle_choose(settle); /* a point that holds as it comes asks for none */
+        /* a point that holds as it comes asks for none, but of a large one the next shall: within a step room is scarce */
+        failed = (before > limit || sd_settle_large(settle)) && sd_settle_choose(settle);
         sd_settle_leave_slopes(settle);
     }
     for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {

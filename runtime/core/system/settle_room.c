@@ -82,9 +82,14 @@ int sd_settle_provide_slopes(sd_settle *settle)
     return 1;
 }
 
+int sd_settle_large(const sd_settle *settle)
+{
+    return settle->unknowns + settle->rates > SMALL_POINT;
+}
+
 void sd_settle_leave_slopes(sd_settle *settle)
 {
-    if (settle->unknowns + settle->rates > SMALL_POINT)
+    if (sd_settle_large(settle))
         free_slopes(settle);
 }
 
@@ -120,7 +125,7 @@ int sd_settle_widen(sd_settle *settle, const int32_t *order, int32_t determined)
 
 void sd_settle_rest(sd_settle *settle)
 {
-    if (settle->unknowns + settle->rates <= SMALL_POINT)
+    if (!sd_settle_large(settle))
         return;
     free(settle->work);
     free(settle->x);

@@ -10,6 +10,8 @@ int sd_settle_provide_point(sd_settle *settle);
 int sd_settle_provide_best(sd_settle *settle);
 /* room for slopes, and for what a basis takes of them; 0: no memory */
 int sd_settle_provide_slopes(sd_settle *settle);
+/* whether room counts more than time */
+int sd_settle_large(const sd_settle *settle);
 /* of a large one lets go of it: rows of linear laws take new slopes once in many steps */
 void sd_settle_leave_slopes(sd_settle *settle);
 

@@ -2,7 +2,7 @@
  *
  *     grid N RTOL DELTACJ
  *
- * One line: steps, CPU seconds of the integration from 0 to 1 s, voltage of the last node; as ladder.c. */
+ * One line as ladder.c. */
 #include "run_ida.h"
 
 static int n, side;

@@ -2,8 +2,8 @@
  *
  *     ladder N RTOL DELTACJ
  *
- * One line: steps, CPU seconds of the integration from 0 to 1 s, voltage of the last node.  Residual and Jacobian cost next
- * to nothing here: what is left is IDA.  DELTACJ: change of cj that it refactors for (0.25 by default). */
+ * One line: steps, CPU seconds of the integration from 0 to 1 s, voltage of the last node at ten instants.  Residual and
+ * Jacobian cost next to nothing here: what is left is IDA.  DELTACJ: change of cj that it refactors for (0.25 by default). */
 #include "run_ida.h"
 
 static int n;
