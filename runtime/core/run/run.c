@@ -83,7 +83,7 @@ void sd_run_settle(sd_run *run, double t)
     double moved = 0.0;
     int at_hand = stepper->onto && !run->fresh;
     lend(run, 1);
-    if (at_hand && t == *stepper->t && sd_settle_holds(settle, t, run->point, run->point_d))
+    if (at_hand && t == stepper->ivp->t && sd_settle_holds(settle, t, run->point, run->point_d))
         settle->drift = settle->constraints;
     else if (at_hand && !stepper->onto(stepper->self, t, run->point, run->point_d, &moved)
              && sd_settle_holds(settle, t, run->point, run->point_d))
@@ -319,7 +319,7 @@ static int passes_over(const sd_run *run, double t)
     int last = next + 1 == run->instants || run->instant[next + 1] >= t;
     if (run->t_from == run->t_begun && run->t_row <= run->t_begun)
         return 0;
-    return run->instant[next] < run->t_row + run->apart * (t - run->t_from) && !(last && t < *run->stepper->t);
+    return run->instant[next] < run->t_row + run->apart * (t - run->t_from) && !(last && t < run->stepper->ivp->t);
 }
 
 /* The next instant within a step that ends at t at which something is watched alone; t where that is none. */
@@ -360,7 +360,7 @@ int sd_run_drain(sd_run *run)
             continue;
         }
         double kind = kind_here(run, asked);
-        if (t == *run->stepper->t_end || t < *run->stepper->t)
+        if (t == run->stepper->ivp->t_end || t < run->stepper->ivp->t)
             kind = (double)((int32_t)kind | run->end_kind);
         run->next += asked;
         if (kind > 0.0)
@@ -376,7 +376,7 @@ int sd_run_drain(sd_run *run)
  * instant is not earlier. */
 static void rows_of_start(sd_run *run, double label)
 {
-    double t = *run->stepper->t;
+    double t = run->stepper->ivp->t;
     int32_t before = run->rows;
     while (run->next < run->instants && run->instant[run->next] < label) {
         double kind = (double)run->instant_kind[run->next];
@@ -406,8 +406,8 @@ static int begin(sd_run *run)
     if (run->rows >= run->room)
         return 1;
     run->fresh = 1;
-    run->t_row = *run->stepper->t;
-    rows_of_start(run, *run->stepper->t);
+    run->t_row = run->stepper->ivp->t;
+    rows_of_start(run, run->stepper->ivp->t);
     run->started = 1;
     return 0;
 }
@@ -462,7 +462,7 @@ static void measure(sd_run *run, double from, double t)
     run->step_supplied = run->supplied;
     if (run->unsummed > 1)
         memset(run->integral, 0, (size_t)run->audited * sizeof(double));
-    else if (t < *run->stepper->t && run->settle && !run->stepper->part_y)
+    else if (t < run->stepper->ivp->t && run->settle && !run->stepper->part_y)
         sd_run_integrate_cut(run, t);
     else
         sd_run_integrate(run, t);
@@ -523,8 +523,8 @@ static int end(sd_run *run)
 /* one step, or what happens where one ends */
 static int advance(sd_run *run)
 {
-    double from = *run->stepper->t;
-    if (from >= *run->stepper->t_end)
+    double from = run->stepper->ivp->t;
+    if (from >= run->stepper->ivp->t_end)
         return end(run);
     memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
     if (run->stepper->step(run->stepper->self))
@@ -534,7 +534,7 @@ static int advance(sd_run *run)
         run->modes->begin = from;
     if (sd_run_changes(run, from))
         return run->modes ? sd_modes_event(run) : SD_EVENT;
-    measure(run, from, *run->stepper->t);
+    measure(run, from, run->stepper->ivp->t);
     if (run->ledgers && run->ledgers->lost >= 0)
         return SD_FAILED;
     return sd_run_drain(run) ? SD_FULL : SD_RUNNING;
@@ -548,7 +548,7 @@ int sd_run_advance(sd_run *run, int64_t steps, double seconds)
     for (int64_t k = 0; k < steps; k++) {
         if (run->pending && sd_run_drain(run))
             return SD_FULL;
-        if (*run->stepper->system->stop)
+        if (*run->stepper->ivp->system->stop)
             return SD_FAILED;
         int state = run->modes && run->modes->waits ? sd_modes_event(run) : advance(run);
         if (state != SD_RUNNING)
@@ -556,5 +556,5 @@ int sd_run_advance(sd_run *run, int64_t steps, double seconds)
         if (k % POLL == POLL - 1 && now() > until)
             return SD_RUNNING;
     }
-    return *run->stepper->t >= *run->stepper->t_end && !run->pending ? SD_FINISHED : SD_RUNNING;
+    return run->stepper->ivp->t >= run->stepper->ivp->t_end && !run->pending ? SD_FINISHED : SD_RUNNING;
 }

@@ -177,7 +177,7 @@ static void take(sd_many *many, sd_run *run, sd_samples *own, sd_samples *there)
         many->thinned += due;
     }
     many->held = run->rows;
-    if (*run->stepper->t >= *run->stepper->t_end && run->rows)
+    if (run->stepper->ivp->t >= run->stepper->ivp->t_end && run->rows)
         claim(many, run->row + (size_t)(run->rows - 1) * (size_t)(SD_ROW_HEAD + 2 * many->observed), 1);
     run->rows = 0;
 }
@@ -200,12 +200,12 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
     if (run->extrema)
         sd_extrema_begin(run->extrema);
     for (;;) {
-        int64_t before = *run->stepper->taken;
+        int64_t before = run->stepper->ivp->taken;
         double from = cpu_now();
         int state = sd_run_advance(run, left, 1e9);
         many->spent += cpu_now() - from;
-        *steps += *run->stepper->taken - before;
-        left -= *run->stepper->taken - before;
+        *steps += run->stepper->ivp->taken - before;
+        left -= run->stepper->ivp->taken - before;
         take(many, run, own, there);
         if (state == SD_FINISHED)
             break;

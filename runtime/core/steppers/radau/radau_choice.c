@@ -33,13 +33,13 @@ static double worth(const sd_radau *radau, const sd_radau_method *method, double
 double sd_radau_choose(sd_radau *radau, double next, double error, int iterations, int troubled)
 {
     const sd_radau_method *method = radau->method;
-    double size[2], length, h = radau->h;
+    double size[2], length, h = radau->ivp.h;
     if (radau->hold > 0)
         radau->hold--;
     if (radau->most_stages == 3 || radau->since < AWHILE || radau->hold > 0)
         return next;
     for (int k = 0; k < 2; k++) {
-        sd_radau_combine(method->stages, radau->n, method->taylor[k], radau->z, radau->rate);
+        sd_radau_combine(method->stages, radau->ivp.n, method->taylor[k], radau->z, radau->rate);
         size[k] = sd_radau_norm(radau, radau->rate);
     }
     if (!(size[0] > 0.0) || !isfinite(size[1]))
