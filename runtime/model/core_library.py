@@ -256,6 +256,7 @@ def _load() -> Any:
         "sd_search_solve": (c.c_int, [_P]),
         "sd_many_runs": (None, [_P, _I, *[_P] * 10]),
         "sd_run_observe": (None, [_P, _D, _P]),
+        "sd_modes_pass": (None, [_P, _D, _D, _D]),
     }
     for name, (result, arguments) in signatures.items():
         function = getattr(core, name)

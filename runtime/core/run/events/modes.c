@@ -252,10 +252,8 @@ static double passing(const sd_modes *m)
     return found;
 }
 
-/* Peaks that have begun at t, behind a step of so many s, are passed in parts, beside those that already are. */
-static void pass(sd_modes *m, double t, double step)
+void sd_modes_pass(sd_modes *m, double t, double step, double passes)
 {
-    const double passes = passing(m);
     const int within = t < m->passed;
     if (!isfinite(passes) || (!within && step <= passes / SHORTER))
         return;
@@ -315,7 +313,7 @@ static int event(sd_run *run, double enough)
         int kind = one || !only_peaks(m, crossed) ? SD_TRACE : 0;
         sd_run_accept(run, t, kind);
         forth(run, to);
-        pass(m, t, step);
+        sd_modes_pass(m, t, step, passing(m));
         go_on(run, t, t, kind, one ? 1 : crossed, one ? one->entries : crossed, misled ? step : 0.0);
         return SD_RUNNING;
     }

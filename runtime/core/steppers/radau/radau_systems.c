@@ -2,6 +2,7 @@
  * models are whole tasks for threads (see radau.h). */
 #include "system/condensed.h"
 #include "linear/lanes.h"
+#include "steppers/combine.h"
 #include "steppers/radau/radau.h"
 #include "steppers/threads.h"
 
@@ -11,25 +12,14 @@
 
 #define LEAN 0.01 /* part of the slope at zero that a faint one gets */
 
-/* out [n] := sum_j weight[j] v[j], in whole lanes, for which all vectors have room */
-static inline __attribute__((always_inline)) void sum(int stages, int32_t n, const double *weight, double *const *v, double *out)
-{
-    for (int32_t i = 0; i < n; i += SD_LANES) {
-        sd_lanes x = weight[0] * SD_FROM(v[0], i);
-        for (int j = 1; j < stages; j++)
-            x += weight[j] * SD_FROM(v[j], i);
-        SD_AT(out, i) = x;
-    }
-}
-
 SD_WIDE void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out)
 {
     if (stages == 3)
-        sum(3, n, weight, v, out);
+        sd_combine(3, n, weight, v, out);
     else if (stages == 5)
-        sum(5, n, weight, v, out);
+        sd_combine(5, n, weight, v, out);
     else
-        sum(7, n, weight, v, out);
+        sd_combine(7, n, weight, v, out);
 }
 
 /* whether the systems of a step are taken at once: a matter of their size, not of the machine */

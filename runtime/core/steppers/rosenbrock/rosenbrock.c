@@ -1,4 +1,4 @@
-/* The step of Rodas5P: stages, error, step size, values within (see rosenbrock.h). */
+/* The step of Rodas5P: its size, its end, values within (see rosenbrock.h). */
 #include "steppers/rosenbrock/rosenbrock.h"
 #include "linear/lanes.h"
 
@@ -14,52 +14,12 @@
 #define CUT 0.2            /* what a refused one is cut to at least */
 #define OPENS 1e-2         /* of the span: the first step at most */
 #define TELLING 3          /* steps that tell how long the first might have been */
-#define SLOPE 1e-6         /* of the step: over which dF/dt is taken */
-#define TELLS 1e-8         /* of the longest step: over that, or the step, at least, for differences over less are round-off */
-#define RESOLVED 64.0      /* of what t resolves: at least that */
-#define INSIDE 0.75        /* of the step: where values within are looked at; those of what is slaved are furthest off there */
 #define SAME 0.01          /* part of an error by which that of a step half as long may differ where a law jumps */
 #define FALLS 0.5          /* of an error: that of a shorter step where none does */
 #define FAR_LONGER 1e3     /* a step over another whose error is to say the same of a jump */
-#define DOUBTED 0.1        /* of a steep row's terms: what it may be off before slopes tell whether tolerances let it be */
-#define LOOSE 5e-3         /* tolerance beyond which that is asked: to 1e-3 it refused none of the steps of five circuits */
-#define LEAST 1e-10        /* error of a step, for the next one's size */
 #define SHRUNK 1e-3        /* of the step that was tried first, below which the point that it begins at is settled */
 #define AFRESH 0.1         /* of it: what is tried from there */
-#define GIVEN 0.1          /* of a slope: what is less has given way */
 #define FAILS 12           /* matrices and stages of a step that may fail */
-
-/* out [n] := sum_j weight[j] x[j] of the first `terms`, in whole lanes, for which all vectors have room */
-static inline __attribute__((always_inline)) void sum(int32_t n, int terms, const double *weight, double *const *x, double *out)
-{
-    for (int32_t i = 0; i < n; i += SD_LANES) {
-        sd_lanes total = weight[0] * SD_FROM(x[0], i);
-        for (int j = 1; j < terms; j++)
-            total += weight[j] * SD_FROM(x[j], i);
-        SD_AT(out, i) = total;
-    }
-}
-
-/* the polynomial of the last step */
-static SD_WIDE void prepare(sd_rosenbrock *rosenbrock)
-{
-    for (int k = 0; k < SD_ROSENBROCK_DENSE; k++)
-        sum(rosenbrock->ivp.n, STAGES, sd_rosenbrock_dense_weight[k], rosenbrock->u, rosenbrock->bend[k]);
-}
-
-/* y(x) = y0 + x (change + (1 - x) (b0 + x (b1 + x b2))) and its slope, x: part of a step of size h from y0 to y1.  yd NULL: y
- * alone. */
-static void polynomial(const sd_rosenbrock *rosenbrock, const double *y0, const double *y1, double h, double x, double *y, double *yd)
-{
-    double left = 1.0 - x, *const *b = rosenbrock->bend;
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i++) {
-        double change = y1[i] - y0[i];
-        double inner = b[0][i] + x * (b[1][i] + x * b[2][i]), inner_d = b[1][i] + 2.0 * x * b[2][i];
-        y[i] = y0[i] + x * (change + left * inner);
-        if (yd)
-            yd[i] = (change + (left - x) * inner + x * left * inner_d) / h;
-    }
-}
 
 static void within(const void *self, double t, double *y, double *yd)
 {
@@ -72,7 +32,7 @@ static void within(const void *self, double t, double *y, double *yd)
         return;
     }
     double h = rosenbrock->ivp.h_used;
-    polynomial(rosenbrock, rosenbrock->last, rosenbrock->phi, h, (t - (rosenbrock->ivp.t - h)) / h, y, yd);
+    sd_rosenbrock_polynomial(rosenbrock, rosenbrock->last, rosenbrock->phi, h, (t - (rosenbrock->ivp.t - h)) / h, y, yd);
 }
 
 static void values(const void *self, double t, double *y)
@@ -143,21 +103,6 @@ static void set_weights(sd_rosenbrock *rosenbrock)
             ivp->weight[i] = 0.0;
 }
 
-/* root mean square over the tested unknowns in the error weights; h: of those that count with it.  Grows `state` to that of
- * what carries the state. */
-static double norm(const sd_rosenbrock *rosenbrock, const double *x, double h, double *state)
-{
-    double all = 0.0, own = 0.0;
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i++) {
-        double part = x[i] * rosenbrock->ivp.weight[i] * (rosenbrock->ivp.test[i] > 0 ? h : 1.0);
-        all += part * part;
-        own += rosenbrock->ivp.test[i] >= 0 ? part * part : 0.0;
-    }
-    double number = rosenbrock->ivp.tested ? rosenbrock->ivp.tested : 1.0;
-    *state = fmax(*state, sqrt(own / number));
-    return rosenbrock->ivp.tested ? sqrt(all / number) : 0.0;
-}
-
 void sd_rosenbrock_start(void *self, double t, const double *y, const double *yd, double h)
 {
     sd_rosenbrock *rosenbrock = self;
@@ -171,7 +116,7 @@ void sd_rosenbrock_start(void *self, double t, const double *y, const double *yd
     if (!(h > 0.0) && rosenbrock->ivp.steps == 0 && isfinite(rosenbrock->opening))
         h = rosenbrock->opening * part;
     if (!(h > 0.0)) { /* local error (h y'/y)^5 within tolerance */
-        double state = 0.0, change = rosenbrock->ivp.rtol * norm(rosenbrock, yd, 1.0, &state);
+        double state = 0.0, change = rosenbrock->ivp.rtol * sd_rosenbrock_norm(rosenbrock, yd, 1.0, &state);
         double longest = OPENS * (rosenbrock->ivp.t_end - t) * fmin(1.0, 10.0 * part); /* runs that are compared begin apart */
         h = sd_first_step(&rosenbrock->ivp, longest, 0.1 * part, change);
     }
@@ -180,123 +125,6 @@ void sd_rosenbrock_start(void *self, double t, const double *y, const double *yd
     rosenbrock->ivp.h = fmin(rosenbrock->ivp.fixed_h > 0.0 ? rosenbrock->ivp.fixed_h : h, rosenbrock->ivp.h_max);
     rosenbrock->error_accepted = rosenbrock->h_refused = 0.0;
     rosenbrock->rejected = rosenbrock->sloped = 0;
-}
-
-/* F at (t, y, yd) into r: SD_NONFINITE with its row where it is none */
-static int residual(sd_rosenbrock *rosenbrock, double t, const double *y, const double *yd, double *r)
-{
-    sd_residual(rosenbrock->ivp.system, t, y, yd, r);
-    if (*rosenbrock->ivp.system->stop)
-        return SD_STOPPED;
-    if (sd_finite(rosenbrock->ivp.n, r))
-        return SD_FINE;
-    rosenbrock->ivp.bad_row = sd_first_bad(rosenbrock->ivp.n, r);
-    return SD_NONFINITE;
-}
-
-/* J, E, F and T at the last accepted point, for steps of about the size at hand */
-static int linearise(sd_rosenbrock *rosenbrock)
-{
-    sd_system *system = rosenbrock->ivp.system;
-    double t = rosenbrock->ivp.t, *drift = rosenbrock->drift, *jy = rosenbrock->jy, *jyd = rosenbrock->jyd;
-    int32_t bad = -1;
-    if (!rosenbrock->sloped)
-        bad = sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->ivp.magnitude, jy, jyd);
-    rosenbrock->sloped = 0;
-    if (*system->stop)
-        return SD_STOPPED;
-    if (bad >= 0) {
-        rosenbrock->ivp.bad_row = bad;
-        return SD_NONFINITE;
-    }
-    rosenbrock->rates = 0;
-    for (int32_t j = 0; j < rosenbrock->ivp.n; j++)
-        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
-            if (jyd[e] != 0.0) {
-                rosenbrock->e[rosenbrock->rates] = jyd[e];
-                rosenbrock->rate_row[rosenbrock->rates] = system->row[e];
-                rosenbrock->rate_column[rosenbrock->rates++] = j;
-            }
-    double over = fmax(SLOPE * rosenbrock->ivp.h, fmin(rosenbrock->ivp.h, TELLS * rosenbrock->ivp.h_max));
-    double later = t + fmax(over, RESOLVED * DBL_EPSILON * fabs(t));
-    int cause = residual(rosenbrock, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->begin);
-    if (cause == SD_FINE)
-        cause = residual(rosenbrock, later, rosenbrock->phi, rosenbrock->yd, drift);
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i++)
-        drift[i] = (drift[i] - rosenbrock->begin[i]) / (later - t);
-    return cause;
-}
-
-/* the factors of J + E / (gamma h) */
-static int factorise(sd_rosenbrock *rosenbrock)
-{
-    double lead = 1.0 / (sd_rosenbrock_gamma * rosenbrock->ivp.h);
-    for (int32_t e = 0; e < rosenbrock->ivp.system->entries; e++)
-        rosenbrock->g[e] = rosenbrock->jy[e] + lead * rosenbrock->jyd[e];
-    int failed = sd_linear_factor(rosenbrock->linear, rosenbrock->g, rosenbrock->ivp.magnitude);
-    rosenbrock->ivp.bad_row = rosenbrock->linear->bad_row;
-    rosenbrock->ivp.bad_column = rosenbrock->linear->bad_column;
-    return failed == 2 ? SD_MEMORY : failed ? SD_SINGULAR : SD_FINE;
-}
-
-/* y, rate [n] := Y_s, Z_s;  v[s] := Z_s + s_s */
-static SD_WIDE void place(sd_rosenbrock *rosenbrock, int s)
-{
-    const double *a = sd_rosenbrock_a[s], *c = sd_rosenbrock_coupling[s], over = 1.0 / rosenbrock->ivp.h;
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i += SD_LANES) {
-        sd_lanes y = SD_FROM(rosenbrock->phi, i), z = SD_FROM(rosenbrock->yd, i), lag = {0.0};
-        for (int j = 0; j < s; j++) {
-            y += a[j] * SD_FROM(rosenbrock->u[j], i);
-            z += a[j] * SD_FROM(rosenbrock->v[j], i);
-            lag += c[j] * SD_FROM(rosenbrock->u[j], i);
-        }
-        SD_AT(rosenbrock->y, i) = y;
-        SD_AT(rosenbrock->rate, i) = z;
-        SD_AT(rosenbrock->v[s], i) = z + over * lag;
-    }
-}
-
-/* u[s] := -F_s - d_s h T, where u[s] is F_s */
-static SD_WIDE void turn(sd_rosenbrock *rosenbrock, int s)
-{
-    double *u = rosenbrock->u[s], dt = sd_rosenbrock_d[s] * rosenbrock->ivp.h;
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i += SD_LANES)
-        SD_AT(u, i) = -SD_FROM(u, i) - dt * SD_FROM(rosenbrock->drift, i);
-}
-
-/* u[s] += E v[s] */
-static void add_moved(sd_rosenbrock *rosenbrock, int s)
-{
-    double *u = rosenbrock->u[s], *v = rosenbrock->v[s];
-    for (int32_t k = 0; k < rosenbrock->rates; k++)
-        u[rosenbrock->rate_row[k]] += rosenbrock->e[k] * v[rosenbrock->rate_column[k]];
-}
-
-/* v[s] := u[s] / (gamma h) - v[s] */
-static SD_WIDE void close(sd_rosenbrock *rosenbrock, int s)
-{
-    double *u = rosenbrock->u[s], *v = rosenbrock->v[s], lead = 1.0 / (sd_rosenbrock_gamma * rosenbrock->ivp.h);
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i += SD_LANES)
-        SD_AT(v, i) = lead * SD_FROM(u, i) - SD_FROM(v, i);
-}
-
-/* all stages of a step */
-static int take_stages(sd_rosenbrock *rosenbrock)
-{
-    for (int s = 0; s < STAGES; s++) {
-        double *u = rosenbrock->u[s], t = rosenbrock->ivp.t + sd_rosenbrock_c[s] * rosenbrock->ivp.h;
-        place(rosenbrock, s);
-        int cause = SD_FINE;
-        if (s == 0)
-            memcpy(u, rosenbrock->begin, (size_t)rosenbrock->ivp.n * sizeof *u);
-        else if ((cause = residual(rosenbrock, t, rosenbrock->y, rosenbrock->rate, u)))
-            return cause;
-        turn(rosenbrock, s);
-        add_moved(rosenbrock, s);
-        sd_linear_solve(rosenbrock->linear, u);
-        close(rosenbrock, s);
-    }
-    return SD_FINE;
 }
 
 /* the new point, and the next step's size */
@@ -340,113 +168,6 @@ static int project(sd_rosenbrock *rosenbrock, sd_settle *onto)
     return 0;
 }
 
-/* what values within the step are off, where what is pulled back at once hides it from the error of the end: a Newton
- * correction at INSIDE of the step; in the weights, in `error`, of the state in `state` */
-static int look_within(sd_rosenbrock *rosenbrock, double *error, double *state)
-{
-    double *end = rosenbrock->end, *r = rosenbrock->inner, h = rosenbrock->ivp.h;
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i++)
-        end[i] = rosenbrock->y[i] + rosenbrock->u[STAGES - 1][i];
-    prepare(rosenbrock);
-    polynomial(rosenbrock, rosenbrock->phi, end, h, INSIDE, rosenbrock->within, rosenbrock->within_d);
-    int cause = residual(rosenbrock, rosenbrock->ivp.t + INSIDE * h, rosenbrock->within, rosenbrock->within_d, r);
-    if (cause != SD_FINE)
-        return cause;
-    sd_linear_solve(rosenbrock->linear, r);
-    *error = fmax(*error, norm(rosenbrock, r, h, state));
-    return SD_FINE;
-}
-
-/* SD_ERROR_TEST where a steep row of the step's end is off by more than the tolerances of its unknowns let it be, by the slopes
- * there: behind an exponential all stages follow the slope at its begin, and agree.  J, E and T are not the begin's then. */
-static int laws_hold(sd_rosenbrock *rosenbrock, double *error)
-{
-    const sd_ivp *ivp = &rosenbrock->ivp;
-    sd_system *system = ivp->system;
-    double t = ivp->t + ivp->h, *y = rosenbrock->end, *yd = rosenbrock->within_d, *r = rosenbrock->inner;
-    double *terms = rosenbrock->within, *open = rosenbrock->drift, *size = rosenbrock->u[0], passed = *error;
-    for (int32_t i = 0; i < ivp->n; i++) {
-        yd[i] = rosenbrock->rate[i] + rosenbrock->v[STAGES - 1][i];
-        size[i] = (fabs(y[i]) + ivp->magnitude[i]) / ivp->h;
-    }
-    int cause = residual(rosenbrock, t, y, yd, r);
-    if (cause != SD_FINE ||
-        sd_first_unmet(system, t, y, size, r, DOUBTED, rosenbrock->g, ivp->magnitude, ivp->met, 0, terms) < 0)
-        return cause;
-    *error = INFINITY;
-    if (sd_jacobian(system, t, y, yd, ivp->magnitude, rosenbrock->jy, rosenbrock->jyd) >= 0)
-        return SD_NONFINITE;
-    for (int32_t i = 0; i < ivp->n; i++)
-        open[i] = ivp->weight[i] > 0.0 ? 1.0 / ivp->weight[i] : ivp->rtol * ivp->magnitude[i];
-    if (sd_first_astray(system, t, y, yd, r, 0.0, rosenbrock->jy, rosenbrock->jyd, ivp->h, open, 0, terms) >= 0)
-        return SD_ERROR_TEST;
-    *error = passed;
-    return SD_FINE;
-}
-
-/* what the end is off by the slopes there, where a law has given way within the step (a tanh that saturates): by those at its
- * begin, which hold it, what is left of its row is next to nothing.  Slopes and factors are not the begin's then. */
-static int gives_way(sd_rosenbrock *rosenbrock, double *error, double *state)
-{
-    sd_system *system = rosenbrock->ivp.system;
-    double t = rosenbrock->ivp.t + rosenbrock->ivp.h, *y = rosenbrock->end, *yd = rosenbrock->within_d, *r = rosenbrock->inner;
-    double lead = 1.0 / (sd_rosenbrock_gamma * rosenbrock->ivp.h), *jy = rosenbrock->jy_end, *jyd = rosenbrock->jyd_end;
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i++)
-        yd[i] = rosenbrock->rate[i] + rosenbrock->v[STAGES - 1][i];
-    int cause = residual(rosenbrock, t, y, yd, r);
-    if (cause != SD_FINE)
-        return cause;
-    if (sd_jacobian(system, t, y, yd, rosenbrock->ivp.magnitude, jy, jyd) >= 0)
-        return SD_NONFINITE;
-    rosenbrock->sloped = 1;
-    int32_t e = 0;
-    while (e < system->entries && !(fabs(jy[e]) < GIVEN * fabs(rosenbrock->jy[e])))
-        e++;
-    if (e == system->entries)
-        return SD_FINE;
-    for (e = 0; e < system->entries; e++)
-        rosenbrock->g[e] = jy[e] + lead * jyd[e];
-    if (sd_linear_factor(rosenbrock->linear, rosenbrock->g, rosenbrock->ivp.magnitude))
-        return SD_FINE;
-    sd_linear_solve(rosenbrock->linear, r);
-    *error = fmax(*error, norm(rosenbrock, r, rosenbrock->ivp.h, state));
-    /* nor is the difference of both solutions what the begin's factors say */
-    memset(r, 0, (size_t)rosenbrock->ivp.n * sizeof *r);
-    const double *u = rosenbrock->u[STAGES - 1];
-    for (int32_t j = 0; j < rosenbrock->ivp.n; j++)
-        for (e = system->column[j]; e < system->column[j + 1]; e++)
-            r[system->row[e]] += (rosenbrock->jy[e] + lead * rosenbrock->jyd[e]) * u[j];
-    sd_linear_solve(rosenbrock->linear, r);
-    *error = fmax(*error, norm(rosenbrock, r, rosenbrock->ivp.h, state));
-    return SD_FINE;
-}
-
-/* factors and stages of a step, its error in `error`, of the state alone in `state`; SD_ERROR_TEST where it is too large */
-static int attempt(sd_rosenbrock *rosenbrock, double *error, double *state)
-{
-    rosenbrock->sloped = 0;
-    int cause = factorise(rosenbrock);
-    if (cause == SD_FINE)
-        cause = take_stages(rosenbrock);
-    if (cause != SD_FINE)
-        return cause;
-    *state = 0.0;
-    *error = norm(rosenbrock, rosenbrock->u[STAGES - 1], rosenbrock->ivp.h, state);
-    memcpy(rosenbrock->ivp.ee, rosenbrock->u[STAGES - 1], (size_t)rosenbrock->ivp.n * sizeof(double));
-    if (*error < 1.0 || rosenbrock->ivp.fixed_h > 0.0)
-        cause = look_within(rosenbrock, error, state);
-    if (rosenbrock->ivp.fixed_h > 0.0)
-        return isfinite(*error) ? SD_FINE : SD_NONFINITE;
-    if (cause != SD_FINE)
-        return cause;
-    if (*error < 1.0 && (cause = gives_way(rosenbrock, error, state)) != SD_FINE)
-        return cause;
-    *error = isfinite(*error) ? fmax(*error, LEAST) : INFINITY;
-    if (!(*error < 1.0))
-        return SD_ERROR_TEST;
-    return rosenbrock->ivp.system->scales > 0 && rosenbrock->ivp.rtol > LOOSE ? laws_hold(rosenbrock, error) : SD_FINE;
-}
-
 /* whether shorter steps do not make a refused one's error less: what follows from the state jumps where a law does.  It is that of
  * one twice as long before it, or not much less than that of one FAR_LONGER; steps that end short of the jump lie between */
 static int stays(sd_rosenbrock *rosenbrock, double error)
@@ -471,13 +192,13 @@ int sd_rosenbrock_step(void *self)
         rosenbrock->ivp.h = sd_fitted(&rosenbrock->ivp, SD_SLACK);
         if (sd_too_small(&rosenbrock->ivp))
             return rosenbrock->ivp.cause = rosenbrock->ivp.cause ? rosenbrock->ivp.cause : SD_STEP;
-        int cause = known ? SD_FINE : linearise(rosenbrock);
+        int cause = known ? SD_FINE : sd_rosenbrock_linearise(rosenbrock);
         known = cause == SD_FINE;
         if (cause == SD_FINE)
-            cause = attempt(rosenbrock, &error, &state);
+            cause = sd_rosenbrock_attempt(rosenbrock, &error, &state);
         if (cause == SD_ERROR_TEST && stays(rosenbrock, error) && state < 1.0) {
             cause = SD_FINE;
-            error = fmax(state, LEAST);
+            error = fmax(state, SD_ROSENBROCK_LEAST);
         }
         if (cause == SD_FINE)
             break;

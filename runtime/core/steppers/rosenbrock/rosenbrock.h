@@ -23,6 +23,7 @@
 
 #define SD_ROSENBROCK_STAGES 8
 #define SD_ROSENBROCK_DENSE 3
+#define SD_ROSENBROCK_LEAST 1e-10 /* error of a step, for the next one's size */
 
 extern const double sd_rosenbrock_gamma;
 extern const double sd_rosenbrock_a[SD_ROSENBROCK_STAGES][SD_ROSENBROCK_STAGES];
@@ -54,5 +55,23 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear);
 void sd_rosenbrock_free(sd_rosenbrock *rosenbrock);
 void sd_rosenbrock_start(void *rosenbrock, double t, const double *y, const double *yd, double h);
 int sd_rosenbrock_step(void *rosenbrock);
+/* rosenbrock_stages.c: F at (t, y, yd) into r [n]: SD_NONFINITE with its row where it is none */
+int sd_rosenbrock_residual(sd_rosenbrock *rosenbrock, double t, const double *y, const double *yd, double *r);
+/* J, E, F and T at the last accepted point, for steps of about the size at hand; the factors of J + E / (gamma h); all stages
+ * of a step, whose end is then y + u[7] with the rates rate + v[7] */
+int sd_rosenbrock_linearise(sd_rosenbrock *rosenbrock);
+int sd_rosenbrock_factorise(sd_rosenbrock *rosenbrock);
+int sd_rosenbrock_stages(sd_rosenbrock *rosenbrock);
+/* the polynomial of the last step */
+void sd_rosenbrock_bend(sd_rosenbrock *rosenbrock);
+/* y(x) = y0 + x (change + (1 - x) (b0 + x (b1 + x b2))) and its slope, x: part of a step of size h from y0 to y1.  yd NULL: y
+ * alone. */
+void sd_rosenbrock_polynomial(const sd_rosenbrock *rosenbrock, const double *y0, const double *y1, double h, double x,
+                              double *y, double *yd);
+/* rosenbrock_error.c: root mean square over the tested unknowns in the error weights; h: of those that count with it.  Grows
+ * `state` to that of what carries the state. */
+double sd_rosenbrock_norm(const sd_rosenbrock *rosenbrock, const double *x, double h, double *state);
+/* factors and stages of a step, its error in `error`, of the state alone in `state`; SD_ERROR_TEST where it is too large */
+int sd_rosenbrock_attempt(sd_rosenbrock *rosenbrock, double *error, double *state);
 
 #endif
