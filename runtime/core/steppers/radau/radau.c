@@ -19,7 +19,6 @@
 #define FEWER 3            /* failures of Newton's in a step from which on each takes stages away */
 #define LENGTHS 2          /* of a step that are tried before corrections are shortened, which is dearer */
 #define PRESSED 1e-3       /* of the longest step: one that must be shorter before a steep law, no length will do */
-#define REGAIN 1.2         /* growth of the growth that steep laws leave a step behind a failure of Newton's */
 #define SHORTENED 50       /* steps of three stages after one that needed shortened corrections */
 #define GOOD 0.001         /* contraction up to which the Jacobian is kept for the next step */
 #define KEEP_LOW 1.0       /* a step that would change by no more than this keeps its factors */
@@ -27,33 +26,6 @@
 #define PULLED 4.0         /* steps resolve what is slower: measured on HIRES, whose rows within steps were 30 times worse */
 #define SINGULAR 6         /* halvings after a singular matrix */
 #define ASTRAY 16.0 /* error of a step that passes over what a steep law does: half of it is tried */
-
-/* Newton's weights and the scale of columns: of unknowns that all count as they are those that there are; where memory for
- * others is missing no scale, which the first step tells */
-static void provide_newton_weights(sd_radau *radau)
-{
-    size_t m = (size_t)sd_whole_lanes(radau->ivp.n + 1);
-    int powers = 0;
-    for (int32_t i = 0; i < radau->ivp.n; i++)
-        powers |= radau->ivp.power[i] != 0;
-    int others = powers || (radau->ivp.atol && !radau->ivp.weight);
-    if (others && !radau->powered)
-        radau->powered = calloc(3 * m, sizeof *radau->powered);
-    if (others && !radau->ivp.weight && radau->powered)
-        radau->ivp.weight = radau->powered + 2 * m;
-    radau->newton_weight = powers ? radau->powered : radau->ivp.weight;
-    radau->scale = others && !radau->powered ? NULL : powers ? radau->powered + m : radau->ivp.magnitude;
-}
-
-/* index-2 unknowns and index-3 multipliers count with powers of h */
-static void set_newton_weights(sd_radau *radau)
-{
-    for (int32_t i = 0; i < radau->ivp.n && radau->scale != radau->ivp.magnitude; i++) {
-        double power = radau->ivp.power[i] == 0 ? 1.0 : radau->ivp.power[i] == 1 ? radau->ivp.h : radau->ivp.h * radau->ivp.h;
-        radau->newton_weight[i] = radau->ivp.weight[i] * power;
-        radau->scale[i] = radau->ivp.magnitude[i] / power;
-    }
-}
 
 static double weight_of(const void *radau, int32_t i)
 {
@@ -135,7 +107,7 @@ void sd_radau_start(void *self, double t, const double *y, const double *yd, dou
     radau->since = radau->hold = 0;
     show_nodes(radau);
     radau->ivp.h = 1.0;
-    provide_newton_weights(radau);
+    sd_radau_provide_weights(radau);
     sd_weigh(&radau->ivp, radau->tolerance, radau->phi);
     if (!(h > 0.0)) { /* local error (h y'/y)^(s+1) within tolerance, with y' / y for the rate of all derivatives */
         double change = sd_radau_norm(radau, yd) * radau->tolerance, power = power_of(radau);
@@ -196,39 +168,16 @@ static void note_led(sd_radau *radau)
     }
 }
 
-/* the new point, and the next step's size */
-static void accept(sd_radau *radau, double error, int iterations, int troubled)
+/* the last points, their slopes and the stages that led to the last one move on by one step */
+static void keep_points(sd_radau *radau)
 {
-    size_t size = (size_t)radau->ivp.n * sizeof(double);
-    const sd_radau_method *method = radau->method;
-    double h = radau->ivp.h, power = power_of(radau);
-    error *= sd_radau_strictness(radau, method) / strictness(radau); /* what the next step is judged by */
-    int usual = sd_radau_iterations(radau);
-    double limit = fmin(SD_SAFETY, SD_SAFETY * (1 + 2 * usual) / (iterations + 2 * usual));
-    double ratio = fmax(1.0 / SD_GROWTH, fmin(1.0 / SD_SHRINK, pow(error, power) / limit));
-    if (radau->ivp.taken > 0 && radau->since > 0) { /* Gustafsson's predictive controller */
-        double predicted = radau->h_accepted / h * pow(error * error / radau->error_accepted, power) / SD_SAFETY;
-        ratio = fmax(ratio, fmax(1.0 / SD_GROWTH, fmin(1.0 / SD_SHRINK, predicted)));
-    }
-    radau->h_accepted = h;
-    radau->error_accepted = fmax(1e-2, error);
-    double next = h / ratio;
-    if (radau->rejected)
-        next = fmin(next, h);
-    radau->longest = fmax(radau->longest, h);
-    radau->growth = troubled ? 1.0 : radau->growth * REGAIN;
-    if (radau->ivp.system->scales > 0 && !radau->pressed) /* where they bend, the estimate says nothing of Newton's reach */
-        next = fmin(next, fmin(radau->growth, SD_GROWTH) * h);
-    radau->since++;
-    if (!(radau->ivp.fixed_h > 0.0))
-        next = sd_radau_choose(radau, next, error, iterations, troubled);
     double *oldest = radau->before, *slope = radau->slope[2];
     for (int32_t i = 0; i < radau->ivp.n && !radau->last; i++)
         oldest[i] = sd_radau_last(radau, i);
     if (radau->last) {
         radau->before = radau->last;
         radau->last = oldest;
-        memcpy(radau->last, radau->phi, size);
+        memcpy(radau->last, radau->phi, (size_t)radau->ivp.n * sizeof(double));
     }
     for (int k = 2; k > 0; k--) {
         radau->slope[k] = radau->slope[k - 1];
@@ -243,13 +192,23 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
         radau->kept[s] = radau->z[s];
         radau->z[s] = swap;
     }
+}
+
+/* the new point, and the next step's size */
+static void accept(sd_radau *radau, double error, int iterations, int troubled)
+{
+    const sd_radau_method *method = radau->method;
+    double h = radau->ivp.h;
+    error *= sd_radau_strictness(radau, method) / strictness(radau); /* what the next step is judged by */
+    double next = sd_radau_next_step(radau, error, iterations, troubled);
+    keep_points(radau);
     radau->used = method;
     sd_radau_combine(method->stages, radau->ivp.n, method->inverse[method->stages - 1], radau->kept, radau->rate);
     for (int32_t i = 0; i < radau->ivp.n; i++) {
         radau->phi[i] += radau->kept[method->stages - 1][i];
         radau->yd[i] = radau->rate[i] / h;
     }
-    memcpy(radau->slope[0], radau->yd, size);
+    memcpy(radau->slope[0], radau->yd, (size_t)radau->ivp.n * sizeof(double));
     sd_advance(&radau->ivp);
     show_nodes(radau);
     sd_radau_note_points(radau);
@@ -288,11 +247,106 @@ static int coupled(sd_radau *radau, int *iterations)
     return cause ? cause : sd_radau_factorise(radau, 1);
 }
 
+/* what has been tried of a step */
+typedef struct trial {
+    int iterations;           /* of Newton's */
+    int failures, singular;   /* of it; of matrices */
+    int fresh;                /* its slopes are of the point that it begins at */
+    int strained;             /* it failed with such slopes */
+    int leap;                 /* 1: it is longer than what failed before; 2: so it was, in vain */
+    double retry, error;      /* the part of its length that is tried next; of the estimate */
+} trial;
+
+/* stages of the length at hand: by Newton's iteration, with shortened corrections, or all at once */
+static int find_stages(sd_radau *radau, trial *one)
+{
+    const int steep = radau->ivp.system->scales > 0, whole = one->leap == 1;
+    int cause = SD_FINE;
+    one->retry = 0.5;
+    one->fresh = !radau->old_jacobian;
+    sd_radau_extrapolate(radau, radau->ivp.h);
+    if (!radau->ready || radau->ivp.h != radau->h_factored)
+        cause = sd_radau_factorise(radau, one->failures > 0 || whole);
+    if (cause == SD_FINE) {
+        radau->theta = 0.0; /* one iteration: the Jacobian is good enough */
+        cause = sd_radau_iterate(radau, one->failures > 1 || whole, &one->iterations, &one->retry);
+    }
+    const double left = radau->ivp.t_end - radau->ivp.t;
+    radau->pressed |= radau->ivp.h < PRESSED * radau->longest && radau->ivp.h < 0.5 * left;
+    int stuck = cause == SD_NEWTON || cause == SD_NONFINITE || cause == SD_SINGULAR;
+    if (stuck && !whole && (one->failures >= LENGTHS || radau->pressed) && steep) {
+        if (radau->method != sd_radau_methods) /* shortened corrections of more stages are dear */
+            radau->since = 0;
+        radau->method = sd_radau_methods;
+        radau->hold = SHORTENED;
+        sd_radau_extrapolate(radau, radau->ivp.h);
+        cause = sd_radau_iterate_damped(radau, &one->iterations);
+        one->fresh = 1;
+    }
+    one->strained |= cause == SD_NEWTON && one->fresh;
+    /* once it fails in any model: twice in a row it may be for no step's length */
+    if (cause == SD_NEWTON && one->fresh && radau->strained && one->leap == 0 && !steep)
+        cause = coupled(radau, &one->iterations);
+    return cause;
+}
+
+/* SD_ERROR_TEST where the stages are too far off, or pass over what a steep law does */
+static int judge(sd_radau *radau, trial *one)
+{
+    int cause = estimate_error(radau, &one->error);
+    if (cause == SD_FINE && one->error < 1.0 && radau->ivp.system->scales > 0 && sd_radau_astray(radau))
+        one->error = ASTRAY;
+    return cause == SD_FINE && !(one->error < 1.0) ? SD_ERROR_TEST : cause;
+}
+
+/* a shorter step after one whose error is too large */
+static void refuse(sd_radau *radau, const trial *one)
+{
+    radau->ivp.rejected_steps++;
+    radau->rejected = 1;
+    int usual = sd_radau_iterations(radau);
+    double limit = fmin(SD_SAFETY, SD_SAFETY * (1 + 2 * usual) / (one->iterations + 2 * usual));
+    double ratio = fmin(1.0 / SD_SHRINK, pow(one->error, power_of(radau)) / limit);
+    radau->ivp.h *= radau->ivp.taken == 0 ? 0.1 : isfinite(ratio) ? 1.0 / fmax(ratio, 1.0) : SD_SHRINK;
+}
+
+/* another step after one whose stages were not found: with fresh slopes, longer where short ones creep, else shorter and with
+ * fewer stages.  0: none */
+static int try_another(sd_radau *radau, trial *one, int cause)
+{
+    radau->ivp.newton_failures++;
+    radau->ready = 0;
+    if (cause == SD_SINGULAR && ++one->singular >= SINGULAR)
+        return 0;
+    if (cause == SD_NEWTON && !one->fresh) {
+        radau->old_jacobian = 0; /* once more with fresh slopes */
+        return 1;
+    }
+    if (one->leap == 1) {
+        radau->ivp.h /= LEAP;
+        one->leap = 2;
+    } else if (one->leap == 0 && radau->creeping >= CREEPS && cause == SD_NEWTON) {
+        radau->ivp.h *= LEAP;
+        radau->old_jacobian = 0;
+        one->leap = 1;
+        return 1;
+    }
+    radau->ivp.h *= cause == SD_NEWTON ? one->retry : 0.25;
+    if (++one->failures > 2)
+        radau->ivp.h *= 0.5;
+    if (one->failures >= FEWER && radau->method->stages > 3) {
+        radau->method--;
+        radau->since = 0;
+    }
+    radau->old_jacobian = 0;
+    radau->rejected = 1;
+    return 1;
+}
+
 int sd_radau_step(void *self)
 {
     sd_radau *radau = self;
-    int singular = 0, iterations = 0, failures = 0, leap = 0, strained = 0;
-    double retry = 0.5, error = 0.0;
+    trial one = {0};
     radau->ivp.cause = radau->work && radau->scale ? SD_FINE : SD_MEMORY;
     if (radau->ivp.cause)
         return radau->ivp.cause;
@@ -301,85 +355,25 @@ int sd_radau_step(void *self)
         radau->ivp.h = sd_fitted(&radau->ivp, SD_SLACK);
         if (sd_too_small(&radau->ivp))
             return radau->ivp.cause = radau->ivp.cause ? radau->ivp.cause : SD_STEP;
-        set_newton_weights(radau);
-        int cause = SD_FINE;
-        retry = 0.5;
-        int fresh = !radau->old_jacobian;
-        sd_radau_extrapolate(radau, radau->ivp.h);
-        if (!radau->ready || radau->ivp.h != radau->h_factored)
-            cause = sd_radau_factorise(radau, failures > 0 || leap == 1);
-        if (cause == SD_FINE) {
-            radau->theta = 0.0; /* one iteration: the Jacobian is good enough */
-            cause = sd_radau_iterate(radau, failures > 1 || leap == 1, &iterations, &retry);
-        }
-        radau->pressed |= radau->ivp.h < PRESSED * radau->longest && radau->ivp.h < 0.5 * (radau->ivp.t_end - radau->ivp.t);
-        int stuck = cause == SD_NEWTON || cause == SD_NONFINITE || cause == SD_SINGULAR;
-        if (stuck && leap != 1 && (failures >= LENGTHS || radau->pressed) && radau->ivp.system->scales > 0) {
-            if (radau->method != sd_radau_methods) /* shortened corrections of more stages are dear */
-                radau->since = 0;
-            radau->method = sd_radau_methods;
-            radau->hold = SHORTENED;
-            sd_radau_extrapolate(radau, radau->ivp.h);
-            cause = sd_radau_iterate_damped(radau, &iterations);
-            fresh = 1;
-        }
-        strained |= cause == SD_NEWTON && fresh;
-        /* once it fails in any model: twice in a row it may be for no step's length */
-        if (cause == SD_NEWTON && fresh && radau->strained && leap == 0 && radau->ivp.system->scales == 0)
-            cause = coupled(radau, &iterations);
-        if (cause == SD_FINE && !(radau->ivp.fixed_h > 0.0)) {
-            cause = estimate_error(radau, &error);
-            if (cause == SD_FINE && error < 1.0 && radau->ivp.system->scales > 0 && sd_radau_astray(radau))
-                error = ASTRAY;
-            if (cause == SD_FINE && !(error < 1.0))
-                cause = SD_ERROR_TEST;
-        }
+        sd_radau_weigh(radau);
+        int cause = find_stages(radau, &one);
+        if (cause == SD_FINE && !(radau->ivp.fixed_h > 0.0))
+            cause = judge(radau, &one);
         if (cause == SD_FINE)
             break;
         radau->ivp.cause = cause;
         if (sd_ends(&radau->ivp, cause))
             return cause;
-        if (cause == SD_ERROR_TEST) {
-            radau->ivp.rejected_steps++;
-            radau->rejected = 1;
-            int usual = sd_radau_iterations(radau);
-            double limit = fmin(SD_SAFETY, SD_SAFETY * (1 + 2 * usual) / (iterations + 2 * usual));
-            double ratio = fmin(1.0 / SD_SHRINK, pow(error, power_of(radau)) / limit);
-            radau->ivp.h *= radau->ivp.taken == 0 ? 0.1 : isfinite(ratio) ? 1.0 / fmax(ratio, 1.0) : SD_SHRINK;
-        } else {
-            radau->ivp.newton_failures++;
-            radau->ready = 0;
-            if (cause == SD_SINGULAR && ++singular >= SINGULAR)
-                return cause;
-            if (cause == SD_NEWTON && !fresh) {
-                radau->old_jacobian = 0; /* once more with fresh slopes */
-                continue;
-            }
-            if (leap == 1) {
-                radau->ivp.h /= LEAP;
-                leap = 2;
-            } else if (leap == 0 && radau->creeping >= CREEPS && cause == SD_NEWTON) {
-                radau->ivp.h *= LEAP;
-                radau->old_jacobian = 0;
-                leap = 1;
-                continue;
-            }
-            radau->ivp.h *= cause == SD_NEWTON ? retry : 0.25;
-            if (++failures > 2)
-                radau->ivp.h *= 0.5;
-            if (failures >= FEWER && radau->method->stages > 3) {
-                radau->method--;
-                radau->since = 0;
-            }
-            radau->old_jacobian = 0;
-            radau->rejected = 1;
-        }
+        if (cause == SD_ERROR_TEST)
+            refuse(radau, &one);
+        else if (!try_another(radau, &one, cause))
+            return cause;
     }
     radau->ivp.cause = SD_FINE;
-    radau->strained = strained;
-    radau->turned = radau->turned && strained;
-    radau->creeping = failures > 0 && error < IDLE ? radau->creeping + 1 : 0;
-    accept(radau, error, iterations, failures > 0);
+    radau->strained = one.strained;
+    radau->turned = radau->turned && one.strained;
+    radau->creeping = one.failures > 0 && one.error < IDLE ? radau->creeping + 1 : 0;
+    accept(radau, one.error, one.iterations, one.failures > 0);
     if (radau->ivp.project)
         project(radau);
     return SD_FINE;

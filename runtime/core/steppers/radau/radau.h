@@ -176,7 +176,9 @@ int sd_radau_residuals(sd_radau *radau);
 double sd_radau_correct(sd_radau *radau);
 /* how far the last correction moved the unknowns with derivatives, in Newton's weights */
 double sd_radau_state_moved(const sd_radau *radau);
-/* radau_newton.c */
+/* radau_newton.c: weights of its norm and scales of columns, their room; at the h of the moment */
+void sd_radau_provide_weights(sd_radau *radau);
+void sd_radau_weigh(sd_radau *radau);
 void sd_radau_leave_below(sd_radau *radau, double null_pivot);
 int sd_radau_iterations(const sd_radau *radau);
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry);
@@ -185,7 +187,8 @@ double sd_radau_newton_tolerance(const sd_radau *radau);
 /* radau_coupled.c: where the slopes of the step's start fade or turn within it, in one direction; else SD_NEWTON */
 int sd_radau_iterate_coupled(sd_radau *radau, int *used);
 void sd_radau_free_coupled(struct sd_coupled *coupled);
-/* radau_choice.c */
-double sd_radau_choose(sd_radau *radau, double next, double error, int iterations, int troubled);
+/* radau_choice.c: the length that the next step should have, by the error of this one and what Newton's iteration took; perhaps
+ * with another number of stages */
+double sd_radau_next_step(sd_radau *radau, double error, int iterations, int troubled);
 
 #endif

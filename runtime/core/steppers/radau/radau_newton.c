@@ -27,6 +27,33 @@ static const struct {
     int lean;
 } ways[] = {{1e-10, 0}, {1e-13, 0}, {1e-16, 0}, {SD_LEAST_PIVOT, 0}, {1e-10, SD_WHERE_LEFT}, {1e-10, SD_WHERE_IDLE}};
 
+/* Newton's weights and the scale of columns: of unknowns that all count as they are those that there are; where memory for
+ * others is missing no scale, which the first step tells */
+void sd_radau_provide_weights(sd_radau *radau)
+{
+    size_t m = (size_t)sd_whole_lanes(radau->ivp.n + 1);
+    int powers = 0;
+    for (int32_t i = 0; i < radau->ivp.n; i++)
+        powers |= radau->ivp.power[i] != 0;
+    int others = powers || (radau->ivp.atol && !radau->ivp.weight);
+    if (others && !radau->powered)
+        radau->powered = calloc(3 * m, sizeof *radau->powered);
+    if (others && !radau->ivp.weight && radau->powered)
+        radau->ivp.weight = radau->powered + 2 * m;
+    radau->newton_weight = powers ? radau->powered : radau->ivp.weight;
+    radau->scale = others && !radau->powered ? NULL : powers ? radau->powered + m : radau->ivp.magnitude;
+}
+
+/* index-2 unknowns and index-3 multipliers count with powers of h */
+void sd_radau_weigh(sd_radau *radau)
+{
+    for (int32_t i = 0; i < radau->ivp.n && radau->scale != radau->ivp.magnitude; i++) {
+        double power = radau->ivp.power[i] == 0 ? 1.0 : radau->ivp.power[i] == 1 ? radau->ivp.h : radau->ivp.h * radau->ivp.h;
+        radau->newton_weight[i] = radau->ivp.weight[i] * power;
+        radau->scale[i] = radau->ivp.magnitude[i] / power;
+    }
+}
+
 /* the part of its column below which a pivot is none; columns of multipliers and states always have one */
 void sd_radau_leave_below(sd_radau *radau, double null_pivot)
 {
