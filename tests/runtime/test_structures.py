@@ -47,7 +47,7 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
         lines += [f'printf("%zu\\n", offsetof({tag}, {field}));' for field in fields]
     source = tmp_path / "sizes.c"
     source.write_text("\n".join([*lines, "return 0; }"]))
-    subprocess.run(["gcc", f"-I{CORE}", str(source), "-o", str(tmp_path / "sizes")], check=True)
+    subprocess.run(["gcc", f"-I{CORE}", str(source), "-o", str(tmp_path / "sizes"), "-lm"], check=True)
     found = subprocess.run([str(tmp_path / "sizes")], check=True, capture_output=True, text=True).stdout.split()
     expected = []
     for name, _ in pairs:
