@@ -2,7 +2,7 @@
 #ifndef SYSDYN_NULL_SPACE_H
 #define SYSDYN_NULL_SPACE_H
 
-#include "linear/dense/lu.h"
+#include "linear/dense/dense_lu.h"
 #include "linear/sparse/sparse.h"
 
 #include <stdlib.h>
