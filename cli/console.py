@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import click
 from sysdyn.cli.failures import OF_RUNS, SOLVER, USAGE, envelope, plain, shown, worst
+from sysdyn.cli.progress import RUN, ProgressLine
 from sysdyn.cli.streams import put
 from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, ModelError, Report, shortened
 
@@ -46,6 +47,10 @@ class Console:
         self.result = {}
         self._plain = []
         self._results = []
+
+    def progress(self, mode: str = "auto", ahead: str = RUN) -> ProgressLine:
+        """A progress line, of which a quiet command shows nothing; mode: of --progress; ahead: what takes long."""
+        return ProgressLine("never" if self.quiet else mode, ahead)
 
     def say(self, message: str) -> None:
         """A message for the person at the terminal."""

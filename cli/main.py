@@ -170,7 +170,8 @@ def _ended_like_an_interruption() -> Iterator[None]:
     Those that somebody ignores (nohup) or handles already stay so.
     """
     mine = threading.current_thread() is threading.main_thread()
-    sent = [s for s in (signal.SIGTERM, signal.SIGHUP) if mine and signal.getsignal(s) is signal.SIG_DFL]
+    ends = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]  # Windows has no SIGHUP
+    sent = [s for s in ends if mine and signal.getsignal(s) is signal.SIG_DFL]
     for one in sent:
         signal.signal(one, signal.default_int_handler)
     heard = [s for s in (signal.SIGINT, *sent) if mine and signal.getsignal(s) is signal.default_int_handler]
@@ -178,7 +179,8 @@ def _ended_like_an_interruption() -> Iterator[None]:
 
     def told(lost: sys.UnraisableHookArgs) -> None:
         """Python drops what is raised where an object is taken apart: the interruption comes again, behind that."""
-        if heard and lost.exc_type is not None and issubclass(lost.exc_type, KeyboardInterrupt):
+        interrupted = lost.exc_type is not None and issubclass(lost.exc_type, KeyboardInterrupt)
+        if heard and interrupted and hasattr(signal, "pthread_kill"):  # Windows: it is lost there
             threading.Timer(0.01, signal.pthread_kill, (threading.get_ident(), heard[0])).start()
         else:
             before(lost)

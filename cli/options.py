@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
+from sysdyn.cli.console import with_console
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -108,3 +109,18 @@ def solved(function: Callable[..., Any]) -> Callable[..., Any]:
     ):
         function = option(function)
     return function
+
+
+def scene_command(name: str, runs: str = "run", at: str | None = None) -> Callable[..., Callable[..., Any]]:
+    """How a command that runs a scene of FILE begins: `chosen`, `solved`, --until and, where `at` says what becomes of
+    them, --at; runs: how many it makes.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        if at is not None:
+            function = click.option("--at", metavar="T1,T2,...", help=f"Instants that {at} too.")(function)
+        said = f"End of the {runs}; an expression, a bare number in s."
+        function = click.option("--until", metavar="T", help=said)(function)
+        return with_console(name)(click.argument("file")(chosen(solved(function))))
+
+    return decorate

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
+from types import TracebackType
+from typing import Self
 
 LONG = 600.0
 """Seconds left that are said at once."""
@@ -12,7 +14,9 @@ SEARCH = "of search lie ahead: fewer --tries would shorten it"
 
 
 class ProgressLine:
-    """Writes to standard error: over itself on a terminal, every ten seconds elsewhere.  ahead: what takes long."""
+    """Writes to standard error: over itself on a terminal, every ten seconds elsewhere; a `with` takes it away.
+    ahead: what takes long.
+    """
 
     def __init__(self, mode: str, ahead: str = RUN) -> None:
         self._ahead = ahead
@@ -39,6 +43,14 @@ class ProgressLine:
         text = f"{100.0 * fraction:5.1f} %{remaining}"
         sys.stderr.write(f"\r{text:<40}" if self._terminal else f"{text}\n")
         sys.stderr.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.clear()
 
     def clear(self) -> None:
         """Take the line away."""

@@ -119,26 +119,14 @@ def network(
     """
     with deep(), at_rest(), budget.drawn():
         try:
-            made = _elaborated(document, model, scene, report, settings, levels, moved)
-            return _network(*made, scene, report, required=required, outputs=outputs)
+            elaborator, reader = _elaborated(document, model, scene, report, settings, levels, moved)
+            try:
+                return _judged(elaborator, reader, scene, report, required=required, outputs=outputs)
+            finally:
+                report.retold(lambda found: told(elaborator, found))
         except budget.SpentError as spent:
             report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
             return None
-
-
-def _network(
-    elaborator: Elaborator,
-    reader: SceneReader,
-    scene: syntax.Scene | None,
-    report: Report,
-    *,
-    required: bool,
-    outputs: Sequence[str] | None,
-) -> Network | None:
-    try:
-        return _judged(elaborator, reader, scene, report, required=required, outputs=outputs)
-    finally:
-        report.retold(lambda found: told(elaborator, found))
 
 
 def _judged(

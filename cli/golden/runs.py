@@ -120,13 +120,7 @@ def _structure(ran: Ran, trace: Arrays) -> dict[str, Any]:
         prepared, started = as_written(prepared, started.state.t) or (prepared, started)
     facts, manifest = started.facts, prepared.manifest
     return {
-        "coordinates": facts.coordinates,
-        "m1": facts.m1,
-        "m2": facts.m2,
-        "dof": facts.dof,
-        "configuration_dof": facts.configuration_dof,
-        "redundant": facts.redundant,
-        "index": facts.index,
+        **facts.counts,
         "unknowns": [[u["name"], u["kind"], u["unit"], u["differential"]] for u in manifest["unknowns"]],
         "rows": [[r["label"], r["kind"]] for r in manifest["rows"]],
         "equations": energies.show(prepared.compiled.energies).splitlines(),

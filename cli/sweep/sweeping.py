@@ -16,6 +16,7 @@ from sysdyn import __version__
 from sysdyn.cli.failures import plain
 from sysdyn.cli.run.request import lock
 from sysdyn.cli.run.request.asked import Request, instants_of, model_digest
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.sweep import results
 from sysdyn.cli.sweep.axes import CHOICES, Axis, Evaluate, axis
 from sysdyn.cli.sweep.journal import Journal
@@ -116,29 +117,11 @@ def sweep(
     """
     runner = runner or Runner(request, keep)
     cases = tuple(study.cases())
-    try:
-        runner.loaded().bound({n: v for n, v in cases[0].items() if n not in CHOICES and not n.startswith("level ")})
-    except ModelError as error:  # numbers that the text refuses are a run's own failure
-        if not {d.code for d in error.diagnostics} <= REFUSED:
-            raise
+    _judged(runner, cases[0])
     target = runner.loaded().target
-    report = Report()
-    instants_of(request, target.document, report)
-    report.raise_if_failed()
-    sha = model_digest(target)
     texts = lock.hashes(target.document.file.source, target.document.file.items)
     digest = study.digest(request=replace(request, output=None), texts=texts, version=__version__, keep=keep)
-    units = _units(runner)
-    attributes = {
-        "Conventions": "CF-1.11",
-        "title": f"sweep of {target.name}",
-        "source": f"sysdyn {__version__}",
-        "model": target.model.name.name,
-        "scene": target.scene.name.name if target.scene else "",
-        "model_sha256": sha,
-        "sample": study.sample if study.runs else "product",
-        "seed": study.seed,
-    }
+    units, attributes = _units(runner), _attributes(target, study)
     place = destination(output)
     with claimed(place), Journal(place, digest) as journal:
         resumed = len(journal.done)
@@ -176,6 +159,32 @@ def _items(
     from sysdyn.cli.sweep.on_dask import results as spread
 
     return spread(request, tasks, left, dask, keep)
+
+
+def _judged(runner: Runner, case: Case) -> None:
+    """What is wrong with the text, or with instants that are asked for, stops a sweep before its first run."""
+    try:
+        runner.loaded().bound({n: v for n, v in case.items() if n not in CHOICES and not n.startswith("level ")})
+    except ModelError as error:  # numbers that the text refuses are a run's own failure
+        if not {d.code for d in error.diagnostics} <= REFUSED:
+            raise
+    report = Report()
+    instants_of(runner.request, runner.loaded().target.document, report)
+    report.raise_if_failed()
+
+
+def _attributes(target: Target, study: Study) -> dict[str, Any]:
+    """Of the file of results: what was run, by what."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": f"sweep of {target.name}",
+        "source": f"sysdyn {__version__}",
+        "model": target.model.name.name,
+        "scene": target.scene.name.name if target.scene else "",
+        "model_sha256": model_digest(target),
+        "sample": study.sample if study.runs else "product",
+        "seed": study.seed,
+    }
 
 
 def _units(runner: Runner) -> dict[str, str]:

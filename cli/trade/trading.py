@@ -31,6 +31,15 @@ LEAST = 40
 """Steps that every run may take: the longest is a twentieth of the span."""
 
 
+def _allowed(request: Request) -> None:
+    """UsageError where what a trade chooses is said already."""
+    check_tolerances(request)
+    if request.rtol is not None or request.atol is not None:
+        raise UsageError("trade chooses the tolerances: --accuracy says what is wanted")
+    if request.method == "euler":
+        raise UsageError("--method euler: trade compares methods that control their error")
+
+
 def trade(
     request: Request,
     report: Report,
@@ -47,11 +56,7 @@ def trade(
     full: every combination at every tolerance; budget [s] of wall time for all; jobs: processes that make runs ahead;
     None: where it pays, which it does not where the search leaves most combinations out.
     """
-    check_tolerances(request)
-    if request.rtol is not None or request.atol is not None:
-        raise UsageError("trade chooses the tolerances: --accuracy says what is wanted")
-    if request.method == "euler":
-        raise UsageError("--method euler: trade compares methods that control their error")
+    _allowed(request)
     began = time.monotonic()
     document = targets.read(request.file, report)
     request = replace(request, text=document.file.source.text if request.file == "-" else None)
@@ -72,6 +77,7 @@ def trade(
         return SECONDS if limit is None else max(limit - time.monotonic(), 1e-3)
 
     combinations = list(bench.combinations())
+    # runs that are made already: by a trade that was stopped, or side by side before the search asks for them
     made_before: Runs = dict(journal.runs) if journal else {}
     left = [c for c in combinations if full or (c, tolerance(FIRST)) not in made_before]
     number = jobs or (company(first) if full else 1)

@@ -14,7 +14,6 @@ from collections.abc import Iterable, Sequence
 from sysdyn.dsl.model.expression import (
     Node,
     add,
-    call,
     const,
     index,
     is_const,
@@ -22,6 +21,7 @@ from sysdyn.dsl.model.expression import (
     mul,
     product,
     rebuild,
+    reduced,
     reduction,
     scale,
     substitute,
@@ -165,15 +165,9 @@ def _elements(node: Node, args: tuple[Node, ...], place: Place, what: str) -> No
         help_ = f"bounds that follow no loop variable are written out, {LARGEST_LITERAL} elements at most"
         raise ModelError([Diagnostic("N608", text, place, help_)])
     parts = [substitute(body, {index(name): const(k)}) for k in range(int(first.data), int(last.data) + 1)]
-    match operator:
-        case "sum":
-            return add(*parts)
-        case "prod":
-            return mul(*parts)
-        case _:
-            if not parts:
-                raise ModelError([Diagnostic("N608", f"the {operator} over an empty range", place)])
-            return call(operator, *parts) if len(parts) > 1 else parts[0]
+    if not parts and operator not in ("sum", "prod"):
+        raise ModelError([Diagnostic("N608", f"the {operator} over an empty range", place)])
+    return reduced(operator, parts)
 
 
 def summands(root: Node) -> list[Node]:

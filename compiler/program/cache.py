@@ -24,6 +24,8 @@ LIMIT = 512 << 20
 """Bytes of all entries; SYSDYN_CACHE_LIMIT (bytes) says otherwise."""
 KEPT = 3600.0
 """Seconds for which an entry just used is never removed: another process may be about to load it."""
+_READ = os.O_RDONLY | sum(getattr(os, flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+"""As it is, never through a link or a pipe: where the system knows such flags (Windows has others than POSIX)."""
 
 
 def folder() -> Path:
@@ -58,11 +60,15 @@ def limit() -> int:
 
 def _mine(found: os.stat_result) -> bool:
     """Only this user can put a file there."""
+    if not hasattr(os, "getuid"):  # on Windows a user's folders are private, and modes say nothing
+        return True
     return found.st_uid == os.getuid() and not found.st_mode & 0o022
 
 
 def _trusted(parent: os.stat_result) -> bool:
     """Nobody but this user and root can put another folder in its place."""
+    if not hasattr(os, "getuid"):
+        return True
     if parent.st_uid not in (0, os.getuid()):
         return False
     if parent.st_mode & stat.S_ISVTX:  # in a sticky folder only owners rename
@@ -89,7 +95,7 @@ def path_of(key: str) -> Path:
 def sound(entry: Path, key: str) -> bool:
     """The entry is a regular file that holds the library which was put there under this key; it counts as used now."""
     try:
-        handle = os.open(entry, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        handle = os.open(entry, _READ)
     except OSError:
         return False
     try:

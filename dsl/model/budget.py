@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import os
-import resource
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -70,6 +69,10 @@ def granted() -> int:
 @cache
 def there() -> int:
     """Bytes of memory that this process may take."""
+    try:
+        import resource
+    except ImportError:  # Windows tells neither
+        return 2 * GRANTED
     most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY:

@@ -315,6 +315,11 @@ def reduction(operator: str, name: str, first: Node, last: Node, body: Node) -> 
     return _make("reduce", (operator, name), (first, last, body))
 
 
+def reduced(operator: str, parts: Sequence[Node]) -> Node:
+    """The same written out: sum, prod, min or max of its parts."""
+    return add(*parts) if operator == "sum" else mul(*parts) if operator == "prod" else call(operator, *parts)
+
+
 # -- passes ------------------------------------------------------------------------------------------------
 
 

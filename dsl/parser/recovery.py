@@ -220,12 +220,7 @@ class Recovery:
         elif (slip := foreign.around(scanner.text, scanner.start, scanner.end, kind)) is not None:
             self._error(slip.complaint, self._token(), slip.meant, slip.span)
         elif kind == "<fault>":
-            first = text in "%!" and not scanner.text[start : scanner.start].strip() and start == scanner.start
-            complaint = complaints.first_token(text, kind, body) if first else complaints.character(text)
-            number = re.search(r"[0-9.]+$", scanner.text[start : scanner.start])
-            if text == "%" and number is not None:
-                complaint = (complaint[0], complaint[1], f"{number[0]} percent")
-            self._error(complaint, self._token())
+            self._error(self._character(text, body, start), self._token())
         elif scanner.suspect is not None:
             sign = scanner.text[scanner.dangling.start : scanner.dangling.end]
             self._error(("E113", f"the statement ends with '{sign}': something is missing", None), scanner.dangling)
@@ -241,26 +236,9 @@ class Recovery:
             what = "level x = name" if body == "statement" else "level name { }"
             self._error(("E107", f"'{what}' belongs in {where}, not in {here}", None), Span(start, start + 5))
         elif word and word not in self._words_here(size) and after[:1] not in (":", "["):
-            complaint = complaints.unknown(word, after, body, scanner.text)
-            netlist = foreign.spice(word, after) if body == "statement" and complaint[::2] == ("E113", None) else None
-            if netlist is not None:
-                complaint = (complaint[0], "an element is written with its label, its parameters named", netlist)
-            continues = after[:1] in ("=", ",") or not after.strip()
-            if after.startswith("->") or (complaint[0] == "E113" and continues and self._indented(start)):
-                complaint = complaints.connection()
-                if self._told_above(start):
-                    return
-            self.nameless = "has a label" in complaint[1]
-            self._error(complaint, Span(start, start + len(word)))
+            self._unknown(word, after, body, start)
         elif kind == ":" and after.startswith((":", "[")) and word in self._words_here(size):
-            message, help_ = f"'{word}' begins a statement here and cannot be the label of an element", f"{word}_: ..."
-            element = _ELEMENT.match(after) is not None
-            if not element and word in _UNLABELLED:
-                help_ = f"{SHAPES.get(word, word + ' ...')}, without ':'"
-            if not element and word in ("phi", "psi", "gamma"):
-                message, help_ = f"a {word} has a label, by which its multiplier is read", f"{word} name: ... = ..."
-            self.nameless = True
-            self._error(("E113", message, help_), Span(start, start + len(word)))
+            self._no_label(word, after, start)
         else:
             accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
             before = scanner.text[: scanner.start].rstrip()
@@ -268,6 +246,41 @@ class Recovery:
             complaint = complaints.expected(accepted, kind, text, line, word)
             self.nameless = "has a label" in complaint[1]
             self._error(complaint, self._token())
+
+    def _character(self, text: str, body: str, start: int) -> complaints.Complaint:
+        """Why a character that begins no token cannot stand there."""
+        before = self.scanner.text[start : self.scanner.start]
+        first = text in "%!" and not before.strip() and start == self.scanner.start
+        complaint = complaints.first_token(text, "<fault>", body) if first else complaints.character(text)
+        number = re.search(r"[0-9.]+$", before)
+        return (*complaint[:2], f"{number[0]} percent") if text == "%" and number is not None else complaint
+
+    def _unknown(self, word: str, after: str, body: str, start: int) -> None:
+        """A word that begins no statement: a slip of one, another language's, or what goes on from the line above."""
+        from sysdyn.dsl.parser import foreign
+
+        complaint = complaints.unknown(word, after, body, self.scanner.text)
+        netlist = foreign.spice(word, after) if body == "statement" and complaint[::2] == ("E113", None) else None
+        if netlist is not None:
+            complaint = (complaint[0], "an element is written with its label, its parameters named", netlist)
+        continues = after[:1] in ("=", ",") or not after.strip()
+        if after.startswith("->") or (complaint[0] == "E113" and continues and self._indented(start)):
+            complaint = complaints.connection()
+            if self._told_above(start):
+                return
+        self.nameless = "has a label" in complaint[1]
+        self._error(complaint, Span(start, start + len(word)))
+
+    def _no_label(self, word: str, after: str, start: int) -> None:
+        """A word that begins a statement stands where the label of one does."""
+        message, help_ = f"'{word}' begins a statement here and cannot be the label of an element", f"{word}_: ..."
+        element = _ELEMENT.match(after) is not None
+        if not element and word in _UNLABELLED:
+            help_ = f"{SHAPES.get(word, word + ' ...')}, without ':'"
+        if not element and word in ("phi", "psi", "gamma"):
+            message, help_ = f"a {word} has a label, by which its multiplier is read", f"{word} name: ... = ..."
+        self.nameless = True
+        self._error(("E113", message, help_), Span(start, start + len(word)))
 
     def _words_here(self, size: int) -> dict[str, int]:
         """The terminals with which a statement may begin here."""

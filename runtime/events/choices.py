@@ -52,9 +52,8 @@ class Choices:
 
     def _idle(self, values: Floats) -> list[int]:
         """Contacts that do nothing, and are not about to."""
-        contacts, zero = self._contacts, self._contacts.observer.zero
-        idle = (k for k, c in enumerate(contacts.contacts) if c.hold < 0 and contacts.idle(k, values))
-        return [k for k in idle if abs(values[row := contacts.contacts[k].rate]) <= zero(row)]
+        contacts = self._contacts
+        return [k for k, c in enumerate(contacts.contacts) if c.hold < 0 and contacts.rests(k, values)]
 
     def _add(self, t: float, point: tuple[Floats, Floats], directions: Floats, between: tuple[str, ...]) -> None:
         """What is observed along the directions [number, unknowns as written]."""

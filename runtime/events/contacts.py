@@ -251,6 +251,11 @@ class Contacts:
         rows = self.contacts[k].value, self.contacts[k].multiplier
         return all(abs(values[row]) <= self.observer.zero(row) for row in rows)
 
+    def rests(self, k: int, values: Floats) -> bool:
+        """Whether it does nothing, nor is about to: its rate is zero too."""
+        rate = self.contacts[k].rate
+        return self.idle(k, values) and bool(abs(values[rate]) <= self.observer.zero(rate))
+
     def _impulse_on(self, k: int, impulses: Floats) -> float:
         """That of a contact; of friction in the plane its size."""
         if self.multiplier[k] < 0:

@@ -246,20 +246,10 @@ class Handler:
         contact = self.plan.contacts[watched.contact]
         return contact.rate if watched.row == contact.value else -1
 
-    def fire(
-        self, t: float, y: Floats, yd: Floats, samples: Sequence[int] = (), which: Sequence[Watched] = ()
-    ) -> Point | None:
-        """The point after everything that happens at t; None where nothing changes.  which: of the watched.
-
-        rounds, simple: what is assigned, and whether that is all, and without an impact; struck: the gap that closed in
-        flight and opened again, where that is all, else -1; soon (s): sooner than that the same shall be asked again.
-        """
-        self._count(t)
-        self.choices.end(t, y, yd)
-        free = self._free()
-        self.simple, self.struck, self.rounds, self.soon = True, -1, [], 0.0
-        said, stood = self._words(), self.kinks.state()
-        self.kinks.anew()
+    def _crossed(
+        self, t: float, y: Floats, yd: Floats, which: Sequence[Watched]
+    ) -> tuple[Sequence[Watched], list[int]]:
+        """Turns sides and branches of laws; what then counts of what is watched, the relations that have crossed."""
         crossed = [w.relation for w in which if w.relation >= 0]
         values = self.observer(t, y, yd) if self.plan.relations else np.zeros(0)
         self._exact = [k for k in crossed if values[self.plan.relations[k].row] == 0.0]
@@ -275,8 +265,10 @@ class Handler:
                 self.side[w.relation] = -float(w.side)
             if w.kink >= 0:
                 self.kinks.cross(w.kink, w.row, w.side)
-        changed = bool(samples) or any(w.kink >= 0 for w in which)
-        begun, y, yd = y, y.copy(), yd.copy()
+        return which, crossed
+
+    def _cascade(self, t: float, y: Floats, yd: Floats, samples: Sequence[int], crossed: list[int]) -> Floats:
+        """Y behind all assignments: those of samples, then round by round of conditions that these have made true."""
         assigned: list[tuple[str, tuple[Assignment, ...]]] = [
             (self.plan.sampled[k].name, self.plan.sampled[k].assignments) for k in samples
         ]
@@ -284,21 +276,41 @@ class Handler:
             fired = self._risen(crossed)
             assigned += [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired]
             if not assigned:
-                break
+                return y
             y = self._assign(t, y, yd, assigned)
             self._renew(t, y, yd)
             self.rounds.append(Round(tuple(group for _, group in assigned), self.side.copy()))
-            changed, assigned, crossed = True, [], []
-        else:
-            raise SolverFailure("chatter", t, 0.0, self._names())
+            assigned, crossed = [], []
+        raise SolverFailure("chatter", t, 0.0, self._names())
+
+    def fire(
+        self, t: float, y: Floats, yd: Floats, samples: Sequence[int] = (), which: Sequence[Watched] = ()
+    ) -> Point | None:
+        """The point after everything that happens at t; None where nothing changes.  which: of the watched.
+
+        rounds, simple: what is assigned, and whether that is all, and without an impact; struck: the gap that closed in
+        flight and opened again, where that is all, else -1; soon (s): sooner than that the same shall be asked again.
+        """
+        self._count(t)
+        self.choices.end(t, y, yd)
+        free = self._free()
+        self.simple, self.struck, self.rounds, self.soon = True, -1, [], 0.0
+        said, stood = self._words(), self.kinks.state()
+        self.kinks.anew()
+        which, crossed = self._crossed(t, y, yd, which)
+        begun, y, yd = y, y.copy(), yd.copy()
+        y = self._cascade(t, y, yd, samples, crossed)
+        # contacts that are touched, and what is not as simple as an assignment
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
+        bent = any(w.kink >= 0 for w in which)
         self._sink(t, which)
         self.succession.blow = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
         self.simple &= not (self.succession.blow and not (free and self._plain))
-        self.simple &= not (self.rounds and (touched or any(w.kink >= 0 for w in which)))
+        self.simple &= not (self.rounds and (touched or bent))
         self.simple &= all(self.plan.contacts[k].kind != "phi" for k in touched)
-        if not (changed or touched):
+        if not (samples or bent or self.rounds or touched):
             return None
+        # the point behind it all
         self.struck = touched[0] if free and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
         self.turns.seen(t, point)

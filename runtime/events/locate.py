@@ -12,7 +12,7 @@ import numpy as np
 from sysdyn.runtime.model.description import Floats
 
 PARTS = 4
-"""Of a step, as core/run/run.c looks at it."""
+"""Of a step, as core/run/run.h looks at it."""
 ITERATIONS = 60
 AT_ONCE = 1e-6
 """Of what is searched: a moment."""

@@ -195,14 +195,16 @@ class _Starts:
         contacts, t = self.contacts, self._t
         known, time = contacts.observer.largest.copy(), max(contacts.time, LEAST)
         parts = SHORT if self._quickly else SHORT[:1]  # it takes long to be sure that a set has no start
+        told = dict[float, tuple[Floats, tuple[float, ...], Floats]]()  # point, set and sizes behind each step
         for jumps, part in itertools.product((False, True), parts):
             h = part * time
-            behind = self._behind(pivoting, held, h, SHORT[-1] * time)
-            if behind is None:
+            if not jumps and (point := self._behind(pivoting, held, h, SHORT[-1] * time)) is not None:
+                told[h] = point, contacts.state(), contacts.observer.largest.copy()
+            if h not in told:
                 continue
-            self._sought_near(None)
-            if jumps:
-                self._sought_near(self._jumped(pivoting, held, behind, 0.5 * h))
+            behind, state, contacts.observer.largest[:] = told[h]
+            contacts.become(state)
+            self._sought_near(self._jumped(pivoting, held, behind, 0.5 * h) if jumps else None)
             pivoting.ahead(t, behind, h)  # impulses are over then
             if self._nearly_fits(kept=not jumps):
                 return True

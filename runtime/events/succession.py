@@ -208,14 +208,10 @@ class Succession:
         open is a set that fits at that very instant alone.  (Not so of their duals, which hold: `_later` moves what
         stands for a flow there by its rate at t, and of a flow at rest that is none.)
         """
-        values, zero = self.observer(t, *point), self.observer.zero
-        idle = opened = False
-        for k, c in enumerate(self.plan.contacts):
-            if c.kind == "psi" and not c.dual and not self.contacts.active[k]:
-                held = stood[k] != 0.0
-                opened |= held
-                idle |= not held and all(abs(values[row]) <= zero(row) for row in (c.value, c.rate))
-        return opened and idle
+        values, active = self.observer(t, *point), self.contacts.active
+        open_ = [k for k, c in enumerate(self.plan.contacts) if c.kind == "psi" and not c.dual and not active[k]]
+        opened = any(stood[k] for k in open_)
+        return opened and any(not stood[k] and self.contacts.rests(k, values) for k in open_)
 
     def _ahead(self, t: float, point: Point, stood: tuple[float, ...]) -> Point | None:
         """The point with the active set that fits a little later, None where none differs.

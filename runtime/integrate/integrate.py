@@ -13,7 +13,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.condense.condensed import Condensed, Forms, condensed
+from sysdyn.runtime.condense.condensed import Condensed
+from sysdyn.runtime.condense.condenser import Forms, condensed
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.causes import NEWTON, failure, placed
 from sysdyn.runtime.integrate.creeping import Creeping

@@ -1,6 +1,6 @@
 """The stepping methods of the core behind one face: what an integration needs to know of each.
 
-The fields that both structures have under one name (t, h, steps, cause, ...) are read and set through `contents`.
+The fields that all structures have in common (sd_ivp: t, h, steps, cause, ...) are read and set through `contents`.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Method:
         if isinstance(system, Condensed):
             self._n = system.whole.unknowns
             condensed = c.addressof(system.condensed)
-            self.expanded = lib.core.sd_expanded_new(self._stepper(), condensed, self._n)
+            self.expanded = lib.core.sd_expanded_new(self.stepper, condensed, self._n)
             if not self.expanded:
                 raise MemoryError
             self._condensed = system
@@ -81,20 +81,12 @@ class Method:
     @property
     def stepper(self) -> int:
         """Address of its sd_stepper, or of the one that shows every unknown."""
-        address = lib.core.sd_expanded_stepper(self.expanded) if self.expanded else self._stepper()
-        assert isinstance(address, int)
-        return address
-
-    def _stepper(self) -> int:
-        address = getattr(lib.core, f"sd_{self.name}_stepper")(self._core)
-        assert isinstance(address, int)
-        return address
+        return c.addressof(self.expanded.contents.face if self.expanded else self.contents.stepper)
 
     def start(self, t: float, y: Floats, yd: Floats) -> None:
         """From (t, y, yd) with a step of its own choice."""
-        name, core = ("expanded", self.expanded) if self.expanded else (self.name, self._core)
         self.begin(y, yd)
-        getattr(lib.core, f"sd_{name}_start")(core, t, lib.pointer(y), lib.pointer(yd), 0.0)
+        lib.core.sd_start(self.stepper, t, lib.pointer(y), lib.pointer(yd))
 
     def rest(self) -> None:
         """Of a large system: until the next start it has no more than its last point, for between pieces of a run the

@@ -24,7 +24,7 @@ OF_INDEX_ONE = ("rosenbrock",)
 
 TRACE, STEP, COMPARED, RELAXING = 1, 2, 4, 8
 """Kinds of rows (their second column, a sum); RELAXING: compared, where something relaxes at once behind a
-restart; in the place of energies these have what core/run/run.c (`relaxes`) tells."""
+restart; in the place of energies these have what core/run/rows.c (`relaxes`) tells."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,8 +89,26 @@ def named(name: str, shape: Shape, elements: Elements, position: int) -> tuple[s
     return own + re.sub(r"^\.\d+", "", tail), file, line
 
 
+class _Elements:
+    """What has a name and a shape, and perhaps names of its elements."""
+
+    __slots__ = ()
+    name: str
+    shape: Shape
+    elements: Elements
+
+    @property
+    def size(self) -> int:
+        """Number of elements."""
+        return count(self.shape)
+
+    def named(self, position: int, name: str = "") -> str:
+        """What an element is called; name: instead of the family's own."""
+        return named(name or self.name, self.shape, self.elements, position)[0]
+
+
 @dataclass(frozen=True, slots=True)
-class Family:
+class Family(_Elements):
     """Unknowns of one name.  owner: coordinate (q f p) or constraint label (kappa mu)."""
 
     name: str
@@ -101,18 +119,9 @@ class Family:
     shape: Shape
     elements: Elements = ()
 
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return count(self.shape)
-
-    def named(self, position: int, name: str = "") -> str:
-        """What an element is called; name: instead of the family's own."""
-        return named(name or self.name, self.shape, self.elements, position)[0]
-
 
 @dataclass(frozen=True, slots=True)
-class RowFamily:
+class RowFamily(_Elements):
     """Rows of one label.  name, stored, rate: of rows of block observe; content: of block initial."""
 
     block: str
@@ -128,15 +137,6 @@ class RowFamily:
     rate: bool
     content: bool
     elements: Elements = ()
-
-    @property
-    def size(self) -> int:
-        """Number of rows."""
-        return count(self.shape)
-
-    def named(self, position: int, name: str = "") -> str:
-        """What a row is called; name: instead of the family's own."""
-        return named(name or self.name, self.shape, self.elements, position)[0]
 
     def at(self, position: int) -> RowLabel:
         """The label of one row."""

@@ -242,6 +242,7 @@ def plan(description: Description, name: str) -> Form:
     if bare:
         k_q = k_f = k_rows = np.zeros(0, np.int32)
     number = int(k_q.size)
+    # rows of each group of blocks, one behind the other; a block adds to those of its group
     nu = at.copy()
     tables: dict[str, Ints] = {}
     groups: list[tuple[str, int, int]] = []
@@ -262,7 +263,7 @@ def plan(description: Description, name: str) -> Form:
                 tables[group][k] = number
                 groups.append((group, k, number))
                 number += description.rows[k].size
-        if group == "kinematics":
+        if group == "kinematics":  # multipliers nu of the stabilised form, in the rows q' = f
             for k in description.families_of("kappa"):
                 nu[k] = unknowns
                 kind.append(("nu", description.families[k].size))
@@ -272,6 +273,7 @@ def plan(description: Description, name: str) -> Form:
             calls.append(Planned(block, at, tables[group]))
             if block + SCALE in description.blocks:
                 scales.append(Planned(block + SCALE, at, tables[group]))
+    # unknowns of a start behind those of the form
     for one in own:
         size = sum(description.families[k].size for k in description.families_of(one))
         kind.append((one, size))

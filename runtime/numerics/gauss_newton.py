@@ -285,6 +285,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             largest = float(np.abs(scaled).max(initial=0.0))
             return (largest if np.isfinite(largest) else np.inf), scaled
 
+        # where it stands; it ends at round-off, or where nothing has become better for long
         size, scaled = measure(x)
         if size < best.residual:
             stale = stale if size > 0.5 * best.residual else 0
@@ -294,6 +295,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             break
         if problem.work.done:
             break
+        # the nearest point at which the linear rows hold
         norm, rows = float(np.linalg.norm(scaled)), [scaled[problem.use]]
         del scaled
         try:
@@ -303,6 +305,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
         problem.spare()
         if not np.isfinite(target).all():
             break
+        # on towards it by halves, until the rows are nearer to zero
         step, tried, move = 1.0, x, np.subtract(target, linear.moved(x), out=target)
         move *= linear.unit
 

@@ -74,6 +74,12 @@ class Structure:
     singular: int = 0
     left_out: tuple[tuple[int, int], ...] = ()
 
+    @property
+    def counts(self) -> dict[str, int | None]:
+        """What is told of a model, and claimed by `expect static`."""
+        names = "coordinates", "m1", "m2", "dof", "configuration_dof", "redundant", "index"
+        return {name: getattr(self, name) for name in names}
+
 
 def _rows_to_one(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     size = np.maximum(np.abs(a).max(axis=1, initial=0.0), np.abs(b).max(axis=1, initial=0.0))

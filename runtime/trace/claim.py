@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import errno
-import fcntl
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.locks import lock as locked
 
-_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL)
+_OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)  # Windows has neither
 
 
 @contextlib.contextmanager
@@ -38,13 +37,13 @@ def claimed(path: Path) -> Iterator[None]:
 def being_written(path: Path) -> bool:
     """Whether a living run holds the trace at `path` (resolved)."""
     try:
-        handle = os.open(_lock_of(path), os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC)
+        handle = os.open(_lock_of(path), _OPEN)
     except OSError:
         return False
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        return error.errno not in _NO_LOCKS
+        locked(handle)
+    except OSError:
+        return True
     finally:
         os.close(handle)
     return False
@@ -57,14 +56,13 @@ def _lock_of(path: Path) -> Path:
 def _locked(lock: Path) -> int:
     """A handle of the lock's file; that of a run which just ended may have lost its name meanwhile, then once more."""
     while True:
-        handle = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        handle = os.open(lock, _OPEN | os.O_CREAT, 0o600)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            if error.errno not in _NO_LOCKS:
-                os.close(handle)
-                raise
-            return handle
+            if not locked(handle):
+                return handle
+        except OSError:
+            os.close(handle)
+            raise
         with contextlib.suppress(FileNotFoundError):
             if lock.stat().st_ino == os.fstat(handle).st_ino:
                 return handle

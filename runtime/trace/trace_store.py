@@ -8,11 +8,9 @@ fills up raises: the handle is turned to memory before HDF5 closes the file, whi
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import gc
 import os
 import re
-import resource
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -23,6 +21,7 @@ from sysdyn.names import stored
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Description, Floats
 from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.locks import lock, unlock
 from sysdyn.values import dataclass
 
 BLOCK = 1024
@@ -117,6 +116,32 @@ def clear(path: Path) -> None:
                 Path(item).unlink()
 
 
+def _most() -> float:
+    """Bytes that a file of this process may have."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return float("inf")
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    return float("inf") if limit == resource.RLIM_INFINITY else limit
+
+
+@contextlib.contextmanager
+def _unlimited() -> Iterator[None]:
+    """Files may have what the hard limit lets them have."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        yield
+        return
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limits[1], limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
 class Store:
     """A file of the trace's layout.  Raises OSError, RuntimeError, ValueError where it cannot be written.
 
@@ -138,7 +163,7 @@ class Store:
         mode = "x" if like is None else "r+"
         self._file = h5py.File(path, mode, libver=("earliest", "v110"))
         with contextlib.suppress(OSError):
-            fcntl.flock(self._file.id.get_vfd_handle(), fcntl.LOCK_UN)
+            unlock(self._file.id.get_vfd_handle())
         try:
             if like is None:
                 hdf5.say(self._file.id, {**layout.attributes, "final": np.int64(0), "met": np.int64(0), "judged": ""})
@@ -155,12 +180,12 @@ class Store:
         """Somebody opened it while it was the trace, and has not closed it: what is read must not change."""
         handle = self._file.id.get_vfd_handle()
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if lock(handle):  # else locks do not work here: HDF5 took none either
+                unlock(handle)
         except BlockingIOError:
             return True
         except OSError:
-            return False  # locks do not work here: HDF5 took none either
-        fcntl.flock(handle, fcntl.LOCK_UN)
+            return False
         return False
 
     def _create(self, layout: Layout) -> None:
@@ -211,12 +236,10 @@ class Store:
         blocks = rows // BLOCK + 2
         whole = len(self._sets) * blocks * BLOCK * 8
         need = whole // (1 if rows >= BLOCK else 4) + HEAD
-        limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
         size = self.path.stat().st_size if self.path.exists() else 0
-        if limit != resource.RLIM_INFINITY and limit < size + whole + HEAD:
+        if _most() < size + whole + HEAD:
             raise OSError(27, "the trace would outgrow the limit on the size of files")
-        disk = os.statvfs(self.path.parent)
-        if disk.f_bavail * disk.f_frsize < need:
+        if shutil.disk_usage(self.path.parent).free < need:
             raise OSError(28, "no space left on the disk for the trace")
 
     def close_with(self, attributes: Mapping[str, Mapping[str, Any]], events: Sequence[Happened] = ()) -> None:
@@ -246,23 +269,20 @@ class Store:
         if self._closed:
             return
         self._closed = True
-        limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-        with contextlib.suppress(Exception):
-            resource.setrlimit(resource.RLIMIT_FSIZE, (limits[1], limits[1]))
-            handle = self._file.id.get_vfd_handle()
-            copy = os.memfd_create("sysdyn-trace")
-            size, offset = os.fstat(handle).st_size, 0
-            while offset < size:
-                sent = os.sendfile(copy, handle, offset, size - offset)
-                if sent == 0:
-                    break
-                offset += sent
-            os.dup2(copy, handle)
-            os.close(copy)
-        with contextlib.suppress(Exception):
-            self._file.close()
-        # every handle of the file dies while its writes still succeed
-        self._sets = []
-        gc.collect()
-        with contextlib.suppress(Exception):
-            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        with _unlimited():
+            with contextlib.suppress(Exception):
+                handle = self._file.id.get_vfd_handle()
+                copy = os.memfd_create("sysdyn-trace")
+                size, offset = os.fstat(handle).st_size, 0
+                while offset < size:
+                    sent = os.sendfile(copy, handle, offset, size - offset)
+                    if sent == 0:
+                        break
+                    offset += sent
+                os.dup2(copy, handle)
+                os.close(copy)
+            with contextlib.suppress(Exception):
+                self._file.close()
+            # every handle of the file dies while its writes still succeed
+            self._sets = []
+            gc.collect()

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 from sysdyn.api import load, simulate
 from sysdyn.cli.main import run
-from sysdyn.runtime.condense import condensed as condensing
+from sysdyn.runtime.condense import condenser as condensing
 from sysdyn.runtime.integrate import integrate
 from sysdyn.runtime.integrate.rows import settlers
 from sysdyn.runtime.model import core_library as lib

@@ -15,7 +15,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model.expression import fresh
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.dsl.text.source import SourceText
-from sysdyn.runtime.condense.condensed import condensed
+from sysdyn.runtime.condense.condenser import condensed
 from sysdyn.runtime.model import carrier
 from sysdyn.runtime.model.system import System
 

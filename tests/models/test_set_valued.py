@@ -4,23 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from set_valued import ALL, PRIMAL, run
 from sysdyn import api
 
-PRIMAL = pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
-ALL = pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 G0 = 9.80665
-
-
-def run(tmp_path, text, formulation=None, accuracy=1e-6, **asked):
-    (tmp_path / "model.sd").write_text(text)
-    given = {"formulation": formulation, "accuracy": accuracy, "output": tmp_path / "out.h5"} | asked
-    return api.simulate(tmp_path / "model.sd", **given)
-
-
-def codes(text):
-    return [(d.code, d.severity) for d in api.check(text) if d.severity == "error" or d.code == "N608"]
-
-
 BLOCK = """\
 model block {
   param mu = 0.5
@@ -133,91 +120,6 @@ def test_sticks_and_slips_on_a_belt_as_a_dissipator_does(tmp_path, formulation, 
         assert np.abs(values[0] - values[1]).max() < 20 * accuracy, name
 
 
-LIMITER = """\
-model charge {
-  param G = 0 S
-  node a, b, k: electrical
-  V: effort(e = 10 V) a -> ground
-  L: dissipator(f = LAW) a -> b
-  R: dissipator(e = 1 kohm*f) b -> k
-  C: potential(e = q/(1 uF)) k -> ground
-  init C.e = 0 V
-}
-scene s of charge {
-  time 0 s to 20 ms
-  trace C.e, L.e, L.f every 0.5 ms
-}
-"""
-
-
-@ALL
-@pytest.mark.parametrize("leak", [0.0, 1e-4])
-@pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock", "auto"])
-@pytest.mark.one_in(3)
-def test_a_capacitor_is_charged_by_a_limited_current(tmp_path, formulation, leak, method):
-    """At 1 mA + G e until nothing is left over the limiter, then by R C."""
-    law = "1 mA*setsign(e)" + (" + 0.1 mS*e" if leak else "")
-    trace = run(tmp_path, LIMITER.replace("LAW", law), formulation, method=method)
-    rate, end = leak / (1e-6 * (1.0 + leak * 1e3)), 10.0 + (1e-3 / leak if leak else 0.0)
-    instant = -np.log1p(-9.0 / end) / rate if leak else 9e-3
-    t = trace.time
-    limited = -end * np.expm1(-rate * t) if leak else 1e3 * t
-    expected = np.where(t < instant, limited, 10.0 - np.exp(-np.maximum(t - instant, 0.0) / 1e-3))
-    assert np.abs(trace["C.e"].values - expected).max() < 1e-5
-    assert [e.time for e in trace.events] == pytest.approx([instant], abs=1e-8)
-
-
-@ALL
-@pytest.mark.one_in(3)
-def test_a_limiter_stops_an_inductor_without_a_jump(tmp_path, formulation):
-    """A current within its limit is held at it, and let go where the voltage turns: the same as a pair of one-way
-    constraints says.
-    """
-    text = """\
-component pair { branch: electrical; psi high: f <= 1 mA; psi low: f >= -1 mA }
-model coil {
-  node a, b, k: electrical
-  V: effort(e = 3 V*cos(500 rad/s*t)) a -> ground
-  L: ELEMENT a -> b
-  I: kinetic(p = 1 H*f) b -> k
-  R: dissipator(e = 1 kohm*f) k -> ground
-  init I.f = 0 A
-}
-scene s of coil { time 0 s to 30 ms; trace I.f, L.e every 0.5 ms }
-"""
-    one = run(tmp_path, text.replace("ELEMENT", "dissipator(f = 1 mA*setsign(e))"), formulation, method="radau")
-    other = run(tmp_path, text.replace("ELEMENT", "pair"), "lagrangian", method="radau")
-    at = np.linspace(0.1e-3, 29.9e-3, 50)
-    for name, size in (("I.f", 1e-3), ("L.e", 2.0)):
-        values = [np.interp(at, trace.time, trace[name].values) for trace in (one, other)]
-        assert np.abs(values[0] - values[1]).max() < 1e-5 * size, name
-
-
-@ALL
-@pytest.mark.one_in(3)
-def test_limiters_of_an_array_end_one_after_the_other(tmp_path, formulation):
-    text = """\
-model bank {
-  param n = 3
-  node a, b[1..n], k[1..n]: electrical
-  V: effort(e = 10 V) a -> ground
-  for i in 1..n {
-    L[i]: dissipator(f = i*1 mA*setsign(e)) a -> b[i]
-    R[i]: dissipator(e = 1 kohm*f) b[i] -> k[i]
-    C[i]: potential(e = q/(1 uF)) k[i] -> ground
-    init C[i].e = 0 V
-  }
-}
-scene s of bank { time 0 s to 20 ms; trace C[1].e, C[2].e, C[3].e every 0.5 ms }
-"""
-    trace = run(tmp_path, text, formulation)
-    for i in (1, 2, 3):
-        instant = (10.0 - i) / i * 1e-3
-        rest = 10.0 - i * np.exp(-np.maximum(trace.time - instant, 0.0) / 1e-3)
-        expected = np.where(trace.time < instant, i * 1e3 * trace.time, rest)
-        assert np.abs(trace[f"C[{i}].e"].values - expected).max() < 1e-5
-
-
 TWO = """\
 model two {
   coord x: translation = 0 m
@@ -280,96 +182,11 @@ scene s of one {{ time 0 s to 1.2 s; trace x, x' every 0.05 s }}
     assert np.abs(trace["x'"].values - expected).max() < 1e-7
 
 
-def relay(law, begin="init x' = 0 m/s", end="10 s"):
-    return f"""\
-model relay {{
-  coord x: translation = 1 m
-  energy T* = 1/2*(1 kg)*x'^2
-  implicit F: N ~ 0 N
-  work F on x
-  gamma g: F = {law}
-  {begin}
-}}
-scene s of relay {{ time 0 s to {end}; trace x, F every 0.1 s }}
-"""
-
-
-@PRIMAL
-def test_a_relay_of_a_position_lets_it_through(tmp_path, formulation):
-    """Parabolas of a period of 4 s: the position cannot be held."""
-    trace = run(tmp_path, relay("-(2 N)*setsign(x)"), formulation)
-    t = np.mod(trace.time, 4.0)
-    expected = np.select([t < 1, t < 3], [1 - t**2, -1 + (t - 2) ** 2], 1 - (4 - t) ** 2)
-    assert np.abs(trace["x"].values - expected).max() < 1e-6
-
-
-def test_a_relay_of_what_it_gives_follows_what_is_asked(tmp_path):
-    """F in 2 N setsign(w - F) is w within 2 N: no state is on the way."""
-    trace = run(tmp_path, relay("2 N*setsign(3 N*cos(2 rad/s*t) - F)", end="5 s"))
-    assert np.abs(trace["F"].values - np.clip(3 * np.cos(2 * trace.time), -2.0, 2.0)).max() < 1e-6
-
-
-def test_a_thermostat_holds_its_temperature(tmp_path):
-    text = """\
-model oven {
-  state T: K = 280 K
-  implicit P: W ~ 0 W
-  dynamic T' = (P - 10 W/K*(T - 270 K))/(100 J/K)
-  gamma relay: P = 250 W + 200 W*setsign(290 K - T)
-}
-scene s of oven { time 0 s to 60 s; trace T, P every 1 s }
-"""
-    trace = run(tmp_path, text)
-    instant = 10.0 * np.log(35.0 / 25.0)
-    expected = np.where(trace.time < instant, 315.0 - 35.0 * np.exp(-trace.time / 10.0), 290.0)
-    assert np.abs(trace["T"].values - expected).max() < 1e-6
-    assert np.abs(trace["P"].values[trace.time > instant + 0.1] - 200.0).max() < 1e-6
-
-
-@PRIMAL
-@pytest.mark.parametrize("speed", ["0.3 m/s", "0 m/s"])
-@pytest.mark.one_in(3)
-def test_a_relay_of_a_far_speed_is_a_sign(tmp_path, formulation, speed):
-    """The force acts on the neighbour of what it reads: that goes through zero at once."""
-    text = f"""\
-model far {{
-  coord x: translation = 0 m
-  coord y: translation = 0.1 m
-  energy T* = 1/2*(1 kg)*(x'^2 + y'^2)
-  energy V = 1/2*(40 N/m)*(x - y)^2 + 1/2*(20 N/m)*y^2
-  implicit F: N ~ 0 N
-  work F on x
-  gamma g: F + 1 N*setsign(y') = 0 N
-  init x' = 0 m/s
-  init y' = {speed}
-}}
-scene s of far {{ time 0 s to 5 s; trace x, y every 0.1 s }}
-"""
-    one, other = (run(tmp_path, said, formulation) for said in (text, text.replace("setsign", "sign")))
-    at = np.linspace(0.0, 5.0, 51)
-    values = [np.interp(at, trace.time, trace["x"].values) for trace in (one, other)]
-    assert np.abs(values[0] - values[1]).max() < 1e-9
-
-
 def test_a_law_reads_another_speed_than_its_own(tmp_path):
     """e = c setsign(f - y') on x: the effort acts along x, whatever moves y."""
     text = TWO.replace("FRICTION", "A: dissipator(e = 3 N*setsign(f - y')) on x; init x' = 1 m/s")
     trace = run(tmp_path, text)
     assert np.abs(trace["y"].values).max() == 0.0
-
-
-@pytest.mark.parametrize("law", [
-    "gamma g: F = -(3 N)*sin(setsign(x'))",
-    "gamma g: F = -(3 N)*setsign(x')^2",
-    "gamma g: F = -(3 N)*setsign(x' + 1 m/s*setsign(x'))",
-    "gamma g: F = -(3 N)*sum(i in 1..2: setsign(x' - i*1 m/s))",
-    "gamma g: F = 0 N; work -(3 N)*setsign(x') on x",
-    "gamma g: F = 0 N; energy V = 3 N*x*setsign(x)",
-    "gamma g: F = 0 N; K: kinetic(p = 3 N.s*setsign(f)) on x",
-])  # fmt: skip
-def test_what_no_relation_can_say_is_refused(law):
-    text = relay("0 N").replace("gamma g: F = 0 N", law)
-    assert codes(text) == [("E705", "error")]
 
 
 PLAY = """\

@@ -1,5 +1,5 @@
-import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -143,9 +143,8 @@ def test_too_little_room_is_seen_before_anything_is_written(tmp_path, monkeypatc
     assert Trace.open(tmp_path / "o.h5").time.size == 0
     writer.append(np.ones((10, 10)))
     writer.flush()
-    real = os.statvfs(tmp_path)
-    fake = type("Disk", (), {"f_bavail": 0, "f_frsize": real.f_frsize})
-    monkeypatch.setattr(os, "statvfs", lambda path: fake)
+    full = shutil.disk_usage(tmp_path)._replace(free=0)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: full)
     writer.append(np.ones((10, 10)))
     with pytest.raises(TraceError, match="no space"):
         writer.flush()

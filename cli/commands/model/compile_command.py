@@ -21,7 +21,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model import network_text
 from sysdyn.dsl.model.network import Event, Switch
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.condense.condensed import departures
+from sysdyn.runtime.condense.condenser import departures
 from sysdyn.runtime.model.failures import NoSuchForm
 from sysdyn.runtime.model.system import System
 

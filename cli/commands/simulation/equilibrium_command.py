@@ -8,7 +8,7 @@ import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER
 from sysdyn.cli.options import chosen
-from sysdyn.cli.progress import SEARCH, ProgressLine
+from sysdyn.cli.progress import SEARCH
 from sysdyn.cli.run.request.asked import Request
 
 
@@ -33,12 +33,8 @@ def command(console: Console, tries: int, no_prune: bool, index: str | None, **o
     from sysdyn.cli.analysis.states import NO_REST
     from sysdyn.dsl.model import expression as ex
 
-    line = ProgressLine("never" if console.quiet else "auto", SEARCH)
-    try:
-        with ex.fresh():
-            made = equilibria(Request(index=index, **options), tries, console.report, line)
-    finally:
-        line.clear()
+    with console.progress(ahead=SEARCH) as line, ex.fresh():
+        made = equilibria(Request(index=index, **options), tries, console.report, line)
     if made is None:
         return console.finish(1)
     found, states, why = made

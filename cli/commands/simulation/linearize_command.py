@@ -65,6 +65,7 @@ def command(
     from sysdyn.dsl.model import expression as ex
     from sysdyn.runtime.linear.tangent import NoLinearisation
 
+    # what is linearised, and where
     form = "3" if index in (None, "auto") else str(index)
     assert form in INDICES
     request = Request(until=at, index=index, **options)
@@ -78,9 +79,8 @@ def command(
             return console.finish(SOLVER if failure else 1)
         from sysdyn.cli.analysis.linear import inputs_of
 
-        chosen_inputs = inputs_of(found.target, found.prepared, moved)
         try:
-            linear = linearised(found, chosen_inputs, form)
+            linear = linearised(found, inputs_of(found.target, found.prepared, moved), form)
         except NoLinearisation as error:
             console.report.error("E607", f"no linearisation: {error}", found.prepared.network.place)
             return console.finish(1)
@@ -90,6 +90,7 @@ def command(
         if locus is not None:
             name, values = _along(locus, found)
             over = answers.locus(request, name, values, rest=equilibrium, found=found)
+    # what is told of it
     console.result = _result(linear, found.prepared.formulation, form)
     console.say(_heading(linear, found.target.name, found.prepared.formulation))
     if found.prepared.network.discretes:
@@ -207,18 +208,38 @@ def _pair(value: complex) -> list[float]:
     return [value.real + 0.0, value.imag + 0.0]
 
 
+def _shares(states: Sequence[str], names: Sequence[str], mode: Any) -> list[float]:
+    """Of each unknown in a mode; 0 for those that are none of its states."""
+    share = dict(zip(names, mode.participation, strict=True))
+    return [float(share.get(name, 0.0)) for name in states]
+
+
+def _mode(mode: Any, names: Sequence[str], stores: Sequence[str], energies: Sequence[float]) -> dict[str, Any]:
+    return {
+        "eigenvalue": _pair(mode.eigenvalue),
+        "frequency": mode.frequency,
+        "damping": mode.damping,
+        "participation": {n: float(s) for n, s in zip(names, mode.participation, strict=True)},
+        "energy": {n: float(s) for n, s in zip(stores, energies, strict=True)},
+        "shape": {n: _pair(complex(v)) for n, v in zip(names, mode.shape, strict=True)},
+    }
+
+
+def _transfer(linear: Any, found: Any) -> dict[str, Any]:
+    return {
+        "output": linear.outputs[found.output],
+        "input": linear.inputs[found.input],
+        "poles": [_pair(complex(p)) for p in found.poles],
+        "zeros": [_pair(complex(z)) for z in found.zeros],
+        "gain": found.gain,
+        "static": found.static,
+        "improper": list(found.improper),
+    }
+
+
 def _result(linear: Any, formulation: str, index: str) -> dict[str, Any]:
     """The object of --json."""
     form, small = linear.descriptor, linear.reduced
-    wide = [0.0] * len(form.states)
-    at = {name: k for k, name in enumerate(form.states)}
-    shares = []
-    for mode in linear.modes:
-        row = list(wide)
-        for name, share in zip(small.names, mode.participation, strict=True):
-            if name in at:
-                row[at[name]] = float(share)
-        shares.append(row)
     result = {
         "E": form.e.tolist(),
         "A": form.a.tolist(),
@@ -229,17 +250,10 @@ def _result(linear: Any, formulation: str, index: str) -> dict[str, Any]:
         "inputs": list(linear.inputs),
         "outputs": list(linear.outputs),
         "eigenvalues": [_pair(mode.eigenvalue) for mode in linear.modes],
-        "participation": shares,
+        "participation": [_shares(form.states, small.names, mode) for mode in linear.modes],
         "modes": [
-            {
-                "eigenvalue": _pair(mode.eigenvalue),
-                "frequency": mode.frequency,
-                "damping": mode.damping,
-                "participation": {n: float(s) for n, s in zip(small.names, mode.participation, strict=True)},
-                "energy": {n: float(s) for n, s in zip(linear.stores, shares_, strict=True)},
-                "shape": {n: _pair(complex(v)) for n, v in zip(small.names, mode.shape, strict=True)},
-            }
-            for mode, shares_ in zip(linear.modes, linear.energies, strict=True)
+            _mode(mode, small.names, linear.stores, shares)
+            for mode, shares in zip(linear.modes, linear.energies, strict=True)
         ],
         "reduced": {
             "A": small.a.tolist(),
@@ -248,18 +262,7 @@ def _result(linear: Any, formulation: str, index: str) -> dict[str, Any]:
             "D": small.d.tolist(),
             "states": list(small.names),
         },
-        "transfer": [
-            {
-                "output": linear.outputs[t.output],
-                "input": linear.inputs[t.input],
-                "poles": [_pair(complex(p)) for p in t.poles],
-                "zeros": [_pair(complex(z)) for z in t.zeros],
-                "gain": t.gain,
-                "static": t.static,
-                "improper": list(t.improper),
-            }
-            for t in linear.transfers
-        ],
+        "transfer": [_transfer(linear, t) for t in linear.transfers],
         "t": linear.t,
         "point": dict(zip(form.states, linear.y.tolist(), strict=False)),
         "moving": linear.moving,

@@ -8,11 +8,10 @@ from typing import Any
 
 import click
 from sysdyn.cli import whole_files
-from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.console import Console
 from sysdyn.cli.failures import SOLVER, UsageError
-from sysdyn.cli.options import chosen, solved
+from sysdyn.cli.options import scene_command
 from sysdyn.cli.page.columns import aligned
-from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.reduce.activity import Activities
 from sysdyn.cli.reduce.reduction import Cost, Reduced, reduce
 from sysdyn.cli.report.balance import WORDS
@@ -23,11 +22,7 @@ BAR = 24
 """Characters of the longest bar."""
 
 
-@with_console("reduce")
-@click.argument("file")
-@chosen
-@solved
-@click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
+@scene_command("reduce", "runs")
 @click.option("-o", "output", metavar="FILE.sd", help="The reduced text. Default: <stem>-reduced.sd beside FILE.")
 @click.option("--plot", metavar="FILE.png|.svg", help="Activities as bars, and where the energy went.")
 @click.option("--activity", "only", is_flag=True, help="The table of activities alone.")
@@ -54,14 +49,8 @@ def command(
         raise UsageError(f"-o {target} is the model itself")
     if plot is not None and Path(plot).suffix not in KINDS:
         raise UsageError(f"--plot '{plot}': a picture of activities is one of {', '.join(KINDS)}")
-    line = ProgressLine("never" if console.quiet else progress)
-    with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
-        try:
-            found = reduce(
-                request, console.report, Path(folder), only=only, budget=budget_of(max_wall), progress=line
-            )  # fmt: skip
-        finally:
-            line.clear()
+    with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder, console.progress(progress) as line:
+        found = reduce(request, console.report, Path(folder), only=only, budget=budget_of(max_wall), progress=line)
     if found is None:
         return console.unable() if console.report.failed else console.finish(SOLVER)
     kept = any(t.kept for t in found.trials)

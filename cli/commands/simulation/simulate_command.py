@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.console import Console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.options import chosen, solved
+from sysdyn.cli.options import scene_command
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.whole_files import named
 
@@ -23,12 +23,7 @@ SHOWN = 4
 """Conserved quantities that the summary lists."""
 
 
-@with_console("simulate")
-@click.argument("file")
-@chosen
-@solved
-@click.option("--until", metavar="T", help="End of the run; an expression, a bare number in s.")
-@click.option("--at", metavar="T1,T2,...", help="Instants that the trace holds too.")
+@scene_command("simulate", "run", "the trace holds")
 @click.option("-o", "output", metavar="TRACE.h5", help="Default: <stem>-<scene>.h5 here.")
 @click.option("--accuracy-check", is_flag=True, help="A second run by another method must agree.")
 @click.option("--no-timings", is_flag=True, help="Leave wall and CPU times out of the trace.")
@@ -38,14 +33,11 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
     from sysdyn.cli.run.running import run
     from sysdyn.cli.run.start.starting import described, shortened, sought
 
-    line = ProgressLine("never" if console.quiet else progress)
     request = Request(timings=not no_timings, **options)
     if request.output == "-" and console.as_json:
         raise UsageError("-o - and --json both want standard output")
-    try:
+    with console.progress(progress) as line:
         ran = _streamed(request, console, line) if _streams(request.output) else run(request, console.report, line)
-    finally:
-        line.clear()
     if ran is None:
         return console.unable()
     console.result = _result(ran)

@@ -11,7 +11,6 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError, worst
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import aligned
-from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.run.many.crew import cores
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.sweep.in_core import KEEPS
@@ -91,12 +90,9 @@ def command(
         raise UsageError(f"-o {target} is the model itself")
     if target.is_file() and not replaceable(target, sweep=True):
         raise UsageError(f"-o {target} exists and is no sweep of sysdyn: give another name, or remove it")
-    line = ProgressLine("never" if console.quiet else progress)
     number = jobs or said.get("jobs") or cores()
-    try:
+    with console.progress(progress) as line:
         swept = sweep(request, asked, target, number, line, timings=not no_timings, keep=kept, dask=dask, runner=runner)
-    finally:
-        line.clear()
     return _shown(console, swept, plot)
 
 

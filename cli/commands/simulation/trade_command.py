@@ -10,11 +10,10 @@ from typing import Any
 import click
 from sysdyn import __version__
 from sysdyn.cli import whole_files
-from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.console import Console
 from sysdyn.cli.failures import SOLVER, UsageError
-from sysdyn.cli.options import chosen, side_by_side, solved
+from sysdyn.cli.options import scene_command, side_by_side
 from sysdyn.cli.page.columns import aligned
-from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.run.request import lock, targets
 from sysdyn.cli.run.request.asked import Request, instants_of
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
@@ -28,11 +27,7 @@ from sysdyn.dsl.text.diagnostics import Report, SourceText
 KINDS = (".html", ".png", ".svg")
 
 
-@with_console("trade")
-@click.argument("file")
-@chosen
-@solved
-@click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
+@scene_command("trade", "runs")
 @click.option("-o", "output", metavar="FILE.html|.png|.svg", help="The work-precision plot; a page that zooms.")
 @click.option("--full", is_flag=True, help="Every combination at every tolerance from 1e-1 to 1e-12.")
 @side_by_side
@@ -60,17 +55,14 @@ def command(
     target = _target(output)
     if locks and options["file"] == "-":
         raise UsageError("--lock of a text from standard input: a lock stands beside a file")
-    line = ProgressLine("never" if console.quiet else progress)
     request = Request(**options)
     try:
-        with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
+        with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder, console.progress(progress) as line:
             budget = budget_of(max_wall)
             found = trade(request, console.report, Path(folder), full=full, budget=budget, progress=line, jobs=jobs)
     except NoReference as error:
         console.complain(f"there is no reference: {error}", SOLVER, error.finding)
         return console.finish(SOLVER)
-    finally:
-        line.clear()
     if found is None:
         return console.unable()
     best = found.chosen

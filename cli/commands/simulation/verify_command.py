@@ -7,23 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.console import Console
 from sysdyn.cli.failures import INTERRUPTED, SOLVER, worst
-from sysdyn.cli.options import chosen, side_by_side, solved
+from sysdyn.cli.options import scene_command, side_by_side
 from sysdyn.cli.page.columns import aligned
-from sysdyn.cli.progress import ProgressLine
 
 if TYPE_CHECKING:
     from sysdyn.cli.verify.agreement import Gap
     from sysdyn.cli.verify.verified import Run, Verified
 
 
-@with_console("verify")
-@click.argument("file")
-@chosen
-@solved
-@click.option("--until", metavar="T", help="End of the runs; an expression, a bare number in s.")
-@click.option("--at", metavar="T1,T2,...", help="Instants that are compared too.")
+@scene_command("verify", "runs", "are compared")
 @click.option("-o", "output", metavar="DIR", help="Keep the traces there, as FORMULATION-METHOD.h5.")
 @side_by_side
 @click.option("--full", is_flag=True, help="Do not take reduced sizes from the ci.toml above FILE's folder.")
@@ -45,7 +39,6 @@ def command(
     from sysdyn.cli.run.request.sizes import sizes
     from sysdyn.cli.verify.verification import verify
 
-    line = ProgressLine("never" if console.quiet else progress)
     request = Request(timings=not no_timings, **options)
     path, reduced = (Path(), ()) if full else sizes(request.file)
     given = {name for name, _ in request.settings}
@@ -56,10 +49,8 @@ def command(
     folder = None if output is None else Path(output)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-    try:
+    with console.progress(progress) as line:
         found = verify(request, console.report, folder, line, jobs)
-    finally:
-        line.clear()
     if found is None:
         return console.unable()
     console.result = _result(found, keep=output is not None, timings=not no_timings)

@@ -6,18 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import click
-from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.console import Console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.options import chosen, solved
-from sysdyn.cli.progress import ProgressLine
+from sysdyn.cli.options import scene_command
 
 
-@with_console("report")
-@click.argument("file")
-@chosen
-@solved
-@click.option("--until", metavar="T", help="End of the run; an expression, a bare number in s.")
-@click.option("--at", metavar="T1,T2,...", help="Instants that the traces hold too.")
+@scene_command("report", "run", "the traces hold")
 @click.option("-o", "output", metavar="FILE.html", help="Default: <stem>-<scene>.html here.")
 def command(console: Console, progress: str, output: str | None, **options: Any) -> int:
     """Write one page about a scene of FILE: text, network, laws, equations, run, energy balance.
@@ -34,13 +28,10 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
     from sysdyn.cli.run.request.asked import Request
     from sysdyn.dsl.model import expression as ex
 
-    line = ProgressLine("never" if console.quiet else progress)
     request = Request(**options)
     with ex.fresh():
-        try:
+        with console.progress(progress) as line:
             study = collect(request, console.report, line)
-        finally:
-            line.clear()
         if study is None:
             return console.unable()
         text = page(study)

@@ -106,13 +106,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     return {
         "ok": not report.failed,
         "formulation": prepared.formulation,
-        "coordinates": facts.coordinates,
-        "m1": facts.m1,
-        "m2": facts.m2,
-        "dof": facts.dof,
-        "configuration_dof": facts.configuration_dof,
-        "redundant": facts.redundant,
-        "index": facts.index,
+        **facts.counts,
         "moved": described(started.state),
         "passivity": {
             "verdict": judged.verdict,

@@ -68,22 +68,8 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             here = [Related("this is left over", where), *related]
             report.error("E903", f"{said}: {left}", zero.place, help=f"{zero.name} other than zero{free}", related=here)
         case _ if error.candidates:
-            fixed = _listed(prepared, error)
-            left = f"{names}: residual {_residual(prepared, error)}"
-            own = {r.label.rstrip("'") for r in error.rows} <= {c.label.rstrip("'") for c in error.candidates}
-            itself = own and all(not r.file for r in error.rows)
-            message = f"fixed initial values of {fixed} contradict {left}"
-            if itself:
-                left = _residual(prepared, error)
-                message, fixed = f"fixed initial values contradict each other: {fixed}, residual {left}", "them"
-            among = "one of " if itself or len(set(fixed.split(", "))) > 1 else ""
-            free = f"free {among}{fixed}: '~' for '='"
-            still = [r.label for r in error.rows if r.kind == "dynamics" and _without_inertia(prepared, r.label)]
-            free += f"; or {still[0]} lacks an inertia: energy T* = 1/2*m*{still[0]}'^2" if still else ""
-            gaps = {switch.name for switch in prepared.network.switches if switch.kind == "phi"}
-            struck = not itself and any(r.label in gaps for r in error.rows)
-            free += "; or the rate behind the impact: a run begins when it is over" if struck else ""
-            report.error("E903", message, where, help=free, related=related)
+            message, help_ = _contradicting(prepared, error, names)
+            report.error("E903", message, where, help=help_, related=related)
         case "fixed" if any(row.kind == "initial" for row in error.rows):
             message = f"an initial value contradicts the constraints: residual {_residual(prepared, error)}"
             report.error("E903", message, where, help="the value that they leave, or '~' for '='")
@@ -102,11 +88,35 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             report.error("E903", message, where, help=help_)
         case _:
             message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
-            sides = {switch.name for switch in prepared.network.switches}  # no guess mends a short circuit
-            one = next((r.label for r in error.rows if re.sub(r"\[.*", "", r.label) in sides), None)
-            given = f"a resistance in series with {one}, which passes or stops all that the others ask for"
-            help_ = "guesses nearer to a solution: init ... ~ ..."
-            report.error("E903", message, where, help=help_ if one is None else f"{given}; else {help_}")
+            report.error("E903", message, where, help=_nearer(prepared, error))
+
+
+def _contradicting(prepared: Prepared, error: InconsistentStart, names: str) -> tuple[str, str]:
+    """Fixed values that contradict each other, or rows (names); what may be freed."""
+    fixed = _listed(prepared, error)
+    left = f"{names}: residual {_residual(prepared, error)}"
+    own = {r.label.rstrip("'") for r in error.rows} <= {c.label.rstrip("'") for c in error.candidates}
+    itself = own and all(not r.file for r in error.rows)
+    message = f"fixed initial values of {fixed} contradict {left}"
+    if itself:
+        left = _residual(prepared, error)
+        message, fixed = f"fixed initial values contradict each other: {fixed}, residual {left}", "them"
+    among = "one of " if itself or len(set(fixed.split(", "))) > 1 else ""
+    free = f"free {among}{fixed}: '~' for '='"
+    still = [r.label for r in error.rows if r.kind == "dynamics" and _without_inertia(prepared, r.label)]
+    free += f"; or {still[0]} lacks an inertia: energy T* = 1/2*m*{still[0]}'^2" if still else ""
+    gaps = {switch.name for switch in prepared.network.switches if switch.kind == "phi"}
+    struck = not itself and any(r.label in gaps for r in error.rows)
+    return message, free + ("; or the rate behind the impact: a run begins when it is over" if struck else "")
+
+
+def _nearer(prepared: Prepared, error: InconsistentStart) -> str:
+    """What may help where nothing is found: no guess mends a short circuit."""
+    sides = {switch.name for switch in prepared.network.switches}
+    one = next((r.label for r in error.rows if re.sub(r"\[.*", "", r.label) in sides), None)
+    given = f"a resistance in series with {one}, which passes or stops all that the others ask for"
+    help_ = "guesses nearer to a solution: init ... ~ ..."
+    return help_ if one is None else f"{given}; else {help_}"
 
 
 def _shown(row: RowLabel) -> str:

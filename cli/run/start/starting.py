@@ -238,15 +238,7 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
             return
         prepared, (system, state, facts) = written[0], (written[1].system, written[1].state, written[1].facts)
     facts = counted_as(prepared, state.t, facts) if prepared.network.statics else facts
-    known = {
-        "coordinates": facts.coordinates,
-        "m1": facts.m1,
-        "m2": facts.m2,
-        "dof": facts.dof,
-        "configuration_dof": facts.configuration_dof,
-        "redundant": facts.redundant,
-        "index": facts.index,
-    }
+    known = facts.counts
     if any(n.data in ("static order", "static manifold") for c in prepared.network.statics for n in _names(c)):
         tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
         counted = order_and_manifold(system, state, tangible)

@@ -19,13 +19,12 @@ from sysdyn.dsl.model.calculus import time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
     add,
-    call,
     const,
     index,
     linear,
-    mul,
     param,
     rebuild,
+    reduced,
     reduction,
     scale,
     sub,
@@ -187,13 +186,7 @@ class Rewriter:
             self._check(found, {name: own})
             halves = _halves(Loop(name, *ends), found.at)
             parts = [self._reduced(node, (h.first, h.last), ranges, active) for h in halves]
-        match operator:
-            case "sum":
-                return add(*parts)
-            case "prod":
-                return mul(*parts)
-            case _:
-                return call(operator, *parts)
+        return reduced(operator, parts)
 
     def _read(self, node: Node, ranges: Ranges, active: tuple[Node, ...]) -> Node:
         if node in active:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from sysdyn.dsl.elaborate.instances.connections import Connections, Ends
-from sysdyn.dsl.elaborate.statements import events
+from sysdyn.dsl.elaborate.statements import friction
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Coupling, Shape, Terminal
@@ -125,7 +125,7 @@ class Elements(Connections):
         def part() -> None:
             """Of the loops in sight: of all, or where the law reads several statements of a label, of a part."""
             law, loops = law_of(self.resolver, symbol, whole, side, value, kind, span), self.resolver.loops
-            node = events.of_law(self, law, symbol.family.name, whole, loops, self.place(s.span))
+            node = friction.of_law(self, law, symbol.family.name, whole, loops, self.place(s.span))
             law = replace(law, law=node)
             self.resolver.laws[symbol.family.name] = law
             said = law.kind, law.side, law.law

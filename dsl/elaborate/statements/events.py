@@ -1,20 +1,15 @@
-"""Events and inequalities: discrete variables, `when`, `every`, constraints that hold at times, set-valued friction.
+"""Events and inequalities: discrete variables, `when`, `every`, constraints that hold at times.
 
 What an event reads is observed beside the traced quantities, so every arrow of the compiler carries it as it carries
 those: a relation a > b is the observation a - b, the value of an action another.  A constraint that holds at times is
-an equality among the rows, and a `Switch` that says when; dry friction, `c*setsign(f)` of an element's own flow and
-`c*abs(u)` in a content, becomes the effort c*sense with a sense that events set, and psi: u = 0, which holds while the
-bodies stick.  In any other relation `setsign(u)` is an unknown, closed by u = 0 or by the sense (`relation`).
+an equality among the rows, and a `Switch` that says when (friction: `friction.py`).
 """
 
 from __future__ import annotations
 
-import math
-
 from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import (
     Action,
@@ -23,21 +18,13 @@ from sysdyn.dsl.model.network import (
     Loop,
     Observation,
     Parameter,
-    Unknown,
-    loop_indices,
-    loop_ranges,
 )
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
 from sysdyn.dsl.names.calls import walk
-from sysdyn.dsl.names.failures import Failed
-from sysdyn.dsl.names.laws import LawOf
 from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Typed, Vector
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
-
-BESIDE = 1e-20
-"""m/s and the like: a flow in the plane that is no flow yet, and has a direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -326,199 +313,3 @@ def _guard(frame: ElaborationContext, guard: syntax.Guard) -> Node:
             "E515", "'while' needs a discrete condition", guard.span, help="discrete locked = false, and a 'when'"
         )
     return node
-
-
-def sticking(
-    frame: ElaborationContext, root: Node, label: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place
-) -> Node:
-    """A law or content with its set-valued terms c*setsign(u), c*abs(u) as c*sense and c*sense*u; the switches that
-    say which sense, and psi: u = 0 for sticking.
-    """
-    again = _said_before(frame, label)
-    own = loop_indices(loops)
-    for k, node in enumerate(ex.calls(root, "setsign")):
-        name = f"{label} sticking" + (f" {k + 1}" if k else "")
-        sense = _sense(frame, f"{name} sense" + (f" {again + 1}" if again else ""), own, loops, place)
-        inner = node.args[0]
-        mark = ex.var("#sign", "s")
-        bound = derivative(ex.substitute(root, {node: mark}), mark)
-        if mark in ex.variables(bound):
-            frame.report.error("E705", "setsign enters this law in another way than c*setsign(f)", place)
-            return ex.substitute(root, {node: ex.const(0.0)})
-        _stick(frame, name, (at, loops), (inner, bound, sense), place, label)
-        root = ex.substitute(root, {node: sense})
-    return root
-
-
-def of_law(
-    frame: ElaborationContext, law: LawOf, label: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place
-) -> Node:
-    """The law of a branch: dry friction of its own flow sticks by a reaction, else it is a relation."""
-    terms = [n.args[0] for n in ex.calls(law.law, "setsign")]
-    if law.kind in ("kinetic", "potential") and not all(map(_steady, terms)):
-        return law.law
-    flow = ex.var(label, "bf", *at)
-    if law.kind == "dissipator" and law.side == "e" and all(_steady(ex.sub(u, flow)) for u in terms):
-        return sticking(frame, law.law, label, at, loops, place)
-    own = {"e": flow, "f": ex.var(label, "be", *at)}.get(law.side) if law.kind == "dissipator" else None
-    return relation(frame, law.law, ex.var(label, f"b{law.side}", *at), label, loops, place, absorbs=own)
-
-
-def relation(
-    frame: ElaborationContext,
-    text: Node,
-    given: Node,
-    label: str,
-    loops: tuple[Loop, ...],
-    place: Place,
-    *,
-    absorbs: Node | None = None,
-) -> Node:
-    """The text of a relation given = text with each term c*setsign(u) as c*s: s closes  u = 0  where that holds, else
-    s = sense, the sign of u.  It holds as long as c*s, what the others leave, is within abs(c): a relation may be
-    written with either sign of c.  Where u is what a dissipator `absorbs` by, c itself is the bound, which is not
-    negative.  A c that a reaction tells is watched (aim).  Where u moves at finite rates alone it is a sign, which may
-    slide (forms/corners).
-    """
-    at, shape = loop_indices(loops), loop_ranges(loops)
-    change: dict[Node, Node] = {}
-    made: list[tuple[Node, Node]] = []
-    again = _said_before(frame, label)
-    for node in ex.calls(text, "setsign"):
-        u = ex.substitute(node.args[0], change)
-        if _steady(u):
-            change[node] = ex.call("sign", u)
-            continue
-        name = f"{label} set" + (f" {again + len(made) + 1}" if again + len(made) else "")
-        change[node] = ex.var(name, "e", *at)
-        frame.parts.unknowns.append(Unknown(name, shape, si(NONE), place))
-        made.append((change[node], u))
-    text = ex.substitute(text, change)
-    root = ex.sub(given, text)
-    for s, u in made:
-        factor, name = derivative(root, s), s.data[0]
-        inside = {n for n in ex.topological([u, factor]) if n.op == "index"} - set(at)
-        if s in ex.variables(factor) or ex.is_const(factor, 0.0) or inside:
-            said = f"setsign enters {label} in another way than c*setsign(u)"
-            frame.report.error("E705", said, place, help="implicit s: 1, closed by gamma set: s = setsign(u)")
-            raise Failed
-        sense, holds = (_sense(frame, f"{name} {what}", at, loops, place) for what in ("sense", "holds"))
-        row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, ex.sub(s, sense))
-        frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
-        rest = ex.substitute(root, {s: ex.const(0.0)})
-        left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
-        bound = ex.neg(factor) if u is absorbs else ex.call("abs", factor)
-        told = u is not absorbs and any(n.data[1] in ("kappa", "mu") for n in ex.variables(factor) if n.op == "var")
-        aim = (factor,) if told else ()
-        draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, aim=aim, holds=holds)
-        frame.parts.drafts.append(draft)
-    return text
-
-
-def _said_before(frame: ElaborationContext, label: str) -> int:
-    """Switches of the elements of one label so far, which may be said one by one."""
-    return sum(draft.element == label for draft in frame.parts.drafts)
-
-
-def _steady(u: Node) -> bool:
-    """Whether a value moves at finite rates alone: of displacements, states and time."""
-    return all(n.op == "time" or (n.data[1] in ("q", "nq", "bq", "s") and not n.data[2]) for n in ex.variables(u))
-
-
-def has_friction(root: Node) -> bool:
-    """Whether a size of flows stands in it."""
-    return any(
-        n.op == "call" and n.data in ("abs", "hypot") and any(map(_rates, n.args)) for n in ex.topological([root])
-    )
-
-
-def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], place: Place) -> Node:
-    """A content D with its terms c*abs(u) of flows as those of set-valued friction (decision 7 of the language)."""
-    at = loop_indices(loops)
-    for node in ex.topological([root]):
-        if node.op != "call" or node.data not in ("abs", "hypot") or not any(map(_rates, node.args)):
-            continue
-        if any(n.op == "reduce" and node in ex.topological([n.args[2]]) for n in ex.topological([root])):
-            continue
-        mark = ex.var("#abs", "s")
-        bound = ex.substitute(derivative(ex.substitute(root, {node: mark}), mark), {mark: ex.const(0.0)})
-        if bound.op == "const" and (bound.data == 0.0 or not math.isfinite(bound.data)):
-            continue  # no corner at rest: abs(f)^3 is smooth
-        name = f"content of line {place.start[0]}" + (f" ({len(frame.parts.drafts)})" if frame.parts.drafts else "")
-        sense = _sense(frame, f"{name} sense", at, loops, place)
-        if node.data == "abs":
-            _stick(frame, name, (at, loops), (node.args[0], bound, sense), place)
-            root = ex.substitute(root, {node: ex.mul(sense, node.args[0])})
-        else:
-            speed = _stick_in_plane(frame, name, (at, loops), (node, bound, sense), place)
-            root = ex.substitute(root, {node: ex.mul(sense, speed)})
-    return root
-
-
-def _stick_in_plane(
-    frame: ElaborationContext,
-    name: str,
-    where: tuple[tuple[Node, ...], tuple[Loop, ...]],
-    what: tuple[Node, Node, Node],
-    place: Place,
-) -> Node:
-    """The speed abs(f) of friction in the plane, continued through zero along the direction of a flow n in which it
-    slips: sign((f + n) n) abs(f + n), whose gradient is the direction of f, and that of n where f is less than n.
-    """
-    (at, loops), (node, bound, sense) = where, what
-    unit, flows = si(NONE), node.args
-    n = tuple(  # any at first: at rest there is none
-        _sense(frame, f"{name} direction {k}", at, loops, place, begins) for k, begins in ((1, BESIDE), (2, 0.0))
-    )
-    labels = (name, f"{name} across")
-    for label, flow in zip(labels, flows, strict=True):
-        frame.said(Constraint("psi", label, at, flow, loops, unit, place))
-    multipliers = tuple(ex.var(label, "mu", *at) for label in labels)
-    along = ex.div(ex.add(*(ex.mul(a, b) for a, b in zip(n, flows, strict=True))), ex.call("hypot", *n))
-    value = ex.sub(along, ex.scale(0.5, node))
-    draft = Draft(
-        name, at, loops, "planar", place, unit, value, ex.call("hypot", *multipliers), bound=bound, sense=sense,
-        rate=time_derivative(along), aim=(*flows, *multipliers, node), direction=n,
-    )  # fmt: skip
-    frame.parts.drafts.append(draft)
-    frame.parts.drafts.append(Draft(labels[1], at, loops, "follows", place, unit, flows[1], multipliers[1]))
-    beside = [ex.add(f, d) for f, d in zip(flows, n, strict=True)]
-    forward = ex.call("sign", ex.add(*(ex.mul(d, b) for d, b in zip(n, beside, strict=True))))
-    return ex.mul(forward, ex.call("hypot", *beside))
-
-
-def _rates(root: Node) -> bool:
-    return any(n.op == "var" and (n.data[1] in ("f", "nf", "bf") or n.data[2] == 1) for n in ex.variables(root))
-
-
-def _sense(
-    frame: ElaborationContext,
-    name: str,
-    at: tuple[Node, ...],
-    loops: tuple[Loop, ...],
-    place: Place,
-    begins: float = 0.0,
-) -> Node:
-    """A parameter that holds the sense of a slip: 1, -1, or 0 while it sticks; or a part of its direction."""
-    shape = loop_ranges(loops) if at else ()
-    indices = tuple(loop.index for loop in loops) if at else ()
-    parameter = Parameter(name, shape, si(NONE), (ex.const(begins),), indices, place)
-    frame.parts.parameters[parameter.name] = parameter
-    frame.parts.discretes.add(parameter.name)
-    return ex.param(parameter.name, *at)
-
-
-def _stick(
-    frame: ElaborationContext,
-    name: str,
-    where: tuple[tuple[Node, ...], tuple[Loop, ...]],
-    what: tuple[Node, Node, Node],
-    place: Place,
-    element: str = "",
-) -> None:
-    """Dry friction: a set-valued effort with its bound and the sense of the motion."""
-    (at, loops), (value, bound, sense) = where, what
-    unit = si(NONE)
-    frame.said(Constraint("psi", name, at, value, loops, unit, place))
-    multiplier = ex.var(name, "mu", *at)
-    frame.parts.drafts.append(Draft(name, at, loops, "friction", place, unit, value, multiplier, element, bound, sense))

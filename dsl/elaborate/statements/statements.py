@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 
 from sysdyn.dsl.elaborate.parts import Requirement
-from sysdyn.dsl.elaborate.statements import events
+from sysdyn.dsl.elaborate.statements import events, friction
 from sysdyn.dsl.elaborate.statements.declarations import Declarations
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
@@ -46,7 +46,7 @@ class Statements(Declarations):
             raise Failed
         node = ex.sub(left.node, right.node)
         if s.kind == "gamma":
-            node = events.relation(self, node, ex.const(0.0), family.name, self.resolver.loops, place)
+            node = friction.relation(self, node, ex.const(0.0), family.name, self.resolver.loops, place)
         constraint = Constraint(s.kind, family.name, at, node, self.resolver.loops, si(dimension), place)
         constraint = events.guarded(self, s, constraint)
         self.said(constraint)
@@ -81,7 +81,7 @@ class Statements(Declarations):
             self.said(Energy(s.function, node, loops, place))
             return
         for part, inside in _parts(node, loops):
-            self.said(Energy("D", events.set_valued(self, part, inside, place), inside, place))
+            self.said(Energy("D", friction.set_valued(self, part, inside, place), inside, place))
 
     def _work(self, s: syntax.Work) -> None:
         effort = self.resolver.scalar(s.effort)
@@ -266,7 +266,7 @@ STATEMENTS: dict[type, Callable[..., None]] = {
 def _parts(node: Node, loops: tuple[Loop, ...]) -> list[tuple[Node, tuple[Loop, ...]]]:
     """A content as contents that add up to it: of its sums over friction each element is a content of its own."""
     sums = [n for n in ex.topological([node]) if n.op == "reduce" and n.data[0] == "sum"]
-    if not any(events.has_friction(n.args[2]) for n in sums):
+    if not any(friction.has_friction(n.args[2]) for n in sums):
         return [(node, loops)]
     if node.op == "sum":
         of_terms = [(c, part) for c, n in zip(node.data[1], node.args, strict=True) for part in _parts(n, loops)]

@@ -1,6 +1,7 @@
-/* Scaling, dense LU and the choice between dense and sparse: see linear.h. */
+/* Scaling, and the choice between dense, sparse and replayed factors: see linear.h. */
 #include "linear/linear.h"
 #include "linear/lanes.h"
+#include "linear/null_space.h"
 #include "linear/sparse/sparse.h"
 
 #include <math.h>
@@ -8,7 +9,6 @@
 #include <string.h>
 
 #define REFINE 1e-8 /* pivots smaller than this part of their column: one step of iterative refinement */
-#define NULL_ROOM 20000000 /* numbers: where there would be more, what was left is zero */
 
 void sd_linear_free(sd_linear *linear)
 {
@@ -111,105 +111,6 @@ static void equilibrate_sum(sd_linear *linear, const double *scale)
         linear->row_scale[i] = linear->row_scale[i] > 0.0 ? 1.0 / linear->row_scale[i] : 1.0;
 }
 
-/* the scaled matrix */
-static sd_matrix scaled_matrix(const sd_linear *linear)
-{
-    return linear->sum ? *linear->sum
-                       : (sd_matrix){.column = linear->column, .row = linear->row, .value = linear->scaled};
-}
-
-static void swap_columns(sd_number *a, int32_t n, int32_t j, int32_t k, int32_t *place)
-{
-    int32_t p = place[j];
-    place[j] = place[k];
-    place[k] = p;
-    for (int32_t i = 0; i < n && j != k; i++) {
-        sd_number swap = a[(size_t)j * n + i];
-        a[(size_t)j * n + i] = a[(size_t)k * n + i];
-        a[(size_t)k * n + i] = swap;
-    }
-}
-
-/* LU of the scaled matrix by columns with row exchanges; columns without a pivot, where they are allowed, come last */
-static int dense_factor(sd_linear *linear)
-{
-    int32_t n = linear->n;
-    sd_number *a = linear->dense;
-    memset(a, 0, (size_t)n * (size_t)n * sizeof *a);
-    for (int32_t j = 0; j < n; j++)
-        for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
-            a[(size_t)j * n + linear->row[e]] += linear->scaled[e];
-    for (int32_t i = 0; i < n; i++)
-        linear->pivot[i] = linear->place[i] = i;
-    linear->smallest = 1.0;
-    linear->rank = n;
-    for (int32_t k = 0; k < linear->rank; k++) {
-        sd_number *ck = a + (size_t)k * n;
-        double size = 0.0;
-        int32_t best = k;
-        for (int32_t i = k; i < n; i++)
-            if (sd_size(ck[i]) > sd_size(ck[best]))
-                best = i;
-        int32_t c = linear->place[k];
-        for (int32_t e = linear->column[c]; e < linear->column[c + 1]; e++)
-            size = fmax(size, sd_size(linear->scaled[e]));
-        double relative = size > 0.0 ? sd_size(ck[best]) / size : 0.0;
-        if (relative < linear->null_pivot && linear->idle[c]) {
-            swap_columns(a, n, k--, --linear->rank, linear->place);
-            continue;
-        }
-        if (!(relative >= linear->smallest)) {
-            linear->smallest = relative;
-            linear->bad_row = linear->pivot[best];
-            linear->bad_column = c;
-        }
-        if (!(sd_size(ck[best]) > 0.0) || !isfinite(sd_size(ck[best])))
-            return 1;
-        if (best != k) {
-            int32_t p = linear->pivot[k];
-            linear->pivot[k] = linear->pivot[best];
-            linear->pivot[best] = p;
-            for (int32_t j = 0; j < n; j++) {
-                sd_number swap = a[(size_t)j * n + k];
-                a[(size_t)j * n + k] = a[(size_t)j * n + best];
-                a[(size_t)j * n + best] = swap;
-            }
-        }
-        sd_number inverse = 1.0 / ck[k];
-        for (int32_t i = k + 1; i < n; i++)
-            ck[i] *= inverse;
-        for (int32_t j = k + 1; j < n; j++) {
-            sd_number *cj = a + (size_t)j * n, u = cj[k];
-            if (u == 0.0)
-                continue;
-            for (int32_t i = k + 1; i < n; i++)
-                cj[i] -= ck[i] * u;
-        }
-    }
-    return 0;
-}
-
-static void dense_solve(const sd_linear *linear, sd_number *x, sd_number *work)
-{
-    int32_t n = linear->n;
-    const sd_number *a = linear->dense;
-    for (int32_t i = 0; i < n; i++)
-        work[i] = x[linear->pivot[i]];
-    for (int32_t k = 0; k < linear->rank; k++) {
-        const sd_number *ck = a + (size_t)k * n;
-        for (int32_t i = k + 1; i < n; i++)
-            work[i] -= ck[i] * work[k];
-    }
-    for (int32_t k = linear->rank; k < n; k++)
-        x[linear->place[k]] = 0.0;
-    for (int32_t k = linear->rank - 1; k >= 0; k--) {
-        const sd_number *ck = a + (size_t)k * n;
-        sd_number v = x[linear->place[k]] = work[k] / ck[k];
-        for (int32_t i = 0; i < k; i++)
-            work[i] -= ck[i] * v;
-    }
-}
-
 void sd_linear_left(const sd_linear *linear, char *left)
 {
     memset(left, 0, (size_t)linear->n);
@@ -291,86 +192,6 @@ static int sparse_factor(sd_linear *linear)
     if (!failed && refined && !linear->work2)
         linear->work2 = calloc((size_t)linear->n + 1, sizeof(sd_number));
     return !failed && refined && !linear->work2 ? 2 : failed;
-}
-
-static void scaled_solve(sd_linear *linear, sd_number *x)
-{
-    if (linear->dense)
-        dense_solve(linear, x, linear->work);
-    else
-        sd_sparse_solve(linear->sparse, x, linear->work, NULL, NULL);
-}
-
-/* v := v without its part along u, which has length one */
-static void without(int32_t n, const sd_number *u, sd_number *v)
-{
-    sd_number along = 0.0;
-    for (int32_t i = 0; i < n; i++)
-        along += sd_conjugate(u[i]) * v[i];
-    for (int32_t i = 0; i < n; i++)
-        v[i] -= along * u[i];
-}
-
-/* v := v / |v|, or zero where that is no number */
-static void to_length_one(int32_t n, sd_number *v)
-{
-    double most = 0.0, square = 0.0;
-    for (int32_t i = 0; i < n; i++)
-        most = sd_size(v[i]) <= most ? most : sd_size(v[i]);
-    if (!(most > 0.0) || !isfinite(most)) {
-        memset(v, 0, (size_t)n * sizeof *v);
-        return;
-    }
-    for (int32_t i = 0; i < n; i++) {
-        v[i] /= most;
-        square += sd_square(v[i]);
-    }
-    for (int32_t i = 0; i < n; i++)
-        v[i] /= sqrt(square);
-}
-
-/* null: orthonormal, by the solutions in which one column that was left is one and the others are zero */
-static int null_vectors(sd_linear *linear)
-{
-    int32_t n = linear->n, found = 0;
-    size_t room = (size_t)(n - linear->rank) * (size_t)n;
-    linear->nulls = 0;
-    if (room > NULL_ROOM)
-        return 0;
-    if (room > linear->null_room) {
-        sd_number *null = realloc(linear->null, room * sizeof *null);
-        if (!null)
-            return 2;
-        linear->null = null;
-        linear->null_room = room;
-    }
-    for (int32_t k = linear->dense ? linear->rank : 0; k < n; k++) {
-        if (linear->sparse && linear->sparse->source[k] >= 0)
-            continue;
-        int32_t c = linear->dense ? linear->place[k] : linear->sparse->order[k];
-        sd_number *v = linear->null + (size_t)found * (size_t)n;
-        memset(v, 0, (size_t)n * sizeof *v);
-        const sd_matrix matrix = scaled_matrix(linear);
-        const sd_number *value = sd_column_of(&matrix, c);
-        for (int32_t e = linear->column[c]; e < linear->column[c + 1]; e++)
-            v[linear->row[e]] -= *value++;
-        scaled_solve(linear, v);
-        v[c] = 1.0;
-        to_length_one(n, v);
-        for (int32_t j = 0; j < found; j++)
-            without(n, linear->null + (size_t)j * (size_t)n, v);
-        to_length_one(n, v);
-        found++;
-    }
-    linear->nulls = found;
-    return 0;
-}
-
-/* takes from x what lies in the directions that the matrix maps to zero */
-static void shorten(const sd_linear *linear, sd_number *x)
-{
-    for (int32_t k = 0; k < linear->nulls; k++)
-        without(linear->n, linear->null + (size_t)k * (size_t)linear->n, x);
 }
 
 /* all that was learnt of matrices before */

@@ -98,10 +98,9 @@ typedef struct sd_run {
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,
                    int32_t audited);
 void sd_run_free(sd_run *run);
-/* whether a row of the trace is asked for at t or before, and not at every step */
-int sd_run_asks(const sd_run *run, double t);
-/* values [observed] := what is observed at run->point, point_d */
-void sd_run_quantities(sd_run *run, double t, double *values);
+/* steps until `steps` more are taken, `seconds` are over, the rows are full, the end, a failure, or a step within which
+ * something watched changes (SD_EVENT: the step is not counted yet, see sd_run_accept) */
+int sd_run_advance(sd_run *run, int64_t steps, double seconds);
 /* notes the powers at y, yd [written], the point at the end of the last step, which a restart leaves */
 void sd_run_leave(sd_run *run, const double *y, const double *yd);
 /* then goes on from y, yd [n] at t with the row of the instant `label` */
@@ -109,19 +108,24 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
 /* the last step counts up to `to`, where a row of kind `kind` is written beside those asked for; after SD_EVENT.  1: the
  * rows are full, `sd_run_drain` goes on */
 int sd_run_accept(sd_run *run, double to, int32_t kind);
+
+/* rows.c: rows of the last step that are still to be written; 1: no room left */
 int sd_run_drain(sd_run *run);
+/* those of the point started from, which stands in run->point then: as of `label` where the instant is not earlier */
+void sd_run_rows_of_start(sd_run *run, double label);
 /* a row of kind `kind` at the end of the last step, which counts and whose rows are drained */
 void sd_run_row(sd_run *run, int32_t kind);
 /* a row of what is watched at t within the last step, where there is room for one */
 void sd_run_sample(sd_run *run, double t);
+/* whether a row of the trace is asked for at t or before, and not at every step */
+int sd_run_asks(const sd_run *run, double t);
 /* run->point, point_d at t within the last step moved onto the equations: by what the method has at hand, where that does; the
  * end of a step may be there */
 void sd_run_settle(sd_run *run, double t);
-/* values [observed] of block observe at t within the last step, on the dense output as it is; settled */
+/* values [observed] := what is observed at run->point, point_d */
+void sd_run_quantities(sd_run *run, double t, double *values);
+/* the same at t within the last step, on the dense output as it is; settled */
 void sd_run_look(sd_run *run, double t, double *values);
 void sd_run_observe(sd_run *run, double t, double *values);
-/* steps until `steps` more are taken, `seconds` are over, the rows are full, the end, a failure, or a step within which
- * something watched changes (SD_EVENT: the step is not counted yet, see sd_run_accept) */
-int sd_run_advance(sd_run *run, int64_t steps, double seconds);
 
 #endif

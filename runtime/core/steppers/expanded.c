@@ -57,7 +57,7 @@ static void values(const void *self, double t, double *y)
 {
     const sd_expanded *expanded = self;
     const sd_stepper *inner = expanded->inner;
-    if (t == *inner->t) {
+    if (t == inner->ivp->t) {
         sd_condensed_expand(expanded->condensed, inner->y, y, 0);
         return;
     }
@@ -82,11 +82,7 @@ static double *spare(void *self, size_t *numbers)
 
 static void start(void *self, double t, const double *y, const double *yd, double h)
 {
-    sd_expanded_start(self, t, y, yd, h);
-}
-
-void sd_expanded_start(sd_expanded *expanded, double t, const double *y, const double *yd, double h)
-{
+    sd_expanded *expanded = self;
     size_t size = (size_t)expanded->face.n * sizeof *y;
     double *z = room_of(expanded);
     if (!z) /* no memory, which the first step tells */
@@ -140,9 +136,4 @@ void sd_expanded_free(sd_expanded *expanded)
     free(expanded->z);
     free(expanded->y);
     free(expanded);
-}
-
-sd_stepper *sd_expanded_stepper(sd_expanded *expanded)
-{
-    return &expanded->face;
 }

@@ -7,7 +7,7 @@
 #include "steppers/stepper.h"
 
 typedef struct sd_expanded {
-    sd_stepper face;
+    sd_stepper face;                  /* which reads y of a start until the first step: it has no other before it, and no yd */
     sd_stepper *inner;
     const sd_condensed *condensed;
     double *z;                        /* [2 room] a point of kept ones; NULL: it stands in what the method has spare */
@@ -19,8 +19,5 @@ typedef struct sd_expanded {
 /* unknowns: of the full system; NULL without memory */
 sd_expanded *sd_expanded_new(sd_stepper *inner, const sd_condensed *condensed, int32_t unknowns);
 void sd_expanded_free(sd_expanded *expanded);
-sd_stepper *sd_expanded_stepper(sd_expanded *expanded);
-/* y is read until the first step: the face has no other before it, and no yd */
-void sd_expanded_start(sd_expanded *expanded, double t, const double *y, const double *yd, double h);
 
 #endif

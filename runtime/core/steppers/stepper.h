@@ -1,7 +1,8 @@
-/* What the driver of an integration asks of a method: steps, values within the last step, a start.
+/* What all methods have in common: the problem (sd_ivp), and what the driver of an integration asks of a method (sd_stepper):
+ * steps, values within the last step, a start.
  *
- * Every method (bdf/bdf.h, radau/radau.h, explicit/dopri.h, energy/energy.h) holds one of these about itself;
- * run.c knows methods by nothing else.
+ * Every method (bdf/bdf.h, radau/radau.h, rosenbrock/rosenbrock.h, explicit/dopri.h, energy/energy.h) begins with an sd_ivp;
+ * run.c knows methods by its stepper alone.
  */
 #ifndef SYSDYN_STEPPER_H
 #define SYSDYN_STEPPER_H
@@ -27,11 +28,9 @@ enum sd_cause {
 
 typedef struct sd_stepper {
     void *self;
-    sd_system *system;
-    int32_t n;
-    const double *t, *t_end;
+    const struct sd_ivp *ivp;
+    int32_t n;                 /* unknowns of the points that it shows */
     const double *y, *yd;      /* [n] the last accepted point, or the one started from */
-    const int64_t *taken;      /* steps since the last start */
     /* one accepted step, or the cause of failure (enum sd_cause) */
     int (*step)(void *self);
     /* y, yd [n] at any t within the last step */
@@ -62,9 +61,32 @@ typedef struct sd_stepper {
     double *(*spare)(void *self, size_t *numbers);
 } sd_stepper;
 
+/* An initial value problem under way: the first member of every method. */
+typedef struct sd_ivp {
+    /* the problem; the caller fills it in before a start */
+    sd_system *system;
+    int32_t n;                /* unknowns that are stepped */
+    double rtol, t_end, h_max;
+    double fixed_h;           /* length of every step; 0: chosen */
+    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
+    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
+    double *met;              /* [n] max |y| */
+    const int8_t *test, *power; /* [n] as bdf/bdf.h says */
+    sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */
+    /* how far it is */
+    int32_t tested;           /* unknowns in the error test */
+    double t, h, h_used;      /* the last accepted point; steps that come and that led there */
+    double *ee, *weight;      /* [n] the last local error, and what the error test weighs it by */
+    int64_t steps, rejected_steps, newton_failures;
+    int64_t taken;            /* steps since the last start */
+    int32_t cause, bad_row, bad_column; /* of the failure of a step */
+    sd_stepper stepper;
+} sd_ivp;
+
 #define SD_ROUND_OFF (10.0 * DBL_EPSILON) /* part of the largest that unknowns have been */
 #define SD_NOISY 10.0  /* times a correction that does not shrink any more: what such ones leave open */
 #define SD_NOISE 1e-9  /* part of an unknown up to which a correction may be that */
+#define SD_SLACK 1e-12 /* of a step: what sums of steps may leave of the span */
 #define SD_SHORT 1e-9 /* of the span: what happens this early is resolved to round-off */
 
 /* What round-off leaves open of an unknown, by the last of corrections that do not shrink any more: rows far from it with
@@ -83,5 +105,26 @@ static inline void sd_met(double size, double *met, double *magnitude)
     if (size > *magnitude)
         *magnitude = size;
 }
+
+/* stepper.c: what drives a method calls; from (t, y, yd) with a step of the method's choice */
+void sd_start(sd_stepper *stepper, double t, const double *y, const double *yd);
+
+/* what methods have in common (stepper.c): at t, where a start begins; which unknowns are tested */
+void sd_begin(sd_ivp *ivp, double t);
+/* magnitudes grow with y [n], and weight [n] := 1 / (atol + tolerance |y|); atol belongs to rtol */
+void sd_weigh(sd_ivp *ivp, double tolerance, const double *y);
+/* sum of squares of a - b [n] over the tested unknowns in the weights; b may be NULL */
+double sd_squares(const sd_ivp *ivp, const double *a, const double *b);
+/* a first step: at most `longest` and `part` of what changes by a tolerance in 1 / change, and what t resolves at least */
+double sd_first_step(const sd_ivp *ivp, double longest, double part, double change);
+/* h, fitted to t_end: the step ends there exactly, and never leaves less than its half for the last one.  slack: part of a
+ * step that is round-off */
+double sd_fitted(const sd_ivp *ivp, double slack);
+/* t + h is t, or nearly (the last bit of the span is a step nonetheless) */
+int sd_too_small(const sd_ivp *ivp);
+/* behind a cause no shorter step is tried */
+int sd_ends(const sd_ivp *ivp, int cause);
+/* the step of length h is accepted */
+void sd_advance(sd_ivp *ivp);
 
 #endif

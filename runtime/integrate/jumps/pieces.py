@@ -165,14 +165,6 @@ class Pieces:
         self._landing = min(t + step, self._landing)
         self.aim()
 
-    def _pass(self, t: float, step: float) -> None:
-        """Peaks that have begun at t, behind a step (s), are passed in parts, beside those that already are."""
-        passes, core = self.handler.passes, self._passing
-        within = t < core.passed
-        if np.isfinite(passes) and (within or step > passes / PARTS):
-            core.part = min(passes / PARTS, core.part if within else np.inf)
-            core.passed = max(t + passes, core.passed if within else t)
-
     def _in_parts(self, t: float) -> None:
         """Steps from t (s) on are parts of what is being passed."""
         if t < self._passing.passed:
@@ -242,7 +234,7 @@ class Pieces:
                 misled = self.handler.stands(which) or (
                     begun and self._first_step.at_once(which, (core.t_from, t, end))
                 )
-                self._pass(t, end - core.t_from)
+                lib.core.sd_modes_pass(c.byref(self._passing), t, end - core.t_from, self.handler.passes)
                 self._go_on(t, point, before, misled=end - core.t_from if misled else 0.0, kind=kind)
                 return time.process_time() - began
             begin = t

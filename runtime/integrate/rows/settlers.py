@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.condense.condensed import Forms
+from sysdyn.runtime.condense.condenser import Forms
 from sysdyn.runtime.condense.elimination import steady
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.integrate.weights.sizes import Sizes

@@ -23,9 +23,9 @@ class Stepper(c.Structure):
 
     _fields_ = [
         ("self", P),
-        ("system", P),
+        ("ivp", P),
         ("n", I),
-        *[(name, P) for name in ["t", "t_end", "y", "yd", "taken", "step", "dense", "refine", "start"]],
+        *[(name, P) for name in ["y", "yd", "step", "dense", "refine", "start"]],
         ("nodes", I),
         *[(name, P) for name in ["node", "node_weight", "node_y", "node_yd", "part_y", "part_yd", "length"]],
         *[(name, P) for name in ["moves", "part_moves"]],
@@ -48,90 +48,48 @@ class Expanded(c.Structure):
     ]
 
 
-class Bdf(c.Structure):
-    """sd_bdf."""
+class Ivp(c.Structure):
+    """sd_ivp: what all methods have in common; each has these fields under their own names."""
 
     _fields_ = [
         ("system", P),
-        ("linear", P),
         ("n", I),
-        ("max_order", I),
+        *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
+        *[(name, P) for name in ["atol", "magnitude", "met", "test", "power", "project"]],
         ("tested", I),
-        ("rtol", D),
-        ("t_end", D),
-        ("h_max", D),
-        ("fixed_h", D),
-        ("atol", P),
-        ("magnitude", P),
-        ("met", P),
-        ("test", P),
-        ("power", P),
-        ("common_from", P),
-        ("common", P),
+        *[(name, D) for name in ["t", "h", "h_used"]],
+        *[(name, P) for name in ["ee", "weight"]],
+        *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
+        *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
+        ("stepper", Stepper),
+    ]
+
+
+class Bdf(c.Structure):
+    """sd_bdf."""
+
+    _anonymous_ = ("ivp",)
+    _fields_ = [
+        ("ivp", Ivp),
+        ("linear", P),
+        ("max_order", I),
+        *[(name, P) for name in ["common_from", "common"]],
         ("commons", I),
-        ("t", D),
-        ("h", D),
-        ("h_used", D),
-        ("cj", D),
-        ("cj_factored", D),
-        ("cj_last", D),
-        ("cj_slopes", D),
-        ("contraction", D),
-        ("order", I),
-        ("order_used", I),
-        ("ns", I),
-        ("rising", I),
-        ("fresh_jacobian", I),
-        ("jacobian_age", I),
-        ("ready", I),
-        ("extra", I),
-        ("psi", _ORDERS),
-        ("alpha", _ORDERS),
-        ("beta", _ORDERS),
-        ("sigma", _ORDERS),
-        ("gamma", _ORDERS),
+        *[(name, D) for name in ["cj", "cj_factored", "cj_last", "cj_slopes", "contraction"]],
+        *[(name, I) for name in ["order", "order_used", "ns", "rising"]],
+        *[(name, I) for name in ["fresh_jacobian", "jacobian_age", "ready", "extra"]],
+        *[(name, _ORDERS) for name in ["psi", "alpha", "beta", "sigma", "gamma"]],
         ("phi", P * (MAX_ORDER + 2)),
-        *[
-            (name, P)
-            for name in (
-                [
-                    "y",
-                    "yd",
-                    "ee",
-                    "delta",
-                    "moved",
-                    "moved_d",
-                    "scale",
-                    "terms",
-                    "rate",
-                    "jy",
-                    "jyd",
-                    "g",
-                    "memory",
-                    "weight",
-                    "own",
-                    "newton_power",
-                    "test_power",
-                ]
-            )
-        ],
+        *[(name, P) for name in ["y", "yd", "delta", "moved", "moved_d", "scale"]],
+        *[(name, P) for name in ["terms", "rate", "jy", "jyd", "g", "memory"]],
+        *[(name, P) for name in ["own", "newton_power", "test_power"]],
         ("h_weighed", D),
         ("powered", P),
         ("powers", I),
         ("apart", P),
         ("aparts", I),
         ("error_next", D),
-        ("steps", L),
-        ("rejected_steps", L),
-        ("newton_failures", L),
-        ("newton_iterations", L),
         ("orders", L),
-        ("taken", L),
-        ("cause", I),
-        ("bad_row", I),
-        ("bad_column", I),
-        ("project", P),
-        ("stepper", Stepper),
     ]
 
 
@@ -157,19 +115,18 @@ class RadauMethod(c.Structure):
 class Radau(c.Structure):
     """sd_radau."""
 
+    _anonymous_ = ("ivp",)
     _fields_ = [
-        ("system", P),
+        ("ivp", Ivp),
         ("linear", P),
         ("complex_linear", P * PAIRS),
-        *[(name, I) for name in ["n", "tested", "stages", "most_stages"]],
-        *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
-        *[(name, P) for name in ["atol", "magnitude", "met", "test", "power", "smooth"]],
-        *[(name, P) for name in ["common_from", "common"]],
+        *[(name, I) for name in ["stages", "most_stages"]],
+        *[(name, P) for name in ["smooth", "common_from", "common"]],
         ("commons", I),
         ("tolerance", D),
         ("strict", D * 3),
         ("strict_first", D),
-        *[(name, D) for name in ["t", "h", "h_used", "h_factored", "h_before", "h_accepted"]],
+        *[(name, D) for name in ["h_factored", "h_before", "h_accepted"]],
         *[(name, D) for name in ["error_accepted", "theta", "state_size", "growth", "longest", "follows"]],
         *[(name, I) for name in ["behind", "balances", "pressed", "ready", "old_jacobian", "rejected"]],
         *[(name, P) for name in ["method", "used"]],
@@ -184,18 +141,13 @@ class Radau(c.Structure):
         *[(name, P) for name in ["first", "led", "gap"]],
         *[(name, D * POINTS) for name in ["apart", "bend"]],
         *[(name, P) for name in ["at_zero", "open"]],
-        *[(name, P) for name in ["y", "rate", "ee", "weight", "terms", "jy", "jyd", "g", "work"]],
+        *[(name, P) for name in ["y", "rate", "terms", "jy", "jyd", "g", "work"]],
         *[(name, P) for name in ["newton_weight", "scale", "powered"]],
         ("w", P * PAIRS),
         ("in_place", I),
         ("beside", P),
         ("twice", P * 2),
         *[(name, P) for name in ["point_y", "point_rate", "coupled"]],
-        *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "newton_iterations"]],
-        *[(name, L) for name in ["factorisations", "taken"]],
-        *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
-        ("project", P),
-        ("stepper", Stepper),
     ]
 
 
@@ -218,50 +170,38 @@ class Underlying(c.Structure):
 class Dopri(c.Structure):
     """sd_dopri."""
 
+    _anonymous_ = ("ivp",)
     _fields_ = [
-        ("system", P),
+        ("ivp", Ivp),
         ("underlying", P),
-        ("n", I),
-        ("tested", I),
-        *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
-        *[(name, P) for name in ["atol", "magnitude", "met", "test", "power"]],
-        *[(name, D) for name in ["patience", "spare", "opening", "t", "h", "h_used", "error_accepted", "speed"]],
+        *[(name, D) for name in ["patience", "spare", "opening", "error_accepted", "speed"]],
         *[(name, I) for name in ["rejected", "dense", "stiff", "smooth", "outrun", "even"]],
         *[(name, P) for name in ["phi", "yd"]],
         *[(name, P * DOPRI_STAGES) for name in ["y", "rate"]],
         ("f", P * DOPRI_DENSE),
-        *[(name, P) for name in ["ee", "weight", "moved", "moved_d", "memory"]],
-        *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
-        *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
-        ("stepper", Stepper),
+        *[(name, P) for name in ["moved", "moved_d", "memory"]],
     ]
 
 
 class Rosenbrock(c.Structure):
     """sd_rosenbrock."""
 
+    _anonymous_ = ("ivp",)
     _fields_ = [
-        ("system", P),
+        ("ivp", Ivp),
         ("linear", P),
-        *[(name, I) for name in ["n", "tested"]],
-        *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
-        *[(name, P) for name in ["atol", "magnitude", "met", "test", "power"]],
         ("opening", D),
-        *[(name, D) for name in ["t", "h", "h_used", "h_accepted", "error_accepted", "h_refused", "error_refused"]],
+        *[(name, D) for name in ["h_accepted", "error_accepted", "h_refused", "error_refused"]],
         ("rejected", I),
         *[(name, P) for name in ["phi", "yd", "last", "y", "rate", "drift", "begin"]],
         *[(name, P) for name in ["end", "within", "within_d", "inner"]],
         *[(name, P * ROSENBROCK_STAGES) for name in ["u", "v"]],
         ("bend", P * ROSENBROCK_DENSE),
-        *[(name, P) for name in ["ee", "weight", "jy", "jyd", "g", "e", "memory", "jy_end", "jyd_end"]],
+        *[(name, P) for name in ["jy", "jyd", "g", "e", "memory", "jy_end", "jyd_end"]],
         ("sloped", I),
         *[(name, P) for name in ["rate_row", "rate_column"]],
         ("rates", I),
-        *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
-        *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
-        ("project", P),
         ("settle", P),
-        ("stepper", Stepper),
     ]
 
 
@@ -274,17 +214,14 @@ class Collocation(c.Structure):
 class Energy(c.Structure):
     """sd_energy."""
 
+    _anonymous_ = ("ivp",)
     _fields_ = [
-        ("system", P),
+        ("ivp", Ivp),
         ("underlying", P),
-        ("n", I),
-        ("tested", I),
-        *[(name, D) for name in ["rtol", "t_end", "h_max", "fixed_h"]],
-        *[(name, P) for name in ["atol", "magnitude", "met", "test", "power"]],
         ("patience", D),
         ("audit", P),
         ("audited", I),
-        *[(name, D) for name in ["t", "h", "h_used", "wanted", "anchor", "anchor_end"]],
+        *[(name, D) for name in ["wanted", "anchor", "anchor_end"]],
         *[(name, L) for name in ["count", "done"]],
         *[(name, D) for name in ["rough", "before", "rough_before"]],
         *[(name, L) for name in ["window", "since", "held"]],
@@ -299,8 +236,5 @@ class Energy(c.Structure):
         *[(name, Collocation) for name in ["stage", "side"]],
         *[(name, P) for name in ["raw", "half", "half_rest", "inner", "inner_d", "trial", "old_y", "old_rate"]],
         *[(name, P) for name in ["begin", "position", "velocity"]],
-        *[(name, P) for name in ["base", "sample", "work", "moves", "inner_moves", "ee", "weight", "memory"]],
-        *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
-        *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
-        ("stepper", Stepper),
+        *[(name, P) for name in ["base", "sample", "work", "moves", "inner_moves", "memory"]],
     ]

@@ -252,10 +252,8 @@ static double passing(const sd_modes *m)
     return found;
 }
 
-/* Peaks that have begun at t, behind a step of so many s, are passed in parts, beside those that already are. */
-static void pass(sd_modes *m, double t, double step)
+void sd_modes_pass(sd_modes *m, double t, double step, double passes)
 {
-    const double passes = passing(m);
     const int within = t < m->passed;
     if (!isfinite(passes) || (!within && step <= passes / SHORTER))
         return;
@@ -278,13 +276,13 @@ static int event(sd_run *run, double enough)
 {
     sd_modes *m = run->modes;
     const sd_stepper *stepper = run->stepper;
-    double end = *stepper->t, t = end;
+    double end = stepper->ivp->t, t = end;
     if (stepper->refine)
         stepper->refine(stepper->self, run->settle);
     for (;;) {
         int32_t crossed = sd_run_crossing(run, end, &t);
         int room = sd_landing_room(run, crossed ? t : end);
-        if (*stepper->system->stop || room < 0)
+        if (*stepper->ivp->system->stop || room < 0)
             return SD_EVENT;
         m->waits = !room;
         if (!room)
@@ -315,7 +313,7 @@ static int event(sd_run *run, double enough)
         int kind = one || !only_peaks(m, crossed) ? SD_TRACE : 0;
         sd_run_accept(run, t, kind);
         forth(run, to);
-        pass(m, t, step);
+        sd_modes_pass(m, t, step, passing(m));
         go_on(run, t, t, kind, one ? 1 : crossed, one ? one->entries : crossed, misled ? step : 0.0);
         return SD_RUNNING;
     }
@@ -338,7 +336,7 @@ int sd_modes_event(sd_run *run)
 static int met(sd_run *run, int32_t row, double side, int *looked)
 {
     sd_modes *m = run->modes;
-    double t = *run->stepper->t, step = (t - run->t_from) / SHORTER;
+    double t = run->stepper->ivp->t, step = (t - run->t_from) / SHORTER;
     if (!(fabs(m->low[row]) <= sd_mode_zero(m, row)) || step <= m->nothing)
         return 0;
     if (!*looked)
@@ -384,13 +382,13 @@ static void settle_end(sd_run *run)
     sd_modes *m = run->modes;
     memcpy(m->before, run->stepper->y, (size_t)m->unknowns * sizeof(double));
     memcpy(m->before_d, run->stepper->yd, (size_t)m->unknowns * sizeof(double));
-    settled(run, *run->stepper->t);
+    settled(run, run->stepper->ivp->t);
 }
 
 static int sample(sd_run *run, int32_t due)
 {
     sd_modes *m = run->modes;
-    double t = *run->stepper->t, enough = run->settle->enough;
+    double t = run->stepper->ivp->t, enough = run->settle->enough;
     run->settle->enough = 0.0;
     settle_end(run);
     sd_landing_look(run, t, m->before, m->before_d, m->low);
@@ -426,7 +424,7 @@ static int jump(sd_run *run)
         return SD_FINISHED;
     run->settle->enough = 0.0;
     settle_end(run);
-    sd_landing_look(run, *run->stepper->t, m->before, m->before_d, m->low);
+    sd_landing_look(run, run->stepper->ivp->t, m->before, m->before_d, m->low);
     sd_landing_look(run, t, m->before, m->before_d, m->values);
     int32_t crossed = turned(run, m->values);
     const sd_transition *one = taken(run, t, crossed, SD_JUMP);
@@ -450,7 +448,7 @@ static int jump(sd_run *run)
 int sd_modes_end(sd_run *run)
 {
     const sd_modes *m = run->modes;
-    double t = *run->stepper->t;
+    double t = run->stepper->ivp->t;
     int32_t jumps = t >= m->segment, due = jumps ? 0 : due_at(m, t);
     if (m->now < 0 || (jumps ? m->at + 1 >= m->pieces : !due))
         return SD_FINISHED;

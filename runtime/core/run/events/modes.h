@@ -144,5 +144,8 @@ int sd_modes_event(struct sd_run *run);
 /* Samples due where a step has met its end, or the text that jumps there: the same, SD_FINISHED where there is nothing or
  * the handler is asked. */
 int sd_modes_end(struct sd_run *run);
+/* Peaks that have begun at t, behind a step of so many s, and take `passes` (s), are passed in parts, beside those that already
+ * are. */
+void sd_modes_pass(sd_modes *m, double t, double step, double passes);
 
 #endif

@@ -188,7 +188,7 @@ static int scan(sd_run *run, double begin, double end, int parts, int seek, int 
 
 int sd_run_changes(sd_run *run, double from)
 {
-    double to = *run->stepper->t, end = to;
+    double to = run->stepper->ivp->t, end = to;
     int parts = SD_PARTS, fell = 0;
     run->t_clear = from;
     run->t_seen = to;

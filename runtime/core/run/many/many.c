@@ -177,7 +177,7 @@ static void take(sd_many *many, sd_run *run, sd_samples *own, sd_samples *there)
         many->thinned += due;
     }
     many->held = run->rows;
-    if (*run->stepper->t >= *run->stepper->t_end && run->rows)
+    if (run->stepper->ivp->t >= run->stepper->ivp->t_end && run->rows)
         claim(many, run->row + (size_t)(run->rows - 1) * (size_t)(SD_ROW_HEAD + 2 * many->observed), 1);
     run->rows = 0;
 }
@@ -200,12 +200,12 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
     if (run->extrema)
         sd_extrema_begin(run->extrema);
     for (;;) {
-        int64_t before = *run->stepper->taken;
+        int64_t before = run->stepper->ivp->taken;
         double from = cpu_now();
         int state = sd_run_advance(run, left, 1e9);
         many->spent += cpu_now() - from;
-        *steps += *run->stepper->taken - before;
-        left -= *run->stepper->taken - before;
+        *steps += run->stepper->ivp->taken - before;
+        left -= run->stepper->ivp->taken - before;
         take(many, run, own, there);
         if (state == SD_FINISHED)
             break;
@@ -243,22 +243,6 @@ static int balanced(const sd_many *many, const sd_ledgers *ledgers)
     return 1;
 }
 
-/* of the samples only those at instants of other ones, which are fewer: a draft has no two within a part of a step */
-static void match(const sd_many *many, sd_samples *mine, const sd_samples *other)
-{
-    int32_t n = 0;
-    size_t columns = (size_t)many->columns, bytes = columns * sizeof(double);
-    for (int32_t k = 0; k < mine->number && n < other->number; k++) {
-        if (mine->time[k] != other->time[n])
-            continue;
-        mine->time[n] = mine->time[k];
-        memmove(mine->value + n * columns, mine->value + k * columns, bytes);
-        memmove(mine->late + n * columns, mine->late + k * columns, bytes);
-        n++;
-    }
-    mine->number = n;
-}
-
 /* tolerance behind a draft of so many steps */
 static double behind(const sd_many *many, int64_t steps)
 {
@@ -274,15 +258,60 @@ static double opening(const sd_pass *pass)
     return pass->opening ? *pass->opening : 0.0;
 }
 
+/* kinds of the rows of the next run: those of the last one, whose end is all that is asked for where it is `lean` */
+static void ask(sd_many *many, const sd_samples *last, int lean)
+{
+    for (int32_t k = 0; !many->known && k < last->number; k++)
+        many->kind[k] = SD_COMPARED | (lean && k == last->number - 1 ? SD_TRACE : 0);
+}
+
+/* what runs have differed by: over, at tolerances a power of ten^step apart; before, step_before: the pair before, -1: none;
+ * power: of the tolerance by which differences fell, -1: not known yet */
+typedef struct fall {
+    double over, step, before, step_before, power;
+} fall;
+
+/* the part of a difference that is the later run's error, `taken` steps long */
+static double part_of(const sd_many *many, fall *f, int64_t taken)
+{
+    if (f->before >= 0.0 && f->over > f->before)
+        return 1.0;
+    double credit = taken >= SHORT ? many->credit : fmin(many->credit, SHORT_CREDIT);
+    if (f->before >= 0.0 && f->over > 0.0 && isfinite(f->before))
+        f->power = fmax(0.3, fmin(1.0, log10(f->before / f->over) / f->step_before));
+    return shrink(f->power < 0.0 ? credit : fmin(f->power, credit), f->step, many->far);
+}
+
+/* the tolerance behind one whose error was so many times what is aimed at; away: the runs have parted */
+static double behind_pair(const sd_many *many, double tolerance, double error, double power, int away)
+{
+    double drop = pow(1.0 / fmax(error, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, SLOWEST)));
+    double least = power < 0.0 ? FIRST_DROP : 1e-3, most = power < 0.0 ? many->little : LEFT;
+    double next = fmax(fmax(least, fmin(drop, most)) * tolerance, many->finest);
+    return away ? fmin(next, TAME) : next;
+}
+
+/* what a run says that is as accurate as asked: whether its ledgers balance and its claims hold */
+static int verdict(const sd_many *many)
+{
+    int32_t at = 0;
+    if (!balanced(many, many->passes[1].run->ledgers))
+        return SD_MANY_ENERGY;
+    for (int32_t k = 0; k < many->claims; k++)
+        at += many->claim[k].moment > 0;
+    return many->broken || many->judged < at ? SD_MANY_CLAIM : SD_MANY_DONE;
+}
+
 /* runs until the last one's estimated error is what was asked: `control` of accuracy/control.py */
 static int control(sd_many *many, int64_t *steps, double *estimate)
 {
     sd_samples *last = &many->sample[0], *own = &many->sample[1], *there = &many->sample[2];
     double tolerance = many->tolerance[0], next, longest = many->passes[1].longest, opened;
-    double before = -1.0, step_before = 0.0, power = -1.0;
+    fall f = {.before = -1.0, .power = -1.0};
     int64_t taken = 0, taken_before;
     /* of a run that is the last one, nobody asks for rows at its own steps */
     int lean = many->keep == 0 && !many->claims && !many->known;
+    /* the draft */
     prepare(many, &many->passes[0], tolerance, many->passes[0].longest, NULL, 0.0);
     int state = integrate(many, &many->passes[0], last, there, &taken);
     *steps += taken;
@@ -295,8 +324,8 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
     for (int number = 2; state == SD_MANY_DONE && number <= RUNS; number++) {
         taken_before = taken;
         taken = 0;
-        for (int32_t k = 0; !many->known && k < last->number; k++)
-            many->kind[k] = SD_COMPARED | (lean && k == last->number - 1 ? SD_TRACE : 0);
+        /* a finer run */
+        ask(many, last, lean);
         prepare(many, &many->passes[1], next, longest, many->known ? NULL : last, opened);
         many->passes[1].run->every_step = many->passes[1].run->every_step && !lean;
         many->passes[1].run->sizes_at_steps = !lean;
@@ -306,32 +335,20 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         if (state && !lost_now)
             return state;
         state = SD_MANY_DONE;
+        /* what it differs by from the last one */
         if (many->known)
-            match(many, there, last);
-        double over, apart = sd_many_difference(many, &many->passes[1], last, there, &over);
+            sd_many_match(many, there, last);
+        double apart = sd_many_difference(many, &many->passes[1], last, there, &f.over);
         if (lost || lost_now)
-            apart = over = INFINITY;
-        double step = log10(tolerance / next), part;
+            apart = f.over = INFINITY;
+        f.step = log10(tolerance / next);
         if (taken == taken_before && apart < SD_MANY_ROUND_OFF)
             return SD_MANY_ACCURACY; /* two runs that took the same steps say nothing */
-        if (before >= 0.0 && over > before)
-            part = 1.0;
-        else {
-            double credit = taken >= SHORT ? many->credit : fmin(many->credit, SHORT_CREDIT);
-            if (before >= 0.0 && over > 0.0 && isfinite(before))
-                power = fmax(0.3, fmin(1.0, log10(before / over) / step_before));
-            part = shrink(power < 0.0 ? credit : fmin(power, credit), step, many->far);
-        }
+        double part = part_of(many, &f, taken);
         *estimate = apart * part;
         int away = next > LOOSE && sd_many_parted(many, &many->passes[1], last, there);
-        if (over * part <= 1.0 && !away) {
-            if (!balanced(many, many->passes[1].run->ledgers))
-                return SD_MANY_ENERGY;
-            int32_t at = 0;
-            for (int32_t k = 0; k < many->claims; k++)
-                at += many->claim[k].moment > 0;
-            return many->broken || many->judged < at ? SD_MANY_CLAIM : SD_MANY_DONE;
-        }
+        if (f.over * part <= 1.0 && !away)
+            return verdict(many);
         if (next <= 1.01 * many->finest)
             break;
         if (lean) { /* once more, with the rows that the next one is compared at */
@@ -340,23 +357,17 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
             taken = taken_before;
             continue;
         }
+        /* it is what the next one is compared with */
         lost = lost_now;
-        before = over;
-        step_before = step;
-        double drop = pow(1.0 / fmax(AIM * over * part, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, SLOWEST)));
+        f.before = f.over;
+        f.step_before = f.step;
         tolerance = next;
         opened = opening(&many->passes[1]);
-        next = fmax(fmax(power < 0.0 ? FIRST_DROP : 1e-3, fmin(drop, power < 0.0 ? many->little : LEFT)) * next, many->finest);
-        next = away ? fmin(next, TAME) : next;
+        next = behind_pair(many, next, AIM * f.over * part, f.power, away);
         longest /= STRETCH;
-        sd_samples *swap = last;
-        if (many->known) {
-            last = there;
-            there = swap;
-        } else {
-            last = own;
-            own = swap;
-        }
+        sd_samples **found = many->known ? &there : &own, *swap = last;
+        last = *found;
+        *found = swap;
     }
     return state ? state : SD_MANY_ACCURACY;
 }

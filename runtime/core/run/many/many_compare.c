@@ -89,3 +89,18 @@ int sd_many_parted(const sd_many *many, const sd_pass *pass, const sd_samples *c
     }
     return 0;
 }
+
+void sd_many_match(const sd_many *many, sd_samples *mine, const sd_samples *other)
+{
+    int32_t n = 0;
+    size_t columns = (size_t)many->columns, bytes = columns * sizeof(double);
+    for (int32_t k = 0; k < mine->number && n < other->number; k++) {
+        if (mine->time[k] != other->time[n])
+            continue;
+        mine->time[n] = mine->time[k];
+        memmove(mine->value + n * columns, mine->value + k * columns, bytes);
+        memmove(mine->late + n * columns, mine->late + k * columns, bytes);
+        n++;
+    }
+    mine->number = n;
+}

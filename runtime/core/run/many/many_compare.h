@@ -14,5 +14,7 @@ double sd_many_difference(const sd_many *many, const sd_pass *pass, const sd_sam
 
 /* 1: two runs differ somewhere by PARTED times all that a quantity was since its start, and by much of what it is */
 int sd_many_parted(const sd_many *many, const sd_pass *pass, const sd_samples *coarse, const sd_samples *fine);
+/* of the samples only those at instants of other ones, which are fewer: a draft has no two within a part of a step */
+void sd_many_match(const sd_many *many, sd_samples *mine, const sd_samples *other);
 
 #endif

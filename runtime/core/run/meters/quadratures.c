@@ -70,7 +70,7 @@ static void shares(const sd_stepper *stepper, double to, double *share)
 /* length of the last step */
 static double length_of(const sd_run *run)
 {
-    return run->stepper->length ? *run->stepper->length : *run->stepper->t - run->t_from;
+    return run->stepper->length ? *run->stepper->length : run->stepper->ivp->t - run->t_from;
 }
 
 /* the method's own quadrature over the part `part` of the last step */
@@ -111,8 +111,8 @@ int sd_run_integrate(sd_run *run, double to)
     run->sampled = 0;
     if (!run->audit || half == 0.0)
         return 0;
-    if (stepper->nodes && (to == *stepper->t || stepper->collocated)) {
-        integrate_nodes(run, to == *stepper->t ? 1.0 : (to - from) / (*stepper->t - from));
+    if (stepper->nodes && (to == stepper->ivp->t || stepper->collocated)) {
+        integrate_nodes(run, to == stepper->ivp->t ? 1.0 : (to - from) / (stepper->ivp->t - from));
         return 0;
     }
     if (stepper->part_y) {
@@ -133,7 +133,7 @@ int sd_run_integrate(sd_run *run, double to)
         powers(run, t, run->point, run->point_d);
         weigh(run, 5.0 * half / 6.0);
     }
-    run->sampled = to == *stepper->t;
+    run->sampled = to == stepper->ivp->t;
     if (run->sampled)
         look(run, to);
     else
@@ -152,7 +152,7 @@ int sd_run_sum(sd_run *run, double to, double sum[2])
         return there;
     }
     double share[SD_NODES + 1], h = length_of(run);
-    shares(stepper, (to - run->t_from) / (*stepper->t - run->t_from), share);
+    shares(stepper, (to - run->t_from) / (stepper->ivp->t - run->t_from), share);
     for (int i = 0; i < 2; i++) {
         sum[i] = share[0] * run->power[2 + i];
         for (int32_t k = 0; k < stepper->nodes; k++)

@@ -28,26 +28,12 @@
 #define LAX 10.0            /* a steep row may be off by as many tolerances of its terms; beside 3: error over steps times tolerance
                              * at most 0.88 instead of 0.52 (an amplifier), 0.42 instead of 0.23 (a diode), in the mean the same */
 #define LOOSEST_ROW 0.3     /* and be off by no more of them: of an exponential that is no law any more any value is within 1 */
+#define FIXED_SLACK 1e-3   /* of a step of fixed length: what may be left of the span */
 #define FINEST_ROW 1e-9     /* part of a steep row's terms that round-off of its unknowns leaves */
-
-static int step(void *bdf)
-{
-    return sd_bdf_step(bdf);
-}
-
-static void dense(const void *bdf, double t, double *y, double *yd)
-{
-    sd_bdf_dense(bdf, t, y, yd);
-}
 
 static void values(const void *bdf, double t, double *y)
 {
     sd_bdf_dense(bdf, t, y, NULL);
-}
-
-static void start(void *bdf, double t, const double *y, const double *yd, double h)
-{
-    sd_bdf_start(bdf, t, y, yd, h);
 }
 
 sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
@@ -69,27 +55,21 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     double *next = bdf->memory;
     for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
         bdf->phi[i] = next;
-    double **vector[VECTORS] = {&bdf->y, &bdf->yd, &bdf->ee, &bdf->weight, &bdf->delta, &bdf->scale, &bdf->own,
+    double **vector[VECTORS] = {&bdf->y, &bdf->yd, &bdf->ivp.ee, &bdf->ivp.weight, &bdf->delta, &bdf->scale, &bdf->own,
                                 &bdf->newton_power, &bdf->test_power, &bdf->moved, &bdf->moved_d, &bdf->terms, &bdf->rate};
     for (size_t i = 0; i < vectors; i++, next += m)
         *vector[i] = next;
     bdf->jy = next;
     bdf->jyd = bdf->jy + nnz;
     bdf->g = steep ? bdf->jyd + nnz : linear->scaled;
-    bdf->system = system;
+    bdf->ivp.system = system;
     bdf->linear = linear;
     sd_linear_replayed(linear);
-    bdf->n = system->unknowns;
+    bdf->ivp.n = system->unknowns;
     bdf->max_order = SD_MAX_ORDER;
-    bdf->stepper = (sd_stepper){bdf, system, bdf->n, &bdf->t, &bdf->t_end, bdf->phi[0], bdf->yd, &bdf->taken,
-                                step, dense, NULL, start};
-    bdf->stepper.values = values;
+    bdf->ivp.stepper = (sd_stepper){.self = bdf, .ivp = &bdf->ivp, .n = bdf->ivp.n, .y = bdf->phi[0], .yd = bdf->yd,
+                                    .step = sd_bdf_step, .dense = sd_bdf_dense, .values = values, .start = sd_bdf_start};
     return bdf;
-}
-
-sd_stepper *sd_bdf_stepper(sd_bdf *bdf)
-{
-    return &bdf->stepper;
 }
 
 void sd_bdf_free(sd_bdf *bdf)
@@ -104,36 +84,32 @@ void sd_bdf_free(sd_bdf *bdf)
 /* magnitudes of the columns: index-2 unknowns and index-3 multipliers with powers of h */
 static void set_scales(sd_bdf *bdf)
 {
-    const double power[3] = {1.0, 1.0 / bdf->h, 1.0 / (bdf->h * bdf->h)};
-    memcpy(bdf->scale, bdf->magnitude, (size_t)bdf->n * sizeof *bdf->scale);
+    const double power[3] = {1.0, 1.0 / bdf->ivp.h, 1.0 / (bdf->ivp.h * bdf->ivp.h)};
+    memcpy(bdf->scale, bdf->ivp.magnitude, (size_t)bdf->ivp.n * sizeof *bdf->scale);
     for (int32_t k = 0; k < bdf->powers; k++)
-        bdf->scale[bdf->powered[k]] *= power[bdf->power[bdf->powered[k]]];
+        bdf->scale[bdf->powered[k]] *= power[bdf->ivp.power[bdf->powered[k]]];
 }
 
-void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, double h)
+void sd_bdf_start(void *self, double t, const double *y, const double *yd, double h)
 {
-    bdf->t = t;
-    bdf->taken = 0;
-    bdf->tested = 0;
-    for (int32_t i = 0; i < bdf->n; i++)
-        bdf->tested += bdf->test[i] >= 0;
-    memcpy(bdf->phi[0], y, (size_t)bdf->n * sizeof *y);
-    memcpy(bdf->y, y, (size_t)bdf->n * sizeof *y);
-    memcpy(bdf->yd, yd, (size_t)bdf->n * sizeof *yd);
-    memset(bdf->ee, 0, (size_t)bdf->n * sizeof *yd);
-    bdf->h = 1.0;
+    sd_bdf *bdf = self;
+    sd_begin(&bdf->ivp, t);
+    memcpy(bdf->phi[0], y, (size_t)bdf->ivp.n * sizeof *y);
+    memcpy(bdf->y, y, (size_t)bdf->ivp.n * sizeof *y);
+    memcpy(bdf->yd, yd, (size_t)bdf->ivp.n * sizeof *yd);
+    memset(bdf->ivp.ee, 0, (size_t)bdf->ivp.n * sizeof *yd);
+    bdf->ivp.h = 1.0;
     bdf->linear->null_pivot = bdf->linear->idle ? SD_LEAST_PIVOT : 0.0;
     sd_bdf_begin_powers(bdf);
     sd_bdf_weights(bdf);
     sd_bdf_weigh(bdf, SD_LOCAL_ERROR_TEST);
-    bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : h > 0.0 ? h : sd_bdf_first_step(bdf, bdf->t_end - t);
-    bdf->h = fmin(bdf->h, bdf->h_max);
-    for (int32_t i = 0; i < bdf->n; i++)
-        bdf->phi[1][i] = bdf->h * yd[i];
-    bdf->psi[0] = bdf->h;
+    bdf->ivp.h = bdf->ivp.fixed_h > 0.0 ? bdf->ivp.fixed_h : h > 0.0 ? h : sd_bdf_first_step(bdf);
+    bdf->ivp.h = fmin(bdf->ivp.h, bdf->ivp.h_max);
+    for (int32_t i = 0; i < bdf->ivp.n; i++)
+        bdf->phi[1][i] = bdf->ivp.h * yd[i];
+    bdf->psi[0] = bdf->ivp.h;
     bdf->order = 1;
     bdf->order_used = 0;
-    bdf->h_used = 0.0;
     bdf->ns = 0;
     bdf->rising = bdf->max_order > 1;
     bdf->contraction = 20.0;
@@ -144,15 +120,15 @@ void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, doub
 static int factorise(sd_bdf *bdf, double t, int fresh)
 {
     if (fresh) {
-        int32_t bad = sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->magnitude, bdf->jy, bdf->jyd);
+        int32_t bad = sd_jacobian(bdf->ivp.system, t, bdf->y, bdf->yd, bdf->ivp.magnitude, bdf->jy, bdf->jyd);
         bdf->jacobian_age = 0;
         bdf->cj_slopes = bdf->cj;
         bdf->fresh_jacobian = 1;
-        if (*bdf->system->stop)
+        if (*bdf->ivp.system->stop)
             return SD_STOPPED;
         if (bad >= 0) {
             bdf->ready = 0;
-            bdf->bad_row = bad;
+            bdf->ivp.bad_row = bad;
             return SD_NONFINITE;
         }
     }
@@ -161,8 +137,8 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
     bdf->ready = 0;
     int failed = sd_linear_factor(bdf->linear, bdf->g, bdf->scale);
     if (failed) {
-        bdf->bad_row = bdf->linear->bad_row;
-        bdf->bad_column = bdf->linear->bad_column;
+        bdf->ivp.bad_row = bdf->linear->bad_row;
+        bdf->ivp.bad_column = bdf->linear->bad_column;
         return failed == 2 ? SD_MEMORY : SD_SINGULAR;
     }
     bdf->cj_factored = bdf->cj;
@@ -175,35 +151,36 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
 /* what a row may be off, of its terms */
 static double row_limit(const sd_bdf *bdf)
 {
-    return fmin(LOOSEST_ROW, fmax(FINEST_ROW, LAX * bdf->rtol));
+    return fmin(LOOSEST_ROW, fmax(FINEST_ROW, LAX * bdf->ivp.rtol));
 }
 
 /* The residual in delta, behind the last correction, is small in every steep row beside the row's own terms: on an
  * exponential a correction says nothing about what it leaves.  Where the factors left a column every row is judged. */
 static int rows_hold(sd_bdf *bdf, double t)
 {
-    for (int32_t i = 0; i < bdf->n; i++)
-        bdf->rate[i] = bdf->cj * (fabs(bdf->y[i]) + bdf->magnitude[i]);
+    for (int32_t i = 0; i < bdf->ivp.n; i++)
+        bdf->rate[i] = bdf->cj * (fabs(bdf->y[i]) + bdf->ivp.magnitude[i]);
     double limit = row_limit(bdf);
-    int all = bdf->linear->rank < bdf->n;
-    return sd_first_unmet(bdf->system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, bdf->met, all, bdf->terms) < 0;
+    int all = bdf->linear->rank < bdf->ivp.n;
+    return sd_first_unmet(bdf->ivp.system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, bdf->ivp.met, all,
+                          bdf->terms) < 0;
 }
 
 /* Every steep row is as small as round-off of the unknowns (`moved`), by slopes at the point itself, lets it be (see
  * radau/radau_newton.c) */
 static int rows_at_round_off(sd_bdf *bdf, double t)
 {
-    sd_jacobian(bdf->system, t, bdf->y, bdf->yd, bdf->magnitude, bdf->jy, bdf->jyd);
-    return sd_first_astray(bdf->system, t, bdf->y, bdf->yd, bdf->delta, row_limit(bdf), bdf->jy, bdf->jyd,
-                           1.0 / bdf->cj, bdf->moved, bdf->linear->rank < bdf->n, bdf->terms) < 0;
+    sd_jacobian(bdf->ivp.system, t, bdf->y, bdf->yd, bdf->ivp.magnitude, bdf->jy, bdf->jyd);
+    return sd_first_astray(bdf->ivp.system, t, bdf->y, bdf->yd, bdf->delta, row_limit(bdf), bdf->jy, bdf->jyd,
+                           1.0 / bdf->cj, bdf->moved, bdf->linear->rank < bdf->ivp.n, bdf->terms) < 0;
 }
 
 /* the residual in delta is finite; else bad_row says where not */
 static int finite(sd_bdf *bdf)
 {
-    int32_t bad = sd_first_bad(bdf->n, bdf->delta);
+    int32_t bad = sd_first_bad(bdf->ivp.n, bdf->delta);
     if (bad >= 0)
-        bdf->bad_row = bad;
+        bdf->ivp.bad_row = bad;
     return bad < 0;
 }
 
@@ -213,8 +190,8 @@ static int cause_of(sd_bdf *bdf, double t, int corrections)
 {
     sd_bdf_predict(bdf);
     for (int m = 0; m < corrections; m++) {
-        sd_residual(bdf->system, t, bdf->y, bdf->yd, bdf->delta);
-        if (*bdf->system->stop)
+        sd_residual(bdf->ivp.system, t, bdf->y, bdf->yd, bdf->delta);
+        if (*bdf->ivp.system->stop)
             return SD_STOPPED;
         if (!finite(bdf))
             return SD_NONFINITE;
@@ -230,7 +207,7 @@ static int factors_serve(const sd_bdf *bdf)
     double ratio = bdf->cj / bdf->cj_factored;
     if (ratio == 1.0)
         return 1;
-    double effort = bdf->system->scales ? 0.0 : sd_linear_effort(bdf->linear);
+    double effort = bdf->ivp.system->scales ? 0.0 : sd_linear_effort(bdf->linear);
     return ratio <= APART && ratio >= 1.0 / APART && effort >= DEAR && bdf->extra < SPENT * effort;
 }
 
@@ -241,24 +218,23 @@ static void balance(sd_bdf *bdf, double *d)
     double ratio = bdf->cj / bdf->cj_factored, part = 2.0 / (1.0 + ratio), power[3] = {1.0, ratio, ratio * ratio};
     if (ratio == 1.0)
         return;
-    for (int32_t i = 0; i < bdf->n; i++)
+    for (int32_t i = 0; i < bdf->ivp.n; i++)
         d[i] *= part;
     for (int32_t k = 0; k < bdf->powers; k++)
-        d[bdf->powered[k]] *= power[bdf->power[bdf->powered[k]]];
+        d[bdf->powered[k]] *= power[bdf->ivp.power[bdf->powered[k]]];
 }
 
 /* Newton's iteration from the prediction with the present factors */
 static int iterate(sd_bdf *bdf, double t)
 {
     double first = 0.0, before = 0.0;
-    int converged = 0, idle = 0, judged = bdf->system->scales > 0;
+    int converged = 0, idle = 0, judged = bdf->ivp.system->scales > 0;
     int others = bdf->cj != bdf->cj_factored;
     double trust = judged ? STEEP_TRUST : TRUST, tolerance = judged ? STEEP : others ? OTHERS : NEWTON_TOLERANCE;
     for (int m = 0; m < ITERATIONS + judged; m++) {
         double *d = bdf->delta;
-        sd_residual(bdf->system, t, bdf->y, bdf->yd, d);
-        bdf->newton_iterations++;
-        if (*bdf->system->stop)
+        sd_residual(bdf->ivp.system, t, bdf->y, bdf->yd, d);
+        if (*bdf->ivp.system->stop)
             return SD_STOPPED;
         if (judged && !finite(bdf)) /* rows are judged, and columns may be left out of the correction */
             return SD_NONFINITE;
@@ -287,9 +263,9 @@ static int iterate(sd_bdf *bdf, double t)
                 bdf->jacobian_age = OLD_JACOBIAN;
         }
         /* they do not shrink, or are round-off of the unknowns whatever they do (a law whose slope vanishes: by halves) */
-        idle = m > 0 && size <= STAGNANT && (!(size < SLOW * before) || size * bdf->rtol <= SD_ROUND_OFF);
-        for (int32_t i = 0; i < bdf->n && idle && judged; i++)
-            bdf->moved[i] = sd_open(d[i], bdf->y[i], bdf->met[i]);
+        idle = m > 0 && size <= STAGNANT && (!(size < SLOW * before) || size * bdf->ivp.rtol <= SD_ROUND_OFF);
+        for (int32_t i = 0; i < bdf->ivp.n && idle && judged; i++)
+            bdf->moved[i] = sd_open(d[i], bdf->y[i], bdf->ivp.met[i]);
         before = size;
         /* a first correction is not believed beyond this, however fast earlier steps converged */
         double contraction = m == 0 ? fmax(bdf->contraction, trust) : bdf->contraction;
@@ -303,11 +279,11 @@ static int iterate(sd_bdf *bdf, double t)
 /* Corrects the prediction; factors are renewed when cj changed, the Jacobian when it is old or fails. */
 static int correct(sd_bdf *bdf)
 {
-    double t = bdf->t + bdf->h;
+    double t = bdf->ivp.t + bdf->ivp.h;
     bdf->fresh_jacobian = 0;
     sd_bdf_weigh(bdf, SD_NEWTON_TEST);
     for (;;) {
-        int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->cj * GROWN < bdf->cj_slopes || bdf->taken == 0 ||
+        int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->cj * GROWN < bdf->cj_slopes || bdf->ivp.taken == 0 ||
                     bdf->fresh_jacobian < 0;
         if (fresh || !bdf->ready || !factors_serve(bdf)) {
             int cause = factorise(bdf, t, fresh);
@@ -332,80 +308,65 @@ static int correct(sd_bdf *bdf)
 /* a smaller step after a failure; on the first step the difference phi[1] = h yd follows */
 static void reduce(sd_bdf *bdf, double ratio)
 {
-    bdf->h *= ratio;
-    if (bdf->taken == 0) {
-        bdf->psi[0] = bdf->h;
-        for (int32_t i = 0; i < bdf->n; i++)
+    bdf->ivp.h *= ratio;
+    if (bdf->ivp.taken == 0) {
+        bdf->psi[0] = bdf->ivp.h;
+        for (int32_t i = 0; i < bdf->ivp.n; i++)
             bdf->phi[1][i] *= ratio;
     }
 }
 
-/* the step ends at t_end exactly, and never leaves less than its half for the last one */
+/* what a sum of fixed steps leaves is round-off: a step of that length would divide multipliers by it */
 static void fit_end(sd_bdf *bdf)
 {
-    double left = bdf->t_end - bdf->t, h = bdf->h;
-    /* what a sum of fixed steps leaves is round-off: a step of that length would divide multipliers by it */
-    double slack = bdf->fixed_h > 0.0 ? 1e-3 : 1e-12;
-    if (h >= left * (1.0 - slack))
-        h = left;
-    else if (2.0 * h > left && bdf->taken > 0 && !(bdf->fixed_h > 0.0))
-        h = 0.5 * left;
-    if (h != bdf->h)
-        reduce(bdf, h / bdf->h);
-    if (bdf->h != h)
-        bdf->h = h;
-}
-
-/* t + h is t, or nearly (the last bit of the span is a step nonetheless) */
-static int too_small(const sd_bdf *bdf)
-{
-    double left = bdf->t_end - bdf->t;
-    return bdf->h < 4.0 * DBL_EPSILON * fmax(fabs(bdf->t), SD_SHORT * left) && bdf->h < left;
+    double h = sd_fitted(&bdf->ivp, bdf->ivp.fixed_h > 0.0 ? FIXED_SLACK : SD_SLACK);
+    if (h != bdf->ivp.h)
+        reduce(bdf, h / bdf->ivp.h);
+    bdf->ivp.h = h;
 }
 
 /* The new point moved onto every constraint; the correction moves with it, and so do the differences made of it. */
 static void project(sd_bdf *bdf)
 {
-    size_t size = (size_t)bdf->n * sizeof(double);
+    size_t size = (size_t)bdf->ivp.n * sizeof(double);
     memcpy(bdf->moved, bdf->y, size);
     memcpy(bdf->moved_d, bdf->yd, size);
-    if (sd_settle_point(bdf->project, bdf->t, bdf->moved, bdf->moved_d))
+    if (sd_settle_point(bdf->ivp.project, bdf->ivp.t, bdf->moved, bdf->moved_d))
         return;
-    for (int32_t i = 0; i < bdf->n; i++) {
-        bdf->ee[i] += bdf->moved[i] - bdf->y[i];
+    for (int32_t i = 0; i < bdf->ivp.n; i++) {
+        bdf->ivp.ee[i] += bdf->moved[i] - bdf->y[i];
         bdf->y[i] = bdf->moved[i];
     }
 }
 
-int sd_bdf_step(sd_bdf *bdf)
+int sd_bdf_step(void *self)
 {
+    sd_bdf *bdf = self;
     int32_t error_failures = 0, order_next = 1;
     double ck, error, norm[4];
     sd_bdf_weights(bdf);
-    bdf->cause = SD_FINE;
+    bdf->ivp.cause = SD_FINE;
     bdf->jacobian_age++;
     for (;;) {
         fit_end(bdf);
-        if (too_small(bdf)) {
-            bdf->cause = bdf->cause ? bdf->cause : SD_STEP;
-            return bdf->cause;
-        }
+        if (sd_too_small(&bdf->ivp))
+            return bdf->ivp.cause = bdf->ivp.cause ? bdf->ivp.cause : SD_STEP;
         sd_bdf_coefficients(bdf, &ck);
         sd_bdf_predict(bdf);
         int cause = correct(bdf);
-        if (cause == SD_FINE && (sd_bdf_test(bdf, ck, norm, &error, &order_next) || bdf->fixed_h > 0.0))
+        if (cause == SD_FINE && (sd_bdf_test(bdf, ck, norm, &error, &order_next) || bdf->ivp.fixed_h > 0.0))
             break;
         sd_bdf_restore(bdf);
-        bdf->cause = cause ? cause : SD_ERROR_TEST;
-        if (cause == SD_STOPPED || cause == SD_MEMORY || bdf->fixed_h > 0.0)
-            return bdf->cause;
+        bdf->ivp.cause = cause ? cause : SD_ERROR_TEST;
+        if (sd_ends(&bdf->ivp, cause))
+            return bdf->ivp.cause;
         if (cause) {
             /* Newton, a singular matrix, a number that is not finite: much smaller */
-            bdf->newton_failures++;
+            bdf->ivp.newton_failures++;
             bdf->jacobian_age = OLD_JACOBIAN; /* taken at a point that proved far off: its slopes mislead */
             reduce(bdf, 0.25);
         } else {
-            bdf->rejected_steps++;
+            bdf->ivp.rejected_steps++;
             bdf->rising = 0;
             error_failures++;
             double ratio = 0.25;
@@ -415,10 +376,9 @@ int sd_bdf_step(sd_bdf *bdf)
             reduce(bdf, ratio);
         }
     }
-    bdf->cause = SD_FINE;
-    double t = bdf->t + bdf->h;
-    bdf->t = fabs(bdf->t_end - t) <= 1e-12 * bdf->h ? bdf->t_end : t;
-    if (bdf->project) {
+    bdf->ivp.cause = SD_FINE;
+    sd_advance(&bdf->ivp);
+    if (bdf->ivp.project) {
         project(bdf);
         sd_bdf_orders(bdf, norm);
     }
@@ -427,10 +387,11 @@ int sd_bdf_step(sd_bdf *bdf)
 }
 
 /* Polynomial through the last order + 1 points, in divided differences. */
-void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd)
+void sd_bdf_dense(const void *self, double t, double *y, double *yd)
 {
-    int32_t k = bdf->taken == 0 ? 0 : bdf->order_used > 0 ? bdf->order_used : 1;
-    double delta = t - bdf->t, c = 1.0, d = 0.0, gamma = bdf->psi[0] != 0.0 ? delta / bdf->psi[0] : 0.0;
+    const sd_bdf *bdf = self;
+    int32_t k = bdf->ivp.taken == 0 ? 0 : bdf->order_used > 0 ? bdf->order_used : 1;
+    double delta = t - bdf->ivp.t, c = 1.0, d = 0.0, gamma = bdf->psi[0] != 0.0 ? delta / bdf->psi[0] : 0.0;
     double value[SD_MAX_ORDER + 2], rate[SD_MAX_ORDER + 2];
     for (int32_t j = 1; j <= k; j++) {
         rate[j] = d = d * gamma + c / bdf->psi[j - 1];
@@ -438,6 +399,6 @@ void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd)
         gamma = (delta + bdf->psi[j - 1]) / bdf->psi[j];
     }
     sd_bdf_interpolate(bdf, k, value, rate, y, yd);
-    if (bdf->taken == 0 && yd)
-        memcpy(yd, bdf->yd, (size_t)bdf->n * sizeof *yd);
+    if (bdf->ivp.taken == 0 && yd)
+        memcpy(yd, bdf->yd, (size_t)bdf->ivp.n * sizeof *yd);
 }

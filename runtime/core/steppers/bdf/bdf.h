@@ -23,47 +23,35 @@
 #define SD_MAX_ORDER 5
 
 typedef struct sd_bdf {
-    sd_system *system;
+    sd_ivp ivp;
     sd_linear *linear;
-    int32_t n, max_order, tested;
-    double rtol, t_end, h_max, fixed_h;
-    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
-    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
-    double *met;              /* [n] max |y| */
-    const int8_t *test, *power;
+    int32_t max_order;
     const int32_t *common_from, *common; /* [commons + 1] where each group begins in `common`: its unknowns */
     int32_t commons;          /* groups of unknowns that are states but for what they have in common */
     /* state of the integration */
-    double t, h, h_used, cj, cj_factored, cj_last, cj_slopes, contraction;
+    double cj, cj_factored, cj_last, cj_slopes, contraction;
     int32_t order, order_used, ns, rising, fresh_jacobian, jacobian_age, ready, extra;
     double psi[SD_MAX_ORDER + 2], alpha[SD_MAX_ORDER + 2], beta[SD_MAX_ORDER + 2], sigma[SD_MAX_ORDER + 2],
         gamma[SD_MAX_ORDER + 2];
     double *phi[SD_MAX_ORDER + 2];
-    double *y, *yd, *ee, *delta, *moved, *moved_d, *scale;
+    double *y, *yd, *delta, *moved, *moved_d, *scale;
     double *terms, *rate, *jy, *jyd, *g, *memory;
-    double *weight; /* [n] as Newton's test has them, then that of the error */
     double *own, *newton_power, *test_power, h_weighed; /* [n] weights and powers of h of unknowns in `apart`, and of which h */
     int32_t *powered, powers; /* [powers] unknowns that do not count alike at every h */
     int32_t *apart, aparts;   /* [aparts] lanes of unknowns that do not count alike in both tests */
     double error_next;        /* estimate of the local error at the order chosen next */
     /* what happened */
-    int64_t steps, rejected_steps, newton_failures, newton_iterations;
     int64_t orders;           /* sum of the orders of all steps */
-    int64_t taken;            /* steps since the last start */
-    int32_t cause, bad_row, bad_column;
-    sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */
-    sd_stepper stepper;
 } sd_bdf;
 
 /* A stepper without its problem set; the caller fills the public fields, then calls sd_bdf_start. */
 sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear);
 void sd_bdf_free(sd_bdf *bdf);
-sd_stepper *sd_bdf_stepper(sd_bdf *bdf);
-void sd_bdf_start(sd_bdf *bdf, double t, const double *y, const double *yd, double h);
+void sd_bdf_start(void *bdf, double t, const double *y, const double *yd, double h);
 /* one accepted step, or the cause of failure */
-int sd_bdf_step(sd_bdf *bdf);
+int sd_bdf_step(void *bdf);
 /* y, yd [n] at any t within the last step; yd NULL: y alone */
-void sd_bdf_dense(const sd_bdf *bdf, double t, double *y, double *yd);
+void sd_bdf_dense(const void *bdf, double t, double *y, double *yd);
 
 /* coefficients.c */
 void sd_bdf_coefficients(sd_bdf *bdf, double *ck);
@@ -84,6 +72,6 @@ void sd_bdf_shift(sd_bdf *bdf);
 /* controller.c */
 int sd_bdf_test(sd_bdf *bdf, double ck, double *norm, double *error, int32_t *order_next);
 void sd_bdf_accept(sd_bdf *bdf, const double *norm, int32_t order_next);
-double sd_bdf_first_step(const sd_bdf *bdf, double span);
+double sd_bdf_first_step(const sd_bdf *bdf);
 
 #endif

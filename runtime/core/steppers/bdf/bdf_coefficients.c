@@ -8,8 +8,8 @@
 void sd_bdf_coefficients(sd_bdf *bdf, double *ck)
 {
     int32_t k = bdf->order;
-    double h = bdf->h;
-    if (h != bdf->h_used || k != bdf->order_used)
+    double h = bdf->ivp.h;
+    if (h != bdf->ivp.h_used || k != bdf->order_used)
         bdf->ns = 0;
     bdf->ns = bdf->ns + 1 < bdf->order_used + 2 ? bdf->ns + 1 : bdf->order_used + 2;
     if (k + 1 >= bdf->ns) {
@@ -41,5 +41,5 @@ void sd_bdf_coefficients(sd_bdf *bdf, double *ck)
 void sd_bdf_restore(sd_bdf *bdf)
 {
     for (int32_t i = 1; i <= bdf->order; i++)
-        bdf->psi[i - 1] = bdf->psi[i] - bdf->h;
+        bdf->psi[i - 1] = bdf->psi[i] - bdf->ivp.h;
 }

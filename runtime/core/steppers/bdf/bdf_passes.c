@@ -25,7 +25,7 @@ static inline double stretch(const sd_bdf *bdf, int32_t k)
 
 static inline __attribute__((always_inline)) void predict(sd_bdf *bdf, const int32_t order, const int stretched)
 {
-    const int32_t n = bdf->n;
+    const int32_t n = bdf->ivp.n;
     double *phi[SD_MAX_ORDER + 1], gamma[SD_MAX_ORDER + 1], by[SD_MAX_ORDER + 1];
     double *const own = bdf->y, *const own_d = bdf->yd;
     for (int32_t k = 0; k <= order; k++) {
@@ -58,9 +58,9 @@ SD_WIDE void sd_bdf_predict(sd_bdf *bdf)
 
 static inline __attribute__((always_inline)) double move(sd_bdf *bdf, const int first)
 {
-    const int32_t n = bdf->n;
-    const double cj = bdf->cj, *const delta = bdf->delta, *const weight = bdf->weight;
-    double *const y = bdf->y, *const yd = bdf->yd, *const ee = bdf->ee;
+    const int32_t n = bdf->ivp.n;
+    const double cj = bdf->cj, *const delta = bdf->delta, *const weight = bdf->ivp.weight;
+    double *const y = bdf->y, *const yd = bdf->yd, *const ee = bdf->ivp.ee;
     sd_lanes sum = {0.0};
     for (ptrdiff_t i = 0; i < n; i += SD_LANES) {
         sd_lanes d = SD_FROM(delta, i), v = d * SD_FROM(weight, i);
@@ -88,13 +88,13 @@ static inline __attribute__((always_inline)) void interpolate(const sd_bdf *bdf,
         a[k] = value[k];
         b[k] = rate[k];
     }
-    for (int32_t i = 0; !yd && i < bdf->n; i++) {
+    for (int32_t i = 0; !yd && i < bdf->ivp.n; i++) {
         double x = phi[0][i];
         for (int32_t k = 1; k <= order; k++)
             x += a[k] * phi[k][i];
         y[i] = x;
     }
-    for (int32_t i = 0; yd && i < bdf->n; i++) {
+    for (int32_t i = 0; yd && i < bdf->ivp.n; i++) {
         double x = phi[0][i], slope = 0.0;
         for (int32_t k = 1; k <= order; k++) {
             x += a[k] * phi[k][i];
@@ -122,8 +122,8 @@ SD_WIDE void sd_bdf_interpolate(const sd_bdf *bdf, int32_t order, const double *
 
 static inline __attribute__((always_inline)) void shift(sd_bdf *bdf, const int32_t order, const int stretched)
 {
-    const int32_t n = bdf->n;
-    double *phi[SD_MAX_ORDER + 2], by[SD_MAX_ORDER + 1], *const ee = bdf->ee;
+    const int32_t n = bdf->ivp.n;
+    double *phi[SD_MAX_ORDER + 2], by[SD_MAX_ORDER + 1], *const ee = bdf->ivp.ee;
     for (int32_t k = 0; k <= order + 1; k++)
         phi[k] = bdf->phi[k];
     for (int32_t k = 0; stretched && k <= order; k++)
@@ -169,9 +169,10 @@ static int rises(const sd_bdf *bdf)
 
 static inline __attribute__((always_inline)) void orders(const sd_bdf *bdf, double *total, const int higher)
 {
-    const int32_t n = bdf->n, k = bdf->order;
-    const double *const ee = bdf->ee, *const one = bdf->phi[k], *const two = bdf->phi[k - 1], *const above = bdf->phi[k + 1];
-    const double *const weight = bdf->weight, by_one = stretch(bdf, k), by_two = stretch(bdf, k - 1);
+    const int32_t n = bdf->ivp.n, k = bdf->order;
+    const double *const ee = bdf->ivp.ee, *const weight = bdf->ivp.weight;
+    const double *const one = bdf->phi[k], *const two = bdf->phi[k - 1], *const above = bdf->phi[k + 1];
+    const double by_one = stretch(bdf, k), by_two = stretch(bdf, k - 1);
     sd_lanes sum[4] = {{0.0}, {0.0}, {0.0}, {0.0}};
     for (ptrdiff_t i = 0; i < n; i += SD_LANES) {
         sd_lanes w = SD_FROM(weight, i), a = SD_FROM(ee, i), b = a + by_one * SD_FROM(one, i);
@@ -194,7 +195,7 @@ SD_WIDE void sd_bdf_orders(const sd_bdf *bdf, double *norm)
 {
     const int32_t k = bdf->order;
     const double none[2] = {0.0}, less[2] = {-1.0}, by[2] = {stretch(bdf, k), stretch(bdf, k - 1)};
-    const double *ee = bdf->ee, *one = bdf->phi[k];
+    const double *ee = bdf->ivp.ee, *one = bdf->phi[k];
     double total[4];
     if (rises(bdf))
         orders(bdf, total, 1);
@@ -207,36 +208,36 @@ SD_WIDE void sd_bdf_orders(const sd_bdf *bdf, double *norm)
         total[3] += rises(bdf) ? apart(bdf, ee, less, bdf->phi[k + 1], NULL) : 0.0;
     }
     for (int j = 0; j < 4; j++)
-        norm[j] = bdf->tested ? sqrt(total[j] / bdf->tested) : 0.0;
+        norm[j] = bdf->ivp.tested ? sqrt(total[j] / bdf->ivp.tested) : 0.0;
 }
 
 /* root mean square of x - minus in the error weights; both end on whole lanes */
 SD_WIDE double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *minus)
 {
-    const int32_t n = bdf->n;
-    const double *const weight = bdf->weight, less[2] = {-1.0};
+    const int32_t n = bdf->ivp.n;
+    const double *const weight = bdf->ivp.weight, less[2] = {-1.0};
     sd_lanes sum = {0.0};
     for (ptrdiff_t i = 0; i < n; i += SD_LANES) {
         sd_lanes v = (SD_FROM(x, i) - SD_FROM(minus, i)) * SD_FROM(weight, i);
         sum += v * v;
     }
     double total = SD_TOTAL(sum) + (bdf->commons ? apart(bdf, x, less, minus, NULL) : 0.0);
-    return bdf->tested ? sqrt(total / bdf->tested) : 0.0;
+    return bdf->ivp.tested ? sqrt(total / bdf->ivp.tested) : 0.0;
 }
 
 /* what a step of length h makes of the weights: powers of h in Newton's test and in that of the error */
 static void set_powers(sd_bdf *bdf)
 {
-    const double power[3] = {1.0, bdf->h, bdf->h * bdf->h}, test[3] = {0.0, 1.0, bdf->h};
+    const double power[3] = {1.0, bdf->ivp.h, bdf->ivp.h * bdf->ivp.h}, test[3] = {0.0, 1.0, bdf->ivp.h};
     const int32_t *const powered = bdf->powered, powers = bdf->powers;
     for (int32_t k = 0; k < powers; k++) {
         int32_t i = powered[k];
-        bdf->newton_power[i] = power[bdf->power[i]];
-        bdf->test_power[i] = test[bdf->test[i] + 1];
+        bdf->newton_power[i] = power[bdf->ivp.power[i]];
+        bdf->test_power[i] = test[bdf->ivp.test[i] + 1];
     }
     for (int32_t k = 0; bdf->commons && k < bdf->common_from[bdf->commons]; k++)
         bdf->test_power[bdf->common[k]] = 0.0; /* groups are summed apart */
-    bdf->h_weighed = bdf->h;
+    bdf->h_weighed = bdf->ivp.h;
 }
 
 /* the lanes of an unknown are weighed apart from now on; powers of zero: they were not */
@@ -255,8 +256,8 @@ void sd_bdf_begin_powers(sd_bdf *bdf)
     for (int32_t k = 0; k < bdf->aparts; k++)
         SD_AT(bdf->newton_power, bdf->apart[k]) = (sd_lanes){0.0};
     bdf->powers = bdf->aparts = 0;
-    for (int32_t i = 0; i < bdf->n; i++)
-        if (bdf->power[i] > 0 || bdf->test[i] != 0) {
+    for (int32_t i = 0; i < bdf->ivp.n; i++)
+        if (bdf->ivp.power[i] > 0 || bdf->ivp.test[i] != 0) {
             bdf->powered[bdf->powers++] = i;
             weigh_apart(bdf, i);
         }
@@ -268,11 +269,11 @@ void sd_bdf_begin_powers(sd_bdf *bdf)
 /* weight := weights times the powers of this step in one of the tests */
 SD_WIDE void sd_bdf_weigh(sd_bdf *bdf, enum sd_test test)
 {
-    if (bdf->h != bdf->h_weighed)
+    if (bdf->ivp.h != bdf->h_weighed)
         set_powers(bdf);
     const int32_t *const apart = bdf->apart, aparts = bdf->aparts;
     const double *const own = bdf->own, *const power = test == SD_NEWTON_TEST ? bdf->newton_power : bdf->test_power;
-    double *const weight = bdf->weight;
+    double *const weight = bdf->ivp.weight;
     for (int32_t k = 0; k < aparts; k++)
         SD_AT(weight, apart[k]) = SD_FROM(own, apart[k]) * SD_FROM(power, apart[k]);
 }
@@ -280,9 +281,9 @@ SD_WIDE void sd_bdf_weigh(sd_bdf *bdf, enum sd_test test)
 /* weight := 1 / (atol + rtol |y|) at the last accepted point */
 SD_WIDE void sd_bdf_weights(sd_bdf *bdf)
 {
-    const int32_t n = bdf->n;
-    const double rtol = bdf->rtol, *const y = bdf->phi[0];
-    double *const met = bdf->met, *const magnitude = bdf->magnitude, *const weight = bdf->weight;
+    const int32_t n = bdf->ivp.n;
+    const double rtol = bdf->ivp.rtol, *const y = bdf->phi[0];
+    double *const met = bdf->ivp.met, *const magnitude = bdf->ivp.magnitude, *const weight = bdf->ivp.weight;
 #pragma GCC ivdep
     for (int32_t i = 0; i < n; i++) {
         double size = fabs(y[i]);
@@ -290,9 +291,9 @@ SD_WIDE void sd_bdf_weights(sd_bdf *bdf)
         magnitude[i] = size > magnitude[i] ? size : magnitude[i];
         weight[i] = 1.0 / (rtol * magnitude[i] + rtol * size);
     }
-    for (int32_t i = 0; bdf->atol && i < n; i++)
-        if (bdf->test[i] >= 0)
-            weight[i] = 1.0 / (bdf->atol[i] + rtol * fabs(y[i]));
+    for (int32_t i = 0; bdf->ivp.atol && i < n; i++)
+        if (bdf->ivp.test[i] >= 0)
+            weight[i] = 1.0 / (bdf->ivp.atol[i] + rtol * fabs(y[i]));
     const int32_t *const apart = bdf->apart, aparts = bdf->aparts;
     double *const own = bdf->own;
     for (int32_t k = 0; k < aparts; k++)
@@ -302,7 +303,7 @@ SD_WIDE void sd_bdf_weights(sd_bdf *bdf)
 /* g := dF/dy + cj dF/dyd */
 SD_WIDE void sd_bdf_matrix(sd_bdf *bdf)
 {
-    const int32_t entries = bdf->system->entries;
+    const int32_t entries = bdf->ivp.system->entries;
     const double cj = bdf->cj, *const jy = bdf->jy, *const jyd = bdf->jyd;
     double *const g = bdf->g;
 #pragma GCC unroll 4

@@ -27,21 +27,18 @@ int sd_bdf_test(sd_bdf *bdf, double ck, double *norm, double *error, int32_t *or
     return *error <= 1.0;
 }
 
-/* Order and step size after an accepted step whose corrections were `norm`, then the differences of the next. */
+/* Order and step size after a step that is accepted, whose corrections were `norm`, then the differences of the next. */
 void sd_bdf_accept(sd_bdf *bdf, const double *norm, int32_t order_next)
 {
     int32_t k = bdf->order, order_change = k - bdf->order_used;
-    double error = bdf->error_next, h = bdf->h, h_next = h;
-    bdf->steps++;
+    double error = bdf->error_next, h = bdf->ivp.h, h_next = h;
     bdf->orders += k;
-    bdf->taken++;
     bdf->order_used = k;
-    bdf->h_used = h;
     if (order_next == k - 1 || k == bdf->max_order)
         bdf->rising = 0;
     if (bdf->rising) {
         /* at the start: order and step rise together */
-        if (bdf->taken > 1) {
+        if (bdf->ivp.taken > 1) {
             bdf->order = k + 1;
             h_next = 2.0 * h;
         }
@@ -73,17 +70,14 @@ void sd_bdf_accept(sd_bdf *bdf, const double *norm, int32_t order_next)
         else if (size >= 1.0)
             h_next = h * fmax(0.5, fmin(0.9, pow(size, -1.0 / (order + 1))));
     }
-    bdf->h = bdf->fixed_h > 0.0 ? bdf->fixed_h : fmin(h_next, bdf->h_max);
+    bdf->ivp.h = bdf->ivp.fixed_h > 0.0 ? bdf->ivp.fixed_h : fmin(h_next, bdf->ivp.h_max);
     sd_bdf_shift(bdf);
 }
 
 /* A first step: a thousandth of the span, or such that the local error h^2 y''/2 is within tolerance, with y'' guessed
  * as y'^2 / y (yd is there, and ee is zero): h = sqrt(rtol) y / y' (the error test cuts it where that was too bold). */
-double sd_bdf_first_step(const sd_bdf *bdf, double span)
+double sd_bdf_first_step(const sd_bdf *bdf)
 {
-    double change = sqrt(bdf->rtol > 0.0 ? bdf->rtol : 1e-6) * sd_bdf_norm(bdf, bdf->yd, bdf->ee);
-    double h = 1e-3 * span, least = 1e3 * DBL_EPSILON * fmax(fabs(bdf->t), SD_SHORT * span);
-    if (isfinite(change) && change * h > 0.5)
-        h = 0.5 / change;
-    return fmax(h, fmin(least, span));
+    double change = sqrt(bdf->ivp.rtol > 0.0 ? bdf->ivp.rtol : 1e-6) * sd_bdf_norm(bdf, bdf->yd, bdf->ivp.ee);
+    return sd_first_step(&bdf->ivp, 1e-3 * (bdf->ivp.t_end - bdf->ivp.t), 0.5, change);
 }

@@ -21,21 +21,6 @@
 #define TWO_PI 6.283185307179586477
 #define VECTORS 21       /* of n, beside the stages */
 
-static int step(void *energy)
-{
-    return sd_energy_step(energy);
-}
-
-static void dense(const void *energy, double t, double *y, double *yd)
-{
-    sd_energy_dense((sd_energy *)energy, t, y, yd); /* a value within a step is made when it is asked for */
-}
-
-static void start(void *energy, double t, const double *y, const double *yd, double h)
-{
-    sd_energy_start(energy, t, y, yd, h);
-}
-
 sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t extended, int32_t audited)
 {
     sd_energy *energy = calloc(1, sizeof *energy);
@@ -51,8 +36,8 @@ sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t e
     double *next = energy->memory;
     double **vectors[VECTORS] = {&energy->phi,     &energy->yd,        &energy->rest,  &energy->from,    &energy->from_d,
                                  &energy->from_rest, &energy->raw,     &energy->half,  &energy->half_rest, &energy->inner,
-                                 &energy->inner_d, &energy->trial,     &energy->old_y, &energy->old_rate, &energy->ee,
-                                 &energy->weight,  &energy->begin,     &energy->position, &energy->velocity,
+                                 &energy->inner_d, &energy->trial,     &energy->old_y, &energy->old_rate, &energy->ivp.ee,
+                                 &energy->ivp.weight,  &energy->begin,     &energy->position, &energy->velocity,
                                  &energy->base,    &energy->sample};
     for (int i = 0; i < VECTORS; i++, next += m)
         *vectors[i] = next;
@@ -66,14 +51,15 @@ sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t e
     energy->work = energy->sample + audited;
     energy->moves = energy->work + audited;
     energy->inner_moves = energy->moves + audited;
-    energy->system = system;
+    energy->ivp.system = system;
     energy->underlying = underlying;
-    energy->n = system->unknowns;
+    energy->ivp.n = system->unknowns;
     energy->audited = audited;
-    energy->stepper = (sd_stepper){energy, system, energy->n, &energy->t, &energy->t_end, energy->phi, energy->yd,
-                                   &energy->taken, step, dense, NULL, start, S, sd_energy_c, sd_energy_b,
-                                   energy->stage.y, energy->stage.rate, energy->side.y, energy->side.rate,
-                                   &energy->h_used, energy->moves, energy->inner_moves, 0};
+    energy->ivp.stepper = (sd_stepper){
+        .self = energy, .ivp = &energy->ivp, .n = energy->ivp.n, .y = energy->phi, .yd = energy->yd, .step = sd_energy_step,
+        .dense = sd_energy_dense, .start = sd_energy_start, .nodes = S, .node = sd_energy_c, .node_weight = sd_energy_b,
+        .node_y = energy->stage.y, .node_yd = energy->stage.rate, .part_y = energy->side.y, .part_yd = energy->side.rate,
+        .length = &energy->ivp.h_used, .moves = energy->moves, .part_moves = energy->inner_moves};
     return energy;
 }
 
@@ -85,62 +71,29 @@ void sd_energy_free(sd_energy *energy)
     free(energy);
 }
 
-sd_stepper *sd_energy_stepper(sd_energy *energy)
+/* root mean square of x over the tested unknowns in the error weights */
+static double norm(const sd_energy *energy, const double *x)
 {
-    return &energy->stepper;
+    return energy->ivp.tested ? sqrt(sd_squares(&energy->ivp, x, NULL) / energy->ivp.tested) : 0.0;
 }
 
-/* weights of the error test at the last accepted point */
-static void set_weights(sd_energy *energy)
+void sd_energy_start(void *self, double t, const double *y, const double *yd, double h)
 {
-    for (int32_t i = 0; i < energy->n; i++) {
-        double size = fabs(energy->phi[i]);
-        sd_met(size, &energy->met[i], &energy->magnitude[i]);
-        double atol = energy->atol && energy->test[i] >= 0 ? energy->atol[i] : energy->rtol * energy->magnitude[i];
-        energy->weight[i] = 1.0 / (atol + energy->rtol * size);
-    }
-}
-
-/* root mean square of a - b over the tested unknowns in the error weights; b may be NULL */
-static double norm(const sd_energy *energy, const double *a, const double *b)
-{
-    double sum = 0.0;
-    for (int32_t i = 0; i < energy->n; i++)
-        if (energy->test[i] >= 0) {
-            double v = (a[i] - (b ? b[i] : 0.0)) * energy->weight[i];
-            sum += v * v;
-        }
-    return energy->tested ? sqrt(sum / energy->tested) : 0.0;
-}
-
-void sd_energy_start(sd_energy *energy, double t, const double *y, const double *yd, double h)
-{
-    size_t size = (size_t)energy->n * sizeof *y;
-    energy->t = t;
-    energy->taken = 0;
-    energy->tested = 0;
-    for (int32_t i = 0; i < energy->n; i++)
-        energy->tested += energy->test[i] >= 0;
+    sd_energy *energy = self;
+    size_t size = (size_t)energy->ivp.n * sizeof *y;
+    sd_begin(&energy->ivp, t);
     memmove(energy->phi, y, size);
     memmove(energy->yd, yd, size);
-    for (int32_t j = 0; j < energy->underlying->solved; j++)
-        if (!energy->underlying->rate[j])
-            energy->yd[energy->underlying->unknown[j]] = 0.0;
+    sd_underlying_begin(energy->underlying, 1e-15, energy->yd);
     memset(energy->rest, 0, size);
-    energy->underlying->tolerance = 1e-15;
-    set_weights(energy);
-    double span = energy->t_end - t, change = energy->rtol * norm(energy, energy->yd, NULL);
-    if (!(h > 0.0)) {
-        h = FIRST * span;
-        if (isfinite(change) && change > 0.0)
-            h = fmin(h, 0.1 / change);
-        h = fmax(h, fmin(1e3 * DBL_EPSILON * fmax(fabs(t), SD_SHORT * span), span));
-    }
-    energy->wanted = fmin(energy->fixed_h > 0.0 ? energy->fixed_h : h, energy->h_max);
+    sd_weigh(&energy->ivp, energy->ivp.rtol, energy->phi);
+    if (!(h > 0.0))
+        h = sd_first_step(&energy->ivp, FIRST * (energy->ivp.t_end - t), 0.1, energy->ivp.rtol * norm(energy, energy->yd));
+    energy->wanted = fmin(energy->ivp.fixed_h > 0.0 ? energy->ivp.fixed_h : h, energy->ivp.h_max);
     energy->anchor_end = -INFINITY;
-    energy->h = energy->wanted;
-    energy->h_used = energy->rough = energy->frequency = energy->lost = energy->content = 0.0;
-    energy->finding = !(energy->fixed_h > 0.0);
+    energy->ivp.h = energy->wanted;
+    energy->rough = energy->frequency = energy->lost = energy->content = 0.0;
+    energy->finding = !(energy->ivp.fixed_h > 0.0);
     energy->guessed = energy->inner_ready = energy->grown = energy->limited = 0;
     energy->held = 0;
     energy->since = 0;
@@ -151,20 +104,20 @@ void sd_energy_start(sd_energy *energy, double t, const double *y, const double 
 /* equal steps from here to the end, none longer than wanted */
 static void fit(sd_energy *energy)
 {
-    if (energy->anchor_end == energy->t_end)
+    if (energy->anchor_end == energy->ivp.t_end)
         return;
-    double left = energy->t_end - energy->t;
-    energy->anchor = energy->t;
-    energy->anchor_end = energy->t_end;
+    double left = energy->ivp.t_end - energy->ivp.t;
+    energy->anchor = energy->ivp.t;
+    energy->anchor_end = energy->ivp.t_end;
     energy->done = 0;
     energy->count = (int64_t)fmax(1.0, ceil(left / energy->wanted * (1.0 - 1e-12)));
-    energy->h = left / (double)energy->count;
+    energy->ivp.h = left / (double)energy->count;
 }
 
 /* another step; one that shrinks soon after it has grown was not to grow yet */
 static void take_step(sd_energy *energy, double wanted)
 {
-    energy->wanted = fmin(wanted, energy->h_max);
+    energy->wanted = fmin(wanted, energy->ivp.h_max);
     energy->anchor_end = -INFINITY;
     energy->rough = 0.0;
     energy->since = 0;
@@ -178,18 +131,31 @@ static void shrink(sd_energy *energy, double factor)
     if (energy->grown && energy->window < LAST_WINDOW)
         energy->window *= 2;
     energy->grown = 0;
-    take_step(energy, vain ? energy->before : energy->h * factor);
+    take_step(energy, vain ? energy->before : energy->ivp.h * factor);
     energy->rough = vain ? rough : 0.0;
 }
 
 /* slopes of all stages as at the start of the step */
 static void guess_start(const sd_energy *energy, const double *y, const double *yd, sd_collocation *guess)
 {
-    size_t size = (size_t)energy->n * sizeof(double);
+    size_t size = (size_t)energy->ivp.n * sizeof(double);
     for (int i = 0; i < S; i++) {
         memcpy(guess->y[i], y, size);
         memcpy(guess->rate[i], yd, size);
     }
+}
+
+/* the stages of the step from a point near the last one, and raw, by the slopes that stand there as guesses */
+static int collocate(sd_energy *energy, const double *from)
+{
+    return sd_energy_collocate(energy, &energy->stage, energy->ivp.t, from, energy->rest, energy->ivp.h, energy->raw,
+                               energy->from_rest);
+}
+
+/* energy that the step drains */
+static double drained(sd_energy *energy)
+{
+    return energy->audit ? sd_energy_drained(energy, &energy->stage, energy->ivp.t, energy->ivp.h) : 0.0;
 }
 
 /* The step from the last point to raw, not moved onto anything yet; its slopes may be guessed from those of the step
@@ -198,15 +164,13 @@ static int attempt(sd_energy *energy)
 {
     int cause = SD_NEWTON;
     if (energy->guessed) {
-        sd_energy_guess(energy, &energy->stage, 1.0, energy->h / energy->h_used, &energy->stage);
-        cause = sd_energy_collocate(energy, &energy->stage, energy->t, energy->phi, energy->rest, energy->h, energy->raw,
-                                    energy->from_rest);
+        sd_energy_guess(energy, &energy->stage, 1.0, energy->ivp.h / energy->ivp.h_used, &energy->stage);
+        cause = collocate(energy, energy->phi);
         if (cause == SD_FINE || cause == SD_STOPPED || cause == SD_MEMORY)
             return cause;
     }
     guess_start(energy, energy->phi, energy->yd, &energy->stage);
-    return sd_energy_collocate(energy, &energy->stage, energy->t, energy->phi, energy->rest, energy->h, energy->raw,
-                               energy->from_rest);
+    return collocate(energy, energy->phi);
 }
 
 /* the highest difference of the stages' slopes over the step, in the weights */
@@ -219,11 +183,11 @@ static double roughness(sd_energy *energy)
             if (k != j)
                 factor[j] /= S * (sd_energy_c[j] - sd_energy_c[k]);
     }
-    memset(energy->ee, 0, (size_t)energy->n * sizeof(double));
+    memset(energy->ivp.ee, 0, (size_t)energy->ivp.n * sizeof(double));
     for (int j = 0; j < S; j++)
-        for (int32_t i = 0; i < energy->n; i++)
-            energy->ee[i] += energy->h * factor[j] * energy->stage.rate[j][i];
-    return norm(energy, energy->ee, NULL);
+        for (int32_t i = 0; i < energy->ivp.n; i++)
+            energy->ivp.ee[i] += energy->ivp.h * factor[j] * energy->stage.rate[j][i];
+    return norm(energy, energy->ivp.ee);
 }
 
 /* multipliers and implicit efforts of the stages at the side: as those of the step, for Newton to begin with */
@@ -238,22 +202,22 @@ static void guess_algebraic(sd_energy *energy)
 /* the error of the step over one shortest period, over what is allowed: the step against two halves of it */
 static int halved(sd_energy *energy, double *error)
 {
-    double h = 0.5 * energy->h;
+    double h = 0.5 * energy->ivp.h;
     for (int part = 0; part < 2; part++) {
         const double *y = part ? energy->half : energy->phi, *rest = part ? energy->half_rest : energy->rest;
         sd_energy_guess(energy, &energy->stage, 0.5 * part, 0.5, &energy->side);
         guess_algebraic(energy);
-        int cause = sd_energy_collocate(energy, &energy->side, energy->t + part * h, y, rest, h,
+        int cause = sd_energy_collocate(energy, &energy->side, energy->ivp.t + part * h, y, rest, h,
                                         part ? energy->inner : energy->half,
                                         part ? energy->inner_d : energy->half_rest);
         if (cause)
             return cause;
     }
-    double span = energy->t_end - energy->t;
+    double span = energy->ivp.t_end - energy->ivp.t;
     double period = energy->frequency > 0.0 ? fmin(TWO_PI / energy->frequency, span) : span;
-    for (int32_t i = 0; i < energy->n; i++)
-        energy->ee[i] = (energy->raw[i] - energy->inner[i]) + (energy->from_rest[i] - energy->inner_d[i]);
-    *error = norm(energy, energy->ee, NULL) * fmin(fmax(1.0, period / energy->h), MOST);
+    for (int32_t i = 0; i < energy->ivp.n; i++)
+        energy->ivp.ee[i] = (energy->raw[i] - energy->inner[i]) + (energy->from_rest[i] - energy->inner_d[i]);
+    *error = norm(energy, energy->ivp.ee) * fmin(fmax(1.0, period / energy->ivp.h), MOST);
     return isfinite(*error) ? SD_FINE : SD_NONFINITE;
 }
 
@@ -261,19 +225,19 @@ static int halved(sd_energy *energy, double *error)
 static int stands(sd_energy *energy)
 {
     double rough = roughness(energy), error;
-    if (energy->fixed_h > 0.0 || rough <= MARGIN * energy->rough)
+    if (energy->ivp.fixed_h > 0.0 || rough <= MARGIN * energy->rough)
         return 1;
     if (halved(energy, &error)) {
         shrink(energy, 0.5);
         energy->finding = 0; /* a length whose halves cannot be made is not tried again */
-        energy->newton_failures++;
+        energy->ivp.newton_failures++;
         return 0;
     }
     double factor = SAFETY * pow(fmax(error, 1e-30), -0.5 / S);
-    if (energy->finding && error < EASY && energy->wanted < energy->h_max) {
-        double h = energy->h;
+    if (energy->finding && error < EASY && energy->wanted < energy->ivp.h_max) {
+        double h = energy->ivp.h;
         take_step(energy, energy->wanted * fmin(GROWTH, fmax(factor, 1.2)));
-        if (energy->h > h)
+        if (energy->ivp.h > h)
             return 0;
     }
     energy->finding = 0;
@@ -284,7 +248,7 @@ static int stands(sd_energy *energy)
     }
     shrink(energy, fmax(SHRINK, fmin(factor, 0.9)));
     energy->limited = 0;
-    energy->rejected_steps++;
+    energy->ivp.rejected_steps++;
     return 0;
 }
 
@@ -292,26 +256,24 @@ static int stands(sd_energy *energy)
 static int complete(sd_energy *energy, double t)
 {
     int again;
-    double target = energy->energy - (energy->audit ? sd_energy_drained(energy, &energy->stage, energy->t, energy->h) : 0.0);
-    int cause = sd_energy_symmetric(energy, t, target, &again);
+    int cause = sd_energy_symmetric(energy, t, energy->energy - drained(energy), &again);
     if (cause == SD_FINE && again)
-        cause = sd_energy_collocate(energy, &energy->stage, energy->t, energy->begin, energy->rest, energy->h, energy->raw,
-                                    energy->from_rest);
-    memcpy(energy->inner_d, energy->stage.rate[S - 1], (size_t)energy->n * sizeof(double));
+        cause = collocate(energy, energy->begin);
+    memcpy(energy->inner_d, energy->stage.rate[S - 1], (size_t)energy->ivp.n * sizeof(double));
     if (cause == SD_FINE && again) /* it is moved with slopes of its own, as the start was */
         cause = sd_underlying_slopes(energy->underlying, t, energy->raw, energy->inner_d);
     if (cause)
         return cause;
-    double drained = energy->audit ? sd_energy_drained(energy, &energy->stage, energy->t, energy->h) : 0.0;
+    double out = drained(energy);
     double start = energy->audit ? energy->moves[2] - energy->moves[3] : 0.0;
-    cause = sd_energy_balance(energy, t, energy->raw, energy->inner_d, energy->energy - drained - start, energy->moves);
+    cause = sd_energy_balance(energy, t, energy->raw, energy->inner_d, energy->energy - out - start, energy->moves);
     if (cause == SD_FINE)
         cause = sd_underlying_slopes(energy->underlying, t, energy->raw, energy->inner_d);
     if (cause)
         return cause;
     energy->from_energy = energy->energy;
     if (energy->audit) { /* compensated */
-        double move = energy->lost - drained - (energy->moves[2] - energy->moves[3]);
+        double move = energy->lost - out - (energy->moves[2] - energy->moves[3]);
         energy->energy = energy->from_energy + move;
         energy->lost = (energy->from_energy - energy->energy) + move;
     }
@@ -325,41 +287,41 @@ static void swap(double **a, double **b)
     *b = c;
 }
 
-int sd_energy_step(sd_energy *energy)
+int sd_energy_step(void *self)
 {
+    sd_energy *energy = self;
     int failures = 0, cause = SD_FINE;
-    double t = energy->t;
-    size_t size = (size_t)energy->n * sizeof(double);
-    set_weights(energy);
-    energy->cause = SD_FINE;
+    double t = energy->ivp.t;
+    size_t size = (size_t)energy->ivp.n * sizeof(double);
+    sd_weigh(&energy->ivp, energy->ivp.rtol, energy->phi);
+    energy->ivp.cause = SD_FINE;
     energy->inner_ready = 0;
-    if (energy->taken == 0 && (energy->cause = sd_underlying_slopes(energy->underlying, t, energy->phi, energy->yd)))
-        return energy->cause;
+    if (energy->ivp.taken == 0 && (energy->ivp.cause = sd_underlying_slopes(energy->underlying, t, energy->phi, energy->yd)))
+        return energy->ivp.cause;
     for (;;) {
         fit(energy);
-        double left = energy->t_end - t;
-        if (energy->h < 4.0 * DBL_EPSILON * fmax(fabs(t), SD_SHORT * left) && energy->h < left)
-            return energy->cause = cause ? cause : SD_STEP;
-        t = energy->done + 1 >= energy->count ? energy->t_end
-                                              : energy->anchor + (double)(energy->done + 1) * energy->h;
+        if (sd_too_small(&energy->ivp))
+            return energy->ivp.cause = cause ? cause : SD_STEP;
+        t = energy->done + 1 >= energy->count ? energy->ivp.t_end
+                                              : energy->anchor + (double)(energy->done + 1) * energy->ivp.h;
         cause = attempt(energy);
         if (cause == SD_FINE && !stands(energy)) {
             energy->guessed = 0;
-            t = energy->t;
+            t = energy->ivp.t;
             continue;
         }
         if (cause == SD_FINE)
             cause = complete(energy, t);
         if (cause == SD_FINE)
             break;
-        t = energy->t;
+        t = energy->ivp.t;
         energy->guessed = 0;
-        if (cause == SD_STOPPED || cause == SD_MEMORY || energy->fixed_h > 0.0)
-            return energy->cause = cause;
-        energy->newton_failures++;
+        if (sd_ends(&energy->ivp, cause))
+            return energy->ivp.cause = cause;
+        energy->ivp.newton_failures++;
         energy->finding = 0;
         if (++failures > FAILURES)
-            return energy->cause = cause;
+            return energy->ivp.cause = cause;
         shrink(energy, 0.5);
         energy->limited = cause == SD_NEWTON;
     }
@@ -369,17 +331,17 @@ int sd_energy_step(sd_energy *energy)
     memcpy(energy->from_d, energy->yd, size);
     memcpy(energy->phi, energy->raw, size);
     memcpy(energy->yd, energy->inner_d, size);
-    energy->h_used = energy->h;
-    energy->from_t = energy->t;
-    energy->t = t;
-    energy->steps++;
-    energy->taken++;
+    energy->ivp.h_used = energy->ivp.h;
+    energy->from_t = energy->ivp.t;
+    energy->ivp.t = t;
+    energy->ivp.steps++;
+    energy->ivp.taken++;
     energy->done++;
     energy->guessed = 1;
-    energy->held = energy->limited && (energy->t_end - t) / energy->h > energy->patience ? energy->held + 1 : 0;
+    energy->held = energy->limited && (energy->ivp.t_end - t) / energy->ivp.h > energy->patience ? energy->held + 1 : 0;
     if (energy->held > HELD)
-        return energy->cause = SD_STIFF;
-    if (!(energy->fixed_h > 0.0) && ++energy->since >= energy->window && 2.0 * energy->wanted <= energy->h_max) {
+        return energy->ivp.cause = SD_STIFF;
+    if (!(energy->ivp.fixed_h > 0.0) && ++energy->since >= energy->window && 2.0 * energy->wanted <= energy->ivp.h_max) {
         energy->before = energy->wanted;
         energy->rough_before = energy->rough;
         take_step(energy, 2.0 * energy->wanted);
@@ -392,7 +354,7 @@ int sd_energy_step(sd_energy *energy)
 static int within(sd_energy *energy, double t)
 {
     double from = energy->from_t, h = t - from;
-    sd_energy_guess(energy, &energy->stage, 0.0, h / energy->h_used, &energy->side);
+    sd_energy_guess(energy, &energy->stage, 0.0, h / energy->ivp.h_used, &energy->side);
     guess_algebraic(energy);
     if (sd_energy_collocate(energy, &energy->side, from, energy->from, energy->from_rest, h, energy->inner,
                             energy->half_rest)) {
@@ -407,15 +369,15 @@ static int within(sd_energy *energy, double t)
     memset(energy->inner_moves, 0, (size_t)energy->audited * sizeof(double));
     if (sd_energy_balance(energy, t, energy->inner, energy->side.rate[S - 1], target, energy->inner_moves))
         return 1;
-    memcpy(energy->inner_d, energy->side.rate[S - 1], (size_t)energy->n * sizeof(double));
+    memcpy(energy->inner_d, energy->side.rate[S - 1], (size_t)energy->ivp.n * sizeof(double));
     return sd_underlying_slopes(energy->underlying, t, energy->inner, energy->inner_d);
 }
 
 /* the cubic of both ends: where a shorter step cannot be made */
 static void cubic(sd_energy *energy, double t)
 {
-    double h = energy->h_used, x = (t - energy->from_t) / h;
-    for (int32_t i = 0; i < energy->n; i++) {
+    double h = energy->ivp.h_used, x = (t - energy->from_t) / h;
+    for (int32_t i = 0; i < energy->ivp.n; i++) {
         double a = energy->from[i], b = energy->phi[i], da = h * energy->from_d[i], db = h * energy->yd[i];
         double c2 = 3.0 * (b - a) - 2.0 * da - db, c3 = da + db - 2.0 * (b - a);
         energy->inner[i] = a + x * (da + x * (c2 + x * c3));
@@ -423,10 +385,11 @@ static void cubic(sd_energy *energy, double t)
     }
 }
 
-void sd_energy_dense(sd_energy *energy, double t, double *y, double *yd)
+void sd_energy_dense(const void *self, double t, double *y, double *yd)
 {
-    size_t size = (size_t)energy->n * sizeof *y;
-    if (energy->taken == 0 || t >= energy->t) {
+    sd_energy *energy = (sd_energy *)self; /* a value within a step is made when it is asked for */
+    size_t size = (size_t)energy->ivp.n * sizeof *y;
+    if (energy->ivp.taken == 0 || t >= energy->ivp.t) {
         memcpy(y, energy->phi, size);
         memcpy(yd, energy->yd, size);
         return;

@@ -32,19 +32,12 @@ typedef struct sd_collocation {
 } sd_collocation;
 
 typedef struct sd_energy {
-    sd_system *system;        /* form 0 */
+    sd_ivp ivp;               /* of form 0 */
     sd_underlying *underlying;
-    int32_t n, tested;
-    double rtol, t_end, h_max, fixed_h;
-    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
-    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
-    double *met;              /* [n] max |y| */
-    const int8_t *test, *power; /* [n] as in bdf/bdf.h */
     double patience;          /* steps still to be taken above which a run is given up */
     const sd_call *audit;     /* block audit; NULL: there is no energy */
     int32_t audited;          /* its rows */
     /* state of the integration */
-    double t, h, h_used;
     double wanted;            /* the step that the accuracy asks for; h: the same, fitted to the end */
     double anchor, anchor_end; /* the steps to anchor_end are equal from here */
     int64_t count, done;      /* of these steps; taken of them */
@@ -69,21 +62,16 @@ typedef struct sd_energy {
     double *base;             /* [n] from where a point is moved onto the balance */
     double *sample, *work;    /* [audited] one of the rows of block audit; what a move of displacements took */
     double *moves, *inner_moves; /* [audited] what such moves took in the last step; within it */
-    double *ee, *weight, *memory;
-    /* what happened */
-    int64_t steps, rejected_steps, newton_failures, taken;
-    int32_t cause, bad_row, bad_column;
-    sd_stepper stepper;
+    double *memory;
 } sd_energy;
 
 /* extended: unknowns that block audit may look at */
 sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t extended, int32_t audited);
 void sd_energy_free(sd_energy *energy);
-sd_stepper *sd_energy_stepper(sd_energy *energy);
-void sd_energy_start(sd_energy *energy, double t, const double *y, const double *yd, double h);
-int sd_energy_step(sd_energy *energy);
+void sd_energy_start(void *energy, double t, const double *y, const double *yd, double h);
+int sd_energy_step(void *energy);
 /* y, yd [n] at any t within the last step */
-void sd_energy_dense(sd_energy *energy, double t, double *y, double *yd);
+void sd_energy_dense(const void *energy, double t, double *y, double *yd);
 /* energy_collocation.c: the stages of a step h from (t, y + rest), their slopes being guesses; x1 = y + rest + h sum b g in
  * `out`, what rounding took of it in `out_rest`; 0 or a cause */
 int sd_energy_collocate(sd_energy *energy, sd_collocation *stage, double t, const double *y, const double *rest, double h,

@@ -37,9 +37,9 @@ double sd_energy_drained(sd_energy *energy, const sd_collocation *stage, double 
 static void along(const sd_energy *energy, const double *from, const double *rate, double part, double *y)
 {
     const sd_underlying *u = energy->underlying;
-    const sd_system *system = energy->system;
-    double tau = energy->h;
-    memcpy(y, from, (size_t)energy->n * sizeof *y);
+    const sd_system *system = energy->ivp.system;
+    double tau = energy->ivp.h;
+    memcpy(y, from, (size_t)energy->ivp.n * sizeof *y);
     for (int32_t l = 0; l < u->solved; l++)
         if (u->rate[l] == 2)
             y[u->unknown[l]] += part * from[u->unknown[l]];
@@ -51,9 +51,9 @@ static void along(const sd_energy *energy, const double *from, const double *rat
  * large as the moves */
 static void work(sd_energy *energy, double t, const double *base, const double *y, const double *rate)
 {
-    const sd_system *system = energy->system;
+    const sd_system *system = energy->ivp.system;
     double *point = energy->old_y;
-    memcpy(point, base, (size_t)energy->n * sizeof *point);
+    memcpy(point, base, (size_t)energy->ivp.n * sizeof *point);
     memset(energy->work, 0, (size_t)energy->audited * sizeof(double));
     for (int side = 1; side >= 0; side--) {
         for (int32_t l = 0; l < system->kinematics; l++)
@@ -89,29 +89,29 @@ int sd_energy_symmetric(sd_energy *energy, double t, double target, int *again)
     double *start = energy->begin, miss = 0.0, size = 0.0;
     *again = 0;
     memset(energy->moves, 0, (size_t)energy->audited * sizeof(double));
-    memcpy(start, energy->raw, (size_t)energy->n * sizeof *start);
+    memcpy(start, energy->raw, (size_t)energy->ivp.n * sizeof *start);
     int cause = sd_underlying_project(u, t, start, energy->stage.rate[SD_ENERGY_STAGES - 1]);
     if (cause)
         return cause;
-    for (int32_t k = 0; k < energy->n; k++)
-        size = fmax(size, fabs(start[k] - energy->raw[k]) / energy->magnitude[k]);
+    for (int32_t k = 0; k < energy->ivp.n; k++)
+        size = fmax(size, fabs(start[k] - energy->raw[k]) / energy->ivp.magnitude[k]);
     if (energy->audit)
         miss = sd_energy_content(energy, t, energy->raw, energy->stage.rate[SD_ENERGY_STAGES - 1]) - target;
     if (size <= FINE && fabs(miss) <= FINE * energy->content)
         return SD_FINE;
     sd_underlying_constraints(u, t, energy->raw, energy->position, energy->velocity);
-    for (int32_t i = 0; i < energy->system->rows; i++) { /* the end is off by the start's, carried along, and by its own */
+    for (int32_t i = 0; i < energy->ivp.system->rows; i++) { /* the end is off by the start's, carried along, and by its own */
         double rate = -0.5 * energy->velocity[i];
-        energy->position[i] = u->displaced[i] ? -0.5 * (energy->position[i] + energy->h * rate) : 0.0;
+        energy->position[i] = u->displaced[i] ? -0.5 * (energy->position[i] + energy->ivp.h * rate) : 0.0;
         energy->velocity[i] = rate;
     }
-    memcpy(start, energy->phi, (size_t)energy->n * sizeof *start);
-    memcpy(energy->inner_d, energy->yd, (size_t)energy->n * sizeof *start);
-    if ((cause = sd_underlying_slopes(u, energy->t, start, energy->inner_d)))
+    memcpy(start, energy->phi, (size_t)energy->ivp.n * sizeof *start);
+    memcpy(energy->inner_d, energy->yd, (size_t)energy->ivp.n * sizeof *start);
+    if ((cause = sd_underlying_slopes(u, energy->ivp.t, start, energy->inner_d)))
         return cause;
     u->goal_position = energy->position;
     u->goal_velocity = energy->velocity;
-    cause = sd_energy_balance(energy, energy->t, start, energy->inner_d, energy->energy - 0.5 * miss, energy->moves);
+    cause = sd_energy_balance(energy, energy->ivp.t, start, energy->inner_d, energy->energy - 0.5 * miss, energy->moves);
     u->goal_position = u->goal_velocity = NULL;
     *again = cause == SD_FINE;
     return cause;
@@ -135,7 +135,7 @@ static int balance(sd_energy *energy, double t, double *y, const double *rate, d
             return cause;
         if (!(fabs(now) < fabs(miss)))
             return SD_FINE;
-        memcpy(y, energy->trial, (size_t)energy->n * sizeof *y);
+        memcpy(y, energy->trial, (size_t)energy->ivp.n * sizeof *y);
         miss = now;
     }
     return SD_FINE;
@@ -143,7 +143,7 @@ static int balance(sd_energy *energy, double t, double *y, const double *rate, d
 
 int sd_energy_balance(sd_energy *energy, double t, double *y, const double *rate, double target, double *gained)
 {
-    memcpy(energy->base, y, (size_t)energy->n * sizeof *y);
+    memcpy(energy->base, y, (size_t)energy->ivp.n * sizeof *y);
     int cause = sd_underlying_project(energy->underlying, t, y, rate);
     if (cause || !energy->audit)
         return cause;

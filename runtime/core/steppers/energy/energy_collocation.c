@@ -47,7 +47,7 @@ void sd_energy_guess(const sd_energy *energy, const sd_collocation *known, doubl
 static void place(const sd_energy *energy, sd_collocation *stage, const double *from, const double *rest, double h)
 {
     const sd_underlying *u = energy->underlying;
-    const sd_system *system = energy->system;
+    const sd_system *system = energy->ivp.system;
     for (int32_t l = 0; l < u->solved; l++) {
         int32_t k = u->unknown[l];
         for (int i = 0; u->rate[l] && i < S; i++) {
@@ -82,22 +82,22 @@ static int sweep(sd_energy *energy, sd_collocation *stage, double t, double h, i
     double largest = 0.0, turned = 0.0, moved = 0.0;
     for (int i = 0; i < S; i++) {
         double *y = stage->y[i], *rate = stage->rate[i];
-        memcpy(energy->old_rate, rate, (size_t)energy->n * sizeof *rate);
+        memcpy(energy->old_rate, rate, (size_t)energy->ivp.n * sizeof *rate);
         int cause = sd_underlying_slopes(u, t + sd_energy_c[i] * h, y, rate);
         if (cause) {
-            energy->bad_row = u->bad_row;
-            energy->bad_column = u->bad_column;
+            energy->ivp.bad_row = u->bad_row;
+            energy->ivp.bad_column = u->bad_column;
             return cause;
         }
-        for (int32_t k = 0; k < energy->n; k++) {
+        for (int32_t k = 0; k < energy->ivp.n; k++) {
             if (!carries(u, k))
                 continue;
-            double turn = (rate[k] - energy->old_rate[k]) / energy->magnitude[k];
+            double turn = (rate[k] - energy->old_rate[k]) / energy->ivp.magnitude[k];
             double size = fabs(h * turn);
             if (!(size <= largest))
                 largest = size;
             if (i == S / 2) {
-                double move = (y[k] - energy->old_y[k]) / energy->magnitude[k];
+                double move = (y[k] - energy->old_y[k]) / energy->ivp.magnitude[k];
                 turned += turn * turn;
                 moved += move * move;
                 energy->old_y[k] = y[k];
@@ -115,7 +115,7 @@ static void finish(const sd_energy *energy, const sd_collocation *stage, const d
                    double *out, double *out_rest)
 {
     const sd_underlying *u = energy->underlying;
-    for (int32_t k = 0; k < energy->n; k++) {
+    for (int32_t k = 0; k < energy->ivp.n; k++) {
         if (!carries(u, k)) {
             out[k] = stage->y[S - 1][k];
             out_rest[k] = 0.0;
@@ -136,7 +136,7 @@ int sd_energy_collocate(sd_energy *energy, sd_collocation *stage, double t, cons
 {
     double change = INFINITY, before = INFINITY;
     int worse = 0;
-    memcpy(energy->old_y, y, (size_t)energy->n * sizeof *y);
+    memcpy(energy->old_y, y, (size_t)energy->ivp.n * sizeof *y);
     for (int m = 0; m < SWEEPS; m++) {
         place(energy, stage, y, rest, h);
         int cause = sweep(energy, stage, t, h, m == 0, &change);
@@ -149,7 +149,7 @@ int sd_energy_collocate(sd_energy *energy, sd_collocation *stage, double t, cons
         }
         worse = m > 0 && change > before ? worse + 1 : 0;
         if (worse >= DIVERGED || m == SWEEPS - 1) { /* over a jump of the slopes nothing contracts: the step becomes short */
-            if (!(change <= LAX * energy->rtol))
+            if (!(change <= LAX * energy->ivp.rtol))
                 return SD_NEWTON;
             finish(energy, stage, y, rest, h, out, out_rest);
             return SD_FINE;

@@ -23,43 +23,32 @@ extern const int sd_dopri_next[SD_DOPRI_ALL]; /* of each row of a: the first beh
 #define SD_DOPRI_NEXT 5                       /* the same of e3, e5 and d */
 
 typedef struct sd_dopri {
-    sd_system *system;        /* form 0 */
+    sd_ivp ivp;               /* of form 0 */
     sd_underlying *underlying;
-    int32_t n, tested;
-    double rtol, t_end, h_max, fixed_h;
-    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
-    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
-    double *met;              /* [n] max |y| */
-    const int8_t *test, *power; /* [n] as in bdf/bdf.h */
     double patience;          /* steps still to be taken above which a stiff run is given up */
     double spare;             /* the same of one whose system is faster than its motion; 0: never */
     double opening;           /* over rtol^(1/8): the first step as an earlier run found it fit, 0: chosen; then as this one does */
     /* state of the integration */
-    double t, h, h_used, error_accepted, speed; /* speed: h |lambda| of the last step */
+    double error_accepted, speed; /* speed: h |lambda| of the last step */
     int32_t rejected, dense;  /* dense: the interpolant of the last step is there */
     int32_t stiff, smooth, outrun, even; /* steps counted */
     double *phi, *yd;         /* [n] the last accepted point */
     double *y[SD_DOPRI_ALL], *rate[SD_DOPRI_ALL]; /* [n] stages of the last step: point, slopes; y[0]: its start */
     double *f[SD_DOPRI_DENSE]; /* [n] the interpolant */
-    double *ee, *weight, *moved, *moved_d, *memory;
-    /* what happened */
-    int64_t steps, rejected_steps, newton_failures, taken;
-    int32_t cause, bad_row, bad_column;
-    sd_stepper stepper;
+    double *moved, *moved_d, *memory;
 } sd_dopri;
 
 sd_dopri *sd_dopri_new(sd_system *system, sd_underlying *underlying);
 void sd_dopri_free(sd_dopri *dopri);
-sd_stepper *sd_dopri_stepper(sd_dopri *dopri);
-void sd_dopri_start(sd_dopri *dopri, double t, const double *y, const double *yd, double h);
-int sd_dopri_step(sd_dopri *dopri);
+void sd_dopri_start(void *dopri, double t, const double *y, const double *yd, double h);
+int sd_dopri_step(void *dopri);
 /* sum [n] := of the first `terms` of a_j k_j, where a is a row of e3, e5 or d */
 void sd_dopri_add_up(int32_t n, int terms, const double *a, double *const *k, double *sum);
 /* point of stage s of a step h: y0 + h sum a_sj k_j */
 void sd_dopri_combine(sd_dopri *dopri, int s, double h);
 /* dopri_dense.c: y, yd [n] at any t within the last step */
-void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd);
+void sd_dopri_dense(const void *dopri, double t, double *y, double *yd);
 /* those values projected onto every constraint, with the slopes there; as `onto` of stepper.h */
-int sd_dopri_onto(sd_dopri *dopri, double t, double *y, double *yd, double *moved);
+int sd_dopri_onto(void *dopri, double t, double *y, double *yd, double *moved);
 
 #endif

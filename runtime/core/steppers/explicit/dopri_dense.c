@@ -17,16 +17,16 @@ static const int NEAREST[SD_DOPRI_ALL - SD_DOPRI_STAGES - 1] = {3, 6, 10};
 static int more_stages(sd_dopri *dopri)
 {
     sd_underlying *u = dopri->underlying;
-    double from = dopri->t - dopri->h_used;
+    double from = dopri->ivp.t - dopri->ivp.h_used;
     for (int s = SD_DOPRI_STAGES + 1; s < SD_DOPRI_ALL; s++) {
         const int near = NEAREST[s - SD_DOPRI_STAGES - 1];
         double *y = dopri->y[s];
-        sd_dopri_combine(dopri, s, dopri->h_used);
-        memcpy(dopri->rate[s], dopri->rate[near], (size_t)dopri->n * sizeof *y);
+        sd_dopri_combine(dopri, s, dopri->ivp.h_used);
+        memcpy(dopri->rate[s], dopri->rate[near], (size_t)dopri->ivp.n * sizeof *y);
         for (int32_t j = 0; j < u->solved; j++)
             if (!u->rate[j])
                 y[u->unknown[j]] = dopri->y[near][u->unknown[j]];
-        if (sd_underlying_slopes(u, from + sd_dopri_c[s] * dopri->h_used, y, dopri->rate[s]))
+        if (sd_underlying_slopes(u, from + sd_dopri_c[s] * dopri->ivp.h_used, y, dopri->rate[s]))
             return 1;
     }
     return 0;
@@ -35,13 +35,13 @@ static int more_stages(sd_dopri *dopri)
 /* Whether further stages lie where a steep law makes anything of them (a diode at 11 V: 1e191 A). */
 static int stray(const sd_dopri *dopri)
 {
-    double *const *k = dopri->rate, h = dopri->h_used;
-    for (int32_t i = 0; i < dopri->n; i++) {
+    double *const *k = dopri->rate, h = dopri->ivp.h_used;
+    for (int32_t i = 0; i < dopri->ivp.n; i++) {
         double most = 0.0;
         for (int s = 0; s <= SD_DOPRI_STAGES; s++)
             most = fmax(most, fabs(k[s][i]));
         for (int s = SD_DOPRI_STAGES + 1; s < SD_DOPRI_ALL; s++)
-            if (h * (fabs(k[s][i]) - BEYOND * most) * dopri->weight[i] > 1.0)
+            if (h * (fabs(k[s][i]) - BEYOND * most) * dopri->ivp.weight[i] > 1.0)
                 return 1;
     }
     return 0;
@@ -74,7 +74,7 @@ static double sum_of(int terms, const double *a, double *const *k, int32_t i)
 static void integrals(sd_dopri *dopri, int terms)
 {
     const sd_underlying *u = dopri->underlying;
-    double h = dopri->h_used, *const *y = dopri->y, **f = dopri->f;
+    double h = dopri->ivp.h_used, *const *y = dopri->y, **f = dopri->f;
     for (int32_t j = 0; j < u->solved; j++) {
         int32_t i = u->unknown[j];
         if (u->rate[j])
@@ -88,15 +88,15 @@ static void integrals(sd_dopri *dopri, int terms)
 /* f [..][n] of all unknowns: of order 7 by all stages, or where these are astray the cubic that stays between both ends */
 static void interpolate(sd_dopri *dopri, int astray)
 {
-    double h = dopri->h_used, **f = dopri->f, *const *k = dopri->rate;
+    double h = dopri->ivp.h_used, **f = dopri->f, *const *k = dopri->rate;
     const int terms = astray ? 0 : SD_DOPRI_ALL;
-    for (int32_t i = 0; i < dopri->n; i++) {
+    for (int32_t i = 0; i < dopri->ivp.n; i++) {
         double change = dopri->phi[i] - dopri->y[0][i], begin = h * k[0][i], end = h * k[SD_DOPRI_STAGES][i];
         cubic(f, i, change, astray ? between(begin, change) : begin, astray ? between(end, change) : end);
     }
     for (int m = 3; m < SD_DOPRI_DENSE; m++) {
-        sd_dopri_add_up(dopri->n, terms, sd_dopri_d[m - 3], k, f[m]);
-        for (int32_t i = 0; i < dopri->n; i++)
+        sd_dopri_add_up(dopri->ivp.n, terms, sd_dopri_d[m - 3], k, f[m]);
+        for (int32_t i = 0; i < dopri->ivp.n; i++)
             f[m][i] *= h;
     }
 }
@@ -106,17 +106,17 @@ static void interpolate(sd_dopri *dopri, int astray)
  * that has a narrow minimum, both agree to the error of the step, and the cubic is 1e5 times as far. */
 static int is_off(const sd_dopri *dopri)
 {
-    double h = dopri->h_used, *const *f = dopri->f, *const *k = dopri->rate;
+    double h = dopri->ivp.h_used, *const *f = dopri->f, *const *k = dopri->rate;
     double off = 0.0, apart = 0.0;
-    for (int32_t i = 0; i < dopri->n; i++) {
+    for (int32_t i = 0; i < dopri->ivp.n; i++) {
         double change = f[0][i], begin = between(h * k[0][i], change), end = between(h * k[SD_DOPRI_STAGES][i], change);
-        for (int s = SD_DOPRI_STAGES + 1; s < SD_DOPRI_ALL && dopri->test[i] >= 0; s++) {
+        for (int s = SD_DOPRI_STAGES + 1; s < SD_DOPRI_ALL && dopri->ivp.test[i] >= 0; s++) {
             double x = sd_dopri_c[s], v = 0.0, w = 2.0 * change - begin - end;
             for (int m = SD_DOPRI_DENSE - 1; m >= 0; m--)
                 v = (v + f[m][i]) * (m % 2 ? 1.0 - x : x);
             w = x * (change + (1.0 - x) * (begin - change + x * w));
-            off += fabs(dopri->y[0][i] + v - dopri->y[s][i]) * dopri->weight[i];
-            apart += fabs(v - w) * dopri->weight[i];
+            off += fabs(dopri->y[0][i] + v - dopri->y[s][i]) * dopri->ivp.weight[i];
+            apart += fabs(v - w) * dopri->ivp.weight[i];
         }
     }
     return !(off < NEARER * apart);
@@ -172,19 +172,20 @@ static double bend(double *const *f, int32_t i, double x)
     return turn;
 }
 
-void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd)
+void sd_dopri_dense(const void *self, double t, double *y, double *yd)
 {
+    sd_dopri *dopri = (sd_dopri *)self; /* the interpolant is made when it is first asked for */
     const sd_underlying *u = dopri->underlying;
-    if (dopri->taken == 0 || t >= dopri->t) {
-        memcpy(y, dopri->phi, (size_t)dopri->n * sizeof *y);
-        memcpy(yd, dopri->yd, (size_t)dopri->n * sizeof *yd);
+    if (dopri->ivp.taken == 0 || t >= dopri->ivp.t) {
+        memcpy(y, dopri->phi, (size_t)dopri->ivp.n * sizeof *y);
+        memcpy(yd, dopri->yd, (size_t)dopri->ivp.n * sizeof *yd);
         return;
     }
     if (!dopri->dense)
         prepare(dopri);
-    double h = dopri->h_used, x = (t - (dopri->t - h)) / h;
-    nested(dopri->n, dopri->f, x, y, yd);
-    for (int32_t i = 0; i < dopri->n; i++) {
+    double h = dopri->ivp.h_used, x = (t - (dopri->ivp.t - h)) / h;
+    nested(dopri->ivp.n, dopri->f, x, y, yd);
+    for (int32_t i = 0; i < dopri->ivp.n; i++) {
         y[i] = dopri->y[0][i] + y[i];
         yd[i] /= h;
     }
@@ -196,10 +197,11 @@ void sd_dopri_dense(sd_dopri *dopri, double t, double *y, double *yd)
         }
 }
 
-int sd_dopri_onto(sd_dopri *dopri, double t, double *y, double *yd, double *moved)
+int sd_dopri_onto(void *self, double t, double *y, double *yd, double *moved)
 {
+    sd_dopri *dopri = self;
     sd_underlying *u = dopri->underlying;
-    size_t size = (size_t)dopri->n * sizeof *y;
+    size_t size = (size_t)dopri->ivp.n * sizeof *y;
     double drift = u->drift; /* of the step */
     memcpy(dopri->moved, y, size);
     memcpy(dopri->moved_d, yd, size);

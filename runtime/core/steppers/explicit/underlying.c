@@ -264,6 +264,14 @@ static int at_once(sd_underlying *u, double t, double *y, double *yd)
     return u->flows ? kinematics(u, y, yd) : SD_FINE;
 }
 
+void sd_underlying_begin(sd_underlying *u, double tolerance, double *yd)
+{
+    u->tolerance = tolerance;
+    for (int32_t j = 0; j < u->solved; j++)
+        if (!u->rate[j])
+            yd[u->unknown[j]] = 0.0;
+}
+
 int sd_underlying_slopes(sd_underlying *u, double t, double *y, double *yd)
 {
     const sd_system *system = u->system;

@@ -54,24 +54,18 @@ typedef struct sd_radau_method {
 extern const sd_radau_method sd_radau_methods[SD_METHODS];
 
 typedef struct sd_radau {
-    sd_system *system;
+    sd_ivp ivp;
     sd_linear *linear;
     sd_linear_z *complex_linear[SD_PAIRS]; /* NULL for those that no method needs */
-    int32_t n, tested;
     int32_t stages, most_stages; /* of the first step; at most */
-    double rtol, t_end, h_max, fixed_h;
-    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
-    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
-    double *met;              /* [n] max |y| */
-    const int8_t *test, *power, *smooth;   /* [n] as in bdf/bdf.h; smooth: 1 where yd is the derivative,
-                                               * SD_UNPULLED: and is interpolated whatever pulls */
+    const int8_t *smooth;     /* [n] 1 where yd is the derivative, SD_UNPULLED: and is interpolated whatever pulls */
     const int32_t *common_from, *common; /* as in bdf/bdf.h: groups that are tested with h but for what they have in common */
     int32_t commons;
     /* state of the integration */
     double tolerance;         /* 0.1 rtol^(2/3) */
     double strict[SD_METHODS]; /* what the estimate of each method counts beside the first one's */
     double strict_first;       /* what it does in the first step, of three stages */
-    double t, h, h_used, h_factored, h_before, h_accepted, error_accepted, theta, state_size;
+    double h_factored, h_before, h_accepted, error_accepted, theta, state_size;
     double growth;            /* of the next step at most where laws are steep */
     double longest;           /* step accepted */
     double follows;           /* behind a restart: tolerances by which what follows moves where slopes move the state by one
@@ -106,8 +100,8 @@ typedef struct sd_radau {
                                                * their sum */
     double *at_zero;          /* [entries] dF/dy where all unknowns are zero, of steep laws; made when first needed */
     char *open;               /* [n] columns that factors left */
-    double *y, *rate, *ee, *weight, *terms, *jy, *jyd, *g, *work; /* work: the memory of all vectors but phi and yd;
-                               * weight NULL: made where it is read */
+    double *y, *rate, *terms, *jy, *jyd, *g, *work; /* work: the memory of all vectors but phi and yd; a weight that is
+                               * NULL is made where it is read */
     double *newton_weight, *scale, *powered; /* of Newton's norm (NULL: as weight), of columns; their memory where powers of
                                               * h count */
     double complex *w[SD_PAIRS]; /* right sides and solutions */
@@ -117,11 +111,6 @@ typedef struct sd_radau {
     sd_system *twice[2];          /* their systems */
     double *point_y, *point_rate; /* [n]; y of a system with all its unknowns alone */
     struct sd_coupled *coupled;   /* radau_coupled.c: all stages at once; made when first needed */
-    /* what happened */
-    int64_t steps, rejected_steps, newton_failures, newton_iterations, factorisations, taken;
-    int32_t cause, bad_row, bad_column;
-    sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */
-    sd_stepper stepper;
 } sd_radau;
 
 /* stages: at most; complex_linear [(stages - 1) / 2] */
@@ -129,13 +118,12 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
 void sd_radau_free(sd_radau *radau);
 /* lets go of all that the steps from the next start on make anew: until then it has no more than its last point */
 void sd_radau_rest(sd_radau *radau);
-sd_stepper *sd_radau_stepper(sd_radau *radau);
-void sd_radau_start(sd_radau *radau, double t, const double *y, const double *yd, double h);
-int sd_radau_step(sd_radau *radau);
+void sd_radau_start(void *radau, double t, const double *y, const double *yd, double h);
+int sd_radau_step(void *radau);
 /* radau_dense.c: y, yd [n] at any t within the last step */
-void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd);
+void sd_radau_dense(const void *radau, double t, double *y, double *yd);
 /* settled derivatives at the points that sd_radau_dense uses, and which unknowns they lead */
-void sd_radau_refine(sd_radau *radau, sd_settle *settle);
+void sd_radau_refine(void *radau, sd_settle *settle);
 /* how far values within the step at hand may be off, in the weights of the error test, of what slopes do not lead */
 double sd_radau_between(const sd_radau *radau);
 /* 1: between the nodes of the step at hand, whose stages are z, a steep law is beyond all magnitudes: the step passes
@@ -157,9 +145,9 @@ static inline double sd_radau_last(const sd_radau *radau, int32_t i)
 /* weight of an unknown in the error test, of magnitudes that a step leaves as they are */
 static inline double sd_radau_weight(const sd_radau *radau, int32_t i)
 {
-    if (radau->weight)
-        return radau->weight[i];
-    return 1.0 / (radau->tolerance * radau->magnitude[i] + radau->tolerance * fabs(radau->phi[i]));
+    if (radau->ivp.weight)
+        return radau->ivp.weight[i];
+    return 1.0 / (radau->tolerance * radau->ivp.magnitude[i] + radau->tolerance * fabs(radau->phi[i]));
 }
 
 /* the same in Newton's norm */
@@ -188,7 +176,9 @@ int sd_radau_residuals(sd_radau *radau);
 double sd_radau_correct(sd_radau *radau);
 /* how far the last correction moved the unknowns with derivatives, in Newton's weights */
 double sd_radau_state_moved(const sd_radau *radau);
-/* radau_newton.c */
+/* radau_newton.c: weights of its norm and scales of columns, their room; at the h of the moment */
+void sd_radau_provide_weights(sd_radau *radau);
+void sd_radau_weigh(sd_radau *radau);
 void sd_radau_leave_below(sd_radau *radau, double null_pivot);
 int sd_radau_iterations(const sd_radau *radau);
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry);
@@ -197,7 +187,8 @@ double sd_radau_newton_tolerance(const sd_radau *radau);
 /* radau_coupled.c: where the slopes of the step's start fade or turn within it, in one direction; else SD_NEWTON */
 int sd_radau_iterate_coupled(sd_radau *radau, int *used);
 void sd_radau_free_coupled(struct sd_coupled *coupled);
-/* radau_choice.c */
-double sd_radau_choose(sd_radau *radau, double next, double error, int iterations, int troubled);
+/* radau_choice.c: the length that the next step should have, by the error of this one and what Newton's iteration took; perhaps
+ * with another number of stages */
+double sd_radau_next_step(sd_radau *radau, double error, int iterations, int troubled);
 
 #endif

@@ -69,8 +69,8 @@ static sd_coupled *coupled_of(sd_radau *radau)
     if (!coupled)
         return NULL;
     coupled->stages = radau->method->stages;
-    coupled->all = coupled->stages * radau->n;
-    if (!arrange(coupled, radau->system)) {
+    coupled->all = coupled->stages * radau->ivp.n;
+    if (!arrange(coupled, radau->ivp.system)) {
         sd_radau_free_coupled(coupled);
         radau->coupled = NULL;
     }
@@ -81,15 +81,15 @@ static sd_coupled *coupled_of(sd_radau *radau)
 static void copy_stages(const sd_radau *radau, double *to)
 {
     for (int s = 0; s < radau->method->stages; s++)
-        memcpy(to + s * radau->n, radau->z[s], (size_t)radau->n * sizeof *to);
+        memcpy(to + s * radau->ivp.n, radau->z[s], (size_t)radau->ivp.n * sizeof *to);
 }
 
 /* step [all] := what the stages have moved by since they were there, in Newton's weights */
 static void since(const sd_radau *radau, double *step)
 {
     for (int s = 0; s < radau->method->stages; s++)
-        for (int32_t k = 0; k < radau->n; k++)
-            step[s * radau->n + k] = (radau->z[s][k] - step[s * radau->n + k]) * sd_radau_newton_weight(radau, k);
+        for (int32_t k = 0; k < radau->ivp.n; k++)
+            step[s * radau->ivp.n + k] = (radau->z[s][k] - step[s * radau->ivp.n + k]) * sd_radau_newton_weight(radau, k);
 }
 
 /* Whether two corrections by the factors at hand, from the extrapolated stages on, have one direction: it is all that is wrong
@@ -97,7 +97,7 @@ static void since(const sd_radau *radau, double *step)
 static int aligned(sd_radau *radau, sd_coupled *coupled)
 {
     double *const steps[] = {coupled->right, coupled->other};
-    sd_radau_extrapolate(radau, radau->h);
+    sd_radau_extrapolate(radau, radau->ivp.h);
     for (int m = 0; m < 2; m++) {
         copy_stages(radau, steps[m]);
         if (sd_radau_residuals(radau))
@@ -113,19 +113,20 @@ static int aligned(sd_radau *radau, sd_coupled *coupled)
 /* the entries of the rows of stage i, at its present point */
 static int fill(sd_radau *radau, sd_coupled *coupled, int i)
 {
-    sd_system *system = radau->system;
-    double t = radau->t + radau->method->c[i] * radau->h;
+    sd_system *system = radau->ivp.system;
+    double t = radau->ivp.t + radau->method->c[i] * radau->ivp.h;
     sd_radau_stage(radau, i, radau->y, radau->rate);
-    int32_t bad = sd_jacobian(system, t, radau->y, radau->rate, radau->magnitude, radau->jy, radau->jyd);
+    int32_t bad = sd_jacobian(system, t, radau->y, radau->rate, radau->ivp.magnitude, radau->jy, radau->jyd);
     radau->old_jacobian = 0;
     if (*system->stop)
         return SD_STOPPED;
     if (bad >= 0) {
-        radau->bad_row = bad;
+        radau->ivp.bad_row = bad;
         return SD_NONFINITE;
     }
     for (int32_t k = 0; k < coupled->all; k++) {
-        const int32_t j = k / radau->n, first = system->column[k % radau->n], number = system->column[k % radau->n + 1] - first;
+        const int32_t j = k / radau->ivp.n, own = k % radau->ivp.n;
+        const int32_t first = system->column[own], number = system->column[own + 1] - first;
         double *to = coupled->values + coupled->column[k] + i * number;
         for (int32_t e = 0; e < number; e++)
             to[e] = radau->lead[i][j] * radau->jyd[first + e] + (i == j ? radau->jy[first + e] : 0.0);
@@ -138,7 +139,7 @@ static double size_of(const sd_radau *radau, const sd_coupled *coupled, int judg
 {
     double sum = 0.0, number = 0.0;
     for (int32_t k = 0; k < coupled->all; k++)
-        if (!judged || radau->test[k % radau->n] >= 0) {
+        if (!judged || radau->ivp.test[k % radau->ivp.n] >= 0) {
             sum += coupled->other[k] * coupled->other[k];
             number++;
         }
@@ -148,7 +149,7 @@ static double size_of(const sd_radau *radau, const sd_coupled *coupled, int judg
 /* a correction from the residuals in d, by the slopes of each stage: `other` */
 static int correct(sd_radau *radau, sd_coupled *coupled)
 {
-    const int32_t n = radau->n;
+    const int32_t n = radau->ivp.n;
     for (int i = 0; i < coupled->stages; i++) {
         int cause = fill(radau, coupled, i);
         if (cause)
@@ -170,7 +171,7 @@ static int correct(sd_radau *radau, sd_coupled *coupled)
 
 int sd_radau_iterate_coupled(sd_radau *radau, int *used)
 {
-    if (radau->n > LARGEST)
+    if (radau->ivp.n > LARGEST)
         return SD_NEWTON;
     sd_coupled *coupled = coupled_of(radau);
     if (!coupled)
@@ -178,9 +179,9 @@ int sd_radau_iterate_coupled(sd_radau *radau, int *used)
     if (!aligned(radau, coupled))
         return SD_NEWTON;
     for (int i = 0; i < coupled->stages; i++)
-        memcpy(coupled->scale + i * radau->n, radau->scale, (size_t)radau->n * sizeof(double));
+        memcpy(coupled->scale + i * radau->ivp.n, radau->scale, (size_t)radau->ivp.n * sizeof(double));
     double before = INFINITY, tolerance = sd_radau_newton_tolerance(radau);
-    sd_radau_extrapolate(radau, radau->h);
+    sd_radau_extrapolate(radau, radau->ivp.h);
     for (int m = 1; m <= ITERATIONS; m++) {
         int cause = sd_radau_residuals(radau);
         if (!cause)

@@ -53,8 +53,8 @@ static void lagrange(const sd_radau *radau, const sd_radau_method *method, doubl
 
 void sd_radau_note_points(sd_radau *radau)
 {
-    double from = radau->t - radau->h_used, x[SD_POINTS] = {radau->t, from, from - radau->h_before};
-    int points = radau->taken > 1 ? SD_POINTS : 2;
+    double from = radau->ivp.t - radau->ivp.h_used, x[SD_POINTS] = {radau->ivp.t, from, from - radau->h_before};
+    int points = radau->ivp.taken > 1 ? SD_POINTS : 2;
     for (int i = 0; i < points; i++) {
         double product = 1.0, sum = 0.0;
         for (int j = 0; j < points; j++)
@@ -72,8 +72,8 @@ void sd_radau_note_points(sd_radau *radau)
  * value_i = (1 - 2 (t - x_i) l_i'(x_i)) l_i^2,  rate_i = (t - x_i) l_i^2 */
 static void hermite(const sd_radau *radau, double t, double *value, double *rate, double *value_d, double *rate_d)
 {
-    double end = t - radau->t, begin = end + radau->h_used, old = begin + radau->h_before;
-    int points = radau->taken > 1 ? SD_POINTS : 2;
+    double end = t - radau->ivp.t, begin = end + radau->ivp.h_used, old = begin + radau->h_before;
+    int points = radau->ivp.taken > 1 ? SD_POINTS : 2;
     double far[SD_POINTS] = {end, begin, points > 2 ? old : 1.0};
     double d2 = points > 2 ? 1.0 : 0.0;
     double l[SD_POINTS] = {far[1] * far[2], far[0] * far[2], far[0] * far[1]};
@@ -113,9 +113,9 @@ static void lifted(const sd_radau *radau, double x, double *value, double *slope
 static void between_points(const sd_radau *radau, double t, double *y, double *yd)
 {
     double a[SD_POINTS], b[SD_POINTS], ad[SD_POINTS], bd[SD_POINTS];
-    int points = radau->taken > 1 ? SD_POINTS : 2;
+    int points = radau->ivp.taken > 1 ? SD_POINTS : 2;
     hermite(radau, t, a, b, ad, bd);
-    for (int32_t i = 0; i < radau->n; i++)
+    for (int32_t i = 0; i < radau->ivp.n; i++)
         if (radau->led[i]) {
             double base = sd_radau_last(radau, i); /* differences against one value: no cancellation of large ones */
             double end = radau->phi[i] - base, old = points > 2 ? radau->before[i] - base : 0.0;
@@ -133,9 +133,9 @@ static void between_points(const sd_radau *radau, double t, double *y, double *y
 static void between_stages(const sd_radau *radau, double t, double *y, double *yd)
 {
     int last = radau->used->stages - 1;
-    double h = radau->h_used, v[SD_STAGES + 1], d[SD_STAGES + 1], by[2];
-    lifted(radau, (t - (radau->t - h)) / h, v, d, by);
-    for (int32_t i = 0; i < radau->n; i++)
+    double h = radau->ivp.h_used, v[SD_STAGES + 1], d[SD_STAGES + 1], by[2];
+    lifted(radau, (t - (radau->ivp.t - h)) / h, v, d, by);
+    for (int32_t i = 0; i < radau->ivp.n; i++)
         if (radau->led[i]) {
             double base = sd_radau_last(radau, i), end = radau->phi[i] - base, slope = radau->slope[1][i];
             double sum = v[last + 1] * end, rate = d[last + 1] * end;
@@ -152,9 +152,9 @@ static void between_stages(const sd_radau *radau, double t, double *y, double *y
 static void of_stages(const sd_radau *radau, double t, char led, double *y, double *yd)
 {
     const sd_radau_method *method = radau->used;
-    double h = radau->h_used, v[SD_STAGES + 1], d[SD_STAGES + 1];
-    lagrange(radau, method, (t - (radau->t - h)) / h, v, d);
-    for (int32_t i = 0; i < radau->n; i++)
+    double h = radau->ivp.h_used, v[SD_STAGES + 1], d[SD_STAGES + 1];
+    lagrange(radau, method, (t - (radau->ivp.t - h)) / h, v, d);
+    for (int32_t i = 0; i < radau->ivp.n; i++)
         if (radau->led[i] == led) {
             double sum = sd_radau_last(radau, i), rate = 0.0;
             for (int s = 0; s < method->stages; s++) {
@@ -175,10 +175,11 @@ static void of_slopes(const sd_radau *radau, double t, double *y, double *yd)
         between_points(radau, t, y, yd);
 }
 
-void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
+void sd_radau_dense(const void *self, double t, double *y, double *yd)
 {
-    int32_t n = radau->n;
-    if (radau->taken == 0 || t >= radau->t) {
+    const sd_radau *radau = self;
+    int32_t n = radau->ivp.n;
+    if (radau->ivp.taken == 0 || t >= radau->ivp.t) {
         memcpy(y, radau->phi, (size_t)n * sizeof *y);
         memcpy(yd, radau->yd, (size_t)n * sizeof *yd);
         return;
@@ -190,13 +191,13 @@ void sd_radau_dense(const sd_radau *radau, double t, double *y, double *yd)
 /* In the weights of the error test, which is of the mean: how far one of many unknowns may be off */
 static double most_off(const sd_radau *radau)
 {
-    return radau->system->scales > 0 ? 1.0 : fmax(1.0, sqrt((double)radau->n / MANY));
+    return radau->ivp.system->scales > 0 ? 1.0 : fmax(1.0, sqrt((double)radau->ivp.n / MANY));
 }
 
 /* where slopes are asked what they make of the step: of more stages the first gap is the one that slopes bend */
 static double place_of(const sd_radau *radau, int k, int looks)
 {
-    return radau->t - radau->h_used * (1.0 - (looks > 1 ? k / 3.0 : 0.5 * radau->used->c[0]));
+    return radau->ivp.t - radau->ivp.h_used * (1.0 - (looks > 1 ? k / 3.0 : 0.5 * radau->used->c[0]));
 }
 
 /* How many tolerances what follows from the state (a node's potential, of two coils that a leak of megohms ties) moves where
@@ -204,7 +205,7 @@ static double place_of(const sd_radau *radau, int k, int looks)
  * that slopes lead do not: what follows would be what is left between them. */
 static double followed(sd_radau *radau, sd_settle *settle)
 {
-    const size_t n = (size_t)radau->n;
+    const size_t n = (size_t)radau->ivp.n;
     double t = place_of(radau, 1, 2), moved = 0.0, most = 0.0;
     double *of = malloc(3 * n * sizeof *of), *y = of + n, *rate = y + n;
     if (!of)
@@ -217,9 +218,9 @@ static double followed(sd_radau *radau, sd_settle *settle)
             of_stages(radau, t, 1, y, rate);
         for (size_t i = 0; i < n && led; i++)
             if (radau->led[i])
-                moved = fmax(moved, fabs(y[i] - radau->ee[i]) * sd_radau_weight(radau, (int32_t)i));
+                moved = fmax(moved, fabs(y[i] - radau->ivp.ee[i]) * sd_radau_weight(radau, (int32_t)i));
         if (!led)
-            memcpy(radau->ee, y, n * sizeof *y);
+            memcpy(radau->ivp.ee, y, n * sizeof *y);
         if ((led && moved < TELLS) || sd_settle_point(settle, t, y, rate)) {
             free(of);
             return 0.0;
@@ -243,24 +244,25 @@ static void mistrust(sd_radau *radau)
     for (int k = 1; k <= looks; k++) {
         double t = place_of(radau, k, looks);
         of_stages(radau, t, 1, radau->y, radau->rate);
-        memcpy(radau->ee, radau->y, (size_t)radau->n * sizeof(double));
+        memcpy(radau->ivp.ee, radau->y, (size_t)radau->ivp.n * sizeof(double));
         of_slopes(radau, t, radau->y, radau->rate);
-        for (int32_t i = 0; i < radau->n; i++)
-            if (radau->led[i] && !(fabs(radau->y[i] - radau->ee[i]) * sd_radau_weight(radau, i) <= most))
+        for (int32_t i = 0; i < radau->ivp.n; i++)
+            if (radau->led[i] && !(fabs(radau->y[i] - radau->ivp.ee[i]) * sd_radau_weight(radau, i) <= most))
                 radau->led[i] = 0;
     }
 }
 
 /* the point that is settled may be room that was lent for it, of which nothing is read from where all unknowns follow from it */
-void sd_radau_refine(sd_radau *radau, sd_settle *settle)
+void sd_radau_refine(void *self, sd_settle *settle)
 {
-    double t[SD_POINTS] = {radau->t, radau->t - radau->h_used, radau->t - radau->h_used - radau->h_before};
-    size_t size = (size_t)radau->n * sizeof(double);
-    int32_t n = settle->seen || radau->n < settle->unknowns ? radau->n : settle->unknowns;
-    for (int k = 0; k < SD_POINTS && k <= radau->taken; k++) {
+    sd_radau *radau = self;
+    double last = radau->ivp.t - radau->ivp.h_used, t[SD_POINTS] = {radau->ivp.t, last, last - radau->h_before};
+    size_t size = (size_t)radau->ivp.n * sizeof(double);
+    int32_t n = settle->seen || radau->ivp.n < settle->unknowns ? radau->ivp.n : settle->unknowns;
+    for (int k = 0; k < SD_POINTS && k <= radau->ivp.taken; k++) {
         if (radau->refined[k])
             continue;
-        for (int32_t i = 0; i < radau->n; i++)
+        for (int32_t i = 0; i < radau->ivp.n; i++)
             radau->y[i] = k == 0 ? radau->phi[i] : k == 1 ? sd_radau_last(radau, i) : radau->before[i];
         memcpy(radau->rate, radau->slope[k], size);
         if (sd_settle_point(settle, t[k], radau->y, radau->rate) == 0)
@@ -269,10 +271,10 @@ void sd_radau_refine(sd_radau *radau, sd_settle *settle)
                     radau->slope[k][i] = radau->rate[i];
         radau->refined[k] = 1;
     }
-    if (radau->fixed_h > 0.0) /* whose error is nobody's wish */
+    if (radau->ivp.fixed_h > 0.0) /* whose error is nobody's wish */
         return;
-    const int asked = radau->follows == 0.0 && radau->taken > 0 && radau->behind && radau->rtol >= FINE;
-    if (asked && !settle->seen && settle->unknowns == radau->n)
+    const int asked = radau->follows == 0.0 && radau->ivp.taken > 0 && radau->behind && radau->ivp.rtol >= FINE;
+    if (asked && !settle->seen && settle->unknowns == radau->ivp.n)
         radau->follows = followed(radau, settle);
     mistrust(radau);
 }
@@ -282,20 +284,20 @@ int sd_radau_astray(sd_radau *radau)
     const sd_radau_method *method = radau->method;
     for (int k = 0; k + 1 < method->stages; k++) {
         double between = 0.5 * (method->c[k] + method->c[k + 1]); /* in the middle of the wider gaps */
-        double v[SD_STAGES + 1], d[SD_STAGES + 1], at = radau->t + between * radau->h;
+        double v[SD_STAGES + 1], d[SD_STAGES + 1], at = radau->ivp.t + between * radau->ivp.h;
         lagrange(radau, method, between, v, d);
-        for (int32_t i = 0; i < radau->n; i++) {
+        for (int32_t i = 0; i < radau->ivp.n; i++) {
             double sum = radau->phi[i], rate = 0.0;
             for (int s = 0; s < method->stages; s++) {
                 sum += v[s + 1] * radau->z[s][i];
                 rate += d[s + 1] * radau->z[s][i];
             }
             radau->y[i] = sum;
-            radau->rate[i] = rate / radau->h;
+            radau->rate[i] = rate / radau->ivp.h;
         }
-        sd_residual(radau->system, at, radau->y, radau->rate, radau->d[0]);
-        if (sd_first_astray(radau->system, at, radau->y, radau->rate, radau->d[0], 0.0, radau->jy, radau->jyd,
-                            radau->h, radau->magnitude, 0, radau->terms) >= 0)
+        sd_residual(radau->ivp.system, at, radau->y, radau->rate, radau->d[0]);
+        if (sd_first_astray(radau->ivp.system, at, radau->y, radau->rate, radau->d[0], 0.0, radau->jy, radau->jyd,
+                            radau->ivp.h, radau->ivp.magnitude, 0, radau->terms) >= 0)
             return 1;
     }
     return 0;
@@ -325,12 +327,12 @@ double sd_radau_between(const sd_radau *radau)
 {
     const sd_radau_method *method = radau->method;
     double v[SD_STAGES + 1], d[SD_STAGES + 1], largest = 0.0;
-    if (radau->taken == 0)
+    if (radau->ivp.taken == 0)
         return 0.0;
-    const double before = -radau->h_used / radau->h;
+    const double before = -radau->ivp.h_used / radau->ivp.h;
     lagrange(radau, method, before, v, d);
-    for (int32_t i = 0; i < radau->n; i++)
-        if (radau->test[i] == 0 && !radau->led[i]) {
+    for (int32_t i = 0; i < radau->ivp.n; i++)
+        if (radau->ivp.test[i] == 0 && !radau->led[i]) {
             double off = radau->phi[i] - sd_radau_last(radau, i);
             for (int s = 0; s < method->stages; s++)
                 off += v[s + 1] * radau->z[s][i];
@@ -345,12 +347,12 @@ void sd_radau_extrapolate(sd_radau *radau, double h)
     const sd_radau_method *used = radau->used;
     for (int s = 0; s < radau->method->stages; s++) {
         double v[SD_STAGES + 1], slope[SD_STAGES + 1];
-        if (radau->taken == 0) {
-            memset(radau->z[s], 0, (size_t)sd_whole_lanes(radau->n) * sizeof(double));
+        if (radau->ivp.taken == 0) {
+            memset(radau->z[s], 0, (size_t)sd_whole_lanes(radau->ivp.n) * sizeof(double));
             continue;
         }
-        lagrange(radau, used, 1.0 + radau->method->c[s] * h / radau->h_used, v, slope);
+        lagrange(radau, used, 1.0 + radau->method->c[s] * h / radau->ivp.h_used, v, slope);
         v[used->stages] -= 1.0; /* of the point that the step begins at */
-        sd_radau_combine(used->stages, radau->n, v + 1, radau->kept, radau->z[s]);
+        sd_radau_combine(used->stages, radau->ivp.n, v + 1, radau->kept, radau->z[s]);
     }
 }

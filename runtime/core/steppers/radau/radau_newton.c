@@ -27,6 +27,33 @@ static const struct {
     int lean;
 } ways[] = {{1e-10, 0}, {1e-13, 0}, {1e-16, 0}, {SD_LEAST_PIVOT, 0}, {1e-10, SD_WHERE_LEFT}, {1e-10, SD_WHERE_IDLE}};
 
+/* Newton's weights and the scale of columns: of unknowns that all count as they are those that there are; where memory for
+ * others is missing no scale, which the first step tells */
+void sd_radau_provide_weights(sd_radau *radau)
+{
+    size_t m = (size_t)sd_whole_lanes(radau->ivp.n + 1);
+    int powers = 0;
+    for (int32_t i = 0; i < radau->ivp.n; i++)
+        powers |= radau->ivp.power[i] != 0;
+    int others = powers || (radau->ivp.atol && !radau->ivp.weight);
+    if (others && !radau->powered)
+        radau->powered = calloc(3 * m, sizeof *radau->powered);
+    if (others && !radau->ivp.weight && radau->powered)
+        radau->ivp.weight = radau->powered + 2 * m;
+    radau->newton_weight = powers ? radau->powered : radau->ivp.weight;
+    radau->scale = others && !radau->powered ? NULL : powers ? radau->powered + m : radau->ivp.magnitude;
+}
+
+/* index-2 unknowns and index-3 multipliers count with powers of h */
+void sd_radau_weigh(sd_radau *radau)
+{
+    for (int32_t i = 0; i < radau->ivp.n && radau->scale != radau->ivp.magnitude; i++) {
+        double power = radau->ivp.power[i] == 0 ? 1.0 : radau->ivp.power[i] == 1 ? radau->ivp.h : radau->ivp.h * radau->ivp.h;
+        radau->newton_weight[i] = radau->ivp.weight[i] * power;
+        radau->scale[i] = radau->ivp.magnitude[i] / power;
+    }
+}
+
 /* the part of its column below which a pivot is none; columns of multipliers and states always have one */
 void sd_radau_leave_below(sd_radau *radau, double null_pivot)
 {
@@ -42,9 +69,9 @@ static const double round_off[SD_METHODS] = {10.0, 40.0, 160.0}, aimed_at[SD_MET
 /* the last factors left a column */
 static int columns_left(const sd_radau *radau)
 {
-    int left = radau->linear->rank < radau->n;
+    int left = radau->linear->rank < radau->ivp.n;
     for (int k = 0; k < radau->method->pairs; k++)
-        left = left || sd_linear_z_rank(radau->complex_linear[k]) < radau->n;
+        left = left || sd_linear_z_rank(radau->complex_linear[k]) < radau->ivp.n;
     return left;
 }
 
@@ -62,12 +89,13 @@ static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
     int judged = all || columns_left(radau);
     double limit = row_limit(radau, newton_tolerance);
     for (int s = 0; s < radau->method->stages; s++) {
-        for (int32_t i = 0; i < radau->n; i++) {
+        for (int32_t i = 0; i < radau->ivp.n; i++) {
             radau->y[i] = radau->phi[i] + radau->z[s][i];
-            radau->rate[i] = (fabs(radau->y[i]) + radau->magnitude[i]) / radau->h;
+            radau->rate[i] = (fabs(radau->y[i]) + radau->ivp.magnitude[i]) / radau->ivp.h;
         }
-        if (sd_first_unmet(radau->system, radau->t + radau->method->c[s] * radau->h, radau->y, radau->rate, radau->d[s], limit,
-                           radau->g, radau->scale, radau->met, judged, radau->terms) >= 0)
+        double t = radau->ivp.t + radau->method->c[s] * radau->ivp.h;
+        if (sd_first_unmet(radau->ivp.system, t, radau->y, radau->rate, radau->d[s], limit, radau->g, radau->scale,
+                           radau->ivp.met, judged, radau->terms) >= 0)
             return 0;
     }
     return 1;
@@ -79,7 +107,7 @@ static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
 static double left_open(const sd_radau *radau, int s, int32_t i, int before)
 {
     double now = radau->full[s][i], was = before ? radau->moved[s][i] : now;
-    return sd_open(now * was > 0.0 && fabs(now) > 0.5 * fabs(was) ? 0.0 : now, radau->y[i], radau->met[i]);
+    return sd_open(now * was > 0.0 && fabs(now) > 0.5 * fabs(was) ? 0.0 : now, radau->y[i], radau->ivp.met[i]);
 }
 
 /* Every steep row is as small as the last corrections (`full`), which do not shrink any more, let it be by slopes at the
@@ -90,13 +118,13 @@ static int rows_at_round_off(sd_radau *radau, double newton_tolerance, int befor
     int all = columns_left(radau);
     double limit = row_limit(radau, newton_tolerance);
     for (int s = 0; s < radau->method->stages; s++) {
-        double t = radau->t + radau->method->c[s] * radau->h;
+        double t = radau->ivp.t + radau->method->c[s] * radau->ivp.h;
         sd_radau_stage(radau, s, radau->y, radau->rate);
-        sd_jacobian(radau->system, t, radau->y, radau->rate, radau->magnitude, radau->jy, radau->jyd);
-        for (int32_t i = 0; i < radau->n; i++)
+        sd_jacobian(radau->ivp.system, t, radau->y, radau->rate, radau->ivp.magnitude, radau->jy, radau->jyd);
+        for (int32_t i = 0; i < radau->ivp.n; i++)
             radau->first[i] = left_open(radau, s, i, before);
-        if (sd_first_astray(radau->system, t, radau->y, radau->rate, radau->d[s], limit, radau->jy, radau->jyd,
-                            radau->h, radau->first, all, radau->terms) >= 0)
+        if (sd_first_astray(radau->ivp.system, t, radau->y, radau->rate, radau->d[s], limit, radau->jy, radau->jyd,
+                            radau->ivp.h, radau->first, all, radau->terms) >= 0)
             return 0;
     }
     return 1;
@@ -124,14 +152,14 @@ double sd_radau_newton_tolerance(const sd_radau *radau)
 static void keep(sd_radau *radau)
 {
     for (int s = 0; s < radau->method->stages; s++)
-        memcpy(radau->base[s], radau->z[s], (size_t)radau->n * sizeof(double));
+        memcpy(radau->base[s], radau->z[s], (size_t)radau->ivp.n * sizeof(double));
 }
 
 /* change := what the stages have moved by from base */
 static void note_change(const sd_radau *radau, double *const *change)
 {
     for (int s = 0; s < radau->method->stages; s++)
-        for (int32_t i = 0; i < radau->n; i++)
+        for (int32_t i = 0; i < radau->ivp.n; i++)
             change[s][i] = radau->z[s][i] - radau->base[s][i];
 }
 
@@ -150,10 +178,10 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
     double tolerance = sd_radau_newton_tolerance(radau);
     double aim = newton_tolerance(radau, aimed_at[radau->method - sd_radau_methods]);
     double before = 0.0, ratio_before = 0.0, trust = 1.0;
-    int patient = full || radau->fixed_h > 0.0;
+    int patient = full || radau->ivp.fixed_h > 0.0;
     *retry = 0.5;
     int usual = sd_radau_iterations(radau), most = patient ? PATIENT : usual, converged = 0, idle = 0;
-    for (int m = 1; m <= most + (radau->system->scales > 0); m++) {
+    for (int m = 1; m <= most + (radau->ivp.system->scales > 0); m++) {
         int cause = sd_radau_residuals(radau);
         if (cause)
             return cause;
@@ -161,9 +189,9 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
             return SD_FINE;
         if (m > most)
             break;
-        if (m > 1 && radau->system->scales > 0)
+        if (m > 1 && radau->ivp.system->scales > 0)
             note_change(radau, radau->moved);
-        double size = radau->system->scales > 0 ? noted_correction(radau) : sd_radau_correct(radau);
+        double size = radau->ivp.system->scales > 0 ? noted_correction(radau) : sd_radau_correct(radau);
         *used = m;
         if (!isfinite(size))
             return SD_NEWTON;
@@ -172,7 +200,8 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
             double ratio = size / before;
             radau->theta = m == 2 ? ratio : sqrt(ratio * ratio_before);
             ratio_before = ratio;
-            const int borne = ratio > SLOW && size < fmin(1.0, FAINTEST / radau->rtol) && sd_radau_state_moved(radau) < tolerance;
+            const int faint = ratio > SLOW && size < fmin(1.0, FAINTEST / radau->ivp.rtol);
+            const int borne = faint && sd_radau_state_moved(radau) < tolerance;
             converged = borne;
             if (!(radau->theta < SLOW) && !(full && m < PATIENT / 2)) {
                 if (size > STAGNANT * tolerance && !borne)
@@ -192,7 +221,7 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
         before = fmax(size, DBL_MIN);
         /* far up an exponential every correction is small */
         converged = converged || (trust * size <= tolerance && as_aimed && !(full && m == 1));
-        if (converged && radau->system->scales == 0)
+        if (converged && radau->ivp.system->scales == 0)
             return SD_FINE;
         if (full) {
             radau->old_jacobian = 0;
@@ -207,7 +236,7 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
 static void move(sd_radau *radau, double part)
 {
     for (int s = 0; s < radau->method->stages; s++)
-        for (int32_t i = 0; i < radau->n; i++)
+        for (int32_t i = 0; i < radau->ivp.n; i++)
             radau->z[s][i] = radau->base[s][i] + part * radau->full[s][i];
 }
 
@@ -221,10 +250,10 @@ static double damped_part(sd_radau *radau, double size)
         if (cause == SD_STOPPED)
             return 0.0;
         if (cause == SD_FINE) {
-            memcpy(radau->first, radau->d[0], (size_t)radau->n * sizeof(double));
+            memcpy(radau->first, radau->d[0], (size_t)radau->ivp.n * sizeof(double));
             double next = sd_radau_correct(radau);
             move(radau, part);
-            memcpy(radau->d[0], radau->first, (size_t)radau->n * sizeof(double));
+            memcpy(radau->d[0], radau->first, (size_t)radau->ivp.n * sizeof(double));
             /* up an exponential every correction is as large as the last */
             if (next <= size * (part < 1.0 ? 1.0 - 0.25 * part : 1.0)) {
                 radau->theta = next / size;
@@ -253,7 +282,7 @@ static int full_correction(sd_radau *radau, int known, int lean, double *size)
 static void take_back(sd_radau *radau)
 {
     for (int s = 0; s < radau->method->stages; s++)
-        memcpy(radau->z[s], radau->base[s], (size_t)radau->n * sizeof(double));
+        memcpy(radau->z[s], radau->base[s], (size_t)radau->ivp.n * sizeof(double));
 }
 
 /* The part of a correction that is taken, whose factors leave columns as this way does; 0: none, or `cause` says why; -1:
@@ -284,7 +313,7 @@ int sd_radau_iterate_damped(sd_radau *radau, int *used)
 {
     double tolerance = sd_radau_newton_tolerance(radau);
     for (int s = 0; s < radau->method->stages; s++)
-        memset(radau->z[s], 0, (size_t)radau->n * sizeof(double));
+        memset(radau->z[s], 0, (size_t)radau->ivp.n * sizeof(double));
     for (int m = 1; m <= WALK; m++) {
         double part = 0.0;
         *used = m;
@@ -302,7 +331,7 @@ int sd_radau_iterate_damped(sd_radau *radau, int *used)
                 return cause;
         }
         if (part == 0.0 || (m >= DAMPED && part < 1.0))
-            return *radau->system->stop ? SD_STOPPED : SD_NEWTON;
+            return *radau->ivp.system->stop ? SD_STOPPED : SD_NEWTON;
         note_change(radau, radau->moved);
     }
     return SD_NEWTON;

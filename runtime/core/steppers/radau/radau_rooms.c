@@ -8,38 +8,18 @@
 #define OWN 4              /* vectors that every step hands on to the next one */
 #define SPARE 64           /* numbers behind each set of vectors: two sets are room for what has a few more than they */
 
-static int step(void *radau)
-{
-    return sd_radau_step(radau);
-}
-
-static void dense(const void *radau, double t, double *y, double *yd)
-{
-    sd_radau_dense(radau, t, y, yd);
-}
-
-static void refine(void *radau, sd_settle *settle)
-{
-    sd_radau_refine(radau, settle);
-}
-
-static void start(void *radau, double t, const double *y, const double *yd, double h)
-{
-    sd_radau_start(radau, t, y, yd, h);
-}
-
 /* the stages of the last accepted step, before it was projected; y, yd [n] */
 static void show(const void *self, int32_t s, double *y, double *yd)
 {
     const sd_radau *radau = self;
-    sd_radau_combine(radau->used->stages, radau->n, radau->used->inverse[s], radau->kept, radau->rate);
+    sd_radau_combine(radau->used->stages, radau->ivp.n, radau->used->inverse[s], radau->kept, radau->rate);
     const double *last = radau->last, *phi = radau->phi, *end = radau->kept[radau->used->stages - 1], *z = radau->kept[s];
-    for (int32_t i = 0; i < radau->n && last; i++)
+    for (int32_t i = 0; i < radau->ivp.n && last; i++)
         y[i] = last[i] + z[i];
-    for (int32_t i = 0; i < radau->n && !last; i++)
+    for (int32_t i = 0; i < radau->ivp.n && !last; i++)
         y[i] = phi[i] - end[i] + z[i];
-    for (int32_t i = 0; i < radau->n; i++)
-        yd[i] = radau->rate[i] / radau->h_used;
+    for (int32_t i = 0; i < radau->ivp.n; i++)
+        yd[i] = radau->rate[i] / radau->ivp.h_used;
 }
 
 /* Factors work in vectors of which nothing is read while they do: the point of a stage is made anew, as are rates of the whole
@@ -47,7 +27,7 @@ static void show(const void *self, int32_t s, double *y, double *yd)
  * matrices are scaled as those of the real one.  0; 2: no memory */
 static int borrow(sd_radau *radau)
 {
-    const sd_condensed *kept = (const sd_condensed *)radau->system->left;
+    const sd_condensed *kept = (const sd_condensed *)radau->ivp.system->left;
     sd_linear *real = radau->linear;
     int failed = sd_linear_borrow(real, kept ? kept->yd : radau->y, NULL, NULL);
     for (int k = 0; k < (radau->most_stages - 1) / 2 && !failed; k++)
@@ -63,17 +43,17 @@ static void leave_room(sd_radau *radau)
     free(radau->beside);
     free(radau->point_y);
     free(radau->led);
-    radau->work = radau->ee = radau->weight = radau->last = radau->point_y = NULL;
+    radau->work = radau->ivp.ee = radau->ivp.weight = radau->last = radau->point_y = NULL;
     radau->led = NULL;
     radau->beside = NULL;
 }
 
 int sd_radau_provide(sd_radau *radau)
 {
-    const sd_system *system = radau->system;
-    size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(radau->n + 1);
-    double **vectors[] = {&radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->last, &radau->weight,
-                          &radau->y, &radau->rate, &radau->ee, &radau->terms, &radau->first};
+    const sd_system *system = radau->ivp.system;
+    size_t nnz = (size_t)system->entries + 1, m = (size_t)sd_whole_lanes(radau->ivp.n + 1);
+    double **vectors[] = {&radau->before, &radau->slope[0], &radau->slope[1], &radau->slope[2], &radau->last,
+                          &radau->ivp.weight, &radau->y, &radau->rate, &radau->ivp.ee, &radau->terms, &radau->first};
     const int sparing = sd_radau_sparing(radau), kept = sparing && system->left;
     /* z and kept change places, and either has next to it what no step hands on (`spare`); the last three: of steep laws */
     double **of_stages[] = {radau->z, radau->d, radau->kept, radau->base, radau->full, radau->moved};
@@ -86,7 +66,7 @@ int sd_radau_provide(sd_radau *radau)
     radau->in_place = kept && sd_condensed_in_place(left) && 2 * m <= (size_t)left->full->unknowns + 8;
     all -= radau->in_place ? 2 : 0;
     radau->work = calloc(all * m + sets * SPARE + (steep ? 3 : 2) * nnz, sizeof(double));
-    radau->led = calloc((size_t)radau->n + 1, sizeof *radau->led);
+    radau->led = calloc((size_t)radau->ivp.n + 1, sizeof *radau->led);
     if (!radau->work || !radau->led) {
         leave_room(radau);
         return -1;
@@ -111,7 +91,7 @@ int sd_radau_provide(sd_radau *radau)
     radau->jy = next;
     radau->jyd = radau->jy + nnz;
     if (sparing)
-        radau->ee = radau->d[0];
+        radau->ivp.ee = radau->d[0];
     if (sparing && borrow(radau)) {
         leave_room(radau);
         return -1;
@@ -123,7 +103,7 @@ int sd_radau_provide(sd_radau *radau)
 double *sd_radau_spare(void *self, size_t *numbers)
 {
     sd_radau *radau = self;
-    *numbers = (size_t)sd_whole_lanes(radau->n + 1) * (size_t)(3 * radau->most_stages - 1 - 2 * radau->in_place) + SPARE;
+    *numbers = (size_t)sd_whole_lanes(radau->ivp.n + 1) * (size_t)(3 * radau->most_stages - 1 - 2 * radau->in_place) + SPARE;
     return sd_radau_provide(radau) ? NULL : radau->z[0] < radau->d[0] ? radau->z[0] : radau->d[0];
 }
 
@@ -143,9 +123,9 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     if (!radau)
         return NULL;
     size_t m = (size_t)sd_whole_lanes(system->unknowns + 1);
-    radau->system = system;
+    radau->ivp.system = system;
     radau->linear = linear;
-    radau->n = system->unknowns;
+    radau->ivp.n = system->unknowns;
     radau->stages = sd_radau_methods[0].stages;
     radau->most_stages = stages;
     for (int32_t k = 0; k < (stages - 1) / 2; k++) {
@@ -163,9 +143,10 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     radau->yd = radau->phi + m;
     sd_radau_gaps(radau->gap);
     radau->method = radau->used = sd_radau_methods;
-    radau->stepper = (sd_stepper){radau, system, radau->n, &radau->t, &radau->t_end, radau->phi, radau->yd,
-                                  &radau->taken, step, dense, refine, start, stages, NULL, NULL, NULL, NULL,
-                                  NULL, NULL, NULL, NULL, NULL, 1, show, NULL, NULL, sd_radau_spare};
+    radau->ivp.stepper = (sd_stepper){
+        .self = radau, .ivp = &radau->ivp, .n = radau->ivp.n, .y = radau->phi, .yd = radau->yd, .step = sd_radau_step,
+        .dense = sd_radau_dense, .refine = sd_radau_refine, .start = sd_radau_start, .nodes = stages, .collocated = 1,
+        .show = show, .spare = sd_radau_spare};
     return radau;
 }
 
@@ -181,9 +162,4 @@ void sd_radau_free(sd_radau *radau)
     free(radau->open);
     sd_radau_free_coupled(radau->coupled);
     free(radau);
-}
-
-sd_stepper *sd_radau_stepper(sd_radau *radau)
-{
-    return &radau->stepper;
 }

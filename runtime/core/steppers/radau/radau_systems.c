@@ -2,6 +2,7 @@
  * models are whole tasks for threads (see radau.h). */
 #include "system/condensed.h"
 #include "linear/lanes.h"
+#include "steppers/combine.h"
 #include "steppers/radau/radau.h"
 #include "steppers/threads.h"
 
@@ -11,36 +12,25 @@
 
 #define LEAN 0.01 /* part of the slope at zero that a faint one gets */
 
-/* out [n] := sum_j weight[j] v[j], in whole lanes, for which all vectors have room */
-static inline __attribute__((always_inline)) void sum(int stages, int32_t n, const double *weight, double *const *v, double *out)
-{
-    for (int32_t i = 0; i < n; i += SD_LANES) {
-        sd_lanes x = weight[0] * SD_FROM(v[0], i);
-        for (int j = 1; j < stages; j++)
-            x += weight[j] * SD_FROM(v[j], i);
-        SD_AT(out, i) = x;
-    }
-}
-
 SD_WIDE void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out)
 {
     if (stages == 3)
-        sum(3, n, weight, v, out);
+        sd_combine(3, n, weight, v, out);
     else if (stages == 5)
-        sum(5, n, weight, v, out);
+        sd_combine(5, n, weight, v, out);
     else
-        sum(7, n, weight, v, out);
+        sd_combine(7, n, weight, v, out);
 }
 
 /* whether the systems of a step are taken at once: a matter of their size, not of the machine */
 static int large(const sd_radau *radau)
 {
-    return radau->n >= SD_LARGE;
+    return radau->ivp.n >= SD_LARGE;
 }
 
 int sd_radau_sparing(const sd_radau *radau)
 {
-    return large(radau) && radau->system->scales == 0 && radau->linear->sparse;
+    return large(radau) && radau->ivp.system->scales == 0 && radau->linear->sparse;
 }
 
 typedef struct factoring {
@@ -51,7 +41,7 @@ typedef struct factoring {
 /* of columns: where pivots are left out they are small or not beside the unknowns themselves, whatever the step */
 static const double *column_scale(const sd_radau *radau)
 {
-    return radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->magnitude : radau->scale;
+    return radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->ivp.magnitude : radau->scale;
 }
 
 /* part 0: J + gamma/h E and its factors; part k: those of J + lambda/h E of pair k - 1 */
@@ -60,20 +50,20 @@ static void factorise_one(void *context, int part)
     factoring *all = context;
     sd_radau *radau = all->radau;
     const sd_radau_method *method = radau->method;
-    int32_t entries = radau->system->entries;
+    int32_t entries = radau->ivp.system->entries;
     const double *scale = column_scale(radau);
     if (sd_radau_sparing(radau)) {
         all->failed[part] = part ? sd_linear_z_factor_sum(radau->complex_linear[part - 1]) : sd_linear_factor_sum(radau->linear);
         return;
     }
     if (part == 0) {
-        double real = method->gamma / radau->h;
+        double real = method->gamma / radau->ivp.h;
         for (int32_t e = 0; e < entries; e++)
             radau->g[e] = radau->jy[e] + real * radau->jyd[e];
         all->failed[0] = sd_linear_factor(radau->linear, radau->g, scale);
         return;
     }
-    double complex both = method->lambda[part - 1] / radau->h;
+    double complex both = method->lambda[part - 1] / radau->ivp.h;
     double complex *gz = sd_linear_z_values(radau->complex_linear[part - 1]);
     for (int32_t e = 0; e < entries; e++)
         gz[e] = radau->jy[e] + both * radau->jyd[e];
@@ -84,10 +74,10 @@ static void factorise_one(void *context, int part)
 static void scale_all(sd_radau *radau)
 {
     const sd_radau_method *method = radau->method;
-    const double real = method->gamma / radau->h, *scale = column_scale(radau);
+    const double real = method->gamma / radau->ivp.h, *scale = column_scale(radau);
     sd_linear_scale_sum(radau->linear, radau->jy, radau->jyd, &real, scale);
     for (int k = 0; k < method->pairs; k++) {
-        const double complex both = method->lambda[k] / radau->h;
+        const double complex both = method->lambda[k] / radau->ivp.h;
         sd_linear_z_scale_sum(radau->complex_linear[k], radau->jy, radau->jyd, &both, scale);
     }
 }
@@ -107,10 +97,10 @@ static int factorise_all(sd_radau *radau)
             factorise_one(&all, part);
         failed = all.failed[part];
         if (part == 0) {
-            radau->bad_row = radau->linear->bad_row;
-            radau->bad_column = radau->linear->bad_column;
+            radau->ivp.bad_row = radau->linear->bad_row;
+            radau->ivp.bad_column = radau->linear->bad_column;
         } else if (failed)
-            sd_linear_z_bad(radau->complex_linear[part - 1], &radau->bad_row, &radau->bad_column);
+            sd_linear_z_bad(radau->complex_linear[part - 1], &radau->ivp.bad_row, &radau->ivp.bad_column);
     }
     return failed;
 }
@@ -118,32 +108,32 @@ static int factorise_all(sd_radau *radau)
 /* A^-1 / h, of the step and the method at hand */
 static void set_lead(sd_radau *radau)
 {
-    if (radau->h_lead == radau->h && radau->of_lead == radau->method)
+    if (radau->h_lead == radau->ivp.h && radau->of_lead == radau->method)
         return;
     for (int s = 0; s < radau->method->stages; s++)
         for (int j = 0; j < radau->method->stages; j++)
-            radau->lead[s][j] = radau->method->inverse[s][j] / radau->h;
-    radau->h_lead = radau->h;
+            radau->lead[s][j] = radau->method->inverse[s][j] / radau->ivp.h;
+    radau->h_lead = radau->ivp.h;
     radau->of_lead = radau->method;
 }
 
 void sd_radau_stage(sd_radau *radau, int s, double *y, double *rate)
 {
     set_lead(radau);
-    sd_radau_combine(radau->method->stages, radau->n, radau->lead[s], radau->z, rate);
-    for (int32_t i = 0; i < radau->n; i++)
+    sd_radau_combine(radau->method->stages, radau->ivp.n, radau->lead[s], radau->z, rate);
+    for (int32_t i = 0; i < radau->ivp.n; i++)
         y[i] = radau->phi[i] + radau->z[s][i];
 }
 
 /* sd_jacobian, for which right sides, which nobody knows yet, are room for the slopes of a whole system that has none */
 static int32_t slopes(sd_radau *radau, double t, const double *y, const double *yd)
 {
-    sd_condensed *kept = sd_radau_sparing(radau) ? (sd_condensed *)radau->system->left : NULL;
+    sd_condensed *kept = sd_radau_sparing(radau) ? (sd_condensed *)radau->ivp.system->left : NULL;
     double *own = kept ? kept->slope : NULL;
     size_t room = (size_t)(radau->d[1] - radau->d[0]) * (size_t)radau->most_stages;
     if (kept && !own && y == radau->phi && (size_t)kept->full->entries < room)
         kept->slope = radau->d[0];
-    int32_t bad = sd_jacobian(radau->system, t, y, yd, radau->magnitude, radau->jy, radau->jyd);
+    int32_t bad = sd_jacobian(radau->ivp.system, t, y, yd, radau->ivp.magnitude, radau->jy, radau->jyd);
     if (kept)
         kept->slope = own;
     return bad;
@@ -153,26 +143,25 @@ static int32_t slopes(sd_radau *radau, double t, const double *y, const double *
  * at the present guess of the end of the step, where slopes at the start mislead (a valve near rest). */
 int sd_radau_factorise(sd_radau *radau, int at_end)
 {
-    sd_system *system = radau->system;
+    sd_system *system = radau->ivp.system;
     if (!radau->old_jacobian) {
         if (at_end)
             sd_radau_stage(radau, radau->method->stages - 1, radau->y, radau->rate);
-        int32_t bad = slopes(radau, at_end ? radau->t + radau->h : radau->t, at_end ? radau->y : radau->phi,
+        int32_t bad = slopes(radau, at_end ? radau->ivp.t + radau->ivp.h : radau->ivp.t, at_end ? radau->y : radau->phi,
                              at_end ? radau->rate : radau->yd);
         if (*system->stop)
             return SD_STOPPED;
         if (bad >= 0) {
-            radau->bad_row = bad;
+            radau->ivp.bad_row = bad;
             return SD_NONFINITE;
         }
         radau->old_jacobian = 1;
     }
     radau->ready = 0;
-    radau->factorisations++;
     int failed = factorise_all(radau);
     if (failed)
         return failed == 2 ? SD_MEMORY : SD_SINGULAR;
-    radau->h_factored = radau->h;
+    radau->h_factored = radau->ivp.h;
     radau->ready = 1;
     return SD_FINE;
 }
@@ -182,14 +171,15 @@ static int find_at_zero(sd_radau *radau)
 {
     if (radau->at_zero)
         return radau->open != NULL;
-    size_t entries = (size_t)radau->system->entries;
+    size_t entries = (size_t)radau->ivp.system->entries;
     radau->at_zero = malloc((2 * entries + 1) * sizeof *radau->at_zero);
-    radau->open = malloc((size_t)radau->n + 1);
+    radau->open = malloc((size_t)radau->ivp.n + 1);
     if (!radau->at_zero || !radau->open)
         return 0;
-    memset(radau->y, 0, (size_t)radau->n * sizeof(double));
-    memset(radau->rate, 0, (size_t)radau->n * sizeof(double));
-    if (sd_jacobian(radau->system, radau->t, radau->y, radau->rate, radau->magnitude, radau->at_zero, radau->at_zero + entries) < 0)
+    memset(radau->y, 0, (size_t)radau->ivp.n * sizeof(double));
+    memset(radau->rate, 0, (size_t)radau->ivp.n * sizeof(double));
+    if (sd_jacobian(radau->ivp.system, radau->ivp.t, radau->y, radau->rate, radau->ivp.magnitude, radau->at_zero,
+                    radau->at_zero + entries) < 0)
         return 1;
     free(radau->open);
     radau->open = NULL;
@@ -200,13 +190,13 @@ static int find_at_zero(sd_radau *radau)
 static int mark_open(sd_radau *radau, int where)
 {
     const sd_linear *linear = radau->linear;
-    if (where == SD_WHERE_LEFT && linear->rank == radau->n)
+    if (where == SD_WHERE_LEFT && linear->rank == radau->ivp.n)
         return 0;
     if (!linear->idle || !find_at_zero(radau))
         return 0;
     if (where == SD_WHERE_LEFT)
         sd_linear_left(linear, radau->open);
-    for (int32_t j = 0; j < radau->n && where == SD_WHERE_IDLE; j++)
+    for (int32_t j = 0; j < radau->ivp.n && where == SD_WHERE_IDLE; j++)
         radau->open[j] = linear->idle[j] != 0;
     return 1;
 }
@@ -218,9 +208,9 @@ int sd_radau_lean(sd_radau *radau, int where)
 {
     if (!mark_open(radau, where))
         return SD_FINE;
-    const sd_system *system = radau->system;
-    sd_steep_terms(radau->system, radau->t, radau->phi, radau->yd, radau->terms);
-    for (int32_t j = 0; j < radau->n; j++)
+    const sd_system *system = radau->ivp.system;
+    sd_steep_terms(radau->ivp.system, radau->ivp.t, radau->phi, radau->yd, radau->terms);
+    for (int32_t j = 0; j < radau->ivp.n; j++)
         for (int32_t e = system->column[j]; e < system->column[j + 1] && radau->open[j]; e++)
             if (radau->terms[system->row[e]] != 0.0)
                 radau->jy[e] += LEAN * (radau->at_zero[e] - radau->jy[e]);
@@ -232,10 +222,10 @@ static void residual_in_place(sd_radau *radau, sd_system *system, int s, double 
 {
     const sd_condensed *left = (const sd_condensed *)system->left;
     double *d = radau->d[s];
-    for (int32_t i = 0; i < radau->n; i++)
+    for (int32_t i = 0; i < radau->ivp.n; i++)
         d[i] = radau->phi[i] + radau->z[s][i];
     sd_condensed_place(left, d);
-    sd_radau_combine(radau->method->stages, radau->n, radau->lead[s], radau->z, d);
+    sd_radau_combine(radau->method->stages, radau->ivp.n, radau->lead[s], radau->z, d);
     sd_condensed_place_rates(left, d);
     sd_condensed_rows(left, t, d, d);
     system->residual_evaluations++;
@@ -244,14 +234,14 @@ static void residual_in_place(sd_radau *radau, sd_system *system, int s, double 
 /* d of stage s := its residual, of `system`, by way of y and rate */
 static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, double *rate)
 {
-    const double t = radau->t + radau->method->c[s] * radau->h;
+    const double t = radau->ivp.t + radau->method->c[s] * radau->ivp.h;
     if (radau->in_place)
         residual_in_place(radau, system, s, t);
     else {
         sd_radau_stage(radau, s, y, rate);
         sd_residual(system, t, y, rate, radau->d[s]);
     }
-    for (int32_t i = radau->n; i < sd_whole_lanes(radau->n); i++)
+    for (int32_t i = radau->ivp.n; i < sd_whole_lanes(radau->ivp.n); i++)
         radau->d[s][i] = 0.0; /* others have worked there */
 }
 
@@ -266,43 +256,44 @@ static void residual_part(void *context, int part)
             residual_of(radau, radau->twice[0], s, radau->y, radau->rate);
     else
         for (int s = half; s < radau->method->stages; s++)
-            residual_of(radau, radau->twice[1], s, radau->system->left ? radau->d[s] : radau->point_y, radau->point_rate);
+            residual_of(radau, radau->twice[1], s, radau->ivp.system->left ? radau->d[s] : radau->point_y, radau->point_rate);
 }
 
 /* the systems and the point that two threads take residuals with; 0: there are none */
 static int accompanied(sd_radau *radau)
 {
-    if (!large(radau) || !radau->system->together || sd_threads() < 2)
+    if (!large(radau) || !radau->ivp.system->together || sd_threads() < 2)
         return 0;
     if (!radau->beside) {
-        radau->beside = sd_beside_new(radau->system);
-        size_t m = (size_t)sd_whole_lanes(radau->n + 1), alone = radau->system->left ? 0 : m, rate = radau->in_place ? 0 : m;
+        radau->beside = sd_beside_new(radau->ivp.system);
+        size_t m = (size_t)sd_whole_lanes(radau->ivp.n + 1);
+        size_t alone = radau->ivp.system->left ? 0 : m, rate = radau->in_place ? 0 : m;
         radau->point_y = calloc(alone + rate + 1, sizeof(double));
         radau->point_rate = radau->point_y + alone;
     }
     if (!radau->beside || !radau->point_y)
         return 0;
-    sd_beside_as(radau->beside, radau->system, radau->twice);
+    sd_beside_as(radau->beside, radau->ivp.system, radau->twice);
     return 1;
 }
 
 /* residuals of the stages into d */
 int sd_radau_residuals(sd_radau *radau)
 {
-    int32_t n = radau->n;
-    int64_t before = radau->system->residual_evaluations;
+    int32_t n = radau->ivp.n;
+    int64_t before = radau->ivp.system->residual_evaluations;
     int made = accompanied(radau);
     set_lead(radau); /* before two threads read it */
     if (made)
         sd_side_by_side(2, residual_part, radau);
     for (int s = 0; s < radau->method->stages; s++) {
         if (!made)
-            residual_of(radau, radau->system, s, radau->y, radau->rate);
-        radau->system->residual_evaluations = before + s + 1; /* those that are looked at */
-        if (*radau->system->stop)
+            residual_of(radau, radau->ivp.system, s, radau->y, radau->rate);
+        radau->ivp.system->residual_evaluations = before + s + 1; /* those that are looked at */
+        if (*radau->ivp.system->stop)
             return SD_STOPPED;
         if (!sd_finite(n, radau->d[s])) {
-            radau->bad_row = sd_first_bad(n, radau->d[s]);
+            radau->ivp.bad_row = sd_first_bad(n, radau->d[s]);
             return SD_NONFINITE;
         }
     }
@@ -330,7 +321,7 @@ static inline __attribute__((always_inline)) void join_parts(sd_lanes re, sd_lan
 static inline __attribute__((always_inline)) void split(sd_radau *radau, int stages, int pairs)
 {
     const sd_radau_method *method = radau->method;
-    for (int32_t i = 0; i < radau->n; i += SD_LANES) {
+    for (int32_t i = 0; i < radau->ivp.n; i += SD_LANES) {
         sd_lanes r[SD_STAGES];
         for (int j = 0; j < stages; j++)
             r[j] = -SD_FROM(radau->d[j], i);
@@ -354,7 +345,7 @@ static inline double squares_of_state(const sd_radau *radau, int32_t i, sd_lanes
 {
     const int32_t *idle = radau->linear->idle;
     double sum = 0.0;
-    for (int32_t l = 0; l < SD_LANES && i + l < radau->n; l++)
+    for (int32_t l = 0; l < SD_LANES && i + l < radau->ivp.n; l++)
         sum += idle[i + l] ? 0.0 : v[l] * v[l];
     return sum;
 }
@@ -365,11 +356,11 @@ static inline __attribute__((always_inline)) void newton_weights(const sd_radau 
     const double part = radau->tolerance;
     if (radau->newton_weight)
         *weight = SD_FROM(radau->newton_weight, i);
-    else if (i + SD_LANES <= radau->n)
-        *weight = 1.0 / (part * SD_FROM(radau->magnitude, i) + part * SD_SIZES(SD_FROM(radau->phi, i)));
+    else if (i + SD_LANES <= radau->ivp.n)
+        *weight = 1.0 / (part * SD_FROM(radau->ivp.magnitude, i) + part * SD_SIZES(SD_FROM(radau->phi, i)));
     else
         for (int32_t l = 0; l < SD_LANES; l++)
-            (*weight)[l] = i + l < radau->n ? sd_radau_weight(radau, i + l) : 0.0;
+            (*weight)[l] = i + l < radau->ivp.n ? sd_radau_weight(radau, i + l) : 0.0;
 }
 
 /* z += S times the solutions in d and w; sums of squares of the correction in Newton's weights, over all unknowns and, where
@@ -377,7 +368,7 @@ static inline __attribute__((always_inline)) void newton_weights(const sd_radau 
 static inline __attribute__((always_inline)) void join(sd_radau *radau, int stages, int pairs, sd_lanes *sum, double *state)
 {
     const sd_radau_method *method = radau->method;
-    for (int32_t i = 0; i < radau->n; i += SD_LANES) {
+    for (int32_t i = 0; i < radau->ivp.n; i += SD_LANES) {
         sd_lanes weight;
         newton_weights(radau, i, &weight);
         sd_lanes real = SD_FROM(radau->d[0], i), re[SD_PAIRS], im[SD_PAIRS];
@@ -432,7 +423,7 @@ double sd_radau_state_moved(const sd_radau *radau)
 {
     const sd_radau_method *method = radau->method;
     double sum = 0.0;
-    for (int32_t i = 0; i < radau->n; i++)
+    for (int32_t i = 0; i < radau->ivp.n; i++)
         for (int s = 0; s < method->stages && radau->smooth[i]; s++) {
             double dz = method->column[s] * radau->d[0][i];
             for (int k = 0; k < method->pairs; k++)
@@ -440,14 +431,14 @@ double sd_radau_state_moved(const sd_radau *radau)
             double v = dz * sd_radau_newton_weight(radau, i);
             sum += v * v;
         }
-    return radau->n ? sqrt(sum / ((double)method->stages * radau->n)) : 0.0;
+    return radau->ivp.n ? sqrt(sum / ((double)method->stages * radau->ivp.n)) : 0.0;
 }
 
 /* One Newton step from the residuals in d; the size of the correction in Newton's weights, and that of what carries the
  * state in state_size. */
 double sd_radau_correct(sd_radau *radau)
 {
-    double all = 0.0, state = 0.0, number = (double)radau->method->stages * radau->n;
+    double all = 0.0, state = 0.0, number = (double)radau->method->stages * radau->ivp.n;
     split_all(radau);
     if (large(radau))
         sd_side_by_side(radau->method->pairs + 1, solve_one, radau);
@@ -455,7 +446,6 @@ double sd_radau_correct(sd_radau *radau)
         for (int part = 0; part <= radau->method->pairs; part++)
             solve_one(radau, part);
     join_all(radau, &all, &state);
-    radau->newton_iterations++;
     radau->state_size = sqrt(state / number);
-    return radau->n ? sqrt(all / number) : 0.0; /* nothing may move: samples alone */
+    return radau->ivp.n ? sqrt(all / number) : 0.0; /* nothing may move: samples alone */
 }

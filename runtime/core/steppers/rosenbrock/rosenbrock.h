@@ -23,6 +23,7 @@
 
 #define SD_ROSENBROCK_STAGES 8
 #define SD_ROSENBROCK_DENSE 3
+#define SD_ROSENBROCK_LEAST 1e-10 /* error of a step, for the next one's size */
 
 extern const double sd_rosenbrock_gamma;
 extern const double sd_rosenbrock_a[SD_ROSENBROCK_STAGES][SD_ROSENBROCK_STAGES];
@@ -31,17 +32,11 @@ extern const double sd_rosenbrock_c[SD_ROSENBROCK_STAGES], sd_rosenbrock_d[SD_RO
 extern const double sd_rosenbrock_dense_weight[SD_ROSENBROCK_DENSE][SD_ROSENBROCK_STAGES];
 
 typedef struct sd_rosenbrock {
-    sd_system *system;
+    sd_ivp ivp;               /* what `test` leaves out is tested too where power is 0 */
     sd_linear *linear;
-    int32_t n, tested;
-    double rtol, t_end, h_max, fixed_h;
-    const double *atol;       /* [n] explicit absolute tolerances, or NULL: rtol * magnitude */
-    double *magnitude;        /* [n] of the unknowns; grows with max |y| */
-    double *met;              /* [n] max |y| */
-    const int8_t *test, *power;   /* [n] as in bdf/bdf.h; what is left out there is tested too where power is 0 */
     double opening;           /* over rtol^(1/5): the first step as an earlier run found it fit, 0: chosen; then as this one does */
     /* state of the integration */
-    double t, h, h_used, h_accepted, error_accepted, h_refused, error_refused;
+    double h_accepted, error_accepted, h_refused, error_refused;
     int32_t rejected;
     double *phi, *yd;         /* [n] the last accepted point */
     double *last;             /* [n] the one before it */
@@ -49,23 +44,34 @@ typedef struct sd_rosenbrock {
     double *begin;            /* [n] F at the last accepted point */
     double *end, *within, *within_d, *inner; /* [n] the end of the step at hand; a point within, its correction */
     double *u[SD_ROSENBROCK_STAGES], *v[SD_ROSENBROCK_STAGES], *bend[SD_ROSENBROCK_DENSE]; /* [n]; bend: of the polynomial */
-    double *ee, *weight;      /* [n] ee: of the last error test, as the other methods name it */
     double *jy, *jyd, *g, *e, *memory;
     double *jy_end, *jyd_end; /* slopes at the end of the step at hand */
     int32_t sloped;           /* whether these are those of the last accepted point, behind a step jy and jyd are */
     int32_t *rate_row, *rate_column, rates; /* of the entries e of E that are not zero */
-    /* what happened */
-    int64_t steps, rejected_steps, newton_failures, taken;
-    int32_t cause, bad_row, bad_column;
-    sd_settle *project;       /* moves each accepted point onto every constraint (index 1 and 0), or NULL */
     sd_settle *settle;        /* of steep laws: moves a point that no step goes on from onto all rows; or NULL */
-    sd_stepper stepper;
 } sd_rosenbrock;
 
 sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear);
 void sd_rosenbrock_free(sd_rosenbrock *rosenbrock);
-sd_stepper *sd_rosenbrock_stepper(sd_rosenbrock *rosenbrock);
-void sd_rosenbrock_start(sd_rosenbrock *rosenbrock, double t, const double *y, const double *yd, double h);
-int sd_rosenbrock_step(sd_rosenbrock *rosenbrock);
+void sd_rosenbrock_start(void *rosenbrock, double t, const double *y, const double *yd, double h);
+int sd_rosenbrock_step(void *rosenbrock);
+/* rosenbrock_stages.c: F at (t, y, yd) into r [n]: SD_NONFINITE with its row where it is none */
+int sd_rosenbrock_residual(sd_rosenbrock *rosenbrock, double t, const double *y, const double *yd, double *r);
+/* J, E, F and T at the last accepted point, for steps of about the size at hand; the factors of J + E / (gamma h); all stages
+ * of a step, whose end is then y + u[7] with the rates rate + v[7] */
+int sd_rosenbrock_linearise(sd_rosenbrock *rosenbrock);
+int sd_rosenbrock_factorise(sd_rosenbrock *rosenbrock);
+int sd_rosenbrock_stages(sd_rosenbrock *rosenbrock);
+/* the polynomial of the last step */
+void sd_rosenbrock_bend(sd_rosenbrock *rosenbrock);
+/* y(x) = y0 + x (change + (1 - x) (b0 + x (b1 + x b2))) and its slope, x: part of a step of size h from y0 to y1.  yd NULL: y
+ * alone. */
+void sd_rosenbrock_polynomial(const sd_rosenbrock *rosenbrock, const double *y0, const double *y1, double h, double x,
+                              double *y, double *yd);
+/* rosenbrock_error.c: root mean square over the tested unknowns in the error weights; h: of those that count with it.  Grows
+ * `state` to that of what carries the state. */
+double sd_rosenbrock_norm(const sd_rosenbrock *rosenbrock, const double *x, double h, double *state);
+/* factors and stages of a step, its error in `error`, of the state alone in `state`; SD_ERROR_TEST where it is too large */
+int sd_rosenbrock_attempt(sd_rosenbrock *rosenbrock, double *error, double *state);
 
 #endif

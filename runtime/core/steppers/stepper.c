@@ -1,0 +1,78 @@
+/* What all methods have in common: see stepper.h. */
+#include "steppers/stepper.h"
+
+#include <math.h>
+
+void sd_start(sd_stepper *stepper, double t, const double *y, const double *yd)
+{
+    stepper->start(stepper->self, t, y, yd, 0.0);
+}
+
+void sd_begin(sd_ivp *ivp, double t)
+{
+    ivp->t = t;
+    ivp->h_used = 0.0;
+    ivp->taken = 0;
+    ivp->tested = 0;
+    for (int32_t i = 0; i < ivp->n; i++)
+        ivp->tested += ivp->test[i] >= 0;
+}
+
+void sd_weigh(sd_ivp *ivp, double tolerance, const double *y)
+{
+    const double part = tolerance == ivp->rtol ? 1.0 : tolerance / ivp->rtol;
+    for (int32_t i = 0; i < ivp->n; i++) {
+        double size = fabs(y[i]);
+        sd_met(size, &ivp->met[i], &ivp->magnitude[i]);
+        double atol = ivp->atol && ivp->test[i] >= 0 ? part * ivp->atol[i] : tolerance * ivp->magnitude[i];
+        if (ivp->weight)
+            ivp->weight[i] = 1.0 / (atol + tolerance * size);
+    }
+}
+
+double sd_squares(const sd_ivp *ivp, const double *a, const double *b)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < ivp->n; i++)
+        if (ivp->test[i] >= 0) {
+            double v = (a[i] - (b ? b[i] : 0.0)) * ivp->weight[i];
+            sum += v * v;
+        }
+    return sum;
+}
+
+double sd_first_step(const sd_ivp *ivp, double longest, double part, double change)
+{
+    double span = ivp->t_end - ivp->t, least = 1e3 * DBL_EPSILON * fmax(fabs(ivp->t), SD_SHORT * span);
+    if (isfinite(change) && change > 0.0)
+        longest = fmin(longest, part / change);
+    return fmax(longest, fmin(least, span));
+}
+
+double sd_fitted(const sd_ivp *ivp, double slack)
+{
+    double left = ivp->t_end - ivp->t, h = ivp->h;
+    if (h >= left * (1.0 - slack))
+        return left;
+    return 2.0 * h > left && ivp->taken > 0 && !(ivp->fixed_h > 0.0) ? 0.5 * left : h;
+}
+
+int sd_too_small(const sd_ivp *ivp)
+{
+    double left = ivp->t_end - ivp->t;
+    return ivp->h < 4.0 * DBL_EPSILON * fmax(fabs(ivp->t), SD_SHORT * left) && ivp->h < left;
+}
+
+int sd_ends(const sd_ivp *ivp, int cause)
+{
+    return cause == SD_STOPPED || cause == SD_MEMORY || ivp->fixed_h > 0.0;
+}
+
+void sd_advance(sd_ivp *ivp)
+{
+    double t = ivp->t + ivp->h;
+    ivp->t = fabs(ivp->t_end - t) <= SD_SLACK * ivp->h ? ivp->t_end : t;
+    ivp->h_used = ivp->h;
+    ivp->steps++;
+    ivp->taken++;
+}
