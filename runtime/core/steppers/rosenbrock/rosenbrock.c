@@ -468,7 +468,7 @@ static int attempt(sd_rosenbrock *rosenbrock, double *error, double *state)
     *state = 0.0;
     *error = norm(rosenbrock, rosenbrock->u[STAGES - 1], rosenbrock->h, state);
     memcpy(rosenbrock->ee, rosenbrock->u[STAGES - 1], (size_t)rosenbrock->n * sizeof(double));
-    if (*error < 1.0 || rosenbrock->fixed_h > 0.0)
+    if (*state < 1.0 || rosenbrock->fixed_h > 0.0) /* what may be taken (`stays`) is asked within, too */
         cause = look_within(rosenbrock, error, state);
     if (rosenbrock->fixed_h > 0.0)
         return isfinite(*error) ? SD_FINE : SD_NONFINITE;
