@@ -161,8 +161,22 @@ class Handler:
 
     # -- the start -----------------------------------------------------------------------------------------------
 
-    def begin(self, t: float, y: Floats, yd: Floats) -> Point | None:
-        """Sides and conditions at the start; samples due there.  The point where they changed it."""
+    def sampled(self, t: float, y: Floats, yd: Floats) -> list[int] | None:
+        """Places of p that samples due at a start, and the conditions that become true by them, assign as the point
+        has it; p has the values then.  None where they assign what p does not hold.
+        """
+        values = self.observer(t, y, yd)
+        for k, relation in enumerate(self.plan.relations):
+            self.side[k] = self._side(k, values[relation.row], 1.0)
+        self.truth, self.rounds = self._true(), []
+        self._cascade(t, y, yd, [(s.name, s.assignments) for s in self.plan.sampled], [])
+        assigned = [a for r in self.rounds for group in r.groups for a in group]
+        return [a.place for a in assigned] if all(a.kind == "discrete" for a in assigned) else None
+
+    def begin(self, t: float, y: Floats, yd: Floats, *, sampled: bool = False) -> Point | None:
+        """Sides and conditions at the start; samples due there, unless it is behind them.  The point where they changed
+        it.
+        """
         values = self.observer(t, y, yd)
         for k, relation in enumerate(self.plan.relations):
             self.side[k] = self._side(k, values[relation.row], 1.0)
@@ -174,7 +188,7 @@ class Handler:
         self.choices.begin(t, y, yd)
         self.truth = self._true()
         due, anew = self.due(t), self.kinks.begin(values)
-        if due:
+        if due and not sampled:
             return self.fire(t, y, yd, due)
         return self.settled(t, y, yd, self._words()) if anew else None
 
@@ -280,17 +294,8 @@ class Handler:
         assigned: list[tuple[str, tuple[Assignment, ...]]] = [
             (self.plan.sampled[k].name, self.plan.sampled[k].assignments) for k in samples
         ]
-        for _ in range(CASCADE):
-            fired = self._risen(crossed)
-            assigned += [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired]
-            if not assigned:
-                break
-            y = self._assign(t, y, yd, assigned)
-            self._renew(t, y, yd)
-            self.rounds.append(Round(tuple(group for _, group in assigned), self.side.copy()))
-            changed, assigned, crossed = True, [], []
-        else:
-            raise SolverFailure("chatter", t, 0.0, self._names())
+        y = self._cascade(t, y, yd, assigned, crossed)
+        changed |= bool(self.rounds)
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
         self._sink(t, which)
         self.succession.blow = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
@@ -308,6 +313,21 @@ class Handler:
         self.happened += self.kinks.happened(t, stood)
         self.passes = self.kinks.passing(stood, self.observer(t, *point)) if self.kinks.peaks else np.inf
         return point
+
+    def _cascade(
+        self, t: float, y: Floats, yd: Floats, assigned: list[tuple[str, tuple[Assignment, ...]]], crossed: list[int]
+    ) -> Floats:
+        """The values y behind what is assigned, and behind what that makes true: a round of `rounds` for each."""
+        for _ in range(CASCADE):
+            fired = self._risen(crossed)
+            assigned = assigned + [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired]
+            if not assigned:
+                return y
+            y = self._assign(t, y, yd, assigned)
+            self._renew(t, y, yd)
+            self.rounds.append(Round(tuple(group for _, group in assigned), self.side.copy()))
+            assigned, crossed = [], []
+        raise SolverFailure("chatter", t, 0.0, self._names())
 
     def _hold(self, values: Floats, crossed: Sequence[int]) -> None:
         """What a constraint holds at zero since an event before (a speed that sticks) is on neither side."""
