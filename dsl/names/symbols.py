@@ -148,12 +148,13 @@ class ConstraintSymbol:
 
 @dataclass(frozen=True, slots=True)
 class NodeSymbol:
-    """A node of a domain."""
+    """A node of a domain; coordinate: the one that is used as such."""
 
     name: str
     family: Family
     domain: DomainSymbol
     place: Place
+    coordinate: UnknownSymbol | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -170,7 +170,7 @@ class Connections(Statements):
                         e.span,
                         help=help_,
                     )
-                node = NodeSymbol(symbol.name, symbol.family, symbol.domain, symbol.place)
+                node = NodeSymbol(symbol.name, symbol.family, symbol.domain, symbol.place, symbol)
                 return self._node_end(node, found.indices, found.change, e)
             case Unsupported():
                 raise Failed
