@@ -157,6 +157,13 @@ class NodeSymbol:
     coordinate: UnknownSymbol | None = None
 
 
+def coordinate_node(symbol: UnknownSymbol) -> NodeSymbol | None:
+    """A coordinate of a common-flow domain as the node that it is."""
+    if symbol.kind != "q" or symbol.domain is None or symbol.domain.common != "flow":
+        return None
+    return NodeSymbol(symbol.name, symbol.family, symbol.domain, symbol.place, symbol)
+
+
 @dataclass(frozen=True, slots=True)
 class BundleNode:
     """Several nodes (or ports) handled as one."""

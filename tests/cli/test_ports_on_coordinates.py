@@ -51,3 +51,37 @@ def test_energy_that_goes_through_a_port_is_written_as_it_is_read():
     text = MODEL.replace("KIND", "coord").replace("MASS", MASS["coord"])
     (told,) = check(text.replace("energy_through(P.x)", "P.energy_through(x)"))
     assert (told.code, told.help) == ("E102", "energy_through(P.x)")
+
+
+BEADS = """component bead {
+  param m = 1 kg
+  port x[1..2]: translation
+  energy T* = 1/2*m*(x[1].f^2 + x[2].f^2)
+  energy V = m*g0*x[2].q + 1/2*(3 N/m)*x[1].q^2
+  K: potential(e = 5 N/m*q) x[1] -> x[2]
+}
+model m {
+  KIND x[1..2], y[1..2]: translation
+  B: bead() x = x
+  C: bead(m = 2 kg) x = y
+  phi tie: x[1]READ = y[1]READ
+  for i in 1..2 {
+    init x[i]READ = 0.1 m*i
+    init x[i].f = 0 m/s
+  }
+  init y[2]READ = 0 m
+  init y[2].f = 0 m/s
+}
+scene s of m { time 0 s to 0.3 s; trace x[2].q as x, y[2].q as y, B.K.e as e }
+"""
+
+
+def test_an_array_of_ports_takes_an_array_of_coordinates(tmp_path):
+    """Refused before (E805), though coordinates of mechanics are nodes."""
+    path, found = tmp_path / "m.sd", {}
+    for kind, read in (("coord", ""), ("node", ".q")):
+        path.write_text(BEADS.replace("KIND", kind).replace("READ", read))
+        found[kind] = simulate(path, output=tmp_path / f"{kind}.h5", accuracy=1e-6)
+    for name in ("x", "y", "e"):
+        other = found["node"][name].values
+        assert np.abs(found["coord"][name].values - other).max() <= 1e-12 * np.abs(other).max()

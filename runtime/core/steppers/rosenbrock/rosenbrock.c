@@ -180,7 +180,7 @@ void sd_rosenbrock_start(sd_rosenbrock *rosenbrock, double t, const double *y, c
 {
     size_t size = (size_t)rosenbrock->n * sizeof *y;
     rosenbrock->t = t;
-    rosenbrock->taken = rosenbrock->sloped = 0;
+    rosenbrock->taken = rosenbrock->sloped = rosenbrock->jumped = 0;
     rosenbrock->tested = 0;
     for (int32_t i = 0; i < rosenbrock->n; i++)
         rosenbrock->tested += rosenbrock->test[i] >= 0;
@@ -483,7 +483,8 @@ static int attempt(sd_rosenbrock *rosenbrock, double *error, double *state)
 }
 
 /* whether shorter steps do not make a refused one's error less: what follows from the state jumps where a law does.  It is that of
- * one twice as long before it, or not much less than that of one FAR_LONGER; steps that end short of the jump lie between */
+ * one twice as long before it, or not much less than that of one FAR_LONGER; steps that end short of the jump lie between.  Behind
+ * one that was taken for it the next is as good as any: where it is not, no law jumps, but each stage passes over a steep place */
 static int stays(sd_rosenbrock *rosenbrock, double error)
 {
     double longer = rosenbrock->h_refused, before = rosenbrock->error_refused;
@@ -512,12 +513,15 @@ int sd_rosenbrock_step(sd_rosenbrock *rosenbrock)
         known = cause == SD_FINE;
         if (cause == SD_FINE)
             cause = attempt(rosenbrock, &error, &state);
-        if (cause == SD_ERROR_TEST && stays(rosenbrock, error) && state < 1.0) {
+        int jumped = cause == SD_ERROR_TEST && stays(rosenbrock, error) && state < 1.0 && !rosenbrock->jumped;
+        if (jumped) {
             cause = SD_FINE;
             error = fmax(state, LEAST);
         }
-        if (cause == SD_FINE)
+        if (cause == SD_FINE) {
+            rosenbrock->jumped = jumped;
             break;
+        }
         rosenbrock->cause = cause;
         rosenbrock->rejected = 1;
         known = known && isfinite(error);
