@@ -1,4 +1,4 @@
-"""A store of a steep law at rest, whose constant and `tanh` cancel but for round-off of it: that is no size of anything."""
+"""A store of a steep law at rest: its constant and `tanh` cancel but for round-off, which is no size of anything."""
 
 import pytest
 from running import ran
