@@ -51,7 +51,7 @@ def eventful_start(system: System, t0: float, plan: Plan, until: float | None = 
     begun: Standing | None = None
     if plan.sampled and any(c.kind == "guarded" for c in plan.contacts):
         system.own_numbers()
-        begun = system.description.p.copy(), system.description.switches.active.copy()
+        begun = _standing(system)
     found: ConsistentState | None = None
     try:
         found = _integrated(system, t0, plan, until)
@@ -62,6 +62,11 @@ def eventful_start(system: System, t0: float, plan: Plan, until: float | None = 
         assert found is not None
         return found
     return _behind_samples(system, t0, plan, until, begun, found)
+
+
+def _standing(system: System) -> Standing:
+    """Parameters and active switches as they are."""
+    return system.description.p.copy(), system.description.switches.active.copy()
 
 
 def _moved(state: ConsistentState) -> bool:
@@ -75,8 +80,8 @@ def _behind_samples(
     """The start behind samples due at t0, which assign what they do at that very point, if it is as guessed; else the
     one before them.  begun: as the text begins; found: the one before, None: there is none.  Raises InconsistentStart.
     """
+    stood, failed = _standing(system), InconsistentStart("stuck", np.inf)
     handler = Handler(plan, system, (t0, t0), begun)
-    stood, failed = handler.now(), InconsistentStart("stuck", np.inf)
     y, yd = (found.y, found.yd) if found is not None else (np.zeros(system.form.written),) * 2
     behind: tuple[ConsistentState, Standing, Floats] | None = None
     try:
