@@ -40,6 +40,9 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
     if have is None or want is None:
         return None
     pairs = [*zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False)]
+    divided = next(filter(None, (_divided(sight, e, factor) for e, factor in pairs)), None)
+    if divided:
+        return divided
     without = [habits.unitless(*found, factor) for e, factor in pairs if factor and (found := bare(sight, e))]
     if without:
         return without[0]
@@ -61,6 +64,25 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
         text = sight.written(within[0])
         said = [f"{text}/(1 {common(have)})"] if len(text) < 40 else []
     return said[0] if said else None
+
+
+def _divided(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | None:
+    """A quantity by the last unit of which a variable of that name is meant: `4 N/V` beside `param V: m`."""
+    stack: list[object] = [expression]
+    while stack:
+        e = stack.pop()
+        stack += children(e)
+        last = e.unit.factors[-1] if isinstance(e, syntax.Quantity) and len(e.unit.factors) > 1 else None
+        if last is None or last.op != "/" or last.exponent != 1:
+            continue
+        assert isinstance(e, syntax.Quantity)
+        symbol, unit = sight.scope.find(last.name), known(last.name)
+        own = symbol.dimension if isinstance(symbol, (ParameterSymbol, UnknownSymbol)) and not symbol.shape else None
+        if own and unit and factor in ((meant := dim.quotient(unit[0], own)), dim.quotient(NONE, meant)):
+            before = e.unit.text.rpartition("/")[0]
+            text = f"{e.text} {e.unit.text}"
+            return f"'{e.text} {before} / {last.name}' divides by the variable {last.name}: in '{text}' it is the unit"
+    return None
 
 
 def _rate(sight: Sight, expression: syntax.Expr, factor: Dimension, sense: int) -> str | None:

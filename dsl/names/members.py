@@ -9,8 +9,8 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Constraint, Domain
-from sysdyn.dsl.model.paynter import EFFORT_CLASSES, MEMBERS
-from sysdyn.dsl.model.units import NONE, Dimension
+from sysdyn.dsl.model.paynter import MEMBERS
+from sysdyn.dsl.model.units import NONE
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Value
 from sysdyn.dsl.names.failures import Failed, NotYetError
@@ -176,29 +176,9 @@ class Members(Ports):
         return base.indices
 
     def _coordinate(self, symbol: UnknownSymbol, base: Located, e: syntax.Member) -> Value:
-        """e, f, p or q of a coordinate, in the letters of its family."""
+        """e, f, p or q of a coordinate."""
         at = (*symbol.family.prefix, *self.indices(symbol.name, symbol.shape, base.indices))
-        family = symbol.family.name
-        assert symbol.domain is not None
-        domain = symbol.domain
-        co = symbol.complementary
-        kinds: dict[str, tuple[str, Dimension]] = {
-            "p" if co else "q": ("q", symbol.dimension),
-            "e" if co else "f": ("f", domain.effort.dimension if co else domain.flow.dimension),
-        }
-        # what the kinetic stores (potential stores, of momentum coordinates) that move with it hold, and its rate
-        held, rate = ("q", "f") if co else ("p", "e")
-        units = {"q": domain.displacement, "f": domain.flow, "p": domain.momentum, "e": domain.effort}
-        kinds[held] = ("p", units[held].dimension)
-        if e.name == rate:
-            node = ex.var(family, "p", *at, order=1)
-            return self._changed(Typed(node, units[rate].dimension), base.change)
-        if e.name in EFFORT_CLASSES and not co:
-            return self._changed(self._effort(family, "x", at, units["e"].dimension, e), base.change)
-        if e.name not in kinds:
-            raise self.no_member(symbol.name, e, ("q", "f", "p", "e", *(() if co else EFFORT_CLASSES)))
-        kind, dimension = kinds[e.name]
-        return self._changed(Typed(ex.var(family, kind, *at), dimension), base.change)
+        return self._changed(self.coordinate_quantity(symbol, at, e), base.change)
 
     def _two_port(self, symbol: TwoPortSymbol, base: Located, e: syntax.Member) -> Value:
         members = {f"{letter}{k}": (letter, k) for k in (1, 2) for letter in "efqp"}
@@ -316,7 +296,10 @@ class Members(Ports):
             help_ = f"phi {symbol.name}: ... where it ties displacements, psi where it ties flows"
             raise self.fail("E102", message, e.span, help=help_)
         if base is None or wrong or e.name != "on" or len(e.args) != 1:
-            raise self.fail("E102", f"there is no '{e.name}(...)' here", e.span, help="label.on(expr) of a phi or psi")
+            help_ = "label.on(expr) of a phi or psi"
+            if e.name == "energy_through" and len(e.args) == 1:
+                help_ = f"energy_through({self._shown(e.base)}.{self._shown(e.args[0].value)})"
+            raise self.fail("E102", f"there is no '{e.name}(...)' here", e.span, help=help_)
         assert isinstance(symbol, ConstraintSymbol)
         at = (*symbol.family.prefix, *(self.index(i) for i in base.indices))
         at = tuple(ex.substitute(a, base.change) for a in at)

@@ -14,7 +14,7 @@ from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Quadrature
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.paths import Paths
-from sysdyn.dsl.names.symbols import BranchSymbol, DomainSymbol, End, Typed, nearest
+from sysdyn.dsl.names.symbols import BranchSymbol, DomainSymbol, End, Typed, UnknownSymbol, nearest
 from sysdyn.dsl.tree import syntax
 
 RATES = ("dot", "der", "d", "dt", "prime")
@@ -60,6 +60,8 @@ class Quantities(Paths):
     def node_quantity(self, end: End, e: syntax.Member) -> Typed:
         """Member e of a common-effort node, q and f of a common-flow node."""
         domain = end.domain
+        if end.node is not None and end.node.coordinate is not None:
+            return self.coordinate_quantity(end.node.coordinate, end.at, e)
         if domain.common == "effort":
             if e.name != "e":
                 shown = self._shown(e.base)
@@ -90,6 +92,27 @@ class Quantities(Paths):
         if end.node is None:
             return Typed(ex.const(0.0), dimension)
         return Typed(ex.var(end.node.family.name, kind, *end.at, order=int(e.name == "e")), dimension)
+
+    def coordinate_quantity(self, symbol: UnknownSymbol, at: tuple[Node, ...], e: syntax.Member) -> Typed:
+        """e, f, p or q of a coordinate, in the letters of its family.  at: all indices."""
+        family, domain, co = symbol.family.name, symbol.domain, symbol.complementary
+        assert domain is not None
+        kinds: dict[str, tuple[str, Dimension]] = {
+            "p" if co else "q": ("q", symbol.dimension),
+            "e" if co else "f": ("f", domain.effort.dimension if co else domain.flow.dimension),
+        }
+        # what the kinetic stores (potential stores, of momentum coordinates) that move with it hold, and its rate
+        held, rate = ("q", "f") if co else ("p", "e")
+        units = {"q": domain.displacement, "f": domain.flow, "p": domain.momentum, "e": domain.effort}
+        kinds[held] = ("p", units[held].dimension)
+        if e.name == rate:
+            return Typed(ex.var(family, "p", *at, order=1), units[rate].dimension)
+        if e.name in EFFORT_CLASSES and not co:
+            return self._effort(family, "x", at, units["e"].dimension, e)
+        if e.name not in kinds:
+            raise self.no_member(self._shown(e.base), e, ("q", "f", "p", "e", *(() if co else EFFORT_CLASSES)))
+        kind, dimension = kinds[e.name]
+        return Typed(ex.var(family, kind, *at), dimension)
 
     def branch_quantity(self, symbol: BranchSymbol, at: tuple[Node, ...], name: str, e: syntax.Member) -> Typed:
         """Members e f q p of a branch, and the power it absorbs."""

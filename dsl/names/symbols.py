@@ -148,12 +148,20 @@ class ConstraintSymbol:
 
 @dataclass(frozen=True, slots=True)
 class NodeSymbol:
-    """A node of a domain."""
+    """A node of a domain; coordinate: the one that is used as such."""
 
     name: str
     family: Family
     domain: DomainSymbol
     place: Place
+    coordinate: UnknownSymbol | None = None
+
+
+def coordinate_node(symbol: UnknownSymbol) -> NodeSymbol | None:
+    """A coordinate of a common-flow domain as the node that it is."""
+    if symbol.kind != "q" or symbol.domain is None or symbol.domain.common != "flow":
+        return None
+    return NodeSymbol(symbol.name, symbol.family, symbol.domain, symbol.place, symbol)
 
 
 @dataclass(frozen=True, slots=True)

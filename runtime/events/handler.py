@@ -161,8 +161,22 @@ class Handler:
 
     # -- the start -----------------------------------------------------------------------------------------------
 
-    def begin(self, t: float, y: Floats, yd: Floats) -> Point | None:
-        """Sides and conditions at the start; samples due there.  The point where they changed it."""
+    def sampled(self, t: float, y: Floats, yd: Floats) -> list[int] | None:
+        """Places of p that samples due at a start, and the conditions that become true by them, assign as the point
+        has it; p has the values then.  None where they assign what p does not hold.
+        """
+        values = self.observer(t, y, yd)
+        for k, relation in enumerate(self.plan.relations):
+            self.side[k] = self._side(k, values[relation.row], 1.0)
+        self.truth, self.rounds = self._true(), []
+        self._cascade(t, y, yd, range(len(self.plan.sampled)), [])
+        assigned = [a for r in self.rounds for group in r.groups for a in group]
+        return [a.place for a in assigned] if all(a.kind == "discrete" for a in assigned) else None
+
+    def begin(self, t: float, y: Floats, yd: Floats, *, sampled: bool = False) -> Point | None:
+        """Sides and conditions at the start; samples due there, unless it is behind them.  The point where they changed
+        it.
+        """
         values = self.observer(t, y, yd)
         for k, relation in enumerate(self.plan.relations):
             self.side[k] = self._side(k, values[relation.row], 1.0)
@@ -174,7 +188,7 @@ class Handler:
         self.choices.begin(t, y, yd)
         self.truth = self._true()
         due, anew = self.due(t), self.kinks.begin(values)
-        if due:
+        if due and not sampled:
             return self.fire(t, y, yd, due)
         return self.settled(t, y, yd, self._words()) if anew else None
 

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import itertools
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
+from sysdyn.runtime.events.handler import Handler, Standing
 from sysdyn.runtime.events.implicit import DENSE
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting, Settle
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.failures import InconsistentStart
+from sysdyn.runtime.model.failures import InconsistentStart, SolverFailure
 from sysdyn.runtime.model.scales import magnitudes
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 
+SAMPLES = 4
+"""Points whose samples at the start are asked for: what a converter samples of its own output is what it starts with.
+"""
 AHEAD = (1e-8, 1e-5)
 """Of the time in which the unknowns change: how far ahead a tie between active sets is looked at, where sources alone
 have moved.
@@ -38,6 +43,73 @@ SPAN = 1.0
 
 def eventful_start(system: System, t0: float, plan: Plan, until: float | None = None) -> ConsistentState:
     """A state at t0 with the active set and the senses that fit it, which the model then has.
+
+    Where samples due at t0 turn what holds, and what held before them has no start, or one that is not as guessed, it
+    is the one behind them, if that is as guessed: nothing moves while no time passes (a charge pump by switches whose
+    pulses begin at t0).  until: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
+    """
+    begun: Standing | None = None
+    if plan.sampled and any(c.kind == "guarded" for c in plan.contacts):
+        system.own_numbers()
+        begun = _standing(system)
+    found: ConsistentState | None = None
+    try:
+        found = _integrated(system, t0, plan, until)
+    except InconsistentStart:
+        if begun is None:
+            raise
+    if begun is None or (found is not None and not _moved(found)):
+        assert found is not None
+        return found
+    return _behind_samples(system, t0, plan, until, begun, found)
+
+
+def _standing(system: System) -> Standing:
+    """Parameters and active switches as they are."""
+    return system.description.p.copy(), system.description.switches.active.copy()
+
+
+def _moved(state: ConsistentState) -> bool:
+    """Whether it is not as guessed."""
+    return state.displaced or bool(state.moved)
+
+
+def _behind_samples(
+    system: System, t0: float, plan: Plan, until: float | None, begun: Standing, found: ConsistentState | None
+) -> ConsistentState:
+    """The start behind samples due at t0, which assign what they do at that very point, if it is as guessed; else the
+    one before them.  begun: as the text begins; found: the one before, None: there is none.  Raises InconsistentStart.
+    """
+    stood, failed = _standing(system), InconsistentStart("stuck", np.inf)
+    handler = Handler(plan, system, (t0, t0), begun)
+    y, yd = (found.y, found.yd) if found is not None else (np.zeros(system.form.written),) * 2
+    behind: tuple[ConsistentState, Standing, Floats] | None = None
+    try:
+        for _ in range(SAMPLES):
+            handler.back(begun)
+            places = handler.sampled(t0, y, yd)
+            assigned = system.description.p[places or []]
+            if behind is not None and np.array_equal(assigned, behind[2]):
+                handler.back(behind[1])
+                return replace(behind[0], sampled=True)
+            state = _integrated(system, t0, plan, until)  # where samples assign nothing, for the word why there is none
+            if not places or (found is not None and _moved(state)):
+                break
+            behind = state, handler.now(), assigned
+            y, yd = state.y, state.yd
+    except InconsistentStart as error:
+        failed = error
+    except SolverFailure as failure:
+        if failure.cause == "max_wall":
+            raise
+    handler.back(stood)
+    if found is None:
+        raise failed
+    return found
+
+
+def _integrated(system: System, t0: float, plan: Plan, until: float | None) -> ConsistentState:
+    """The same, whatever samples do.
 
     Constants of integrated constraints are those of the guess.  Where it is not the start (capacitors alone at a node,
     in loops), they are what follows: the constraint is its own integral, whatever it is at the start.

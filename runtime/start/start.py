@@ -57,7 +57,8 @@ class ConsistentState:
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
     found it; "" of a state that was not sought from guesses.  zeros: where y is what the search left of a zero (None:
     nowhere), by which nothing else is sized: a slope made of such a current would have 1e19 K balance a voltage.
-    displaced: whether a displacement is not as guessed; kept: whether all that carries the state is.
+    displaced: whether a displacement is not as guessed; kept: whether all that carries the state is.  sampled: it is
+    the point behind the samples that are due at t.
     """
 
     t: float
@@ -69,6 +70,7 @@ class ConsistentState:
     zeros: Mask | None = None
     displaced: bool = False
     kept: bool = True
+    sampled: bool = False
 
     @property
     def y(self) -> Floats:

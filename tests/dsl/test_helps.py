@@ -33,6 +33,17 @@ model m {
         ("let y = f(x)", "E206", "x/(1 m)"),
         ("let y = min(x, 3)", "E206", "write '3 m'"),
         ("let y = min(x, t)", "E206", "both in m"),
+        (
+            "param V = 2 m^3; let y = 3 kg/V + 2 kg/m^3",  # s^3.A/m^2 by volts
+            "E203",
+            "'3 kg / V' divides by the variable V: in '3 kg/V' it is the unit",
+        ),
+        (
+            "state V: m/s = 1 m/s; dynamic V' = 4 m^2/s^3/V*2 + 2 m/s^2",
+            "E203",
+            "'4 m^2/s^3 / V' divides by the variable V: in '4 m^2/s^3/V' it is the unit",
+        ),
+        ("param V = 2 m^3; let y = 3 kg/V + 2 s", "E203", "write '2 s^3.A/m^2'"),  # by neither it fits
         ("param p = 0x10 kg", "E114", "16: numbers are written in digits of ten"),
         ("param p = 1_000 kg", "E114", "1000: digits stand together"),
         ("param p = 1_000 kg/m", "E114", "1000: digits stand together"),

@@ -23,6 +23,13 @@ def test_no_more_is_left_open_than_is_told(number, formulation, accuracy, tmp_pa
     assert not found.defect, str(found)
 
 
+def test_rows_within_a_step_taken_for_its_state_are_of_that_step(tmp_path):
+    """A reaction jumps within it: 5.8 times off what was asked in one row."""
+    found = told(tmp_path, drawn(117), "lagrangian", 1e-3, "rosenbrock", [])
+    assert found.met
+    assert not found.defect, str(found)
+
+
 @pytest.mark.parametrize("number", range(len(FAMILIES)), ids=[family.__name__ for family in FAMILIES])
 @pytest.mark.one_in(3)
 def test_every_family_is_met_as_told(number, tmp_path):

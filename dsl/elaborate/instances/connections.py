@@ -17,6 +17,7 @@ from sysdyn.dsl.names.symbols import (
     Typed,
     UnknownSymbol,
     Unsupported,
+    coordinate_node,
     nearest,
 )
 from sysdyn.dsl.tree import syntax
@@ -170,7 +171,8 @@ class Connections(Statements):
                         e.span,
                         help=help_,
                     )
-                node = NodeSymbol(symbol.name, symbol.family, symbol.domain, symbol.place)
+                node = coordinate_node(symbol)
+                assert node is not None
                 return self._node_end(node, found.indices, found.change, e)
             case Unsupported():
                 raise Failed

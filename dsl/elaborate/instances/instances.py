@@ -40,7 +40,9 @@ from sysdyn.dsl.names.symbols import (
     PortSymbol,
     Scope,
     Space,
+    UnknownSymbol,
     Unsupported,
+    coordinate_node,
     nearest,
 )
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
@@ -433,12 +435,15 @@ class Instances(Inputs):
         """A port that is an array: the array of nodes that it is bound to, under the port's name."""
         found = self.resolver.located(value)
         symbol = None if found is None else found.symbol
+        coordinate = symbol if isinstance(symbol, UnknownSymbol) else None
+        if coordinate is not None:
+            symbol = coordinate_node(coordinate)
         if found is None or not isinstance(symbol, NodeSymbol) or found.indices or not symbol.family.shape:
             message = f"port '{name}' of '{s.decl.name}' is an array, '{self._text(value)}' is no array of nodes"
             raise self.resolver.fail("E805", message, value.span, help=f"node a[1..3]: {wanted.name}, and {name} = a")
         own, place = symbol.family, self.place(value.span)
         prefix = tuple(ex.substitute(a, found.change) for a in own.prefix)
-        node = NodeSymbol(name, Family(own.name, prefix, own.around, own.shape), symbol.domain, place)
+        node = NodeSymbol(name, Family(own.name, prefix, own.around, own.shape), symbol.domain, place, coordinate)
         self._same_domain(s, f"port '{name}'", wanted, End(node, (), symbol.domain), value)
         return node
 

@@ -63,7 +63,10 @@ def conjugate_of(parts: NetworkBuilder, space: Space, end: End, *, rates: bool =
             if any(effort in ex.variables(root) for root in _roots(s)):
                 raise NotSaidError("acts on its effort", s.place)
         return ex.add(*terms)
-    q, f, p = (ex.var(name, f"n{letter}", *end.at) for letter in "qfp")
+    coordinate = end.node.coordinate
+    if coordinate is not None and coordinate.complementary:
+        raise NotSaidError("acts on a momentum coordinate", end.node.place)
+    q, f, p = (ex.var(name, letter if coordinate else f"n{letter}", *end.at) for letter in "qfp")
     terms += [summed(ex.mul(ex.var(b.name, "be", *b.at), derivative(b.on, q)), b.loops[around:]) for b in along if b.on]
     jumps = {draft.label: draft.place for draft in parts.drafts if draft.kind in ("phi", "psi", "guarded")}
     for s in said:

@@ -63,9 +63,9 @@ class Pieces:
         """The number of the segment."""
         n = run.system.form.written
         before = run.y[:n].copy(), run.start_rate[:n].copy()
-        if plan.sampled:
+        if plan.sampled and not start.sampled:
             run.driver.note(start.t, *before)
-        self._first(self.handler.begin(start.t, *before))
+        self._first(self.handler.begin(start.t, *before, sampled=start.sampled))
         self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
         if self.modes is not None:
             self._passing = self.modes.core

@@ -192,7 +192,7 @@ class Rosenbrock(c.Structure):
         ("linear", P),
         ("opening", D),
         *[(name, D) for name in ["h_accepted", "error_accepted", "h_refused", "error_refused"]],
-        ("rejected", I),
+        *[(name, I) for name in ["rejected", "jumped"]],
         *[(name, P) for name in ["phi", "yd", "last", "y", "rate", "drift", "begin"]],
         *[(name, P) for name in ["end", "within", "within_d", "inner"]],
         *[(name, P * ROSENBROCK_STAGES) for name in ["u", "v"]],

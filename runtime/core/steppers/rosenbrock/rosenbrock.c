@@ -124,7 +124,7 @@ void sd_rosenbrock_start(void *self, double t, const double *y, const double *yd
         rosenbrock->opening = INFINITY;
     rosenbrock->ivp.h = fmin(rosenbrock->ivp.fixed_h > 0.0 ? rosenbrock->ivp.fixed_h : h, rosenbrock->ivp.h_max);
     rosenbrock->error_accepted = rosenbrock->h_refused = 0.0;
-    rosenbrock->rejected = rosenbrock->sloped = 0;
+    rosenbrock->rejected = rosenbrock->sloped = rosenbrock->jumped = 0;
 }
 
 /* the new point, and the next step's size */
@@ -169,7 +169,8 @@ static int project(sd_rosenbrock *rosenbrock, sd_settle *onto)
 }
 
 /* whether shorter steps do not make a refused one's error less: what follows from the state jumps where a law does.  It is that of
- * one twice as long before it, or not much less than that of one FAR_LONGER; steps that end short of the jump lie between */
+ * one twice as long before it, or not much less than that of one FAR_LONGER; steps that end short of the jump lie between.  Behind
+ * one that was taken for it the next is as good as any: where it is not, no law jumps, but each stage passes over a steep place */
 static int stays(sd_rosenbrock *rosenbrock, double error)
 {
     double longer = rosenbrock->h_refused, before = rosenbrock->error_refused;
@@ -196,12 +197,15 @@ int sd_rosenbrock_step(void *self)
         known = cause == SD_FINE;
         if (cause == SD_FINE)
             cause = sd_rosenbrock_attempt(rosenbrock, &error, &state);
-        if (cause == SD_ERROR_TEST && stays(rosenbrock, error) && state < 1.0) {
+        int jumped = cause == SD_ERROR_TEST && stays(rosenbrock, error) && state < 1.0 && !rosenbrock->jumped;
+        if (jumped) {
             cause = SD_FINE;
             error = fmax(state, SD_ROSENBROCK_LEAST);
         }
-        if (cause == SD_FINE)
+        if (cause == SD_FINE) {
+            rosenbrock->jumped = jumped;
             break;
+        }
         rosenbrock->ivp.cause = cause;
         rosenbrock->rejected = 1;
         known = known && isfinite(error);

@@ -37,7 +37,7 @@ typedef struct sd_rosenbrock {
     double opening;           /* over rtol^(1/5): the first step as an earlier run found it fit, 0: chosen; then as this one does */
     /* state of the integration */
     double h_accepted, error_accepted, h_refused, error_refused;
-    int32_t rejected;
+    int32_t rejected, jumped; /* jumped: whether the last one was taken for its state alone */
     double *phi, *yd;         /* [n] the last accepted point */
     double *last;             /* [n] the one before it */
     double *y, *rate, *drift; /* [n] Y_i, Z_i, T */

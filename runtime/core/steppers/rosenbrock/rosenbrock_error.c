@@ -115,7 +115,7 @@ int sd_rosenbrock_attempt(sd_rosenbrock *rosenbrock, double *error, double *stat
     *state = 0.0;
     *error = sd_rosenbrock_norm(rosenbrock, rosenbrock->u[STAGES - 1], rosenbrock->ivp.h, state);
     memcpy(rosenbrock->ivp.ee, rosenbrock->u[STAGES - 1], (size_t)rosenbrock->ivp.n * sizeof(double));
-    if (*error < 1.0 || rosenbrock->ivp.fixed_h > 0.0)
+    if (*state < 1.0 || rosenbrock->ivp.fixed_h > 0.0) /* what may be taken (`stays`) is asked within, too */
         cause = look_within(rosenbrock, error, state);
     if (rosenbrock->ivp.fixed_h > 0.0)
         return isfinite(*error) ? SD_FINE : SD_NONFINITE;
