@@ -86,7 +86,7 @@ class Method:
     def start(self, t: float, y: Floats, yd: Floats) -> None:
         """From (t, y, yd) with a step of its own choice."""
         self.begin(y, yd)
-        lib.core.sd_start(self.stepper, t, lib.pointer(y), lib.pointer(yd))
+        lib.core.sd_stepper_start(self.stepper, t, lib.pointer(y), lib.pointer(yd))
 
     def rest(self) -> None:
         """Of a large system: until the next start it has no more than its last point, for between pieces of a run the

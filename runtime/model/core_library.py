@@ -158,7 +158,7 @@ def _load() -> Any:
         "sd_linear_free": (None, [_P]),
         "sd_linear_factor": (c.c_int, [_P, _P, _P]),
         "sd_linear_solve": (None, [_P, _P]),
-        "sd_start": (None, [_P, _D, _P, _P]),
+        "sd_stepper_start": (None, [_P, _D, _P, _P]),
         "sd_bdf_new": (c.POINTER(Bdf), [_P, _P]),
         "sd_bdf_free": (None, [_P]),
         "sd_linear_z_new": (_P, [_I, _P, _P, _P]),

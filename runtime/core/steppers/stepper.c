@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-void sd_start(sd_stepper *stepper, double t, const double *y, const double *yd)
+void sd_stepper_start(sd_stepper *stepper, double t, const double *y, const double *yd)
 {
     stepper->start(stepper->self, t, y, yd, 0.0);
 }

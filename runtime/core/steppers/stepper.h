@@ -107,7 +107,7 @@ static inline void sd_met(double size, double *met, double *magnitude)
 }
 
 /* stepper.c: what drives a method calls; from (t, y, yd) with a step of the method's choice */
-void sd_start(sd_stepper *stepper, double t, const double *y, const double *yd);
+void sd_stepper_start(sd_stepper *stepper, double t, const double *y, const double *yd);
 
 /* what methods have in common (stepper.c): at t, where a start begins; which unknowns are tested */
 void sd_begin(sd_ivp *ivp, double t);
