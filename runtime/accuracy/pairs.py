@@ -19,6 +19,9 @@ UNSEEN, ALIKE = 100.0, 0.3
 agree on how large it was within this part."""
 TIMING, SHARE = 1e-9, 1e-3
 """Of the span: the time tolerance of comparisons, as that of `diff`; and of the accuracy asked at most."""
+RUNAWAY = 1e3
+"""Times the round-off of a run: that of the next one is not believed to be more (a step of 1e-17 s, thrown off by an
+exponential, leaves magnitudes beside which everything is zero)."""
 LOST = 0.01
 """Of what it is: where two runs differ by more they hardly share a digit."""
 FALLS, FAINT = 0.3, 100.0
@@ -118,7 +121,8 @@ def zero(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
     before, now = (np.abs(values).max(axis=0) for values in (coarse.own[0], fine.values))
     seen = np.maximum(before, now)
     found = np.isfinite(seen)  # an infinite value is no zero beside an infinite noise
-    found &= (seen <= fine.noise) | ((now <= FALLS * before) & (now <= FAINT * np.asarray(fine.noise)))
+    noise = np.minimum(fine.noise, RUNAWAY * np.asarray(coarse.noise))
+    found &= (seen <= noise) | ((now <= FALLS * before) & (now <= FAINT * noise))
     if fine.left_open is not None:
         with np.errstate(invalid="ignore"):  # values that are no numbers
             far = apart(coarse, fine).max(axis=0)

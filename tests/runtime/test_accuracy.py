@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.accuracy.control import TAME, WORTH, Lighter, control
 from sysdyn.runtime.accuracy.laws import LAWS, STEEP, law_of
-from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, left_at_rest
+from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, left_at_rest
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.failures import SolverFailure
 
@@ -151,6 +151,17 @@ def test_a_finer_run_that_fails_by_chance_is_tried_a_little_further():
     assert achieved.met
     assert len(tried) == 4
     assert tried[3] == pytest.approx(WORTH * tried[2])
+
+
+@pytest.mark.parametrize(("noise", "apart"), [(68.0, np.inf), (1e-13, 1e-2 * 3.7)])
+def test_a_run_that_was_thrown_off_does_not_say_what_round_off_is(noise, apart):
+    """A bridge of exponential diodes: magnitudes of steps of 1e-17 s made round-off of 69 V, beside which 3.7 V were
+    nothing in both runs, told as an error of 0 and met.
+    """
+    largest = np.array([4852.0 if noise > 1.0 else 3.7])
+    coarse = Sampled(1e-4, np.array([[1.0], [3.7]]), np.array([3.7]), steps=229, noise=np.array([4e-10]))
+    fine = Sampled(1e-6, np.array([[1.0], [3.7 * 0.99]]), largest, steps=8148, noise=np.array([noise]))
+    assert difference(coarse, fine, np.array([1e-2]))[0] == pytest.approx(apart / 3.7)
 
 
 def test_behind_a_strained_draft_comes_a_tame_one():
