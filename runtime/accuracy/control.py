@@ -31,6 +31,8 @@ RETRIED = (1.0, 0.1, 1e-2)
 """Of the tolerance of a first run: the next ones where it fails."""
 WORTH = 0.3
 """Of the last tolerance: a run with more than that says little beside it."""
+CHANCES = ("newton", "error_test", "singular")
+"""Of a step at an event: another tolerance may pass there."""
 ROOT = 0.5
 """Part of what is credited where a quantity ends as a root of the state, from the pair on that shows it."""
 SHORT = 60
@@ -375,7 +377,7 @@ def control(
 
 def _finer(run: Run, last: Sampled, tolerance: float, longest: float, law: Law, *, compared: bool) -> Sampled | None:
     """A run with a smaller tolerance; where it fails half the way to it, while that is worth a run, or once a little
-    further: at an event Newton's method fails by chance.
+    further: at an event a step fails by chance.
 
     compared: there is an estimate without it; else its failure is raised.
     """
@@ -387,7 +389,7 @@ def _finer(run: Run, last: Sampled, tolerance: float, longest: float, law: Law, 
             tried += 1
             if _limited(failure) or (not compared and tried == len(RETRIED)):
                 raise
-            by_chance = tried == 1 and failure.cause == "newton"
+            by_chance = tried == 1 and failure.cause in CHANCES
         if not compared:  # there is nothing to hand back yet: as coarse as will do, else a little finer
             coarse = law.ratio * last.tolerance
             tolerance = coarse if tolerance < WORTH * coarse and tried == 1 else WORTH * tolerance
