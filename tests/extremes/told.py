@@ -78,6 +78,8 @@ def told(folder: Path, motion: Motion, formulation: str, accuracy: float, method
     loose, exact = (at(times) for at in known)
     size = np.abs(exact).max(axis=1, keepdims=True)
     off = np.abs(np.array([np.asarray(found.trace[name]) for name in motion.names]) - exact) / size
+    before = np.diff(times, append=np.inf) <= 2.0 * np.spacing(times)  # a jump, of which the truth knows the end alone
+    off[:, before] = 0.0
     name, row = np.unravel_index(int(np.argmax(off)), off.shape)
     statistics = found.trace.statistics
     return Told(
