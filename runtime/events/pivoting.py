@@ -40,6 +40,21 @@ such point was found."""
 Point = tuple[Floats, Floats]
 
 
+def once(contacts: Contacts, settle: Settle) -> Settle:
+    """The same, asked once for each active set and point: ways that lead back find what was found there.  Of one that
+    does nothing but answer.
+    """
+    known = dict[tuple[float, tuple[float, ...], bytes, bytes], tuple[Floats, Floats, Floats] | None]()
+
+    def asked(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+        key = t, contacts.state(), y.tobytes(), yd.tobytes()
+        if key not in known:
+            known[key] = settle(t, y, yd)
+        return known[key]
+
+    return asked
+
+
 class NoActiveSetError(Exception):
     """No set of constraints fits; names: of those that kept changing."""
 
@@ -59,7 +74,6 @@ class Pivoting:
 
     def fit(self, t: float, y: Floats, yd: Floats, settle: Settle) -> Point:
         """A consistent point whose active set fits, from the present one; NoActiveSetError."""
-        settle = self._once(settle)
         self.contacts.reversed.clear()
         before, turned = (self.contacts.active.copy(), self.contacts.p.copy()), dict[int, set[bool]]()
         found = self._among_flows(t, y, yd, settle) if self._flows else None
@@ -78,18 +92,6 @@ class Pivoting:
             return self._pivoted(t, y, yd, settle, turned)
         finally:
             self.contacts.open = frozenset()
-
-    def _once(self, settle: Settle) -> Settle:
-        """The same, asked once for each active set and point: ways that lead back find what was found there."""
-        known = dict[tuple[tuple[float, ...], bytes, bytes], tuple[Floats, Floats, Floats] | None]()
-
-        def once(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
-            key = self.contacts.state(), y.tobytes(), yd.tobytes()
-            if key not in known:
-                known[key] = settle(t, y, yd)
-            return known[key]
-
-        return once
 
     @cached_property
     def _implicit(self) -> Implicit:

@@ -14,7 +14,7 @@ from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.impacts import UNSEEN, Impacts
 from sysdyn.runtime.events.memory import Memory
-from sysdyn.runtime.events.pivoting import NoActiveSetError, Settle
+from sysdyn.runtime.events.pivoting import NoActiveSetError, Settle, once
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -88,7 +88,7 @@ class Succession:
             if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
                 self.contacts.turn(k, values)
         self.contacts.apply()
-        found = self.determined.fit(t, y, yd, restart.struck, touched)
+        found = self.determined.fit(t, y, yd, once(self.contacts, restart.struck), touched)
         still = touched if self.contacts.state() == stood else ()
         if self._tied(t, found, still):
             found = self._ahead(t, found, self.contacts.state()) or found
@@ -256,7 +256,7 @@ class Succession:
         straight = self._restart.settler.system.are("q")
         mean = yd if found is None else np.where(straight, yd, 0.5 * (yd + found[1]))
         try:
-            self.determined.fit(t + time, y + time * mean, yd, quickly)
+            self.determined.fit(t + time, y + time * mean, yd, once(self.contacts, quickly))
         except NoActiveSetError:
             return None
         found = self._restart.struck(t, y, yd) if self.contacts.state() != stood else None
