@@ -15,7 +15,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors, sparse_factors
 from sysdyn.runtime.numerics.products import add_product, largest_product
-from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_squares
+from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_by, least_squares
 from sysdyn.runtime.numerics.symmetric import Symmetric
 from sysdyn.runtime.numerics.tall import by_columns, solved
 
@@ -112,8 +112,7 @@ def in_order(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floa
     held, at last of the others; A [rows, unknowns] by its entries, a full matrix.
     """
     i, j, v = entries
-    a = np.zeros(shape)
-    np.add.at(a, (i, j), v)
+    a = _full(shape, i, j, v)
     if not (np.isfinite(a).all() and np.isfinite(aim).all()):
         raise NotFiniteError
     row, column = factors(a)
@@ -140,23 +139,23 @@ _Way = Callable[[tuple[int, int], tuple[Any, Any, Floats], Floats], Floats]
 """From a shape, the entries of rows of size one and their aim: the u of least norm."""
 
 
-def _singular_values(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
-    i, j, v = entries
+def _full(shape: tuple[int, int], i: Any, j: Any, v: Floats) -> Floats:
+    """The full matrix of entries v at rows i and columns j."""
     a = np.zeros(shape)
     np.add.at(a, (i, j), v)
-    return least_squares(a, aim, RANK)
+    return a
+
+
+def _singular_values(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
+    return least_squares(_full(shape, *entries), aim, RANK)
 
 
 def _of_known(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
     """The same by the decomposition that is remembered, and once more for what that misses."""
-    i, j, v = entries
-    a = np.zeros(shape)
-    np.add.at(a, (i, j), v)
-    left, sigma, right = decomposed(a)
-    k = count(sigma, RANK)
-    left, sigma, right = left[:, :k].T, sigma[:k], right[:k].T
-    found = right @ ((left @ aim) / sigma)
-    return np.asarray(found + right @ ((left @ (aim - a @ found)) / sigma))
+    a = _full(shape, *entries)
+    parts = decomposed(a)
+    found = least_by(parts, aim, RANK)
+    return found + least_by(parts, aim - a @ found, RANK)
 
 
 def _of_one_size(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
@@ -165,11 +164,8 @@ def _of_one_size(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: 
     """
     i, j, v = entries
     size = sparse_factors(i, j, np.abs(v), shape)[1]
-    a = np.zeros(shape)
-    np.add.at(a, (i, j), v * size[j])
-    left, sigma, right = decomposed(a)
-    k = count(sigma, RANK)
-    found, free = right[:k].T @ ((left[:, :k].T @ aim) / sigma[:k]), right[k:].T
+    parts = decomposed(_full(shape, i, j, v * size[j]))
+    found, free = least_by(parts, aim, RANK), parts[2][count(parts[1], RANK) :].T
     return np.asarray(size * (found - free @ least_squares(size[:, None] * free, size * found, RANK)))
 
 

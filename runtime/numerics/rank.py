@@ -140,6 +140,11 @@ def least_squares(matrix: Floats, aim: Floats, smallest: float = TOLERANCE) -> F
     try:
         return np.asarray(np.linalg.lstsq(matrix, aim, rcond=smallest)[0], dtype=np.float64)
     except np.linalg.LinAlgError:
-        u, sigma, vt = decomposed(matrix)
-        k = count(sigma, smallest)
-        return np.asarray(vt[:k].T @ ((u[:, :k].T @ aim) / sigma[:k]))
+        return least_by(decomposed(matrix), aim, smallest)
+
+
+def least_by(parts: tuple[Floats, Floats, Floats], aim: Floats, smallest: float = TOLERANCE) -> Floats:
+    """The same by a decomposition, as `decomposed` answers it."""
+    u, sigma, vt = parts
+    k = count(sigma, smallest)
+    return np.asarray(vt[:k].T @ ((u[:, :k].T @ aim) / sigma[:k]))
