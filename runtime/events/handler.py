@@ -68,12 +68,10 @@ class Watched:
 class Handler:
     """Events of one run.  system: as the stepper sees it; restart: consistent points of it."""
 
-    def __init__(
-        self, plan: Plan, system: System, span: tuple[float, float], begin: Standing, rtol: float = 0.0
-    ) -> None:
+    def __init__(self, plan: Plan, system: System, span: tuple[float, float], begin: Standing) -> None:
         self.plan, self.system, self.span = plan, system, span
         self.p, self.nothing = system.description.p, NOTHING * (span[1] - span[0])
-        self.observer = Observer(system, rtol)
+        self.observer = Observer(system)
         self.contacts = Contacts(plan, system, self.observer, self.p)
         self.determined = Determined(self.contacts)
         self.succession = Succession(plan, self.contacts, self.determined)

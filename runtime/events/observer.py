@@ -16,15 +16,12 @@ SMALL = 1e-9
 """Of the largest value and terms met of a row: what is less is zero."""
 LEAST = 1e-24
 """In SI units: a value that has never been more has no size yet; round-off of what is held at zero is less still."""
-NOISE = 0.01
-"""Of a run's tolerance: what it leaves of a zero."""
 
 
 class Observer:
     """largest [observed]: of values and of the terms of their expressions, at the points asked for."""
 
-    def __init__(self, system: System, rtol: float = 0.0) -> None:
-        self.small = max(SMALL, min(NOISE * rtol, 1e-6))
+    def __init__(self, system: System) -> None:
         self._number = system.observed_rows("observe")[1]
         self._calls = [system.observer(name) for name in ("observe", "observe_scale")]
         self._y, self._yd = np.zeros(system.form.extended), np.zeros(system.form.extended)
@@ -71,4 +68,4 @@ class Observer:
 
     def zero(self, row: int) -> float:
         """Below it a value of the row is zero."""
-        return self.small * float(self.largest[row])
+        return SMALL * float(self.largest[row])

@@ -25,9 +25,6 @@ from sysdyn.runtime.start.restart import Restart
 AHEAD = (1e-9, 1e-7, 1e-5, 1e-3)
 """Of the time in which the unknowns change: how far ahead a tie between active sets is looked at."""
 
-FAR = 1e6
-"""Times the size of a rate: beside it round-off is no zero any more (observer.SMALL)."""
-
 Point = tuple[Floats, Floats]
 
 
@@ -55,21 +52,15 @@ class Succession:
         draft hold only nearly, and what is left over is taken for a multiplier (a diode that lets go before a
         capacitor).
         """
-        stood, sizes = self.contacts.state(), self._restart.sizes_of_rates()
-        known = sizes.copy()
+        stood = self.contacts.state()
         try:
-            found, sought = self._after(t, y, yd, touched, stalled=stalled)
+            return self._after(t, y, yd, touched, stalled=stalled)
         except NoActiveSetError:
             self.contacts.become(stood)
             y, yd, done = self._restart.settler.moved(t, y, yd)
             if not done:
                 raise
-            found, sought = self._after(t, y, yd, touched, stalled=True)
-        # a set that was tried and has no rank leaves rates without bound, beside which nothing else is met
-        met = np.fmax(known, np.abs(found[1][self._restart.settler.rates]))
-        beside, sizes[:] = bool((sizes > FAR * met).any()), met
-        again = self._restart.struck(t, *found) if beside else None
-        return found if again is None else (again[0], again[1]), sought
+            return self._after(t, y, yd, touched, stalled=True)
 
     def _after(self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool) -> tuple[Point, bool]:
         """The same from this very point."""

@@ -78,11 +78,6 @@ class Restart:
         lib.reader(self.settler.core.contents.scale, y.size)[:] = known
         return found
 
-    def sizes_of_rates(self) -> Floats:
-        """Sizes [rates] as they stand, of sets that were tried too."""
-        core = self.settler.core.contents
-        return lib.reader(core.scale, core.unknowns + core.rates)[core.unknowns :]
-
     def _struck(
         self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, quickly: bool = False
     ) -> tuple[Floats, Floats, Floats] | None:

@@ -151,7 +151,7 @@ class Settler:
         if common is not None and (common >= 0).any():
             self._by_differences(common, np.arange(n, dtype=np.int32) if condensed is None else condensed.kept)
         self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
-        self.scale = np.concatenate([magnitude, magnitude[self.rates] / time_scale])
+        self.scale, self._time = np.concatenate([magnitude, magnitude[self.rates] / time_scale]), time_scale
         self.linear: Any = None
         if self._moves <= LATER:
             self._provide()
@@ -269,7 +269,7 @@ class Settler:
         if not self.core:
             raise MemoryError
         core = self.core.contents
-        core.state, core.follows = lib.pointer(self._part), FREE**2
+        core.state, core.follows, core.time = lib.pointer(self._part), FREE**2, self._time
         core.rate = lib.pointer(self.rates)
         core.pair, core.pairs = lib.pointer(self._pairs), len(self._pairs)
         if self.linear is None:

@@ -75,6 +75,8 @@ static void start(sd_run *run, double label)
         sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after, room_of_contents(run));
     run->t_from = run->t_to = run->t_begun = t;
     run->fresh = 0;
+    if (run->settle)
+        run->settle->within = 0.0;
     if (run->extrema)
         run->extrema->number = 0; /* what jumps has no crest */
 }
@@ -184,6 +186,8 @@ static int advance(sd_run *run)
     if (run->stepper->step(run->stepper->self))
         return SD_FAILED;
     run->t_from = from;
+    if (run->settle)
+        run->settle->within = run->stepper->ivp->t - from;
     if (run->modes)
         run->modes->begin = from;
     if (sd_run_changes(run, from))

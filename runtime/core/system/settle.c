@@ -51,6 +51,18 @@ static int choose(sd_settle *settle, double t, const double *y, const double *yd
     return failed;
 }
 
+/* Whether a rate has moved by more than its unknown may within the step: where something relaxes at once, errors that are
+ * small in states are rates without bound, and the potentials that follow from these are any */
+static int races(const sd_settle *settle, const double *yd)
+{
+    for (int32_t k = 0; k < settle->rates && settle->hold == 1.0; k++) {
+        const double moved = yd[settle->rate[k]] - settle->x0[settle->unknowns + k];
+        if (fabs(moved) * settle->within > settle->scale[settle->rate[k]])
+            return 1;
+    }
+    return 0;
+}
+
 /* The iteration within the basis from (y, yd) = x0: 1 where it settled and the state stayed, the residual in `best`;
  * else the point is as it was. */
 static int follow(sd_settle *settle, double t, double *y, double *yd, double *best)
@@ -85,7 +97,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
         before = now;
     }
     *best = before;
-    if (!failed && before <= fmax(bound, settle->enough)) {
+    if (!failed && before <= fmax(bound, settle->enough) && !races(settle, yd)) {
         settle->refused = 0;
         return 1;
     }
@@ -187,20 +199,34 @@ static void finish(sd_settle *settle, double t, double *y, double *yd, int done,
         measure(settle, t, y, yd);
 }
 
-/* Whether the rows hold at (y, yd) as far as `limit`, or its own do.  Of steep laws a polynomial may be anywhere between
- * steps: where the iteration left magnitudes far beyond its point, in those of the motion and of this point. */
-static int holds(sd_settle *settle, double t, const double *y, const double *yd, double best, double limit)
+/* 1: magnitudes that the iteration left far beyond the point (y, yd) are those of the motion and of this point again: of
+ * rates, which a step of no time may have had, and of steep laws, whose polynomial may be anywhere between steps */
+static int shrunk(sd_settle *settle, const double *y, const double *yd)
 {
-    const int32_t number = settle->system->scales > 0 ? settle->unknowns + settle->rates : 0;
-    int grown = 0;
+    const int32_t n = settle->unknowns, number = settle->system->scales > 0 ? n : 0;
+    int found = 0;
     for (int32_t j = 0; j < number; j++) {
-        double size = fmax(settle->usual[j], fabs(j < settle->unknowns ? y[j] : yd[settle->rate[j - settle->unknowns]]));
+        double size = fmax(settle->usual[j], fabs(y[j]));
         if (settle->scale[j] > BEYOND * size && size > 0.0) {
             settle->scale[j] = size;
-            grown = 1;
+            found = 1;
         }
     }
-    if (grown) {
+    for (int32_t k = 0; k < settle->rates; k++) {
+        double size = sd_settle_rate(settle, k, yd);
+        if (settle->scale[n + k] > BEYOND * size) {
+            settle->scale[n + k] = size;
+            found = 1;
+        }
+    }
+    return found;
+}
+
+/* Whether the rows hold at (y, yd) as far as `limit`, or its own do, in magnitudes that the iteration has not left far
+ * beyond the point. */
+static int holds(sd_settle *settle, double t, const double *y, const double *yd, double best, double limit)
+{
+    if (shrunk(settle, y, yd)) {
         if (!sd_settle_slopes(settle, t, y, yd, 0))
             return 0;
         sd_settle_leave_slopes(settle);
@@ -231,7 +257,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     settle->calls++;
     settle->contracted = 0.0;
     take(settle, y, yd, settle->x0);
-    const size_t steep = settle->system->scales > 0 ? (size_t)(settle->unknowns + settle->rates) * sizeof(double) : 0;
+    const size_t steep = settle->system->scales > 0 ? (size_t)settle->unknowns * sizeof(double) : 0;
     memcpy(settle->usual, settle->scale, steep);
     int tried = settle->refused < REFUSALS || (settle->refused < SD_BASIS_OUT && settle->calls % AGAIN == 0);
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && tried) {
@@ -262,6 +288,11 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     if (best <= close) {
         put(settle, settle->x, y, yd);
         done = holds(settle, t, y, yd, best, close);
+        if (!done) { /* from here on, in magnitudes of this point */
+            iterate(settle, t, y, yd, ITERATIONS, &best);
+            put(settle, settle->x, y, yd);
+            done = best <= close && holds(settle, t, y, yd, best, close);
+        }
     }
     if (!done && settle->calls - 1 > settle->failures) { /* steep laws: between steps a polynomial may be far off */
         if (steep) {

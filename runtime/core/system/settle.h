@@ -40,6 +40,8 @@ typedef struct sd_settle {
     int32_t pairs;
     double follows;                  /* weight of the others: almost nothing */
     double *scale;                   /* [unknowns + rates] magnitudes */
+    double time;                     /* s in which unknowns change: their magnitudes over it are those of rates, at least */
+    double within;                   /* s of the step within which points are; 0: of none */
     const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE; SD_LEFT_OUT */
     const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
     int32_t kinematics;

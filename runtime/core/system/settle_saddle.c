@@ -7,6 +7,12 @@
 
 #define EPSILON 1e-14 /* of redundant rows */
 
+double sd_settle_rate(const sd_settle *settle, int32_t k, const double *yd)
+{
+    const double usual = settle->scale[settle->rate[k]] / settle->time, rate = fabs(yd[settle->rate[k]]);
+    return rate > usual && isfinite(rate) ? rate : usual;
+}
+
 int sd_settle_slopes(sd_settle *settle, double t, const double *y, const double *yd, int met)
 {
     sd_system *system = settle->system;
@@ -16,11 +22,11 @@ int sd_settle_slopes(sd_settle *settle, double t, const double *y, const double 
         return 0;
     sd_jacobian(system, t, y, yd, settle->scale, settle->jy, settle->jyd);
     memset(settle->row_scale, 0, (size_t)settle->rows * sizeof(double));
-    for (int32_t j = 0; j < n + rates && met; j++) {
-        double size = fabs(j < n ? y[j] : yd[settle->rate[j - n]]);
-        if (size > settle->scale[j] && isfinite(size))
-            settle->scale[j] = size;
-    }
+    for (int32_t j = 0; j < n && met; j++)
+        if (fabs(y[j]) > settle->scale[j] && isfinite(y[j]))
+            settle->scale[j] = fabs(y[j]);
+    for (int32_t k = 0; k < rates && met; k++)
+        settle->scale[n + k] = sd_settle_rate(settle, k, yd);
     for (int32_t j = 0; j < n; j++) /* scale of yd at [step] for the moment */
         settle->step[j] = 0.0;
     for (int32_t k = 0; k < rates; k++)

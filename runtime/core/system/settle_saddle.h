@@ -4,8 +4,12 @@
 
 #include "system/settle.h"
 
+/* Magnitude of rate k at a point: that of its unknown over the time in which unknowns change, or what it is there.  One
+ * that has been larger says nothing: what is left of a row would be little beside a rate of no time long ago. */
+double sd_settle_rate(const sd_settle *settle, int32_t k, const double *yd);
+
 /* Slopes at (t, y, yd) in scaled unknowns, and row scales from the magnitudes of the terms.  met: the point is one of
- * the motion, with which magnitudes grow; an iterate may be anywhere.  0: no memory. */
+ * the motion, with which magnitudes of unknowns grow, and has those of rates; an iterate may be anywhere.  0: no memory. */
 int sd_settle_slopes(sd_settle *settle, double t, const double *y, const double *yd, int met);
 
 /* the saddle-point matrix and its factors at (t, y, yd); 1: there are none */

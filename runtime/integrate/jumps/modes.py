@@ -15,6 +15,7 @@ import numpy as np
 from sysdyn.runtime.events.bounces import Bounce
 from sysdyn.runtime.events.handler import STALLED, Handler, Watched
 from sysdyn.runtime.events.kinks import WORDS
+from sysdyn.runtime.events.observer import SMALL
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.integrate.jumps.crossing import JUMP
 from sysdyn.runtime.integrate.jumps.segments import core_pieces
@@ -154,7 +155,7 @@ class Modes:
         core.system = c.addressof(systems)
         core.period, core.next = self._array([s.period for s in plan.sampled]), lib.pointer(handler.next)
         core.first, core.nothing = handler.span[0], handler.nothing
-        core.small, core.largest = handler.observer.small, lib.pointer(handler.observer.largest)
+        core.small, core.largest = SMALL, lib.pointer(handler.observer.largest)
         alike = handler.observer.groups
         core.alikes, core.alike = len(alike), self._array(np.concatenate([*alike, []]), np.int32)
         core.alike_end = self._array(np.cumsum([g.size for g in alike]), np.int32)

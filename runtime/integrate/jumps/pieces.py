@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from sysdyn.runtime.events.handler import Handler, Point, Watched
+from sysdyn.runtime.events.observer import SMALL
 from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.jumps.crossing import go_on
@@ -51,7 +52,7 @@ class Pieces:
         self.run = run
         start = run.start
         assert run.request.begin is not None
-        self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin, run.request.rtol)
+        self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin)
         self.handler.restart = run.settlers.restart
         self.handler.contacts.size(run.sizes.magnitude, run.sizes.time)
         method = run.method.contents
@@ -280,7 +281,7 @@ class Pieces:
         step = max((method.t - run.start.t) / max(method.steps, 1), method.h)
         self._open = left_open(run.system, method.t, last, step).quantities
         faint = [row for row in rows if observer.largest[row] < self._open[row]]
-        observer.largest[faint] = self._open[faint] / observer.small
+        observer.largest[faint] = self._open[faint] / SMALL
         return bool(faint)
 
     def _accept(self, t: float, kind: int, sink: Sink, which: Sequence[Watched] = ()) -> None:
