@@ -187,7 +187,7 @@ static int advance(sd_run *run)
         return SD_FAILED;
     run->t_from = from;
     if (run->settle)
-        run->settle->within = run->stepper->ivp->t - from;
+        run->settle->within = from > run->t_begun ? run->stepper->ivp->t - from : 0.0;
     if (run->modes)
         run->modes->begin = from;
     if (sd_run_changes(run, from))
