@@ -17,6 +17,8 @@ from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.runtime.start.strategies import behind
 
+CLOSE = 1e-9
+"""Scaled residual with which a point lives (settle.c)."""
 STILL = 1e-10
 """Of its magnitude: what a state may move by and has not jumped."""
 GUESSES = (0.0, *(sign * size for size in (1.0, 0.1, 1e-2, 1e-3, 10.0) for sign in (1.0, -1.0)))
@@ -76,35 +78,43 @@ class Restart:
         except UnbalancedError:
             found = None
         lib.reader(self.settler.core.contents.scale, y.size)[:] = known
-        return found
+        return None if found is None or not found[3] else found[:3]
 
     def _struck(
         self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, quickly: bool = False
-    ) -> tuple[Floats, Floats, Floats] | None:
-        """The same; magnitude [unknowns as written] before it."""
+    ) -> tuple[Floats, Floats, Floats, bool] | None:
+        """The same, and whether rates of rows are met too; magnitude [unknowns as written] before it."""
         before, yd = y, yd.copy()
         yd[self.settler.system.idle_multipliers()] = 0.0  # what does not hold any more pushes no more
         same, moved = _held(self.settler, t, (y, yd), magnitude)
         moved &= self.state
         if same is not None and not moved.any():  # no state need jump: there is no impulse
-            return *same, np.zeros(y.size)
+            return *same, np.zeros(y.size), self._lives
         push = None
         if same is None or moved[self.settler.system.kinds == "q"].any():
             y, push = self.instant.displacements(t, y, yd, magnitude)
         y, impulse = self.instant.flows(t, y, yd, magnitude, push=push)
         kept = self._kept(t, y, yd, magnitude)
         if kept is not None:
-            return *kept, impulse
+            return *kept, impulse, self._lives
         # what follows may jump by far more than its magnitude: at equal weights that would move the state
         self.settler.core.contents.ready = 0
         found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
         if done and self._stays(found, y, magnitude):
-            return found, rate, impulse
+            return found, rate, impulse, self._lives
         if quickly or unmet(self.settler, t, y, yd, self.settler.alone(self.state)):
             return None
         # what follows is sought from where it was: impulses move it along slopes that steep laws had before the jump
         searched = self._search(t, np.where(self.state, y, before), yd)
-        return (*searched, impulse) if searched is not None and self._stays(searched[0], y, magnitude) else None
+        stays = searched is not None and self._stays(searched[0], y, magnitude)
+        return (*searched, impulse, True) if searched is not None and stays else None
+
+    @property
+    def _lives(self) -> bool:
+        """Whether what settled last meets the rates of rows too: where a law is steep without bound one need not, but a
+        source that diodes short where it goes through zero has none.
+        """
+        return bool(self.settler.core.contents.residual <= CLOSE)
 
     def _stays(self, found: Floats, y: Floats, magnitude: Floats) -> bool:
         """Whether the state is where the balances of the instant put it; one that moves besides is no answer."""
