@@ -52,10 +52,12 @@ static int choose(sd_settle *settle, double t, const double *y, const double *yd
 }
 
 /* Whether a rate has moved by more than its unknown may within the step: where something relaxes at once, errors that are
- * small in states are rates without bound, and the potentials that follow from these are any */
+ * small in states are rates without bound, and the potentials that follow from these are any.  Events read them; of runs
+ * without, `determined` is 0: rows are compared. */
 static int races(const sd_settle *settle, const double *yd)
 {
-    for (int32_t k = 0; k < settle->rates && settle->hold == 1.0; k++) {
+    const int read = settle->determined && settle->hold == 1.0 && settle->within > 0.0;
+    for (int32_t k = 0; k < settle->rates && read; k++) {
         const double moved = yd[settle->rate[k]] - settle->x0[settle->unknowns + k];
         if (fabs(moved) * settle->within > settle->scale[settle->rate[k]])
             return 1;
