@@ -268,9 +268,9 @@ def _bound(value: Any, depth: int) -> Index:
 def _kernel(value: Mapping[str, Any]) -> Kernel:
     loops = tuple((_bound(low, depth), _bound(high, depth)) for depth, (low, high) in enumerate(value.get("loops", ())))
     names = ("reads", "rates", "curved", "bent")
-    known = (frozenset(value[name]) if name in value else None for name in names)
+    reads, rates, curved, bent = (frozenset(value[name]) if name in value else None for name in names)
     rows = tuple(_reference(row) for row in value.get("rows", ())) if loops else ()
-    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())), *known, rows)
+    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())), reads, rates, curved, bent, rows)
 
 
 def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
