@@ -72,6 +72,7 @@ def _kernel(pattern: Pattern) -> dict[str, Any]:
         "reads": list(pattern.reads),
         "rates": list(pattern.rates),
         "curved": list(pattern.curved),
+        "bent": list(pattern.bent),
     }
 
 

@@ -195,6 +195,11 @@ def local_variables(root: Node, kinds: str | Sequence[str], order: int | None = 
     return sorted((n for n in found if order is None or n.data[2] == order), key=lambda n: n.number)
 
 
+def is_constant(root: Node, changing: frozenset[str]) -> bool:
+    """Whether neither unknowns nor time nor the parameters `changing` enter the expression."""
+    return not variables(root) and not any(n.op == "param" and n.data in changing for n in topological([root]))
+
+
 def is_affine(root: Node, changing: frozenset[str]) -> bool:
     """Whether the expression is a constant plus constants times unknowns: neither unknowns nor time nor the parameters
     `changing` enter a constant.

@@ -12,7 +12,7 @@ from typing import Any
 
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, Block, DescriptorForm, Kernel
 from sysdyn.compiler.model.integers import Index, Integers, Reference, Slot
-from sysdyn.compiler.model.terms import Nest, is_affine
+from sysdyn.compiler.model.terms import Nest, is_affine, is_constant
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node, is_const, linear, topological, variables
 from sysdyn.values import dataclass
@@ -75,7 +75,8 @@ class Routine:
 @dataclass(frozen=True, slots=True)
 class Pattern:
     """What one kernel adds to: its loops, rows, and the places of its entries; families of unknowns that it reads and
-    whose rates it reads; row families to which it adds anything but constants and constants times unknowns.
+    whose rates it reads; row families to which it adds anything but constants and constants times unknowns; those to
+    which it adds anything whose slopes change.
     """
 
     loops: tuple[tuple[Index, Index], ...]
@@ -85,6 +86,7 @@ class Pattern:
     reads: tuple[int, ...]
     rates: tuple[int, ...]
     curved: tuple[int, ...]
+    bent: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,15 +153,18 @@ class Programmer:
         stores: list[tuple[Reference | int, Node]] = [(places[k], piece) for k, piece in pieces]
         self._cut((block, "rows", number), bounds, stores, [rows[k] for k, _ in pieces], 0)
         found: dict[str, tuple[tuple[Reference, Reference], ...]] = {"dy": (), "dyd": ()}
+        bent: set[int] = set()
         for part, order in (("dy", 0), ("dyd", 1)):
             entries = [] if block in WITHOUT_ENTRIES else _entries(kernel, order)
             found[part] = tuple((places[e.row], self.reference(e.column, loops)) for e in entries)
             numbered: list[tuple[Reference | int, Node]] = [(k, e.value) for k, e in enumerate(entries)]
             self._cut((block, part, number), bounds, numbered, [rows[e.row] for e in entries], len(entries))
+            bent.update(rows[e.row] for e in entries if not is_constant(e.value, self.changing))
         unknowns = {n.data for s in kernel.rows for n in variables(s.expression) if n.op == "var"}
         read = [sorted({self.families[owner, kind] for owner, kind, of in unknowns if of == k}) for k in (0, 1)]
         curved = sorted({s.row for s in kernel.rows if not is_affine(s.expression, self.changing)})
-        return Pattern(bounds, places, found["dy"], found["dyd"], tuple(read[0]), tuple(read[1]), tuple(curved))
+        reads, rates = (tuple(families) for families in read)
+        return Pattern(bounds, places, found["dy"], found["dyd"], reads, rates, tuple(curved), tuple(sorted(bent)))
 
     def formula(self, block: str, number: int, nest: Nest, expression: Node) -> None:
         """One value an iteration, in the order of the iterations (formulas.py)."""

@@ -322,6 +322,7 @@ class Condensed:
             row=lib.pointer(self.pattern.row),
             scales=whole.core.scales,
             stop=whole.core.stop,
+            steady=whole.core.steady,
             together=whole.core.together,
         )
 

@@ -156,7 +156,8 @@ class Reference:
 class Kernel:
     """One loop nest of a block: (first, last) of each loop as indices, the entries it writes an iteration; reads,
     rates: families of unknowns and of their derivatives that it reads, curved: row families to which it adds more than
-    constants and constants times unknowns (None: not known); rows: what a loop adds to, of a kernel without loops none.
+    constants and constants times unknowns, bent: those to which it adds what has slopes that change (None: not known);
+    rows: what a loop adds to, of a kernel without loops none.
     """
 
     loops: tuple[tuple[Index, Index], ...]
@@ -165,6 +166,7 @@ class Kernel:
     reads: frozenset[int] | None = None
     rates: frozenset[int] | None = None
     curved: frozenset[int] | None = None
+    bent: frozenset[int] | None = None
     rows: tuple[Reference, ...] = ()
 
 
@@ -265,9 +267,10 @@ def _bound(value: Any, depth: int) -> Index:
 
 def _kernel(value: Mapping[str, Any]) -> Kernel:
     loops = tuple((_bound(low, depth), _bound(high, depth)) for depth, (low, high) in enumerate(value.get("loops", ())))
-    reads, rates, curved = (frozenset(value[name]) if name in value else None for name in ("reads", "rates", "curved"))
+    names = ("reads", "rates", "curved", "bent")
+    reads, rates, curved, bent = (frozenset(value[name]) if name in value else None for name in names)
     rows = tuple(_reference(row) for row in value.get("rows", ())) if loops else ()
-    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())), reads, rates, curved, rows)
+    return Kernel(loops, _pairs(value.get("dy", ())), _pairs(value.get("dyd", ())), reads, rates, curved, bent, rows)
 
 
 def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:

@@ -160,6 +160,8 @@ class System(Facts):
         self.work = self._work(layout.entries)
         self._keep += [calls]
         self._reads_rate, self._may_hold = layout.reads_rate, layout.may_hold
+        blocks = self.description.blocks
+        planned = [kernel for call in form.calls for kernel in blocks.get(call.block, ())]
         self._core = lib.System(
             unknowns=form.unknowns,
             rows=form.rows,
@@ -177,6 +179,7 @@ class System(Facts):
             scale=c.addressof(scales),
             v=lib.pointer(self.work),
             stop=lib.pointer(self.failure.flag),
+            steady=all(not kernel.bent and kernel.bent is not None for kernel in planned),
             together=isinstance(self.carrier, LibraryCarrier),
         )
         self._bring_back()

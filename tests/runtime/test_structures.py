@@ -60,7 +60,7 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
 CONTRACTS = {
     1: "da7d7f02b741f1788e20489ec42b69c77a427b0fdf7e9d642f416b45c0d25392",
     2: "36e6b82ac6ac33ecefe0dec8ff11dfddbedf80af805d01604ce418aa781080a6",
-    3: "919cdc5bfcdc7bd58a4a1b3eb264893bc9ba049acae80241b0ce2339088fcad8",
+    3: "2d6abd88e23a63506c7c6728be334ef1b5b787a97ec9699ae15e77557f232477",
 }
 """SHA-256 of model.h without white space, by SD_CONTRACT."""
 

@@ -25,7 +25,7 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
     /* where rows are settled with the kept unknowns alone, points stand where such a system evaluates its own: between what
      * moves a point and who looks at it nothing is evaluated */
     const sd_condensed *left = settle ? (const sd_condensed *)settle->system->left : NULL;
-    run->memory = calloc((left ? 0 : 2 * n) + 3 * m + 5 * a, sizeof(double));
+    run->memory = calloc((left ? 0 : 2 * n) + 3 * m + (7 + SD_PAST) * a, sizeof(double));
     if (!run->memory) {
         free(run);
         return NULL;
@@ -45,6 +45,10 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
     run->sample = run->after + a;
     run->integral = run->sample + a;
     run->end = run->integral + a;
+    run->middle = run->end + a;
+    run->within = run->middle + a;
+    for (int k = 0; k < SD_PAST; k++)
+        run->past[k] = run->within + (size_t)(k + 1) * a;
     return run;
 }
 
@@ -74,7 +78,7 @@ static void start(sd_run *run, double label)
     if (run->ledgers)
         sd_ledgers_note(run->ledgers, t, run->point, run->point_d, run->after, room_of_contents(run));
     run->t_from = run->t_to = run->t_begun = t;
-    run->fresh = 0;
+    run->fresh = run->pasts = 0;
     if (run->settle)
         run->settle->within = 0.0;
     if (run->extrema)
@@ -117,6 +121,20 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
     run->stepper->start(run->stepper->self, t, y, yd, 0.0);
     run->fresh = 1;
     start(run, label);
+}
+
+/* where a step lies behind, the powers at its start are those of one before now */
+static void keep_past(sd_run *run)
+{
+    if (!(run->t_to > run->t_from))
+        return;
+    double *room = run->past[SD_PAST - 1];
+    memmove(run->past + 1, run->past, (SD_PAST - 1) * sizeof *run->past);
+    memmove(run->t_past + 1, run->t_past, (SD_PAST - 1) * sizeof *run->t_past);
+    memcpy(room, run->power, (size_t)run->audited * sizeof *room);
+    run->past[0] = room;
+    run->t_past[0] = run->t_from;
+    run->pasts += run->pasts < SD_PAST;
 }
 
 /* quadratures over the step just accepted, powers and balances at its end */
@@ -182,6 +200,7 @@ static int advance(sd_run *run)
     double from = run->stepper->ivp->t;
     if (from >= run->stepper->ivp->t_end)
         return end(run);
+    keep_past(run);
     memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
     if (run->stepper->step(run->stepper->self))
         return SD_FAILED;

@@ -6,8 +6,8 @@
  * At the instants the dense output is moved onto the constraints and their hidden derivatives (settle.h), so multipliers
  * and accelerations are as exact as positions.
  * Energy balance: [T + V](t) - [T + V](t0) + int dissipated dt - int supplied dt.  The integrals of each accepted step:
- * where laws are steep by the method's stages, at which they hold, else by the 4-point Gauss-Lobatto rule (exact to
- * degree 5) on the dense output.
+ * where laws are steep by the method's stages, at which they hold, else on the dense output: by what is known from steps before
+ * and the middle of this one (exact to degree 5), and by Lobatto's rule of five points (to 7) where that leaves something open.
  * Where an integration restarts after a jump, what T + V gained there was supplied by the impulses that forced it.
  */
 #ifndef SYSDYN_RUN_H
@@ -26,6 +26,7 @@
 #define SD_COMPARED 4 /* that runs are compared by */
 #define SD_RELAXING 8 /* of these: where something relaxes at once within the first step behind a restart */
 #define SD_PARTS 4    /* of a step, at whose ends what is watched is looked at */
+#define SD_PAST 3     /* steps before the last one whose powers are known */
 #define SD_FINEST 1024 /* parts of a step that what is watched does not follow in fewer */
 
 enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3, SD_EVENT = 4 };
@@ -72,6 +73,9 @@ typedef struct sd_run {
                                                     * restart */
     double *power, *after, *sample, *integral, *end;   /* [audited] at the start and the end of the last step; of one
                                                         * sample; integrals over the step; of a row */
+    double *middle, *within;                           /* [audited] in the middle of the last step; work */
+    double *past[SD_PAST], t_past[SD_PAST];            /* [audited] at the starts of the steps before it, the last one first, */
+    int32_t pasts;                                     /* so many of them: since the last start */
     double *point, *point_d, *values, *largest, *slope, *memory; /* point: of a sample or a row; largest [observed]: of observe_scale;
                                        * slope [observed]: rates of the dense output as it is */
     int64_t rows_written;

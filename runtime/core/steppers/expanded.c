@@ -52,18 +52,14 @@ static void dense(const void *self, double t, double *y, double *yd)
     sd_condensed_show(expanded->condensed, z, zd, y, yd);
 }
 
-/* within the step what powers and energies read, at its end all */
 static void values(const void *self, double t, double *y)
 {
     const sd_expanded *expanded = self;
     const sd_stepper *inner = expanded->inner;
-    if (t == inner->ivp->t) {
-        sd_condensed_expand(expanded->condensed, inner->y, y, 0);
-        return;
-    }
     double *z = room_of(expanded);
-    inner->values(inner->self, t, z);
-    sd_condensed_audited(expanded->condensed, z, y);
+    if (t != inner->ivp->t)
+        inner->values(inner->self, t, z);
+    sd_condensed_audited(expanded->condensed, t != inner->ivp->t ? z : inner->y, y);
 }
 
 static void refine(void *self, sd_settle *settle)

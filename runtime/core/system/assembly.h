@@ -16,6 +16,7 @@
  *                                      multiplier of a redundant constraint), with their entry
  *   held_rate [held]                   1: the row reads "derivative of the unknown = 0"
  *   cleared [clear]                    the other entries of these rows
+ *   steady                             1: slopes are the same at every point between two starts of a method
  *   scale [scales]                     calls of the scale blocks of steep rows (none: no row is steep)
  * All arrays belong to the caller.
  */
@@ -71,6 +72,7 @@ struct sd_system {
     const int32_t *stop; /* nonzero: a callback of the caller failed, give up */
     int64_t residual_evaluations, jacobian_evaluations;
     const sd_left *left; /* the unknowns and rows are those that are left of another system; NULL: all are */
+    int32_t steady;
     int32_t together;    /* 1: its blocks may be called by several threads at once */
 };
 

@@ -3,83 +3,104 @@
 #include "linear/lanes.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* x := factors * sources + constant of one unknown, as most of a small model stand: outside the wide loops */
-static inline void evaluate_one(const sd_straight *straight, double *x, int rate)
+#define AT_ONCE 4 /* terms of a sum in one pass over memory */
+
+/* x := factors * sources + constant of few unknowns, as most of a small model stand: outside the wide loops */
+static inline void evaluate_few(const sd_straight *straight, double *x, const double *constant)
 {
-    const int32_t *source = straight->source, terms = straight->terms;
+    const int32_t *source = straight->source, terms = straight->terms, n = straight->number;
     const double *f = straight->factor;
-    double sum = terms > 0 ? f[0] * x[source[0]] : 0.0;
-    for (int32_t k = 1; k < terms; k++)
-        sum += f[k] * x[source[k]];
-    if (straight->constant && !rate)
-        sum += straight->constant[0];
-    x[straight->place] = sum;
+    for (int32_t i = 0; i < n; i++) {
+        double sum = terms > 0 ? f[i] * x[source[0] + i] : 0.0;
+        for (int32_t k = 1; k < terms; k++)
+            sum += f[k * n + i] * x[source[k] + i];
+        x[straight->place + i] = constant ? sum + constant[i] : sum;
+    }
 }
 
-/* the same of one factor a term, up to two terms: along a line of like sections the factors would be most of what is read */
-static inline __attribute__((always_inline)) void evaluate_alike(const sd_straight *straight, double *x, int rate)
+/* Where the terms of a stretch begin */
+typedef struct terms {
+    const double *source[AT_ONCE], *factor[AT_ONCE];
+} terms;
+
+/* out of the unknowns i .. i + SD_LANES */
+static inline __attribute__((always_inline)) void sum_lanes(const terms *of, ptrdiff_t i, const int32_t number, const int alike,
+                                                            double *out)
+{
+    sd_lanes sum = {0.0};
+    for (int32_t k = 0; k < number; k++) {
+        const sd_lanes source = SD_FROM(of->source[k], i);
+        const double f = of->factor[k][0];
+        sd_lanes term = {f, f, f, f};
+        if (!alike)
+            term = SD_FROM(of->factor[k], i);
+        term *= source;
+        if (k == 0)
+            sum = term;
+        else
+            sum += term;
+    }
+    SD_AT(out, i) = sum;
+}
+
+/* The same of many unknowns, of so many terms; alike: of one factor each, for along a line of like sections the factors would be
+ * most of what is read.  The last lanes overlap those before them. */
+static inline __attribute__((always_inline)) void sum_up(const sd_straight *straight, double *x, const int32_t number,
+                                                         const int alike)
+{
+    const ptrdiff_t n = straight->number;
+    double *const out = x + straight->place;
+    terms of;
+    for (int32_t k = 0; k < number; k++) {
+        of.source[k] = x + straight->source[k];
+        of.factor[k] = straight->factor + k * (alike ? straight->alike : n);
+    }
+    for (ptrdiff_t i = 0; i + SD_LANES <= n; i += SD_LANES)
+        sum_lanes(&of, i, number, alike, out);
+    if (n % SD_LANES)
+        sum_lanes(&of, n - SD_LANES, number, alike, out);
+}
+
+/* x += factors * sources of the terms from AT_ONCE on */
+static inline void add_terms(const sd_straight *straight, double *x)
 {
     const int32_t n = straight->number;
     double *restrict out = x + straight->place;
-    const double *restrict c = rate ? NULL : straight->constant, *restrict a = x + straight->source[0];
-    const double *restrict b = straight->terms > 1 ? x + straight->source[1] : NULL;
-    const double fa = straight->factor[0], fb = b ? straight->factor[straight->alike] : 0.0;
-    if (b)
+    for (int32_t k = AT_ONCE; k < straight->terms; k++) {
+        const double *restrict a = x + straight->source[k], *restrict f = straight->factor + (size_t)k * n;
         for (int32_t i = 0; i < n; i++)
-            out[i] = fa * a[i] + fb * b[i];
-    else
-        for (int32_t i = 0; i < n; i++)
-            out[i] = fa * a[i];
-    for (int32_t i = 0; c && i < n; i++)
-        out[i] += c[i];
-}
-
-/* x := factors * sources + constant, up to three terms in one pass over memory */
-static inline __attribute__((always_inline)) void evaluate(const sd_straight *straight, double *x, int rate)
-{
-    int32_t n = straight->number, terms = straight->terms;
-    double *restrict out = x + straight->place;
-    const double *restrict f = straight->factor, *restrict c = rate ? NULL : straight->constant;
-    const double *restrict a = terms > 0 ? x + straight->source[0] : NULL, *restrict fa = f;
-    const double *restrict b = terms > 1 ? x + straight->source[1] : NULL, *restrict fb = f + n;
-    const double *restrict d = terms > 2 ? x + straight->source[2] : NULL, *restrict fd = f + 2 * (size_t)n;
-    if (terms == 0)
-        memset(out, 0, (size_t)n * sizeof *out);
-    else if (terms == 1)
-        for (int32_t i = 0; i < n; i++)
-            out[i] = fa[i] * a[i];
-    else if (terms == 2)
-        for (int32_t i = 0; i < n; i++)
-            out[i] = fa[i] * a[i] + fb[i] * b[i];
-    else
-        for (int32_t i = 0; i < n; i++)
-            out[i] = fa[i] * a[i] + fb[i] * b[i] + fd[i] * d[i];
-    for (int32_t k = 3; k < terms; k++) {
-        const double *restrict more = x + straight->source[k], *restrict fm = f + (size_t)k * n;
-        for (int32_t i = 0; i < n; i++)
-            out[i] += fm[i] * more[i];
+            out[i] += f[i] * a[i];
     }
-    for (int32_t i = 0; c && i < n; i++)
-        out[i] += c[i];
 }
 
-SD_WIDE static void evaluate_many(const sd_straight *straight, double *x, int rate)
+SD_WIDE static void evaluate_many(const sd_straight *straight, double *x, const double *constant)
 {
-    if (straight->alike)
-        evaluate_alike(straight, x, rate);
-    else
-        evaluate(straight, x, rate);
+    switch (straight->alike ? -straight->terms : straight->terms) {
+    case -2: sum_up(straight, x, 2, 1); break;
+    case -1: sum_up(straight, x, 1, 1); break;
+    case 0: sum_up(straight, x, 0, 0); break;
+    case 1: sum_up(straight, x, 1, 0); break;
+    case 2: sum_up(straight, x, 2, 0); break;
+    case 3: sum_up(straight, x, 3, 0); break;
+    case 4: sum_up(straight, x, 4, 0); break;
+    default: sum_up(straight, x, AT_ONCE, 0); add_terms(straight, x);
+    }
+    double *restrict out = x + straight->place;
+    for (int32_t i = 0; constant && i < straight->number; i++)
+        out[i] += constant[i];
 }
 
 static inline void evaluate_straight(const sd_straight *straight, double *x, int rate)
 {
-    if (straight->number == 1)
-        evaluate_one(straight, x, rate);
+    const double *constant = rate ? NULL : straight->constant;
+    if (straight->number < SD_LANES)
+        evaluate_few(straight, x, constant);
     else
-        evaluate_many(straight, x, rate);
+        evaluate_many(straight, x, constant);
 }
 
 void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate)

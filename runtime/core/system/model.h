@@ -73,11 +73,12 @@ typedef void sd_entries(const sd_frame *frame, double t, const double *y, const 
  *             observe_rate, observe_scale those of "observe".
  *             rows of observe also hold {"name", "stored": bool, "rate": bool}.
  *   blocks    {name: {"kernels": [{"loops": [[lo, hi], ...], "rows": [REF, ...], "dy": [[REF row, REF column], ...],
- *             "dyd": [...], "reads": [family, ...], "rates": [...], "curved": [row family, ...]}, ...]}}
+ *             "dyd": [...], "reads": [family, ...], "rates": [...], "curved": [row family, ...], "bent": [...]}, ...]}}
  *             lo, hi: slots of ix (both ends included), or an INDEX where a bound follows an outer loop of the same
  *             nest (triangular sums).  v runs kernel by kernel, iteration by iteration (last loop
  *             fastest), entry by entry.  One place may occur several times: entries add up.  reads, rates: unknowns
- *             and derivatives that enter rows; curved: rows that are more than constants plus constants (parameters) times unknowns.
+ *             and derivatives that enter rows; curved: rows that are more than constants plus constants (parameters) times unknowns;
+ *             bent: rows whose slopes change while a run goes on smoothly.  Any of the four may be missing: not known.
  *   REF       [family, [INDEX, ...]], INDEX = [loop or -1, offset slot of ix or -1, constant]:
  *             value = (loop variable or 0) + (ix[slot] or 0) + constant; INDEX = [loop, slot, constant, table]:
  *             ix[ix[table] + that value], from a table of indices that stands in ix behind all slots.

@@ -9,6 +9,8 @@ from sysdyn.runtime.model.structures.c_types import D, I, L, P
 ROW_HEAD = 8
 NODES = 7
 """SD_NODES: of a method, at most."""
+PAST = 3
+"""SD_PAST: steps before the last one whose powers are known."""
 OWN = 2**31 - 1
 """SD_OWN: the mode that the core has found by itself."""
 
@@ -231,7 +233,10 @@ class Run(c.Structure):
         ("t_from", D),
         ("t_row", D),
         ("t_begun", D),
-        *[(name, P) for name in ["power", "after", "sample", "integral", "end"]],
+        *[(name, P) for name in ["power", "after", "sample", "integral", "end", "middle", "within"]],
+        ("past", P * PAST),
+        ("t_past", D * PAST),
+        ("pasts", I),
         *[(name, P) for name in ["point", "point_d", "values", "largest", "slope", "memory"]],
         ("rows_written", L),
         ("first_energy", D),

@@ -82,6 +82,7 @@ class System(c.Structure):
         ("residual_evaluations", L),
         ("jacobian_evaluations", L),
         ("left", P),
+        ("steady", I),
         ("together", I),
     ]
 

@@ -30,6 +30,12 @@ static inline __attribute__((always_inline)) sd_lanes summed(sd_lane_sum sum)
     return sum.real + (sd_lanes){-i[1], i[0], -i[3], i[2]};
 }
 
+/* one number of each column of a panel that are so far apart */
+static inline __attribute__((always_inline)) sd_lanes across(const sd_number *x, int32_t apart)
+{
+    return (sd_lanes){creal(x[0]), cimag(x[0]), creal(x[apart]), cimag(x[apart])};
+}
+
 static inline __attribute__((always_inline)) sd_lanes sizes(sd_lanes x)
 {
     const sd_lanes parts = SD_SIZES(x);
@@ -47,6 +53,11 @@ static inline __attribute__((always_inline)) void add_times(sd_lane_sum *sum, sd
 static inline __attribute__((always_inline)) sd_lanes summed(sd_lane_sum sum)
 {
     return sum;
+}
+
+static inline __attribute__((always_inline)) sd_lanes across(const sd_number *x, int32_t apart)
+{
+    return (sd_lanes){x[0], x[apart], x[2 * (int64_t)apart], x[3 * (int64_t)apart]};
 }
 
 static inline __attribute__((always_inline)) sd_lanes sizes(sd_lanes x)

@@ -291,7 +291,7 @@ static int provide_rests(sd_fronts *f)
     size_t lines = 0, panel = 0;
     for (int32_t i = 0; i < f->fronts; i++) {
         const sd_front *front = &f->front[i];
-        const size_t here = (size_t)lines_of(front), numbers = here * (size_t)front->many;
+        const size_t here = (size_t)lines_of(front), numbers = here * (size_t)whole_line(front->many);
         lines = here > lines ? here : lines;
         panel = numbers > panel ? numbers : panel;
         waiting[front->side] += left_by(front);

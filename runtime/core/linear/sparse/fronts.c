@@ -34,7 +34,7 @@ static void fill_panels(const sd_fronts *f, const sd_front *front, const sd_fron
 {
     const int32_t lines = lines_of(front);
     memset(l, 0, (size_t)front->many * (size_t)lines * sizeof *l);
-    memset(u, 0, (size_t)front->many * (size_t)lines * sizeof *u);
+    memset(u, 0, (size_t)whole_line(front->many) * (size_t)lines * sizeof *u);
     for (const sd_front_entry *end = f->entry + front->entries; entry < end; entry++)
         *(entry->place < 0 ? u + ~entry->place : l + entry->place) += sd_entry_of(matrix, entry->entry, entry->column);
     const sd_number *rest = f->top[!front->side];
@@ -107,23 +107,23 @@ static SD_WIDE void invert_triangle(int32_t many, int32_t lines, sd_number *pane
     for (int32_t k = many - 1; k >= 0; k--) {
         const int32_t from = k / IN_LANES * IN_LANES, next = k + 1;
         sd_number *column = panel + (int64_t)k * lines;
-        for (int32_t i = from; i < many; i++) {
-            by[i] = column[i];
-            column[i] = i == k;
+        for (int32_t i = from; i < own; i += IN_LANES) {
+            SD_AT(by, i) = SD_FROM(column, i);
+            SD_AT(column, i) = (sd_lanes){0.0};
         }
+        column[k] = 1.0;
         sum_columns(LESS, own - from, many - next, column + lines + from, lines, by + next, 1, NULL, column + from);
         if (inverse)
             scale_lines(own - from, inverse[k], column + from);
     }
 }
 
-/* the panel of U by lines, each filled up to whole lanes */
-static void turn_panel(int32_t many, int32_t lines, const sd_number *panel, sd_number *turned)
+/* the panel of U, whose columns are filled up to whole lanes, by lines */
+static SD_WIDE void turn_panel(int32_t own, int32_t lines, const sd_number *panel, sd_number *turned)
 {
-    const int32_t own = whole_line(many);
-    for (int32_t i = 0; i < lines; i++)
-        for (int32_t k = 0; k < own; k++)
-            turned[(int64_t)i * own + k] = k < many ? panel[(int64_t)k * lines + i] : 0.0;
+    for (int32_t k = 0; k < own; k += IN_LANES, panel += (int64_t)IN_LANES * lines)
+        for (int32_t i = 0; i < lines; i++)
+            SD_AT(turned, (int64_t)i * own + k) = across(panel + i, lines);
 }
 
 double sd_fronts_factor(sd_fronts *f, const sd_matrix *matrix)
@@ -145,7 +145,7 @@ double sd_fronts_factor(sd_fronts *f, const sd_matrix *matrix)
         f->top[front->side] += left_by(front);
         invert_triangle(many, lines, l, NULL, f->line);
         invert_triangle(many, lines, u, inverse, f->line);
-        turn_panel(many, lines, u, l + (int64_t)many * lines);
+        turn_panel(whole_line(many), lines, u, l + (int64_t)many * lines);
     }
     return least;
 }

@@ -1,7 +1,13 @@
 /* Integrals of powers over the last step: see quadratures.h. */
 #include "run/meters/quadratures.h"
 
+#include <math.h>
 #include <string.h>
+
+/* Of the tolerance, and of the powers themselves: what the last term may be.  A balance is judged by ten tolerances at least, and
+ * what is left behind the last term is less by as much again: sums over a run are off by 0.001 to 0.007 tolerances (a grid, a
+ * ladder).  With a tenth every second step needs two points more. */
+#define LITTLE 1.0
 
 void sd_run_audit(const sd_run *run, double t, const double *y, const double *yd, double *out)
 {
@@ -10,18 +16,18 @@ void sd_run_audit(const sd_run *run, double t, const double *y, const double *yd
         run->audit->rows(&run->audit->frame, t, y, yd, out);
 }
 
-/* run->sample [audited]: the same, energies but for those that come with powers */
-static void powers(sd_run *run, double t, const double *y, const double *yd)
+/* out [audited]: the same, energies but for those that come with powers */
+static void powers(sd_run *run, double t, const double *y, const double *yd, double *out)
 {
-    memset(run->sample, 0, (size_t)run->audited * sizeof(double));
-    run->powers->rows(&run->powers->frame, t, y, yd, run->sample);
+    memset(out, 0, (size_t)run->audited * sizeof(double));
+    run->powers->rows(&run->powers->frame, t, y, yd, out);
 }
 
-/* run->integral += weight * run->sample */
-static void weigh(sd_run *run, double weight)
+/* run->integral += weight * values */
+static void weigh(sd_run *run, const double *values, double weight)
 {
     for (int32_t k = 2; k < run->audited; k++)
-        run->integral[k] += weight * run->sample[k];
+        run->integral[k] += weight * values[k];
 }
 
 /* point at t within the last step, and point_d where what is audited reads it */
@@ -32,6 +38,15 @@ static void look(sd_run *run, double t)
         stepper->values(stepper->self, t, run->point);
     else
         stepper->dense(stepper->self, t, run->point, run->point_d);
+}
+
+/* the same at the end of what is integrated, all of it where that is not the end of the step */
+static void look_at_end(sd_run *run, double to)
+{
+    if (run->sampled)
+        look(run, to);
+    else
+        run->stepper->dense(run->stepper->self, to, run->point, run->point_d);
 }
 
 /* share [nodes + 1]: int_0^to of the polynomials of degree `nodes` that are 1 at the step's start, at each node, and 0 at
@@ -81,8 +96,7 @@ static void integrate_nodes(sd_run *run, double part)
     run->noded = stepper->collocated;
     if (part < 1.0) { /* the whole step takes nothing of its start */
         shares(stepper, part, share);
-        memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
-        weigh(run, h * share[0]);
+        weigh(run, run->power, h * share[0]);
     }
     for (int32_t k = 0; k < stepper->nodes; k++) {
         double weight = part < 1.0 ? share[k + 1] : stepper->node_weight[k];
@@ -93,8 +107,9 @@ static void integrate_nodes(sd_run *run, double part)
         if (stepper->show)
             stepper->show(stepper->self, k, run->point, run->point_d);
         const double *y = stepper->show ? run->point : stepper->node_y[k];
-        powers(run, from + stepper->node[k] * h, y, stepper->show ? run->point_d : stepper->node_yd[k]);
-        weigh(run, h * weight);
+        powers(run, from + stepper->node[k] * h, y, stepper->show ? run->point_d : stepper->node_yd[k],
+               run->sample);
+        weigh(run, run->sample, h * weight);
         if (stepper->collocated)
             memcpy(run->node_power[k], run->sample + 2, sizeof run->node_power[k]);
     }
@@ -102,14 +117,77 @@ static void integrate_nodes(sd_run *run, double part)
         run->integral[k] += stepper->moves[k];
 }
 
+/* rows dissipated and supplied, of all and of each ledger: what the past leaves open of both is little of the sums */
+static int sure(const sd_run *run, const double *open)
+{
+    const double little = LITTLE * run->stepper->ivp->rtol;
+    for (int32_t k = 2; k + 1 < run->audited; k += k == 2 ? SD_LEDGER_ROWS - 1 : SD_LEDGER_ROWS) {
+        const double *sum = run->integral + k, *left = open + k;
+        if (!(fabs(left[0]) + fabs(left[1]) <= little * (fabs(sum[0]) + fabs(sum[1]))))
+            return 0;
+    }
+    return 1;
+}
+
+/* By the polynomial through powers at the ends and in the middle of the step, and at the starts p of those before it: Simpson's rule
+ * and, in parts s of the step, w = s (s - 1/2) (s - 1),
+ *     int w (s - p_1) ds f[0, 1/2, 1, p_1, p_2] + int w (s - p_1) (s - p_2) ds f[0, 1/2, 1, p_1, p_2, p_3],
+ * where int w = int w (s - 1/2)^2 = 0, int w (s - 1/2) = -1/120.  0: the last term is not little. */
+static int integrate_past(sd_run *run, double to)
+{
+    enum { POINTS = SD_PAST + 3 };
+    static const double simpson[POINTS] = {1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0};
+    const double *rows[POINTS] = {run->power, run->middle, run->sample}, from = run->t_from, h = to - from;
+    double at[POINTS] = {0.0, 0.5, 1.0}, difference[POINTS], *open = run->within;
+    if (run->pasts < SD_PAST)
+        return 0;
+    for (int k = 0; k < SD_PAST; k++) {
+        at[3 + k] = (run->t_past[k] - from) / h;
+        rows[3 + k] = run->past[k];
+    }
+    const double higher = (at[3] + at[4] - 1.0) / 120.0 * h, lower = -h / 120.0;
+    memset(open, 0, (size_t)run->audited * sizeof *open);
+    for (int i = 0; i < POINTS; i++) {
+        double product = i < 3 ? 0.5 * (i == 1 ? -0.5 : 1.0) : at[i] * (at[i] - 0.5) * (at[i] - 1.0);
+        for (int j = 3; j < POINTS; j++)
+            product *= i == j ? 1.0 : at[i] - at[j];
+        difference[i] = 1.0 / product;
+    }
+    for (int i = 0; i < POINTS; i++) {
+        const double last = higher * difference[i];
+        const double own = h * simpson[i] + lower * (at[i] - at[POINTS - 1]) * difference[i] + last;
+        for (int32_t k = 2; k < run->audited; k++) {
+            run->integral[k] += own * rows[i][k];
+            open[k] += last * rows[i][k];
+        }
+    }
+    return sure(run, open);
+}
+
+/* by Lobatto's rule of five points, two more than are known */
+static void integrate_lobatto(sd_run *run, double to)
+{
+    static const double inner = 0.32732683535398857190; /* sqrt(21) / 14 */
+    double from = run->t_from, h = to - from;
+    memset(run->integral, 0, (size_t)run->audited * sizeof(double));
+    for (int k = -1; k <= 1; k += 2) {
+        double t = from + (0.5 + k * inner) * h;
+        look(run, t);
+        powers(run, t, run->point, run->point_d, run->within);
+        weigh(run, run->within, 49.0 / 180.0 * h);
+    }
+    weigh(run, run->power, 0.05 * h);
+    weigh(run, run->middle, 16.0 / 45.0 * h);
+    weigh(run, run->sample, 0.05 * h);
+}
+
 int sd_run_integrate(sd_run *run, double to)
 {
-    static const double inner = 0.44721359549995793928; /* 1/sqrt(5) */
     const sd_stepper *stepper = run->stepper;
-    double from = run->t_from, half = 0.5 * (to - from), middle = 0.5 * (to + from);
+    double from = run->t_from, middle = 0.5 * (to + from);
     memset(run->integral, 0, (size_t)run->audited * sizeof(double));
     run->sampled = 0;
-    if (!run->audit || half == 0.0)
+    if (!run->audit || to == from)
         return 0;
     if (stepper->nodes && (to == stepper->ivp->t || stepper->collocated)) {
         integrate_nodes(run, to == stepper->ivp->t ? 1.0 : (to - from) / (stepper->ivp->t - from));
@@ -118,28 +196,22 @@ int sd_run_integrate(sd_run *run, double to)
     if (stepper->part_y) {
         stepper->dense(stepper->self, to, run->point, run->point_d);
         for (int32_t k = 0; k < stepper->nodes; k++) {
-            powers(run, from + stepper->node[k] * (to - from), stepper->part_y[k], stepper->part_yd[k]);
-            weigh(run, (to - from) * stepper->node_weight[k]);
+            powers(run, from + stepper->node[k] * (to - from), stepper->part_y[k], stepper->part_yd[k], run->sample);
+            weigh(run, run->sample, (to - from) * stepper->node_weight[k]);
         }
         for (int32_t k = 2; stepper->part_moves && k < run->audited; k++)
             run->integral[k] += stepper->part_moves[k];
         return 1;
     }
-    memcpy(run->sample, run->power, (size_t)run->audited * sizeof(double));
-    weigh(run, half / 6.0);
-    for (int k = -1; k <= 1; k += 2) {
-        double t = middle + k * inner * half;
-        look(run, t);
-        powers(run, t, run->point, run->point_d);
-        weigh(run, 5.0 * half / 6.0);
-    }
+    look(run, middle);
+    powers(run, middle, run->point, run->point_d, run->middle);
     run->sampled = to == stepper->ivp->t;
-    if (run->sampled)
-        look(run, to);
-    else
-        stepper->dense(stepper->self, to, run->point, run->point_d);
+    look_at_end(run, to);
     sd_run_audit(run, to, run->point, run->point_d, run->sample);
-    weigh(run, half / 6.0);
+    if (!integrate_past(run, to)) {
+        integrate_lobatto(run, to);
+        look_at_end(run, to);
+    }
     return !run->sampled;
 }
 
@@ -177,7 +249,7 @@ void sd_run_integrate_cut(sd_run *run, double to)
         double t = middle + node[high][k] * half;
         run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
         sd_run_settle(run, t);
-        powers(run, t, run->point, run->point_d);
-        weigh(run, half * weight[high][k]);
+        powers(run, t, run->point, run->point_d, run->sample);
+        weigh(run, run->sample, half * weight[high][k]);
     }
 }

@@ -11,6 +11,7 @@
 #define SELDOM 4 /* of these: where rows are judged or points projected */
 #define ITERATIONS 4        /* of Newton a step */
 #define NEWTON_TOLERANCE 0.33 /* of the error tolerance (Brenan, Campbell & Petzold) */
+#define UNKNOWN 20.0        /* contraction assumed where none has been seen */
 #define TRUST 0.02          /* least contraction assumed of a first correction (an exponential law may lie ahead) */
 #define STEEP 0.1           /* with steep laws instead of the one, ... */
 #define STEEP_TRUST 0.3     /* ... and the other: corrections left out would be errors that fall slower than the tolerance */
@@ -112,7 +113,7 @@ void sd_bdf_start(void *self, double t, const double *y, const double *yd, doubl
     bdf->order_used = 0;
     bdf->ns = 0;
     bdf->rising = bdf->max_order > 1;
-    bdf->contraction = 20.0;
+    bdf->contraction = UNKNOWN;
     bdf->ready = 0;
 }
 
@@ -143,7 +144,7 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
     }
     bdf->cj_factored = bdf->cj;
     bdf->extra = 0;
-    bdf->contraction = 20.0;
+    bdf->contraction = UNKNOWN;
     bdf->ready = 1;
     return SD_FINE;
 }
@@ -276,6 +277,13 @@ static int iterate(sd_bdf *bdf, double t)
     return SD_NEWTON;
 }
 
+/* Whether slopes at hand may mislead, or there are none since the start */
+static int slopes_fade(const sd_bdf *bdf)
+{
+    int old = bdf->jacobian_age >= OLD_JACOBIAN || bdf->cj * GROWN < bdf->cj_slopes;
+    return bdf->ivp.taken == 0 || (old && !bdf->ivp.system->steady);
+}
+
 /* Corrects the prediction; factors are renewed when cj changed, the Jacobian when it is old or fails. */
 static int correct(sd_bdf *bdf)
 {
@@ -283,8 +291,7 @@ static int correct(sd_bdf *bdf)
     bdf->fresh_jacobian = 0;
     sd_bdf_weigh(bdf, SD_NEWTON_TEST);
     for (;;) {
-        int fresh = bdf->jacobian_age >= OLD_JACOBIAN || bdf->cj * GROWN < bdf->cj_slopes || bdf->ivp.taken == 0 ||
-                    bdf->fresh_jacobian < 0;
+        int fresh = slopes_fade(bdf) || bdf->fresh_jacobian < 0;
         if (fresh || !bdf->ready || !factors_serve(bdf)) {
             int cause = factorise(bdf, t, fresh);
             if (cause == SD_SINGULAR && bdf->fresh_jacobian == 0) {
@@ -294,8 +301,10 @@ static int correct(sd_bdf *bdf)
             if (cause)
                 return cause;
         }
-        if (bdf->cj != bdf->cj_last)
-            bdf->contraction = 20.0;
+        if (bdf->ivp.system->steady && bdf->cj == bdf->cj_factored)
+            bdf->contraction = 0.0; /* factors of the very matrix leave nothing */
+        else if (bdf->cj != bdf->cj_last)
+            bdf->contraction = UNKNOWN;
         bdf->cj_last = bdf->cj;
         int cause = iterate(bdf, t);
         if (cause == SD_FINE || cause == SD_STOPPED || bdf->fresh_jacobian)
