@@ -8,8 +8,8 @@ In a series class the first potential store is the coordinate.  Another one hold
 initial content less +- that of the first; it is chosen where not all of these are fixed and a loop of stores and
 efforts, or what is said of anything else (a resistor, an effort of e = q + q^3), may ask for others.  What is no store
 begins at what the text says of it, else at zero, whatever the first store holds.  A store between two nodes of the
-reflection (an inductor) holds their difference: where such stores close loops in which contents are said, each has its
-own initial content as k where the text fixes it, else it is chosen.  The same where something else is said.
+reflection (an inductor) holds their difference: where such stores may close loops each has its own initial content as k
+where the text fixes it, else it is chosen.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
-from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_size, meet, shape_of, union, without
+from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_size, shape_of, union, without
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import (
@@ -199,7 +199,10 @@ class Contents:
                 followers.setdefault(m.element.number, []).append(m)
         for group in followers.values():
             self._follower(group[0].element, group)
-        self._chords([e for e in between if e.number in self.looped and e.branch.law is not None])
+        for e in between:
+            if e.number in self.looped and e.branch.law is not None:
+                value = self.start(e.name, indices(e.named), ranges_over(e.named))
+                self._constant(e, value if self._fixed(e, e.named) else None)
 
     def start(self, name: str, at: tuple[Node, ...], within: overlaps.Ranges) -> Node:
         """The initial content of a store: what the statement about it says, else 0."""
@@ -219,13 +222,6 @@ class Contents:
         sought = self._loose or self.looped & {element.number, *(m.leader.number for m in members)}
         fixed = all(self._fixed(element, m.box) and self._fixed(m.leader, _led_by(m)) for m in members)
         self._constant(element, value if fixed or not sought else None)
-
-    def _chords(self, looped: Sequence[Element]) -> None:
-        """The constants of stores between nodes of the reflection whose loops start with contents of their own."""
-        given = {e.number for e in looped if any(meet(box, e.named) for _, box in self._given.get(e.name, ()))}
-        for e in looped if given or self._loose else ():
-            value = self.start(e.name, indices(e.named), ranges_over(e.named))
-            self._constant(e, value if self._fixed(e, e.named) else None)
 
     def _constant(self, element: Element, value: Node | None) -> None:
         """A parameter of that value over the element's indices, none for zero; chosen by the start where None."""
