@@ -154,6 +154,26 @@ scene s of m { time 0 s to 0.3 s; init C2.e = 0 V
         assert found["V"].values[-1] == pytest.approx(-0.132349, abs=1e-6)
 
 
+@pytest.mark.parametrize("formulation", FOUR)
+def test_a_source_beside_others_pays_what_a_capacitor_of_any_law_takes(tmp_path, formulation):
+    """The charges at its node add up by an integrated row, in which nobody keeps that of the source."""
+    text = """\
+model m {
+  node a: electrical
+  V: effort(e = (if t < 0.2 s then 1 V else 3 V)) a -> ground
+  C: potential(e = 2 V*(q/(1 C) + 0.3*(q/(1 C))^3)) a -> ground
+  R: dissipator(e = 1 ohm*f) a -> ground
+}
+scene s of m { time 0 s to 0.3 s
+  trace C.energy as EC, R.energy as ER, V.energy as EV, C.q as q every 10 ms; accuracy 1e-6 }
+"""
+    found = _run(text, tmp_path, formulation=formulation)
+    q = found["q"].values
+    took = (q**2 + 0.15 * q**4)[[0, -1]]
+    assert _last(found, "EC", "ER") == pytest.approx((took[1] - took[0], 1.0 * 0.2 + 9.0 * 0.1), abs=1e-7)
+    assert sum(_last(found, "EC", "ER", "EV")) == pytest.approx(0.0, abs=1e-7)  # 0.059 J by the mean of the voltage
+
+
 def test_a_mean_that_is_zero_is_no_energy_that_is(tmp_path):
     """From -3 V to 3 V the mean effort is nothing, what a capacitor of cubic law takes on the way is not."""
     text = """\

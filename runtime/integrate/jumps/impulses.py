@@ -67,11 +67,11 @@ class Impulses:
         # displacements tell the pulses of their flows
         self._given = over.force | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
         self._pulses = over.pulses(self._moved, self._given)
-        self._balances, self._others = self._by_order()
+        open_ = np.isin(np.arange(settled.unknowns), unread)  # their flows are given, their places nobody keeps
+        self._balances, self._others = self._by_order(open_)
         forced = np.isin(np.arange(settled.rows), self._row[in_y & over.force[self._column]])
         self._laws = settled.of_groups("gamma") & ~forced  # at each point too where their flows are no pulses
-        displaced = (settled.kinds == "q") & ~np.isin(np.arange(settled.unknowns), unread)
-        self._carries = displaced | inert | over.contents
+        self._carries = ((settled.kinds == "q") & ~open_) | inert | over.contents
         held = form.k_q[inert[form.k_f]]
         self._stays = np.isin(np.arange(settled.unknowns), np.concatenate([self.states, held, unread]))
 
@@ -88,8 +88,10 @@ class Impulses:
         found = self._row[rates[self._row] & self._in_y & pulses[self._column]]
         return np.setdiff1d(found, self.rows)
 
-    def _by_order(self) -> tuple[Mask, Mask]:
-        """Rows that impulses meet, integrated over an instant; rows that hold at each point of the rise."""
+    def _by_order(self, open_: Mask) -> tuple[Mask, Mask]:
+        """Rows that impulses meet, integrated over an instant; rows that hold at each point of the rise, none of which
+        reads open displacements.
+        """
         settled, flow = self.system, (self._moved >= 0)[self._column]
         moved, own = np.zeros((2, settled.rows), dtype=bool)
         moved[self._row[self._in_rate | (self._in_y & flow)]], own[self.rows] = True, True
@@ -98,7 +100,8 @@ class Impulses:
         told = np.zeros(settled.rows, dtype=bool)
         told[self._row[(self._given & (settled.kinds == "f"))[self._column] & self._in_y]] = True
         integrated |= settled.of_groups("phi_rate") & told
-        held = settled.of_groups("phi", "phi_rate", "psi", "momentum")
+        places = np.isin(np.arange(settled.rows), self._row[self._in_y & open_[self._column]])
+        held = settled.of_groups("phi", "phi_rate", "psi", "momentum") & ~places
         return integrated, held | (settled.of_groups("dynamics", "gamma") & ~moved)
 
     def gains(self, before: Side, behind: Side, magnitude: Floats) -> Floats:
@@ -114,7 +117,7 @@ class Impulses:
         found, balanced, faithful = self._straight(before, behind, way, others)
         if not (balanced and faithful):
             curved = self._curved(before, behind, way, (magnitude, others))
-            if curved is None and not balanced and not self._assigned:
+            if curved is None and not self._assigned:
                 raise SolverFailure("unbalanced", behind.t, 0.0)
             found = found if curved is None else curved
         return np.where(assigned, 0.0, found)
