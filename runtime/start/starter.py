@@ -32,7 +32,7 @@ from sysdyn.runtime.numerics.products import add_sizes, linked
 from sysdyn.runtime.numerics.work import Work
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.runtime.start.residue import Residue
-from sysdyn.runtime.start.sums import Sums, Weights, floating, weights
+from sysdyn.runtime.start.sums import Sums, Weights, of_few, of_many, weights
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
@@ -281,12 +281,17 @@ class Starter:
 
         They are taken from the inertia at two points: what moves with the state is left out.
         """
+        settled = self.settled
         if not unsettled.size or (self.n > DENSE and not self.equations.joined.any()):
-            return weights(())
+            return weights(np.zeros((0, unsettled.size)))
         points = [self._inertia(shift) for shift in (0.0, 0.1)]
-        number = np.cumsum(self.settled.are("f")) - 1
-        own = own_unknown(self.settled, "dynamics_rate", "f")[unsettled]
-        return floating(points, np.where(own >= 0, number[own], -1), DENSE)
+        number = np.cumsum(settled.are("f")) - 1
+        own = own_unknown(settled, "dynamics_rate", "f")[unsettled]
+        own = np.where(own >= 0, number[own], -1)
+        if self.n > DENSE:
+            return of_many(points, own, DENSE)
+        whole = np.arange(points[0].size)[None]
+        return of_few(np.hstack([np.where((own >= 0)[:, None], p.blocks(whole)[0][own], 0.0) for p in points]))
 
     def _inertia(self, shift: float) -> Inertia:
         """Inertia beside the state that the text says."""

@@ -6,14 +6,12 @@ follows from the balances, summed so that the rates go.  A sum stands in the pla
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Places
 from sysdyn.runtime.model.inertia import Inertia
 from sysdyn.runtime.numerics.components import components
 from sysdyn.runtime.numerics.products import add_product, add_sizes
-from sysdyn.runtime.numerics.rank import left_null_vectors
+from sysdyn.runtime.numerics.rank import left_null_vectors, null_space
 from sysdyn.values import dataclass
 
 CANCELS = 1e-14
@@ -31,11 +29,10 @@ class Weights:
     value: Floats
 
 
-def weights(sums: Sequence[tuple[Places, Floats]]) -> Weights:
-    """Of the rows and values of each sum."""
-    total = np.repeat(np.arange(len(sums)), [rows.size for rows, _ in sums])
-    rows, values = (np.concatenate([item[k] for item in sums] or [np.zeros(0)]) for k in (0, 1))
-    return Weights(len(sums), total, rows.astype(np.int64), values)
+def weights(matrix: Floats) -> Weights:
+    """Those of a full matrix [sums, rows]."""
+    total, row = np.nonzero(matrix)
+    return Weights(len(matrix), total, row, matrix[total, row])
 
 
 class Sums:
@@ -89,9 +86,16 @@ def _scaled(matrix: Floats) -> Floats:
     return np.asarray(matrix / np.where(size > 0.0, size, 1.0))
 
 
-def floating(points: Sequence[Inertia], own: Places, most: int) -> Weights:
-    """Sums of rows that read no inertia, of flows that it joins in groups, each at most `most` large; of larger ones
-    the plain sum if it is one.  points: inertia at several points; own [rows]: the flow whose balance a row is, or -1.
+def of_few(matrix: Floats) -> Weights:
+    """Sums [k, rows] of the rows of a full matrix of inertia that are nothing."""
+    if not np.isfinite(matrix).all():
+        return weights(np.zeros((0, len(matrix))))
+    return weights(null_space(_scaled(matrix).T).T)
+
+
+def of_many(points: list[Inertia], own: Places, most: int) -> Weights:
+    """The same of flows that inertia joins in groups, each at most `most` large; of larger ones the plain sum if it is
+    one.  points: inertia at several points; own [rows]: the flow whose balance a row is, or -1.
     """
     number = points[0].size
     joined = np.hstack([np.tile(np.arange(number), (2, 1)), *(point.joined() for point in points)])
@@ -102,16 +106,17 @@ def floating(points: Sequence[Inertia], own: Places, most: int) -> Weights:
     begin = np.append(np.flatnonzero(np.diff(label[order], prepend=-1)), number)
     size = np.diff(begin)
     found: list[tuple[Places, Floats]] = []
-    for s in np.unique(size[size <= most]):
+    for s in np.unique(size[(size > 1) & (size <= most)]):
         members = order[begin[:-1][size == s][:, None] + np.arange(s)]
         members = members[(place[members] >= 0).all(axis=1)]
         blocks = np.concatenate([point.blocks(members) for point in points], axis=2)
-        asked = np.isfinite(blocks).all(axis=(1, 2)) & ((s > 1) | ~blocks.any(axis=(1, 2)))
-        members, blocks = members[asked], blocks[asked]
+        members, blocks = (item[np.isfinite(blocks).all(axis=(1, 2))] for item in (members, blocks))
         group, vectors = left_null_vectors(_scaled(blocks))
         found += zip(place[members[group]], vectors, strict=True)
     for c in np.flatnonzero(size > most):
         members = order[begin[c] : begin[c + 1]]
         if (place[members] >= 0).all() and all(point.cancels(members) for point in points):
             found.append((place[members], np.full(members.size, members.size**-0.5)))
-    return weights(found)
+    row = np.repeat(np.arange(len(found)), [len(p) for p, _ in found])
+    columns, values = (np.concatenate([item[k] for item in found] or [np.zeros(0)]) for k in (0, 1))
+    return Weights(len(found), row, columns.astype(np.int64), values)
