@@ -46,16 +46,23 @@ def moved(model: EnergyModel) -> frozenset[str]:
     return given(model) | frozenset(n.data[0] for t in pieces for n in local_variables(t.expression, rate))
 
 
-def inertial(model: EnergyModel) -> frozenset[str]:
-    """Coordinates by whose flow T* has a second derivative that is not zero by its structure."""
-    found = set()
+def _inertia(model: EnergyModel) -> Iterator[tuple[Node, Node, list[Node]]]:
+    """Each flow of each term of T*: the term's slope by it, and the flows by which that has one, by its structure."""
     for term in model.function(model.mirror.coenergy):
         rates = local_variables(term.expression, model.mirror.rate)
         for a in rates:
             slope = derivative(term.expression, a)
-            if any(not is_const(derivative(slope, b), 0.0) for b in rates):
-                found.add(a.data[0])
-    return frozenset(found)
+            yield a, slope, [b for b in rates if not is_const(derivative(slope, b), 0.0)]
+
+
+def inertial(model: EnergyModel) -> frozenset[str]:
+    """Coordinates by whose flow T* has a second derivative that is not zero by its structure."""
+    return frozenset(a.data[0] for a, _, others in _inertia(model) if others)
+
+
+def shared(model: EnergyModel) -> frozenset[str]:
+    """Coordinates whose momentum dT*/df other flows make too."""
+    return frozenset(a.data[0] for a, _, others in _inertia(model) if any(b is not a for b in others))
 
 
 def jumping(model: EnergyModel) -> frozenset[str]:
@@ -64,14 +71,10 @@ def jumping(model: EnergyModel) -> frozenset[str]:
     """
     pairs: list[tuple[str, str]] = []
     found = set[str]()
-    for term in model.function(model.mirror.coenergy):
-        rates = local_variables(term.expression, model.mirror.rate)
-        for a in rates:
-            slope = derivative(term.expression, a)
-            joined = [b.data[0] for b in rates if not is_const(derivative(slope, b), 0.0)]
-            pairs += [(a.data[0], b) for b in joined]
-            if joined and any(_jumps(model, n) for n in topological([slope])):
-                found.add(a.data[0])
+    for a, slope, others in _inertia(model):
+        pairs += [(a.data[0], b.data[0]) for b in others]
+        if others and any(_jumps(model, n) for n in topological([slope])):
+            found.add(a.data[0])
     while more := {a for a, b in pairs if b in found} - found:
         found |= more
     return frozenset(found)
@@ -88,18 +91,6 @@ def _jumps(model: EnergyModel, node: Node) -> bool:
     if node.op in ("cmp", "table") or (node.op == "call" and node.data in JUMPING):
         return any(n.op == "time" or (n.op == "var" and n.data[1] in ("s", "e")) for n in variables(node))
     return False
-
-
-def shared(model: EnergyModel) -> frozenset[str]:
-    """Coordinates whose momentum dT*/df other flows make too."""
-    found = set()
-    for term in model.function(model.mirror.coenergy):
-        rates = local_variables(term.expression, model.mirror.rate)
-        for a in rates:
-            slope = derivative(term.expression, a)
-            if any(b is not a and not is_const(derivative(slope, b), 0.0) for b in rates):
-                found.add(a.data[0])
-    return frozenset(found)
 
 
 def momentum(model: EnergyModel, node: Node) -> Node:

@@ -1,4 +1,4 @@
-"""A maximum matching of rows and columns by their pattern alone (core/linear/order/order.h)."""
+"""A maximum matching of rows and columns by their pattern alone (core/linear/order/matching.h)."""
 
 from __future__ import annotations
 

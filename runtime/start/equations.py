@@ -26,12 +26,13 @@ HIDDEN = ("dynamics_rate", "momentum_rate", "phi_rate", "phi_acceleration", "psi
 class Equations:
     """system: as written; settled: its form "start".
 
-    guessed: (rows of block initial that are guesses, the unknowns that they miss); unsettled [rows]: they need not
-    hold; rows, columns [entries]: of what some block writes in the matrix; alike [unknowns]: number of the kind and
-    unit of each; member [unknowns of y]: number of the kind; n: unknowns of y, those of the start alone among them;
-    joined [unknowns of y]: flows whose coordinates hold inertia of each other; momenta: (unknowns beside flows and
-    momenta that are contents of their kind, one of these flows each); balanced: flows have balances of their own, which
-    say what their stores hold (in Kane's form they are shared).
+    guessed: (rows of block initial that are guesses, the unknowns that they miss); told [unknowns of y]: what only
+    begins at a value of the others; unsettled [rows]: they need not hold; rows, columns [entries]: of what some block
+    writes in the matrix; alike [unknowns]: number of the kind and unit of each; member [unknowns of y]: number of the
+    kind; n: unknowns of y, those of the start alone among them; joined [unknowns of y]: flows whose coordinates hold
+    inertia of each other; momenta: (unknowns beside flows and momenta that are contents of their kind, one of these
+    flows each); balanced: flows have balances of their own, which say what their stores hold (in Kane's form they are
+    shared).
     """
 
     def __init__(self, system: System, settled: System) -> None:
@@ -45,6 +46,7 @@ class Equations:
         self._entries(settled)
         misses = np.append(settled.are("slack", "unsaid"), np.zeros(self.rates.size, dtype=bool))[self.columns]
         self.guessed = self.rows[misses], self.columns[misses]
+        self.told = self._told(settled)
         contents = self.contents(settled)
         self._kinds(settled, contents)
         self.measured = self._measured(settled, contents)
@@ -86,6 +88,15 @@ class Equations:
         of_family = [number.setdefault(f.kind, len(number)) for f in settled.description.families]
         self.member = np.array([*of_family, 0], dtype=np.int32)[settled.family_of]
         self.members = len(number)
+
+    def _told(self, settled: System) -> Mask:
+        """Dynamic variables that no row reads but those of block initial, one of which tells them [unknowns of y]."""
+        plain, initial = self.columns < self.n, settled.of_groups("initial")
+        row, column, telling = self.rows[plain], self.columns[plain], initial.copy()
+        telling[self.guessed[0]] = False
+        told, read = np.zeros((2, self.n), dtype=bool)
+        told[column[telling[row]]] = read[column[~initial[row]]] = True
+        return np.asarray(settled.are("s") & told & ~read)
 
     @staticmethod
     def contents(settled: System) -> Mask:

@@ -284,12 +284,30 @@ def consistent_start(
     behind one of half its length, that say which stores alone move.
     Raises InconsistentStart; SolverFailure (max_wall).
     """
+    starter = Starter(system if system.form.name == "3" else system.another("3"))
+    system = starter.system
+    if constants:
+        integrated, places = _integrated(starter)
+        starter.every[integrated] = False
+    if without:
+        rows, _, numbers, _ = switch_rows(system.description, starter.settled.form)
+        starter.every[rows[np.isin(numbers, without)]] = False
+    starter.work = Work(until=until)
     try:
-        return _consistent(
-            system, t0, near, until, without, jumped, constants=constants, quickly=quickly, silent=silent or quickly
-        )
+        if jumped is not None:
+            starter.jump_alone(t0, jumped)
+        guess = _aimed(starter, t0) if near is None else _close_to(starter, t0, near.y)
+        best, strategy = _sought(starter, t0, guess, quickly=quickly, silent=silent or quickly)
     except OutOfTimeError as error:
         raise SolverFailure("max_wall", t0, 0.0) from error
+    if constants:
+        system.description.p[places] += starter.residual(t0, best.x)[integrated]
+    found = _state(starter, t0, guess, best, strategy)
+    if best.x.size > LARGE:
+        starter.forget()
+        del starter, guess, best
+        system.trim(LARGE)
+    return found
 
 
 def _integrated(starter: Starter) -> tuple[Places, Places]:
@@ -301,62 +319,46 @@ def _integrated(starter: Starter) -> tuple[Places, Places]:
     return np.concatenate(rows), np.concatenate(places)
 
 
-def _consistent(
-    system: System,
-    t0: float,
-    near: ConsistentState | None,
-    until: float | None,
-    without: Sequence[int],
-    jumped: tuple[Floats, Floats] | None,
-    *,
-    constants: bool,
-    quickly: bool,
-    silent: bool,
-) -> ConsistentState:
-    """The same; OutOfTimeError."""
-    system = system if system.form.name == "3" else system.another("3")
-    starter = Starter(system)
-    if constants:
-        integrated, places = _integrated(starter)
-        starter.every[integrated] = False
-    if without:
-        rows, _, numbers, _ = switch_rows(system.description, starter.settled.form)
-        starter.every[rows[np.isin(numbers, without)]] = False
-    starter.work = Work(until=until)
-    if jumped is not None:
-        starter.jump_alone(t0, jumped)
-    guess = _aimed(starter, t0)
-    if near is not None:  # but for its multipliers, which redundant rows make as large as they like
-        y = np.where(system.are(*STATE, "e"), near.y, starter.given.guess[: system.unknowns])
-        guess = starter.unknowns(t0, y, np.zeros(y.size))
-    if silent and not starter.jumping and no_start(starter, t0, guess, starter.free):
+def _close_to(starter: Starter, t: float, y: Floats) -> Floats:
+    """A state as the guess, but for its multipliers, which redundant rows make as large as they like."""
+    system = starter.system
+    near = np.where(system.are(*STATE, "e"), y, starter.given.guess[: system.unknowns])
+    return starter.unknowns(t, near, np.zeros(near.size))
+
+
+def _sought(starter: Starter, t: float, guess: Floats, *, quickly: bool, silent: bool) -> tuple[Solution, str]:
+    """The solution, and the strategy that found it; where there is none rates of laws without a slope are not asked for
+    either, and the search begins anew.  InconsistentStart.
+    """
+    if silent and not starter.jumping and no_start(starter, t, guess, starter.free):
         raise InconsistentStart("stuck", float("inf"))
-    best, strategy = _attempt(starter, t0, guess, starter.free, 1 if quickly else None)
-    if (quickly or starter.jumping) and not strategy:
+    until = starter.work.until
+    best, strategy = _attempt(starter, t, guess, starter.free, 1 if quickly else None)
+    if strategy:
+        return best, strategy
+    if quickly or starter.jumping:
         raise InconsistentStart("stuck", best.residual)
-    if not strategy:
-        flat = _flat(starter, t0, guess, starter.free)
-        if unasked(starter, flat):
-            starter.work = Work(until=until)
-            best, strategy = _attempt(starter, t0, guess, starter.free)
-        if not strategy:
-            raise _explain(starter, t0, guess, starter.free, best, flat)
-    if constants:
-        system.description.p[places] += starter.residual(t0, best.x)[integrated]
+    flat = _flat(starter, t, guess, starter.free)
+    if unasked(starter, flat):
+        starter.work = Work(until=until)
+        best, strategy = _attempt(starter, t, guess, starter.free)
+        if strategy:
+            return best, strategy
+    raise _explain(starter, t, guess, starter.free, best, flat)
+
+
+def _state(starter: Starter, t: float, guess: Floats, best: Solution, strategy: str) -> ConsistentState:
+    """The state at a solution, and what moved for it."""
     at = starter.moves("q")
     displaced = bool((best.x[at] != guess[at]).any())
     starter.spare()
-    largest = np.maximum(starter.scale(t0, guess), starter.largest_alike(best.x))
-    state = starter.free & ~starter.following(t0, best.x)
+    largest = np.maximum(starter.scale(t, guess), starter.largest_alike(best.x))
+    state = starter.free & ~starter.following(t, best.x)
     kept = bool((np.abs(best.x - guess) <= EXACT * largest)[state].all())
-    zeros = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: system.form.written]
-    del largest
-    moved = tuple(moved_guesses(starter, t0, best.x, starter.scale(t0, best.x)))
+    zeros = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: starter.system.form.written]
+    del largest  # of a large model the room counts
+    moved = tuple(moved_guesses(starter, t, best.x, starter.scale(t, best.x)))
     fixed = np.abs(best.x[starter.pinned])
     nothing = NOTHING * min(1.0, float(fixed[fixed > 0.0].min(initial=1.0)))
     y, yd = (np.where(np.abs(values) < nothing, 0.0, values) for values in starter.expand(best.x))
-    if best.x.size > LARGE:
-        starter.forget()
-        del starter, guess
-        system.trim(LARGE)
-    return ConsistentState(t0, y, yd, moved, best.residual, strategy, zeros, displaced, kept)
+    return ConsistentState(t, y, yd, moved, best.residual, strategy, zeros, displaced, kept)

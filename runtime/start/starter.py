@@ -300,7 +300,8 @@ class Starter:
 
     @remembered
     def following(self, t: float, x: Floats) -> Mask:
-        """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia.
+        """Unknowns that follow from the state: multipliers, implicit ones, derivatives, flows without inertia, and what
+        only begins at a value of the others (energies since the start).
 
         Of a momentum and its flow the one that is written carries the state, else the momentum; where other flows make
         it too, the momentum in any case.
@@ -310,6 +311,7 @@ class Starter:
         carries = state & ~self.measured
         carries[: self.system.unknowns] &= self.system.differential(jyd)
         carries |= self.given.written & state
+        carries &= ~self.equations.told
         flow, momentum, written = self._flow, self._momentum, self.given.written
         carries[flow[~written[flow]]] = False
         carries[momentum[written[flow] & ~self.equations.joined[flow]]] = False

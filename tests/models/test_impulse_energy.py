@@ -29,7 +29,7 @@ model m {
 }
 scene s of m { time 0 s to 0.5 s
   init C2.e = 0 V
-  trace V.energy as EV, C1.energy as E1, C2.energy as E2, R.energy as ER QTRACE every 10 ms; accuracy 1e-6 }
+  trace V.energy as EV, C1.energy as E1, C2.energy as E2, R.energy as ER, Q every 10 ms; accuracy 1e-6 }
 """
 STEPS = {
     "text": ("", "(if t < 0.2 s then 0 m/s else 0.5 m/s)"),
@@ -68,20 +68,43 @@ def test_a_source_of_velocity_that_steps_does_the_work_of_its_impulse(tmp_path, 
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", FOUR)
 def test_a_source_of_voltage_that_steps_pays_for_the_charge_that_passes_at_once(tmp_path, formulation):
-    primal = not formulation.startswith(
-        "co_"
-    )  # a state that integrates a current is not found in the complementary ones
-    text = VOLTAGE if primal else VOLTAGE.replace("  state Q: C = 0 C\n  dynamic Q' = V.f\n", "")
-    text = text.replace("QTRACE", ", Q" if primal else "")
     passed, flows = 4.0 / 3.0, 8.0 / 3.0 * (1.0 - np.exp(-0.1))
     left = 4.0 / 3.0 * np.exp(-0.1)
     for method in ("auto", "bdf", "radau", "rosenbrock"):
-        found = _run(text, tmp_path, formulation=formulation, method=method)
+        found = _run(VOLTAGE, tmp_path, formulation=formulation, method=method)
         wanted = -(2.0 * passed + 3.0 * flows), (3.0 - left) ** 2 - 1.0, 0.5 * left**2
         assert _last(found, "EV", "E1", "E2") == pytest.approx(wanted, abs=4e-6)
         assert sum(_last(found, "EV", "E1", "E2", "ER")) == pytest.approx(0.0, abs=4e-6)
-        if primal:
-            assert found["Q"].values[-1] == pytest.approx(-(passed + flows), abs=4e-6)
+        assert found["Q"].values[-1] == pytest.approx(-(passed + flows), abs=4e-6)
+
+
+ALONE = """\
+model m {
+  node a: electrical
+  state W: J = 0 J
+  state S: C.V^2 = 0 C.V^2
+  V: effort(e = (if t < 0.2 s then 0 V else 5 V)) a -> ground
+  C: potential(q = 2 mF*e) a -> ground
+  dynamic W' = C.e*C.f
+  dynamic S' = POWER
+}
+scene s of m { time 0 s to 0.3 s; trace C.e as e, W, S every 10 ms; accuracy 1e-6 }
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_what_a_capacitor_takes_at_once_is_integrated_along_its_voltage(tmp_path, formulation):
+    """Where nothing has inertia or displacements either, as in the complementary forms."""
+    found = _run(ALONE.replace("POWER", "C.e^2*C.f"), tmp_path, formulation=formulation)
+    assert _last(found, "e", "W", "S") == pytest.approx((5.0, 0.5 * 2e-3 * 5.0**2, 2e-3 * 5.0**3 / 3.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_the_square_of_a_pulse_has_no_integral(tmp_path, formulation):
+    """However small it is beside a current that is there: 1e-8 C and 20 A."""
+    text = ALONE.replace("C.V^2", "A^2.s").replace("POWER", "(C.f + 20 A)^2").replace("2 mF", "2 nF")
+    with pytest.raises(api.SolverFailure, match="endless"):
+        _run(text, tmp_path, formulation=formulation)
 
 
 CURVED = """\
@@ -131,6 +154,26 @@ scene s of m { time 0 s to 0.3 s; init C2.e = 0 V
         assert found["V"].values[-1] == pytest.approx(-0.132349, abs=1e-6)
 
 
+@pytest.mark.parametrize("formulation", FOUR)
+def test_a_source_beside_others_pays_what_a_capacitor_of_any_law_takes(tmp_path, formulation):
+    """The charges at its node add up by an integrated row, in which nobody keeps that of the source."""
+    text = """\
+model m {
+  node a: electrical
+  V: effort(e = (if t < 0.2 s then 1 V else 3 V)) a -> ground
+  C: potential(e = 2 V*(q/(1 C) + 0.3*(q/(1 C))^3)) a -> ground
+  R: dissipator(e = 1 ohm*f) a -> ground
+}
+scene s of m { time 0 s to 0.3 s
+  trace C.energy as EC, R.energy as ER, V.energy as EV, C.q as q every 10 ms; accuracy 1e-6 }
+"""
+    found = _run(text, tmp_path, formulation=formulation)
+    q = found["q"].values
+    took = (q**2 + 0.15 * q**4)[[0, -1]]
+    assert _last(found, "EC", "ER") == pytest.approx((took[1] - took[0], 1.0 * 0.2 + 9.0 * 0.1), abs=1e-7)
+    assert sum(_last(found, "EC", "ER", "EV")) == pytest.approx(0.0, abs=1e-7)  # 0.059 J by the mean of the voltage
+
+
 def test_a_mean_that_is_zero_is_no_energy_that_is(tmp_path):
     """From -3 V to 3 V the mean effort is nothing, what a capacitor of cubic law takes on the way is not."""
     text = """\
@@ -169,7 +212,7 @@ scene s of m { time 0 s to 0.5 s; trace K.energy as K, M.energy as M, x.f as v e
 
 
 READ = (
-    VOLTAGE.replace("QTRACE", ", D.f as D")
+    VOLTAGE.replace(", Q every", ", D.f as D every")
     .replace("a, b:", "a, b, d:")
     .replace(
         "  state Q",
@@ -272,8 +315,6 @@ def test_what_is_sampled_at_the_start_counts(tmp_path, formulation):
     """Two capacitors that a sample charges at once: what sources gave is what stores and resistors have."""
     source = "discrete u = 1 V; every 10 ms { u := 4 V - u }; V: effort(e = u) a -> ground"
     text = VOLTAGE.replace("V: effort(e = (if t < 0.2 s then 1 V else 3 V)) a -> ground", source)
-    for line in ("QTRACE", "state Q: C = 0 C\n", "dynamic Q' = V.f\n"):
-        text = text.replace(line, "")
     trace = _run(text, tmp_path, formulation=formulation)
     total = sum(trace[name].values for name in ("EV", "E1", "E2", "ER"))
     assert np.abs(trace["EV"].values).max() > 2.0

@@ -6,12 +6,14 @@ At every row, those at the two sides of an instant among them, against Kirchhoff
 import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
+from start_strategies import started
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
+from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.start import eventful_start
 from sysdyn.runtime.model.system import System
 
@@ -188,3 +190,56 @@ model pulsed {
         network = load.network(document, document.models["pulsed"], None, report)
         made = prepare(network, report, formulation="lagrangian", backend="numpy")
         assert not np.shares_memory(System(made.structure, made.arrays, made.carrier).description.p, made.binding.p)
+
+
+FORCED = """
+model m {
+  node a, b: electrical
+  V: effort(e = 5 V) a -> ground
+  C1: potential(q = 2 F*e) a -> b
+  C2: potential(q = 3 F*e) b -> ground
+  R: dissipator(e = 5 ohm*f) b -> ground
+  I: flow(f = 2 A) c -> ground
+  L1: kinetic(p = 0.25 H*f) d -> c
+  L2: kinetic(p = 4 H*f) c -> d
+  G: dissipator(e = 3 ohm*f) d -> ground
+}
+scene s of m { time 0 s to 1 s; trace C1.q, C2.q, L1.p, L2.p%s }
+""".replace("node a, b", "node a, b, c, d")
+
+
+@pytest.mark.parametrize("traced", ["", ", C1.energy", ", L2.energy", ", C2.energy + L1.energy as all"])
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(3)
+def test_what_is_traced_does_not_move_the_start(formulation, traced):
+    """Charges q1/2 F + q2/3 F = 5 V and fluxes p1/0.25 H - p2/4 H = 2 A of least squares, whatever is written down: the
+    energy with which an element began pulled at them as a store of its own would.
+    """
+    begun = started(FORCED % traced, formulation)
+    found = Observer(begun.system)(begun.state.t, *begun.state.for_form(begun.system))[:4]
+    charges = 5.0 / (0.25 + 1.0 / 9.0) * np.array([0.5, 1.0 / 3.0])
+    fluxes = 2.0 / (16.0 + 1.0 / 16.0) * np.array([4.0, -0.25])
+    assert found == pytest.approx(np.append(charges, fluxes), rel=1e-9)
+
+
+CUBIC = """
+model m {
+  node a, b: electrical
+  V: effort(e = 1 V) c -> ground
+  S: dissipator(e = 1 ohm*f) c -> a
+  L1: kinetic(f = 0.5 A*(p/(1 Wb) + (p/(1 Wb))^3)) a -> b
+  L2: kinetic(p = 0.2 H*f) b -> ground
+  R: dissipator(e = 1 ohm*f) b -> ground
+  init L1.f ~ -5 A
+}
+scene s of m { time 0 s to 1 s; trace L1.p, L2.p }
+""".replace("node a, b", "node a, b, c")
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
+def test_a_guess_of_a_flow_moves_the_store_of_whose_law_it_tells_no_content(formulation):
+    """p + p^3 = -10: p = -2; the store beside it, of which nothing is said, was moved as far (1 Wb)."""
+    begun = started(CUBIC, formulation)
+    found = Observer(begun.system)(begun.state.t, *begun.state.for_form(begun.system))[:2]
+    assert found == pytest.approx([-2.0, 0.0], abs=1e-9)

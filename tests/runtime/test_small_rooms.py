@@ -4,7 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from sysdyn.runtime.events.bounces import thrown
 from sysdyn.runtime.events.returns import SEEN, flights
+from sysdyn.runtime.events.watching import FALLEN, Watched, Watching
 from sysdyn.runtime.integrate.jumps.first_step import PARTS, WIDER, FirstStep
 from sysdyn.runtime.integrate.jumps.modes import EARLY
 from sysdyn.runtime.model.facts import Facts
@@ -39,6 +41,41 @@ def test_a_thrown_ball_is_back_after_twice_its_speed_over_g(speed):
     assert least == pytest.approx(2.0 * np.sqrt(2.0 * SEEN * 1e-9 / G), rel=1e-9)
     falling = np.array([0.0, -speed]), np.array([-speed, -G])
     assert flights(flying, flying, 0.0, falling, speed / G, [(0, 1)]) == []
+
+
+class Watch(Watching):
+    """A gap whose row is 3, samples of 10 ms and 25 ms, values that count as zero below 1e-6; a run of 1 s."""
+
+    def __init__(self):
+        contact = SimpleNamespace(value=3, rate=4)
+        samples = [SimpleNamespace(period=0.01), SimpleNamespace(period=0.025)]
+        self.plan = SimpleNamespace(contacts=[contact], sampled=samples, relations=[], kinks=[])
+        self.span, self.nothing, self.next = (0.5, 1.5), 1e-12, np.zeros(2, dtype=np.int64)
+        self.observer = SimpleNamespace(zero=lambda row: 1e-6, largest=np.ones(5))
+        self.bounces = {}
+
+
+def test_samples_are_due_once_each_whatever_their_instants_are_rounded_to():
+    watch, met = Watch(), {0: 0, 1: 0}
+    while (t := watch.next_sample()) < 0.6 + 1e-9:
+        due = watch.due(t * (1.0 + 2e-16))
+        assert due == [k for k, n in ((0, (t - 0.5) / 0.01), (1, (t - 0.5) / 0.025)) if abs(n - round(n)) < 1e-6]
+        assert watch.due(t) == []
+        for k in due:
+            met[k] += 1
+    assert met == {0: 11, 1: 5}
+
+
+@pytest.mark.parametrize("speed", [1e-4, 0.1])
+def test_behind_an_impact_a_gap_closes_below_a_part_of_what_it_rises_to(speed):
+    watch, gap = Watch(), Watched(-1, 0, 3, 1)
+    assert (watch._least(gap), watch._level(gap), watch.rate(gap)) == (1e-6, 0.0, 4)
+    watch.bounces[3] = thrown(-1e-9, speed, G)
+    rises = 0.5 * speed**2 / G
+    assert watch._least(gap) == pytest.approx(FALLEN * min(1e-6, rises), rel=1e-12)
+    assert watch._level(gap) == -1e-9
+    assert watch.flight(2.0 * rises) == pytest.approx(2.0 * speed / G, rel=1e-12)
+    assert watch.flight(0.5 * rises) == np.inf
 
 
 def test_the_rate_of_a_source_at_its_peak_is_zero():

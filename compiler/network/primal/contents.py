@@ -8,8 +8,8 @@ In a series class the first potential store is the coordinate.  Another one hold
 initial content less +- that of the first; it is chosen where not all of these are fixed and a loop of stores and
 efforts, or what is said of anything else (a resistor, an effort of e = q + q^3), may ask for others.  What is no store
 begins at what the text says of it, else at zero, whatever the first store holds.  A store between two nodes of the
-reflection (an inductor) holds their difference: where such stores close loops in which contents are said, each has its
-own initial content as k where the text fixes it, else it is chosen.  The same where something else is said.
+reflection (an inductor) holds their difference: where such stores may close loops each has its own initial content as k
+where the text fixes it, else it is chosen.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
-from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_size, meet, shape_of, union, without
+from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_size, shape_of, union, without
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import (
@@ -180,8 +180,7 @@ class Contents:
         self.dynamics: list[Dynamic] = []
         self._given: dict[str, list[tuple[Initial, Box]]] = {}
         self._stems: list[str] = []
-        self._settled: set[int] = set()  # numbers of followers that are no stores, whose constant the text tells
-        self._free: list[Element] = []  # those whose constant follows from what they begin at
+        self._led: dict[int, Element] = {}  # followers that are no stores: what they begin at is no guess
         kinetic = {e.name for e in elements if e.branch.kind == "kinetic"}
         self._loose = any(  # what is said of others may ask for contents
             not _is_content(i) and not _of_momenta(i, kinetic) for i in initials
@@ -200,7 +199,10 @@ class Contents:
                 followers.setdefault(m.element.number, []).append(m)
         for group in followers.values():
             self._follower(group[0].element, group)
-        self._chords([e for e in between if e.number in self.looped and e.branch.law is not None])
+        for e in between:
+            if e.number in self.looped and e.branch.law is not None:
+                value = self.start(e.name, indices(e.named), ranges_over(e.named))
+                self._constant(e, value if self._fixed(e, e.named) else None)
 
     def start(self, name: str, at: tuple[Node, ...], within: overlaps.Ranges) -> Node:
         """The initial content of a store: what the statement about it says, else 0."""
@@ -216,25 +218,10 @@ class Contents:
             first = self.start(m.leader.name, m.leader_at(at), part)
             value = inside(part, whole, sub(self.start(element.name, at, part), scale(m.sign, first)), value)
         if element.branch.kind != "potential":
-            led = all(self._fixed(m.leader.name, _led_by(m)) for m in members)
-            open_ = any(m.leader.branch.kind == "potential" for m in members) and not led
-            if open_ and (self._loose or any(m.leader.number in self.looped for m in members)):
-                self._free.append(element)
-                self._constant(element, None)
-            else:
-                self._settled.add(element.number)
-                self._constant(element, value)
-            return
-        fixed = all(self._fixed(element.name, m.box) and self._fixed(m.leader.name, _led_by(m)) for m in members)
-        sought = self._loose or element.number in self.looped
+            self._led[element.number] = element
+        sought = self._loose or self.looped & {element.number, *(m.leader.number for m in members)}
+        fixed = all(self._fixed(element, m.box) and self._fixed(m.leader, _led_by(m)) for m in members)
         self._constant(element, value if fixed or not sought else None)
-
-    def _chords(self, looped: Sequence[Element]) -> None:
-        """The constants of stores between nodes of the reflection whose loops start with contents of their own."""
-        given = {e.number for e in looped if any(meet(box, e.named) for _, box in self._given.get(e.name, ()))}
-        for e in looped if given or self._loose else ():
-            value = self.start(e.name, indices(e.named), ranges_over(e.named))
-            self._constant(e, value if self._fixed(e.name, e.named) else None)
 
     def _constant(self, element: Element, value: Node | None) -> None:
         """A parameter of that value over the element's indices, none for zero; chosen by the start where None."""
@@ -252,9 +239,10 @@ class Contents:
             self.states.append(State(name, shape, unit, place))
             self.dynamics.append(Dynamic(var(name, "s", *indices(box)), const(0.0), loops_over(box), place))
 
-    def _fixed(self, name: str, box: Box) -> bool:
-        """Whether the text fixes the contents of all these elements."""
-        return not without(box, *(said for initial, said in self._given.get(name, ()) if initial.fixed))
+    def _fixed(self, element: Element, box: Box) -> bool:
+        """Whether the text fixes the contents of all these elements; of what is no store it does, if only at zero."""
+        given = self._given.get(element.name, ())
+        return element.branch.kind != "potential" or not without(box, *(said for i, said in given if i.fixed))
 
     # -- initial conditions -------------------------------------------------------------------------------------
 
@@ -283,8 +271,8 @@ class Contents:
                     yield replace(initial, target=target, value=value, loops=own)
 
     def _begun(self) -> Iterator[Initial]:
-        """What those begin at whose constants follow from it."""
-        for e in self._free:
+        """What followers that are no stores begin at."""
+        for e in self._led.values():
             b, given = e.branch, [initial for initial, _ in self._given.get(e.name, ())]
             within = ranges_of(b.loops, self.reader.sizes, b.place)
             zero = Initial(var(e.name, "bq", *b.at), const(0.0), True, b.loops, b.place, said=False)
@@ -298,9 +286,9 @@ class Contents:
         target = initial.target
         if _is_content(initial):
             piece = self.reader.piece(target.data[0], target.args, ranges)
-            if piece.element.number in self._settled:
-                return None
             m, (_, fixed) = piece.member, self.reader.book.contents.get(piece.element.number, ("", True))
+            if fixed and piece.element.number in self._led:
+                return None  # by its constant
             if m is not None and fixed and piece.element.branch.kind == "potential":
                 q = var(m.coordinate, "q", *m.indices(target.args))
                 if m.leads and len(m.index) == len(target.args):

@@ -58,16 +58,13 @@ def measured(
 
 
 def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
-    """Guesses of the contents of a statement's elements: by the text, and zero where it guesses nothing.
-
-    Left out is what it guesses in words that tell no content; what is fixed is guessed as well (at zero where only the
-    start can tell it).
+    """Guesses of the contents of a statement's elements: by the text, fixed or not, and zero where it says nothing, or
+    in words of which only the start can tell a content.
     """
-    telling, contents = [i for i in initials if _tells(i, b)], set[Initial]()
-    for i, loops, content in told(b, telling, sizes):
-        contents.add(i)
+    telling = list[Initial]()
+    for i, loops, content in told(b, [i for i in initials if _tells(i, b)], sizes):
+        telling.append(i)
         yield replace(i, value=content, loops=loops, fixed=False, said=not i.fixed)
-    telling = [i for i in telling if i in contents or not i.fixed]
     within = ranges_of(b.loops, sizes, b.place)
     zero = Initial(const(0.0), const(0.0), False, b.loops, b.place, said=False)
     yield from (replace(zero, loops=narrowed(b.loops, ranges)) for ranges in untold(telling, b.at, within, sizes))

@@ -14,7 +14,8 @@ from sysdyn.runtime.integrate.jumps.modes import AT_ONCE, EARLY
 from sysdyn.runtime.model.description import Floats
 
 if TYPE_CHECKING:
-    from sysdyn.runtime.events.handler import Handler, Watched
+    from sysdyn.runtime.events.handler import Handler
+    from sysdyn.runtime.events.watching import Watched
     from sysdyn.runtime.integrate.integrate import Integration
 
 PARTS = 8

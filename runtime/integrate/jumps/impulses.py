@@ -30,7 +30,9 @@ AGREED = 1e-8
 AWAY = 1e-6
 """Of its magnitude: by how much the end of a curved way may be elsewhere."""
 STEEP = 1e-6
-"""Of a power: by what it may differ with pulses in the place of finite flows."""
+"""Of a power: by what it may differ with pulses in the place of finite flows and forces."""
+RISE = 1e-9
+"""s: of pulses that are told from what is finite."""
 
 _Slopes = tuple[Floats, Floats]
 
@@ -65,10 +67,11 @@ class Impulses:
         # displacements tell the pulses of their flows
         self._given = over.force | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
         self._pulses = over.pulses(self._moved, self._given)
-        self._balances, self._others = self._by_order()
+        open_ = np.isin(np.arange(settled.unknowns), unread)  # their flows are given, their places nobody keeps
+        self._balances, self._others = self._by_order(open_)
         forced = np.isin(np.arange(settled.rows), self._row[in_y & over.force[self._column]])
         self._laws = settled.of_groups("gamma") & ~forced  # at each point too where their flows are no pulses
-        self._carries = ((settled.kinds == "q") & ~np.isin(np.arange(settled.unknowns), unread)) | inert
+        self._carries = ((settled.kinds == "q") & ~open_) | inert | over.contents
         held = form.k_q[inert[form.k_f]]
         self._stays = np.isin(np.arange(settled.unknowns), np.concatenate([self.states, held, unread]))
 
@@ -85,8 +88,10 @@ class Impulses:
         found = self._row[rates[self._row] & self._in_y & pulses[self._column]]
         return np.setdiff1d(found, self.rows)
 
-    def _by_order(self) -> tuple[Mask, Mask]:
-        """Rows that impulses meet, integrated over an instant; rows that hold at each point of the rise."""
+    def _by_order(self, open_: Mask) -> tuple[Mask, Mask]:
+        """Rows that impulses meet, integrated over an instant; rows that hold at each point of the rise, none of which
+        reads open displacements.
+        """
         settled, flow = self.system, (self._moved >= 0)[self._column]
         moved, own = np.zeros((2, settled.rows), dtype=bool)
         moved[self._row[self._in_rate | (self._in_y & flow)]], own[self.rows] = True, True
@@ -95,7 +100,8 @@ class Impulses:
         told = np.zeros(settled.rows, dtype=bool)
         told[self._row[(self._given & (settled.kinds == "f"))[self._column] & self._in_y]] = True
         integrated |= settled.of_groups("phi_rate") & told
-        held = settled.of_groups("phi", "phi_rate", "psi", "momentum")
+        places = np.isin(np.arange(settled.rows), self._row[self._in_y & open_[self._column]])
+        held = settled.of_groups("phi", "phi_rate", "psi", "momentum") & ~places
         return integrated, held | (settled.of_groups("dynamics", "gamma") & ~moved)
 
     def gains(self, before: Side, behind: Side, magnitude: Floats) -> Floats:
@@ -111,7 +117,7 @@ class Impulses:
         found, balanced, faithful = self._straight(before, behind, way, others)
         if not (balanced and faithful):
             curved = self._curved(before, behind, way, (magnitude, others))
-            if curved is None and not balanced and not self._assigned:
+            if curved is None and not self._assigned:
                 raise SolverFailure("unbalanced", behind.t, 0.0)
             found = found if curved is None else curved
         return np.where(assigned, 0.0, found)
@@ -125,7 +131,9 @@ class Impulses:
     # -- the rise ------------------------------------------------------------------------------------------------
 
     def _slopes(self, sides: tuple[Side, Side], part: float, y: Floats, pulse: Floats | float = 0.0) -> _Slopes:
-        """dF/dy, dF/dyd [entries] at y, text and parameters a part of their way along; pulse [unknowns]: of flows."""
+        """dF/dy, dF/dyd [entries] at y, text and parameters a part of their way along; pulse [unknowns]: of flows,
+        of forces.
+        """
         p, own = self.system.description.p, self.system.description.p.copy()
         found = []
         for side in sides:
@@ -159,20 +167,30 @@ class Impulses:
     def _straight(self, before: Side, behind: Side, way: Floats, others: Mask) -> tuple[Floats, bool, bool]:
         """The gains [states] where all unknowns go straight; whether impulses balance there, and others [rows] hold."""
         gained, balanced, faithful = np.zeros(self.states.size), True, True
-        pulse = self._pulse(way)
         for part in GAUSS:
             y = before.y + part * way
             slopes = self._slopes((before, behind), part, y)
             impulse, met = self._impulse(slopes, way)
             rate = self._rate(terms := self._terms(slopes, way, impulse))
             self._still(terms, behind.t)
-            if pulse.any():
-                pulsed = self._terms(self._slopes((before, behind), part, y, pulse), way, impulse)
-                self._finite(rate, self._rate(pulsed), behind.t)
+            fast = self._fast(terms, way, impulse)
+            if fast.any():
+                with np.errstate(all="ignore"):
+                    pulsed = self._terms(self._slopes((before, behind), part, y, fast), way, impulse)
+                    self._finite(rate, self._rate(pulsed), behind.t)
             gained += 0.5 * rate
             balanced &= met
             faithful &= self._holds((before, behind), part, y, others)
         return gained, balanced, faithful
+
+    def _fast(self, terms: Floats, way: Floats, impulse: Floats) -> Floats:
+        """Flows and forces [unknowns] in a rise that takes RISE; impulses that are nothing beside the largest term of a
+        balance are round-off.
+        """
+        size = np.where(self._balances[self._pulses.row], np.abs(terms), 0.0)
+        own = (self._pulses.column % 2 == 1) & (size > BROKEN * size.max(initial=0.0))
+        counts = np.isin(np.arange(way.size), self._pulses.column[own] // 2)
+        return (self._pulse(way) + np.where(counts, impulse, 0.0)) / RISE
 
     def _still(self, terms: Floats, t: float) -> None:
         """SolverFailure where a dynamic variable that others read has a rate with an impulse: it would jump."""

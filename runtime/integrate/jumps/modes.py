@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from sysdyn.runtime.events.bounces import Bounce
-from sysdyn.runtime.events.handler import STALLED, Handler, Watched
+from sysdyn.runtime.events.handler import STALLED, Handler
 from sysdyn.runtime.events.kinks import WORDS
 from sysdyn.runtime.events.observer import SMALL
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
+from sysdyn.runtime.events.watching import Watched
 from sysdyn.runtime.integrate.jumps.crossing import JUMP
 from sysdyn.runtime.integrate.jumps.segments import core_pieces
 from sysdyn.runtime.integrate.jumps.strikes import Balance, of_momenta, struck

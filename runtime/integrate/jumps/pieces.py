@@ -13,9 +13,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from sysdyn.runtime.events.handler import Handler, Point, Watched
+from sysdyn.runtime.events.handler import Handler, Point
 from sysdyn.runtime.events.observer import SMALL
 from sysdyn.runtime.events.plan import Happened, Plan
+from sysdyn.runtime.events.watching import Watched
 from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.jumps.crossing import go_on
 from sysdyn.runtime.integrate.jumps.first_step import PARTS, FirstStep
