@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.model.interpret import over
 from sysdyn.compiler.model.parameters import Parameters
-from sysdyn.dsl.model.expression import Node, is_const, variables
+from sysdyn.dsl.model.expression import Node, is_const, topological, variables
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Branch, Network, Slope
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
@@ -34,6 +34,10 @@ class Slopes:
             return Parameters(self._network, {})
         except ModelError:  # binding says what is wrong
             return None
+
+    def assigned(self, node: Node) -> bool:
+        """Whether the expression reads a parameter that events assign."""
+        return any(n.op == "param" and n.data in self._network.discretes for n in topological([node]))
 
     def flat(self, branch: Branch, slope: Node) -> bool:
         """Whether the slope is zero in all elements."""
