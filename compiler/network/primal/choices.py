@@ -168,9 +168,10 @@ class Causality:
         v, given = own(branch, OWN[branch.kind][0]), conjugate(branch)
         alone = self._alone(law, given)
         straight = line(law, given) if alone else None
-        if self.slopes.flat(branch, straight.slope) if straight else alone and not kinetic and not variables(law):
+        flat = self.slopes.flat(branch, straight.slope) if straight else alone and not kinetic and not variables(law)
+        if flat:
             return self._held(law if straight is None else straight.constant)
-        if straight is not None:
+        if straight is not None and flat is not None:
             note = ("N601", f"the law of {branch.name} was inverted: it is linear")
             return self._explicit(straight.inverse(v), (note,))
         found = inverse(branch, law, given, v, self.slopes, self.tables) if alone else None
