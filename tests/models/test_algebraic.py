@@ -82,3 +82,37 @@ def test_a_diode_that_follows_its_source_between_long_steps(tmp_path, formulatio
     amperes = 25.85e-3 / 100.0 * lambertw(inner).real - 1e-12
     assert np.abs(trace["R.f"].values - amperes).max() < 1e-9 * np.abs(amperes).max()
     assert np.abs(trace["D.e"].values - (volts - 100.0 * amperes)).max() < 1e-8
+
+
+@pytest.mark.parametrize("accuracy", [4.6e-4, 1e-5, 1e-7])
+def test_a_root_of_a_law_that_follows_its_source(tmp_path, accuracy):
+    """u/R = v/R + k v^3 beside a capacitor that stays empty: no error has a test, and Newton's iteration for all stages
+    took its second correction for round-off wherever those of the state were (1e6 V, told as met).
+    """
+    text = """
+    model cubic {
+      param G = 0 S
+      param G1 = 0 S
+      param R5 = 1 ohm
+      param k = 1 S/V^2
+      param C = 1 F
+      node u, v, w, x: electrical
+      source: effort(e = 2 V*sin(1.906 rad/s*t)) u -> ground
+      feed: dissipator(e = 2.553 ohm*f) v -> u
+      load: dissipator(f = G1*e + k*e^3) v -> ground
+      left: dissipator(e = 0.362 ohm*f) w -> u
+      leak: dissipator(f = G*e) x -> w
+      store: potential(q = C*e) x -> w
+      right: dissipator(e = R5*f) ground -> w
+    }
+    scene run of cubic {
+      time 0 s to 4 s
+      solver radau
+      trace v.e as v every 0.05 s
+    }
+    """
+    trace = trace_of(tmp_path, text, scene="run", formulation="co_hamiltonian", accuracy=accuracy)
+    source = 2.0 * np.sin(1.906 * trace.time)
+    roots = [np.roots([2.553, 0.0, 1.0, -u]) for u in source]
+    real = np.array([next(r.real for r in found if abs(r.imag) < 1e-9) for found in roots])
+    assert np.abs(trace["v"] - real).max() < 1e-9
