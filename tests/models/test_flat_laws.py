@@ -135,3 +135,14 @@ def test_an_array_with_one_flat_law(tmp_path):
     last = [trace_of(tmp_path, text, formulation=f)["v[3].e"].values[-1] for f in FOUR]
     assert last == pytest.approx([last[0]] * 4, rel=1e-3)
     assert last[0] > 0.0
+
+
+def test_an_inductor_of_zero_between_nodes_is_a_wire(tmp_path):
+    """A fault in sysdyn in the complementary forms: what holds nothing was guessed to hold nothing."""
+    text = MODEL.replace("param R", "param L0 = 0 H\n  param R").replace(
+        "a -> b", "a -> w\n  L0_: kinetic(p = L0*f) w -> b"
+    )
+    text = text.replace("node a, b", "node a, b, w")
+    alone = trace_of(tmp_path, MODEL)["b.e"].values
+    for formulation in FOUR:
+        assert np.abs(trace_of(tmp_path, text, formulation=formulation)["b.e"] - alone).max() < 1e-6, formulation

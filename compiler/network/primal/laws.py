@@ -39,6 +39,7 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.model.network import (
+    Branch,
     Constraint,
     Coupling,
     Dynamic,
@@ -78,6 +79,7 @@ class Laws:
     initials: list[Initial] = field(default_factory=list)
     functions: dict[int, dict[str, Node]] = field(default_factory=dict)
     slopes: tuple[Slope, ...] = ()
+    constant: set[Branch] = field(default_factory=set)  # what they hold is the same whatever their effort
     tables: dict[str, Table] = field(default_factory=dict)
 
 
@@ -167,6 +169,7 @@ class _Statement:
             self._work(law.stated)
             found.efforts[self.element.number] = law.stated
         elif law.how == "row":
+            found.constant.add(b)
             self._row("psi", law.stated, b.domain.flow)
             found.efforts[self.element.number] = var(self._name("law"), "mu", *b.at)
         elif law.how in ("implicit", "state"):
