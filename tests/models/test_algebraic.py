@@ -116,3 +116,27 @@ def test_a_root_of_a_law_that_follows_its_source(tmp_path, accuracy):
     roots = [np.roots([2.553, 0.0, 1.0, -u]) for u in source]
     real = np.array([next(r.real for r in found if abs(r.imag) < 1e-9) for found in roots])
     assert np.abs(trace["v"] - real).max() < 1e-9
+
+
+def test_a_ledger_is_balanced_however_light_the_method(tmp_path):
+    """Behind a draft in which little happens the bdf had 200 steps for its ledger, too: E921 by 1.03 of the limit."""
+    text = """
+    model light {
+      param C0 = 0 F
+      node a, b, c: electrical
+      V: effort(e = 2 V*sin(1.085 rad/s*t)) a -> ground
+      M: dissipator(e = 0.462 ohm*f + 1 ohm/A^2*f^3) b -> a
+      one: potential(q = C0*e) c -> b
+      two: potential(q = 0.915 F*e) ground -> c
+      three: potential(q = C0*e) a -> b
+      R: dissipator(e = 2.994 ohm*f) a -> ground
+    }
+    scene run of light {
+      time 0 s to 4 s
+      accuracy 1e-5
+      trace R.f every 0.05 s
+    }
+    """
+    trace = trace_of(tmp_path, text, scene="run", formulation="hamiltonian")
+    assert trace.attributes["met"] == 1
+    assert np.abs(trace["R.f"] - 2.0 / 2.994 * np.sin(1.085 * trace.time)).max() < 1e-9
