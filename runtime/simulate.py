@@ -171,6 +171,7 @@ def _unbalanced(runs: Runs, options: Options) -> float:
 
 def _balanced(runs: Runs, options: Options, achieved: Achieved) -> Achieved:
     """A ledger is a sum over the steps: where it alone is off, they are shortened while that helps."""
+    runs.patience = runs.patience_with_draft = None  # no method follows
     off = _unbalanced(runs, options) if achieved.met else 0.0
     for _ in range(REFINED):
         if off <= 1.0:

@@ -11,7 +11,7 @@ that no potential store holds, and initial positions: see `quadratures`, `positi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 
 from sysdyn.compiler.network.along import along
@@ -30,7 +30,6 @@ from sysdyn.dsl.model.network import (
     Coupling,
     Domain,
     Network,
-    Slope,
 )
 from sysdyn.dsl.model.paynter import REFLECTED, REFLECTED_FUNCTIONS
 from sysdyn.dsl.model.rewriting import expressions, rewritten
@@ -52,7 +51,7 @@ def reflect(network: Network) -> Network:
     network = with_positions(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
-    return replace(relabelled(network), slopes=tuple(_moduli(network.couplings)), read=read)
+    return replace(relabelled(network), read=read)
 
 
 def relabelled(network: Network) -> Network:
@@ -103,17 +102,7 @@ def _branch(b: Branch) -> Branch:
 
 
 def _coupling(c: Coupling) -> Coupling:
-    if c.kind == "transformer":
-        return replace(c, side=REFLECTED[c.side])
-    # e1 = r f2 reads f1 = r e2 in the reflection: e2 = f1/r and with e1 f1 + e2 f2 = 0 e1 = -f2/r
-    return replace(c, ratio=ex.neg(ex.div(ex.const(1.0), c.ratio)))
-
-
-def _moduli(couplings: Iterable[Coupling]) -> Iterator[Slope]:
-    """The moduli that are divided by."""
-    for c in couplings:
-        if c.kind == "gyrator" and not ex.is_const(c.ratio) and not ex.variables(c.ratio):
-            yield Slope(c.first.rpartition(".")[0] or c.first, c.ratio, c.loops, False, c.place)
+    return replace(c, side=REFLECTED[c.side])
 
 
 def _read(network: Network) -> Iterable[str]:

@@ -98,7 +98,8 @@ class Branch:
 
 @dataclass(frozen=True, slots=True)
 class Coupling:
-    """A two-port of two branches: transformer f1 = ratio*f2 (side f) or e1 = ratio*e2 (side e); gyrator e1 = ratio*f2.
+    """A two-port of two branches: transformer f1 = ratio*f2 (side f) or e1 = ratio*e2 (side e); gyrator f1 = ratio*e2
+    (side f) or e1 = ratio*f2 (side e).
 
     The companion law follows from e1 f1 + e2 f2 = 0.
     """
@@ -111,6 +112,11 @@ class Coupling:
     side: str
     ratio: Node
     place: Place
+
+    @property
+    def stem(self) -> str:
+        """The two-port's own name."""
+        return self.first.rpartition(".")[0] or self.first
 
 
 @dataclass(frozen=True, slots=True)

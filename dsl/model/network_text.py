@@ -68,9 +68,8 @@ def _terminal(b: Branch, end: Terminal | None) -> str:
 
 def _coupling(c: Coupling) -> str:
     first, second = c.first + _at(c.at), c.second + _at(c.at)
-    if c.kind == "transformer":
-        return f"transformer {first}.{c.side} = ({c.ratio})*{second}.{c.side}"
-    return f"gyrator {first}.e = ({c.ratio})*{second}.f"
+    other = c.side if c.kind == "transformer" else {"e": "f", "f": "e"}[c.side]
+    return f"{c.kind} {first}.{c.side} = ({c.ratio})*{second}.{other}"
 
 
 def _at(at: tuple[Node, ...]) -> str:

@@ -150,7 +150,7 @@ def _off_diagram(context: Context, side: str, other: str, span: syntax.Span) -> 
 
 @dataclass(frozen=True, slots=True)
 class RatioOf:
-    """A two-port: side e or f of branch 1 = ratio * that of branch 2 (gyrator: e1 = ratio*f2)."""
+    """A two-port: side e or f of branch 1 = ratio * that of branch 2 (gyrator: e1 = ratio*f2 or f1 = ratio*e2)."""
 
     kind: str
     side: str
@@ -204,7 +204,5 @@ def _normal(kind: str, letter: str, number: int, ratio: Node) -> RatioOf:
         if number == 2:
             return RatioOf(kind, "f" if letter == "e" else "e", ex.neg(ratio))
         return RatioOf(kind, letter, ratio)
-    # gyrator: e1 = r f2.  f1 = g e2 gives e2 = f1/g = -r f1; e2 = r f1 gives e1 = -r f2; f2 = g e1 gives e1 = f2/g
-    inverse = ex.div(ex.const(1.0), ratio)
-    forms = {("e", 1): ratio, ("f", 1): ex.neg(inverse), ("e", 2): ex.neg(ratio), ("f", 2): inverse}
-    return RatioOf(kind, "e", forms[letter, number])
+    # gyrator: e2 = r f1 gives e1 = -r f2; f2 = g e1 gives f1 = -g e2
+    return RatioOf(kind, letter, ratio if number == 1 else ex.neg(ratio))

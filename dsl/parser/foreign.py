@@ -13,6 +13,8 @@ from sysdyn.values import dataclass
 _DIGITS_BEFORE = re.compile(r"(?<!\w)[0-9]+$")
 _UNIT = re.compile(r"[^\W\d]\w*(?:\^-?[0-9]+)?(?:[./][^\W\d]\w*(?:\^-?[0-9]+)?)*")
 _DIGITS = re.compile(r"[0-9]+")
+_ARGUMENT = re.compile(r"[(,)]\s*\w+\s*=[^=,()]*[^=,()\s]\s*$")
+_NAMED = re.compile(r"\s*=(?!=)")
 _SPICE = re.compile(r"(?:[\w.+-]+[ \t]+){2,}[\w.+-]+[ \t]*(?:[#;].*)?$")
 _PARTS = {"R": "resistor(R = 1 kohm)", "C": "capacitor(C = 1 uF)", "L": "inductor(L = 1 mH)", "V": "voltage(v = 5 V)"}
 _PARTS |= {"I": "current(i = 1 A)", "D": "diode()", "K": "spring(k = 1 N/m)", "M": "mass(m = 1 kg)"}
@@ -71,6 +73,10 @@ def around(text: str, start: int, end: int, kind: str) -> Slip | None:
             either = f"{meant}, or {before.group()}{behind.group()}"
             return Slip(("E113", said, either))
         return Slip(("E113", said, meant), meant, span)
+    if kind == "<name>" and _ARGUMENT.search(line) and _NAMED.match(text, end):
+        said = f"'{sign} = ...' is an argument of its own: a comma stands before it"
+        span = Span(first + len(line.rstrip()), end)
+        return Slip(("E113", said, f", {sign} = ..."), f", {sign}", span)
     unclosed = _unclosed(text, Span(start, end), line) if kind == "<name>" else None
     if unclosed is not None:
         return Slip(unclosed)

@@ -236,7 +236,7 @@ def guesses(net, *initials):
     momenta = {e.number: e.branch.law for e in elements if e.branch.kind == "kinetic"}
     reader = Rewriter(sizes, EliminationTable(pieces, {}, momenta, lambda *_: x.const(0.0)))
     assert Contents(reader, (), initials, elements, reflected=False).parameters == []
-    found, stores = measured(network, initials, sizes, reader, reflected=False)
+    found, stores = measured(network, set(), initials, sizes, reader, reflected=False)
     return {i.store: (i.said, i.value.data) for i in found}, stores
 
 

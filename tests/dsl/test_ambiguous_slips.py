@@ -57,3 +57,19 @@ def test_letters_in_the_wrong_case():
     meant = {"hz": "Hz", "RPM": "rpm", "KN": "kN", "Kg": "kg", "PA": "Pa", "kpa": "kPa"}
     assert {wrong: respelled(wrong) for wrong in meant} == meant
     assert respelled("mhz") is None
+
+
+@pytest.mark.parametrize(
+    ("right", "name"),
+    [
+        ("B: transformer(f1 = 2*f2) p = x, n = ground", "n"),
+        ("P: resistor(R = 1 kohm, T = 3 K)", "T"),
+        ("P: capacitor(V = 1 kohm, C = 1 uF)", "C"),
+    ],
+)
+def test_a_comma_between_arguments_is_no_product_of_units(right, name):
+    """`R = 1 kohm C = 1 uF`: the remedy had been '1 kohm.C'."""
+    found = told(right.replace(f", {name} =", f" {name} ="))
+    said = f"'{name} = ...' is an argument of its own: a comma stands before it"
+    assert found[0] == ("E113", said, f", {name} = ...")
+    assert said not in [message for _, message, _ in told(right)]

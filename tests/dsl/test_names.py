@@ -308,8 +308,8 @@ def test_two_ports_pass_on_their_power(read, kind, side, r):
         beside = "f" if which == "e" else "e"
         one |= {beside + "1": 5.0, beside + "2": -found * 5.0}
     else:
-        assert which == "e"
-        one = {"e1": found * 3.0, "f2": 3.0, "f1": 5.0, "e2": -found * 5.0}
+        beside = "f" if which == "e" else "e"
+        one = {which + "1": found * 3.0, beside + "2": 3.0, beside + "1": 5.0, which + "2": -found * 5.0}
     assert one["e1"] * one["f1"] + one["e2"] * one["f2"] == pytest.approx(0.0, abs=1e-12)
     assert one[side] == pytest.approx(r * one[letter + other], rel=1e-15)
 

@@ -337,3 +337,27 @@ def test_a_modulus_that_goes_through_zero(tmp_path, formulation, zero):
     exact = solve_ivp(slopes, (0.0, 3.0), [0.0, 0.0], "DOP853", trace.time, rtol=1e-11, atol=1e-13).y
     for name, values in zip(("Ld.f", "Lq.f"), exact, strict=True):
         assert np.abs(trace[name].values - values).max() < 1e-7 * np.abs(values).max()
+
+
+@pytest.mark.parametrize("law", ["f = on*e/R", "e = R/max(on, 1e-300)*f"])
+def test_what_events_assign_decides_no_form(tmp_path, law):
+    """A leak that is shut at the start, opens at 2 V and shuts at 20 ms: the law had been compiled as f = 0."""
+    elements = f"""
+  supply: effort(e = 5 V) s -> ground
+  feed: dissipator(e = R*f) s -> a
+  cap: potential(q = C*e) a -> ground
+  leak: dissipator({law}) a -> ground
+  discrete on = 0
+  when a.e > 2 V {{ on := 1 }}
+  when t > 20 ms {{ on := 0 }}
+  init cap.e = 0 V
+"""
+    text = _text(("R = 1 kohm", "C = 10 uF"), "s, a: electrical", elements, "cap.e as c", "0.05 s").replace(
+        "0.05 s\n}", "1 ms\n}"
+    )
+    for formulation in FOUR:
+        trace = trace_of(tmp_path, text, formulation=formulation)
+        t, tau, opens, shuts = trace.time, 0.01, 0.01 * np.log(5 / 3), 0.02
+        open_ = 2.5 - 0.5 * np.exp(-2 * (np.clip(t, opens, shuts) - opens) / tau)
+        c = np.where(t < opens, 5 * (1 - np.exp(-t / tau)), 5 - (5 - open_) * np.exp(-np.maximum(t - shuts, 0) / tau))
+        assert np.abs(trace["c"] - c).max() < 5e-8, formulation

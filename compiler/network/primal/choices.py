@@ -79,7 +79,7 @@ class Causality:
         """
         branch, v, w = self.branch, own(self.branch, OWN[self.branch.kind][0]), conjugate(self.branch)
         ends = (n for n in topological([law]) if n.op == "call" and n.data in ("ln", "log10", "atanh"))
-        if branch.kind != "dissipator" or variables(law) != {v} or not any(v in variables(n) for n in ends):
+        if branch.kind != "dissipator" or not self._alone(law, v) or not any(v in variables(n) for n in ends):
             return None
         found = inverse(branch, law, v, w, self.slopes, self.tables)
         if found is None or not self._rest_on(found.rests):
@@ -166,11 +166,12 @@ class Causality:
         """A law of the conjugate variable: inverted, or implicit."""
         branch, kinetic = self.branch, self.kinetic
         v, given = own(branch, OWN[branch.kind][0]), conjugate(branch)
-        alone = not variables(law) - {given}
+        alone = self._alone(law, given)
         straight = line(law, given) if alone else None
-        if self.slopes.flat(branch, straight.slope) if straight else not kinetic and not variables(law):
+        flat = self.slopes.flat(branch, straight.slope) if straight else alone and not kinetic and not variables(law)
+        if flat:
             return self._held(law if straight is None else straight.constant)
-        if straight is not None:
+        if straight is not None and flat is not None:
             note = ("N601", f"the law of {branch.name} was inverted: it is linear")
             return self._explicit(straight.inverse(v), (note,))
         found = inverse(branch, law, given, v, self.slopes, self.tables) if alone else None
@@ -181,6 +182,10 @@ class Causality:
         text = f"{self._side(branch.side)}({self._side(given.data[1][1])}) of {branch.name} stays implicit"
         kept = self._stored(law, given)
         return Law("state" if kinetic else "implicit", sub(v, law), (("N604", text),), kept=kept)
+
+    def _alone(self, law: Node, given: Node) -> bool:
+        """Whether a law reads `given` alone and nothing that events assign: values at the start decide no form then."""
+        return not variables(law) - {given} and not self.slopes.assigned(law)
 
     def _stored(self, law: Node, given: Node) -> Node | None:
         """The energy of a store with a law of `given` alone, int f dp or int e dq; None where that is not closed."""

@@ -14,7 +14,7 @@ where the text fixes it, else it is chosen.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence, Set
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
@@ -80,23 +80,27 @@ def told(b: Branch, initials: Iterable[Initial], sizes: Sizes) -> Iterator[tuple
             yield initial, narrowed(b.loops, found[0]), content
 
 
-def at_stores(network: Network, incidence: Incidence, reader: Rewriter, *, reflected: bool) -> Iterator[Initial]:
-    """Initial conditions; efforts of potential stores, and of nodes that a linear one holds to ground, as contents."""
+def at_stores(
+    network: Network, constant: Set[Branch], incidence: Incidence, reader: Rewriter, *, reflected: bool
+) -> Iterator[Initial]:
+    """Initial conditions; efforts of potential stores, and of nodes that a linear one holds to ground, as contents, but
+    for those that hold the same (`constant`) at any effort.
+    """
     kinds = {b.name: b.kind for b in network.branches}
     for initial in network.initials:
         told = initial.target.op == "var" and not initial.target.data[2]
         name, kind, _ = initial.target.data if told else ("", "", 0)
         if kind == "ne":
             for part in _at_store(initial, incidence.cells.get(name, ()), reader):
-                yield from _as_content(part, reader)
+                yield from _as_content(part, constant, reader)
             continue
         apart = kind in ("be", "bf") and kinds[name] not in TELLING
         if kind == "nf" and reflected:
             apart = not any(_holds(touch) for cell in incidence.cells.get(name, ()) for touch in cell.touches)
-        yield from _as_content(replace(initial, apart=apart and not initial.fixed), reader)
+        yield from _as_content(replace(initial, apart=apart and not initial.fixed), constant, reader)
 
 
-def _as_content(initial: Initial, reader: Rewriter) -> Iterator[Initial]:
+def _as_content(initial: Initial, constant: Set[Branch], reader: Rewriter) -> Iterator[Initial]:
     """Where a law tells it, what the store holds at the effort."""
     target = initial.target
     if target.op != "var" or target.data[1:] != ("be", 0) or variables(initial.value):
@@ -106,7 +110,8 @@ def _as_content(initial: Initial, reader: Rewriter) -> Iterator[Initial]:
 
     def content(ranges: Ranges) -> Node | None:
         piece = reader.piece(target.data[0], target.args, ranges)
-        found = held_at(piece.element.branch, "be", mark)
+        branch = piece.element.branch
+        found = None if branch in constant else held_at(branch, "be", mark)
         return None if found is None else substitute(reader.at_piece(found, piece, target.args), {mark: initial.value})
 
     for loops, value in reader.cut(initial.loops, initial.place, content):

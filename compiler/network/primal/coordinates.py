@@ -45,10 +45,12 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     book = EliminationTable(pieces, said.efforts, said.momenta, potentials.read, functions=said.functions)
     book.sticking = _sticking(network)
     reader = Rewriter(sizes, book)
-    initials = foremost(tuple(at_stores(network, incidence, reader, reflected=reflected)), network.branches, sizes)
+    initials = foremost(
+        tuple(at_stores(network, said.constant, incidence, reader, reflected=reflected)), network.branches, sizes
+    )
     read = _charges(network)
     contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected, read=read)
-    guesses, stores = measured(network, initials, sizes, reader, reflected=reflected)
+    guesses, stores = measured(network, said.constant, initials, sizes, reader, reflected=reflected)
     found = replace(
         network,
         parameters=(*network.parameters, *contents.parameters),

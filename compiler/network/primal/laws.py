@@ -39,6 +39,7 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.model.network import (
+    Branch,
     Constraint,
     Coupling,
     Dynamic,
@@ -78,6 +79,7 @@ class Laws:
     initials: list[Initial] = field(default_factory=list)
     functions: dict[int, dict[str, Node]] = field(default_factory=dict)
     slopes: tuple[Slope, ...] = ()
+    constant: set[Branch] = field(default_factory=set)  # what they hold is the same whatever their effort
     tables: dict[str, Table] = field(default_factory=dict)
 
 
@@ -93,7 +95,6 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     for (e, choice), (_, law) in zip(choices, chosen, strict=True):
         if e.name in asked:
             found.functions[e.number] = choice.functions(law)
-    found.slopes = tuple(slopes.decided)
     names: dict[tuple[int, str], Part] = {}
     for suffix, hows in (("e", ("implicit", "state")), ("p", ("state",)), ("law", ("implicit", "state", "row"))):
         kept = [e for e, law in chosen if law.how in hows]
@@ -107,9 +108,10 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     found.momenta.update(momenta)
     keep = network.scene is not None and network.scene.keeps("keep_implicit")
     for coupling, label in _ratios(network, elements, sizes):
-        # of a moving modulus the reflection has the reciprocal, which has no value where the modulus is zero
-        moving = reflected and bool(variables(coupling.ratio))
-        _couple(coupling, label, elements, sizes, found, keep=keep, moving=moving)
+        explicit = coupling.kind != "gyrator" or coupling.side == "e"
+        divided = explicit or slopes.divided(coupling)
+        _couple(coupling, label, elements, sizes, found, keep=keep, divided=divided)
+    found.slopes = tuple(slopes.decided)
     return found
 
 
@@ -167,6 +169,7 @@ class _Statement:
             self._work(law.stated)
             found.efforts[self.element.number] = law.stated
         elif law.how == "row":
+            found.constant.add(b)
             self._row("psi", law.stated, b.domain.flow)
             found.efforts[self.element.number] = var(self._name("law"), "mu", *b.at)
         elif law.how in ("implicit", "state"):
@@ -223,18 +226,14 @@ def _ratios(network: Network, elements: Sequence[Element], sizes: Sizes) -> Iter
     live = [c for c in network.couplings if any(e.name == c.first for e in elements)]
     stems: dict[str, set[str]] = {}
     for c in live:
-        stems.setdefault(_stem(c.first), set()).add(c.first)
-    families = [c.first if len(stems[_stem(c.first)]) > 1 else _stem(c.first) for c in live]
+        stems.setdefault(c.stem, set()).add(c.first)
+    families = [c.first if len(stems[c.stem]) > 1 else c.stem for c in live]
     boxes = []
     for c in live:
         ranges = {loop.index: sizes.interval(loop.first, loop.last, c.place) for loop in c.loops}
         boxes.append(tuple(sizes.affine(node, ranges, c.place).over(ranges) for node in c.at))
     labels = parts([(f"{name}.ratio", box) for name, box in zip(families, boxes, strict=True)])
     return zip(live, labels, strict=True)
-
-
-def _stem(name: str) -> str:
-    return name.rpartition(".")[0] or name
 
 
 def _couple(
@@ -245,22 +244,23 @@ def _couple(
     found: Laws,
     *,
     keep: bool,
-    moving: bool,
+    divided: bool,
 ) -> None:
-    """Transformer f1 = n f2 or e1 = n e2; gyrator e1 = r f2.  The companion law makes e1 f1 + e2 f2 zero.
+    """Transformer f1 = n f2 or e1 = n e2; gyrator e1 = r f2 or f1 = g e2.  The companion law makes e1 f1 + e2 f2 zero.
 
-    keep: the efforts of a gyrator are unknowns; moving: they are, and their gammas have the reciprocal of its ratio.
+    keep: the efforts of a gyrator are unknowns, and where g cannot be `divided` by.
     """
     label = part.name
     c = coupling
     first, second = (var(name, "bf", *c.at) for name in (c.first, c.second))
     domain = next(e.branch.domain for e in elements if e.name == c.first)
     if c.kind == "gyrator":
-        efforts = mul(c.ratio, second), neg(mul(c.ratio, first))
-        if keep or moving:
-            efforts = _kept(c, part, efforts, elements, found, moving=moving)
+        ratio = c.ratio if c.side == "e" else neg(div(const(1.0), c.ratio))
+        efforts = mul(ratio, second), neg(mul(ratio, first))
+        if keep or not divided:
+            efforts = _kept(c, part, efforts, elements, found, divided=divided)
         for effort, name in zip(efforts, (c.first, c.second), strict=True):
-            place = replace(c.place, element=_stem(c.first))
+            place = replace(c.place, element=c.stem)
             found.works.append(Work(neg(effort), var(name, "bq", *c.at), c.loops, place))
     else:
         multiplier = var(label, "mu", *c.at)
@@ -288,10 +288,11 @@ def _kept(
     elements: Sequence[Element],
     found: Laws,
     *,
-    moving: bool,
+    divided: bool,
 ) -> tuple[Node, Node]:
-    """Both efforts of a gyrator as unknowns, each closed by its gamma; moving: this is one of flows."""
+    """Both efforts of a gyrator as unknowns, each closed by its gamma: one of flows where g is not divided by."""
     c, made = coupling, []
+    flows = [var(name, "bf", *c.at) for name in (c.second, c.first)]
     domains = [next(e.branch.domain for e in elements if e.name == name) for name in (c.first, c.second)]
     for port, (effort, domain, other) in enumerate(zip(efforts, domains, reversed(domains), strict=True), start=1):
         unit = domain.effort
@@ -299,8 +300,8 @@ def _kept(
         found.unknowns.setdefault(unknown, Unknown(unknown, shape_of(part.box), unit, c.place))
         own_effort = var(unknown, "e", *c.at)
         equation = sub(own_effort, effort)
-        if moving:
-            equation, unit = sub(div(own_effort, c.ratio), div(effort, c.ratio)), other.flow
+        if not divided:
+            equation, unit = (add, sub)[port - 1](flows[port - 1], mul(c.ratio, own_effort)), other.flow
         found.constraints.append(Constraint("gamma", f"{unknown}.law", c.at, equation, c.loops, unit, c.place))
         made.append(own_effort)
     return made[0], made[1]

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.model.interpret import over
 from sysdyn.compiler.model.parameters import Parameters
-from sysdyn.dsl.model.expression import Node, is_const, variables
+from sysdyn.dsl.model.expression import Node, is_const, topological, variables
 from sysdyn.dsl.model.expression_text import to_text
-from sysdyn.dsl.model.network import Branch, Network, Slope
+from sysdyn.dsl.model.network import Branch, Coupling, Network, Slope
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 
 
@@ -35,15 +35,32 @@ class Slopes:
         except ModelError:  # binding says what is wrong
             return None
 
-    def flat(self, branch: Branch, slope: Node) -> bool:
-        """Whether the slope is zero in all elements."""
+    def assigned(self, node: Node) -> bool:
+        """Whether the expression reads a parameter that events assign."""
+        return any(n.op == "param" and n.data in self._network.discretes for n in topological([node]))
+
+    def flat(self, branch: Branch, slope: Node) -> bool | None:
+        """Whether the slope is zero in all elements; None where it is in some of them: no form holds of them all."""
         if is_const(slope) or variables(slope) or self._parameters is None:
             return False
         found = Slope(branch.name, slope, branch.loops, False, branch.place)
         values = _values(found, self._parameters)
-        flat = branch.kind != "kinetic" and bool(values.size) and not values.any()
+        store = branch.kind == "kinetic"
+        if not store and values.any() and not values.all():
+            return None
+        flat = not store and bool(values.size) and not values.any()
         self.decided.append(replace(found, flat=flat))
         return flat
+
+    def divided(self, coupling: Coupling) -> bool:
+        """Whether the law of a two-port may be divided by its ratio: not by one that moves or is zero."""
+        ratio = coupling.ratio
+        if is_const(ratio) or variables(ratio) or self.assigned(ratio):
+            return is_const(ratio) and not is_const(ratio, 0.0)
+        found = Slope(coupling.stem, ratio, coupling.loops, False, coupling.place)
+        whole = self._parameters is None or bool(_values(found, self._parameters).all())
+        self.decided.extend([found] if whole else [])
+        return whole
 
     def values(self, branch: Branch, node: Node) -> NDArray[np.float64] | None:
         """The values of an expression of parameters in all elements of a branch; None where they are not known."""

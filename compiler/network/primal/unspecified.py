@@ -7,7 +7,7 @@ change of what is held.  All stores that share a coordinate with such a one are 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Box, Sizes, meet
@@ -19,10 +19,16 @@ from sysdyn.dsl.model.network import Branch, Energy, Initial, Loop, Network
 
 
 def measured(
-    network: Network, initials: Sequence[Initial], sizes: Sizes, reader: Rewriter, *, reflected: bool
+    network: Network,
+    constant: Set[Branch],
+    initials: Sequence[Initial],
+    sizes: Sizes,
+    reader: Rewriter,
+    *,
+    reflected: bool,
 ) -> tuple[tuple[Initial, ...], frozenset[str]]:
     """One guess for the stores of a statement that are measured by their contents; the stores all of whose guesses by
-    the text are among them.
+    the text are among them.  constant: those that hold the same whatever happens.
 
     Between common-flow nodes of the author's network positions are guessed, not lengths.
     """
@@ -31,7 +37,11 @@ def measured(
     held: dict[tuple[str, str], list[Box]] = {}
     known = {initial.store for initial in initials}
     for b in network.branches:
-        if b.kind not in TELLING or (b.kind == "potential" and b.domain.common == "flow" and not reflected):
+        if (
+            b.kind not in TELLING
+            or b in constant
+            or (b.kind == "potential" and b.domain.common == "flow" and not reflected)
+        ):
             continue
         unit = b.domain.displacement if b.kind == "potential" else b.domain.effort
         for loops, content in _contents(b, b.loops, reader):

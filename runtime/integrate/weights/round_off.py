@@ -123,8 +123,10 @@ def _scaled(
     del terms, jy, jyd  # of a large system the room counts, here and below
     if not (np.isfinite(values).all() and np.isfinite(size).all()):
         return None
-    size = _eliminated(system, (rows, columns, values), size)
-    # in magnitudes: what an elimination leaves of the largest unknown is no change of one that is small by its unit
+    size, brought = _eliminated(system, (rows, columns, values), size)
+    # in magnitudes: what an elimination leaves of the largest unknown is no change of one that is small by its unit; a
+    # unit of which there is no more than its round-off has no magnitude of its own
+    met = np.where(met > EPS * brought, met, brought)
     of_row, of_column = np.where(size > 0.0, size, 1.0), np.where(met > 0.0, met, 1.0)
     with np.errstate(all="ignore"):
         values *= of_column[columns]
@@ -138,8 +140,10 @@ def _given(system: System) -> Floats:
     return group_maxima(system, np.abs(values))[alike(system)]
 
 
-def _eliminated(system: System, entries: tuple[Ints, Ints, Floats], size: Floats) -> Floats:
-    """Terms [rows] with those that elimination brings into a row: of the rows that are pivots of its columns."""
+def _eliminated(system: System, entries: tuple[Ints, Ints, Floats], size: Floats) -> tuple[Floats, Floats]:
+    """Terms [rows] with those that elimination brings into a row, of the rows that are pivots of its columns; what it
+    brings there of each unknown [unknowns].
+    """
     rows, columns, values = entries
     row, column = sparse_factors(rows, columns, np.abs(values), (system.rows, system.unknowns))
     scaled = np.abs(values) * row[rows] * column[columns]
@@ -149,4 +153,4 @@ def _eliminated(system: System, entries: tuple[Ints, Ints, Floats], size: Floats
     for _ in range(HOPS):
         np.maximum.at(brought, columns[pivot], size[rows[pivot]] / np.abs(values[pivot]))
         np.maximum.at(size, rows, np.abs(values) * brought[columns])
-    return size
+    return size, brought

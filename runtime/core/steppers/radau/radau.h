@@ -184,6 +184,7 @@ int sd_radau_iterations(const sd_radau *radau);
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry);
 int sd_radau_iterate_damped(sd_radau *radau, int *used);
 double sd_radau_newton_tolerance(const sd_radau *radau);
+double sd_radau_row_limit(const sd_radau *radau, double newton_tolerance);
 /* radau_coupled.c: where the slopes of the step's start fade or turn within it, in one direction; else SD_NEWTON */
 int sd_radau_iterate_coupled(sd_radau *radau, int *used);
 void sd_radau_free_coupled(struct sd_coupled *coupled);

@@ -169,6 +169,26 @@ static int correct(sd_radau *radau, sd_coupled *coupled)
     return sd_finite(coupled->all, coupled->other) ? SD_FINE : SD_NEWTON;
 }
 
+/* whether the rows are met behind the last correction, beside their terms: slopes times unknowns */
+static int rows_hold(sd_radau *radau, sd_coupled *coupled, double tolerance)
+{
+    const int32_t n = radau->ivp.n;
+    const double limit = sd_radau_row_limit(radau, tolerance);
+    double *terms = coupled->right;
+    if (sd_radau_residuals(radau))
+        return 0;
+    memset(terms, 0, (size_t)coupled->all * sizeof *terms);
+    for (int32_t k = 0; k < coupled->all; k++) {
+        const double y = radau->phi[k % n] + radau->z[k / n][k % n];
+        for (int32_t e = coupled->column[k]; e < coupled->column[k + 1]; e++)
+            terms[coupled->row[e]] += fabs(coupled->values[e] * y);
+    }
+    for (int32_t k = 0; k < coupled->all; k++)
+        if (!(fabs(radau->d[k / n][k % n]) <= limit * terms[k]))
+            return 0;
+    return 1;
+}
+
 int sd_radau_iterate_coupled(sd_radau *radau, int *used)
 {
     if (radau->ivp.n > LARGEST)
@@ -190,9 +210,11 @@ int sd_radau_iterate_coupled(sd_radau *radau, int *used)
         if (cause)
             return cause;
         double size = size_of(radau, coupled, 0);
-        /* multipliers of constraints that fade are known to a round-off that grows, what they do to the state is not */
+        if (size <= tolerance) /* it falls with the square of the one before */
+            return SD_FINE;
+        /* multipliers of constraints that fade are known to a round-off that grows, what they do to the rows is not */
         int idle = size > STAGNANT * before && size_of(radau, coupled, 1) <= tolerance;
-        if (size <= tolerance || idle) /* it falls with the square of the one before */
+        if (idle && rows_hold(radau, coupled, tolerance))
             return SD_FINE;
         if (m > ASIDE && !(size < before))
             return SD_NEWTON;

@@ -76,7 +76,7 @@ static int columns_left(const sd_radau *radau)
 }
 
 /* what a row may be off, of its terms */
-static double row_limit(const sd_radau *radau, double newton_tolerance)
+double sd_radau_row_limit(const sd_radau *radau, double newton_tolerance)
 {
     double limit = fmin(1.0, fmax(FINEST_ROW, LAX * newton_tolerance * radau->tolerance));
     return columns_left(radau) ? fmax(limit, FAINT_ROW) : limit;
@@ -87,7 +87,7 @@ static double row_limit(const sd_radau *radau, double newton_tolerance)
 static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
 {
     int judged = all || columns_left(radau);
-    double limit = row_limit(radau, newton_tolerance);
+    double limit = sd_radau_row_limit(radau, newton_tolerance);
     for (int s = 0; s < radau->method->stages; s++) {
         for (int32_t i = 0; i < radau->ivp.n; i++) {
             radau->y[i] = radau->phi[i] + radau->z[s][i];
@@ -116,7 +116,7 @@ static double left_open(const sd_radau *radau, int s, int32_t i, int before)
 static int rows_at_round_off(sd_radau *radau, double newton_tolerance, int before)
 {
     int all = columns_left(radau);
-    double limit = row_limit(radau, newton_tolerance);
+    double limit = sd_radau_row_limit(radau, newton_tolerance);
     for (int s = 0; s < radau->method->stages; s++) {
         double t = radau->ivp.t + radau->method->c[s] * radau->ivp.h;
         sd_radau_stage(radau, s, radau->y, radau->rate);
