@@ -57,8 +57,10 @@ class Contacts:
         kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
         for kind in sorted(kinds):
             same = [c for c in contacts if (c.kind, observer.unit(c.value)) == kind]
-            for name in ("value", "rate", "multiplier"):
+            for name in ("value", "rate"):
                 observer.alike([getattr(c, name) for c in same])
+            # what friction bears is of the size of its bound, before it has ever held too
+            observer.alike([row for c in same for row in (c.multiplier, c.bound) if row >= 0])
         own = [places[k.number] if k.hold < 0 else None for k in contacts]
         self.multiplier = [-1 if at is None else int(system.form.at[at[0]]) + at[1] for at in own]
         self.frozen = mates(plan, system, self.multiplier)
@@ -302,7 +304,7 @@ class Contacts:
         if values[c.bound] == 0.0:  # no friction: it does not hold, whatever holds the bodies (a latch, another law)
             return bool(self.active[k] or sense == 0.0)
         if self.active[k]:
-            beyond = abs(values[c.multiplier]) > values[c.bound] * (1.0 + 1e-9) + zero(c.multiplier)
+            beyond = abs(values[c.multiplier]) > values[c.bound] + zero(c.multiplier)
             return bool(beyond or self._overstrained(k, impulse))
         if sense == 0.0:
             return True

@@ -361,8 +361,12 @@ void sd_run_look(sd_run *run, double t, double *values)
 void sd_run_observe(sd_run *run, double t, double *values)
 {
     run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
-    if (run->settle)
+    if (run->settle) { /* to round-off, in a draft too: as the point will be whose event is sought */
+        const double enough = run->settle->enough;
+        run->settle->enough = 0.0;
         sd_run_settle(run, t);
+        run->settle->enough = enough;
+    }
     sd_run_quantities(run, t, values);
 }
 

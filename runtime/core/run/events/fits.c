@@ -6,7 +6,6 @@
 #include "run/events/landing.h"
 
 #define FULL_SENSE 1e-9  /* of a sense: what it may pass its end by */
-#define SLIP 1e-9        /* of a bound of friction */
 #define SLIDES 2.0       /* branches, as events/kinks.py names them */
 #define RESTS 3.0
 #define NO_SIZE 1e-9     /* of its magnitude, an unknown of which round-off leaves nothing open */
@@ -22,7 +21,7 @@ static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const
     if (c->kind == SD_FRICTION && v[c->bound] == 0.0)
         return !holds && sense != 0.0;
     if (holds && c->kind == SD_FRICTION)
-        return fabs(v[c->multiplier]) <= v[c->bound] * (1.0 + SLIP) + sd_mode_zero(m, c->multiplier);
+        return fabs(v[c->multiplier]) <= v[c->bound] + sd_mode_zero(m, c->multiplier);
     if (holds)
         return v[c->multiplier] >= -sd_mode_zero(m, c->multiplier) &&
                (c->kind != SD_PHI || v[c->rate] >= -sd_mode_zero(m, c->rate));
