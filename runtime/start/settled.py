@@ -342,6 +342,7 @@ class Settler:
         """Points settle to round-off meanwhile, in a draft too: behind a jump what is left over moves the state."""
         core = self.core.contents
         enough, core.enough = core.enough, 0.0
+        core.ready = 0
         try:
             yield
         finally:

@@ -361,11 +361,16 @@ void sd_run_look(sd_run *run, double t, double *values)
 void sd_run_observe(sd_run *run, double t, double *values)
 {
     run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
-    if (run->settle) { /* to round-off, in a draft too: as the point will be whose event is sought */
-        const double enough = run->settle->enough;
-        run->settle->enough = 0.0;
-        sd_run_settle(run, t);
-        run->settle->enough = enough;
+    sd_settle *settle = run->settle;
+    if (settle) { /* as the point will be from which the event is: to round-off, in a draft too, and by factors of its own,
+                   * for slopes of elsewhere put it elsewhere */
+        const double enough = settle->enough;
+        settle->enough = 0.0;
+        settle->ready = SD_BY_NONE;
+        lend(run, 1);
+        sd_settle_point(settle, t, run->point, run->point_d);
+        lend(run, 0);
+        settle->enough = enough;
     }
     sd_run_quantities(run, t, values);
 }

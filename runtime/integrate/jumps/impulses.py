@@ -51,8 +51,8 @@ class Impulses:
     """states: the dynamic variables that no other row reads, rows: those of their rates.  system: of the run."""
 
     def __init__(self, system: System, unread: Ints, *, assigned: bool) -> None:
-        """unread: displacements that the run does not integrate; assigned: events assign flows, by impulses from
-        nowhere.
+        """unread: displacements that the run does not integrate; assigned: events assign flows or dynamic variables,
+        by impulses from nowhere.
         """
         self._assigned = assigned
         settled = self.system = system.another("settled")

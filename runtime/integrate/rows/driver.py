@@ -66,7 +66,7 @@ class Driver:
         self._left: Side | None = None
         plan = request.events
         said = () if plan is None else (*(w.assignments for w in plan.whens), *(s.assignments for s in plan.sampled))
-        self._assigned = any(a.kind == "flow" for assignments in said for a in assignments)
+        self._assigned = any(a.kind != "discrete" for assignments in said for a in assignments)
         self.unread: Ints = np.zeros(0, dtype=np.int32)
         """Displacements that no row of the run reads: they are not integrated."""
         self.core = lib.core.sd_run_new(
