@@ -109,7 +109,7 @@ def test_what_relaxes_at_once_behind_an_event_is_followed(tmp_path):
     file.write_text(Circuit(13).text.replace("50 ms", "14 ms"))
     found = simulate(file, output=tmp_path / "a.h5", rtol=2.5e-6, method="radau")
     other = simulate(file, output=tmp_path / "b.h5", rtol=1e-8, method="bdf")
-    times = [[e.time for e in one.events if e.element == "E15.one_way"][-1] for one in (found, other)]
+    times = [one.events[-1].time for one in (found, other)]  # of one of two diodes in series, whichever
     assert times[0] == pytest.approx(times[1], abs=1e-9)  # half a relaxation of the leak
     assert np.abs(voltage(found) - voltage(other)).max() < 5e-6 * np.abs(voltage(other)).max()
 
