@@ -72,9 +72,8 @@ def _of_branches(study: Study) -> list[list[str]]:
             cells["p-f"] = '<span class="soft">in the energies</span>'
         rows.append([name, escape(branch.domain.name), *cells.values()])
     for c in study.network.couplings:
-        other = c.side if c.kind == "transformer" else {"e": "f", "f": "e"}[c.side]
         one = types.expression(var(c.first, f"b{c.side}", *c.at))
-        two = types.expression(var(c.second, f"b{other}", *c.at))
+        two = types.expression(var(c.second, f"b{c.read}", *c.at))
         law = math(one, mo("="), types.held(c.ratio), "<mspace width='.14em'/>", two)
         domains = [b.domain.name for name in (c.first, c.second) for b in study.network.branches if b.name == name]
         label = study.link(c.place, escape(c.first.partition("#")[0])) + f' <span class="soft">{c.kind}</span>'

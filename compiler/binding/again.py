@@ -20,7 +20,7 @@ from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.model.interpret import grid, last_of, looped
 from sysdyn.compiler.model.parameters import Extents
 from sysdyn.compiler.program.program import Program
-from sysdyn.dsl.model.expression import Node, topological, topological_unbound
+from sysdyn.dsl.model.expression import Node, reads, topological_unbound
 from sysdyn.dsl.model.network import Network, Slope
 from sysdyn.values import dataclass
 
@@ -77,7 +77,7 @@ def way(
         return None
 
     def read(node: Node) -> bool:
-        return any(n.op == "param" and n.data in moving for n in topological([node]))
+        return reads(node, moving)
 
     slopes = [slope for slope in network.slopes if read(slope.expression)]
     pins = [(k, pin) for k, pin in enumerate(form.pins) if read(pin.value)]

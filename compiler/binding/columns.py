@@ -19,7 +19,7 @@ from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.model.interpret import Value, evaluate
 from sysdyn.compiler.model.parameters import Parameters
 from sysdyn.compiler.program.program import Program
-from sysdyn.dsl.model.expression import Node, topological
+from sysdyn.dsl.model.expression import Node, reads, topological
 from sysdyn.dsl.model.network import Network
 from sysdyn.values import dataclass
 
@@ -137,7 +137,7 @@ def columns(
         good &= np.isfinite(found)
         values.values[name] = found
     for slope in network.slopes:
-        if not _uses(slope.expression, moving):
+        if not reads(slope.expression, moving):
             continue
         if slope.loops:
             return None
@@ -147,7 +147,7 @@ def columns(
             good &= slope.sign * found > 0.0
     starts: list[tuple[Start, Floats]] = []
     for pin, start in zip(form.pins, binding.initial, strict=True):
-        if not _uses(pin.value, moving):
+        if not reads(pin.value, moving):
             continue
         if pin.nest:
             return None
@@ -159,10 +159,6 @@ def columns(
         if name in moving:
             p[:, place] = values.values[name]
     return Columns(p, tuple(starts), good)
-
-
-def _uses(node: Node, names: set[str]) -> bool:
-    return any(n.op == "param" and n.data in names for n in topological([node]))
 
 
 def _over(node: Node, values: Parameters, runs: int) -> Floats:

@@ -13,7 +13,19 @@ from sysdyn.compiler.model.energies import EnergyModel, Offset, Row
 from sysdyn.compiler.model.mirror import Mirror
 from sysdyn.compiler.model.terms import Nest, Term, local_variables
 from sysdyn.dsl.model.calculus import derivative
-from sysdyn.dsl.model.expression import Node, add, const, mul, neg, param, substitute, time, topological, var, variables
+from sysdyn.dsl.model.expression import (
+    Node,
+    add,
+    const,
+    mul,
+    neg,
+    param,
+    reads,
+    substitute,
+    time,
+    var,
+    variables,
+)
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.text.diagnostics import Diagnostic
 
@@ -52,7 +64,7 @@ def _touches(rows: list[Row], tangible: frozenset[str], mirror: Mirror) -> bool:
 def _all_exact(rows: list[Row], model: EnergyModel) -> bool:
     """I1: coefficients and the free part of parameters alone that no event assigns: with b the primitive would jump."""
     terms = [term for row in rows for term in row.terms]
-    if any(n.op == "param" and n.data in model.discretes for term in terms for n in topological([term.expression])):
+    if any(reads(term.expression, model.discretes) for term in terms):
         return False
     return all(_exact(term, model.mirror) for term in terms)
 

@@ -20,6 +20,7 @@ from sysdyn.dsl.model.expression import (
     linear,
     mul,
     product,
+    reads,
     rebuild,
     reduced,
     reduction,
@@ -197,7 +198,7 @@ def local_variables(root: Node, kinds: str | Sequence[str], order: int | None = 
 
 def is_constant(root: Node, changing: frozenset[str]) -> bool:
     """Whether neither unknowns nor time nor the parameters `changing` enter the expression."""
-    return not variables(root) and not any(n.op == "param" and n.data in changing for n in topological([root]))
+    return not variables(root) and not reads(root, changing)
 
 
 def is_affine(root: Node, changing: frozenset[str]) -> bool:

@@ -20,7 +20,7 @@ from __future__ import annotations
 import itertools
 import math
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
@@ -336,6 +336,11 @@ def nodes_of(root: Node) -> Sequence[Node]:
 def calls(root: Node, function: str) -> list[Node]:
     """Where an expression calls a function, arguments before users."""
     return [n for n in nodes_of(root) if n.op == "call" and n.data == function]
+
+
+def reads(root: Node, parameters: Container[str]) -> bool:
+    """Whether an expression reads one of these parameters."""
+    return any(n.op == "param" and n.data in parameters for n in topological([root]))
 
 
 def topological_unbound(roots: Iterable[Node]) -> list[Node]:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 
 from sysdyn.dsl.model.expression import Node, index, is_const
+from sysdyn.dsl.model.paynter import REFLECTED
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
@@ -117,6 +118,11 @@ class Coupling:
     def stem(self) -> str:
         """The two-port's own name."""
         return self.first.rpartition(".")[0] or self.first
+
+    @property
+    def read(self) -> str:
+        """The side of the second branch that the law reads."""
+        return self.side if self.kind == "transformer" else REFLECTED[self.side]
 
 
 @dataclass(frozen=True, slots=True)

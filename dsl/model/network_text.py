@@ -68,8 +68,7 @@ def _terminal(b: Branch, end: Terminal | None) -> str:
 
 def _coupling(c: Coupling) -> str:
     first, second = c.first + _at(c.at), c.second + _at(c.at)
-    other = c.side if c.kind == "transformer" else {"e": "f", "f": "e"}[c.side]
-    return f"{c.kind} {first}.{c.side} = ({c.ratio})*{second}.{other}"
+    return f"{c.kind} {first}.{c.side} = ({c.ratio})*{second}.{c.read}"
 
 
 def _at(at: tuple[Node, ...]) -> str:

@@ -6,6 +6,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, signals_held
 from sysdyn.dsl.model.expression import Node
+from sysdyn.dsl.model.paynter import REFLECTED
 from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.context import Context
 from sysdyn.dsl.names.failures import Failed
@@ -178,8 +179,8 @@ def ratio_of(
     near = [
         n for n in ex.variables(node) if n.op == "var" and n.data[0] == me.family.name and n.data[1] in ("be", "bf")
     ]
-    expected = letter if kind == "transformer" else {"e": "f", "f": "e"}[letter]
-    wrong = {"e": "f", "f": "e"}[expected]
+    expected = letter if kind == "transformer" else REFLECTED[letter]
+    wrong = REFLECTED[expected]
     if expected not in far:
         if wrong in far:
             other = "gyrator" if kind == "transformer" else "transformer"

@@ -176,7 +176,7 @@ class Quantities(Paths):
             ex.var(family, f"b{letter}", *n.args) for n in ex.variables(law.law) for letter in "efqp" if n.op == "var"
         }
         read = ex.variables(law.law)
-        changed = any(n.op == "param" and n.data in self.discretes for n in ex.topological([law.law]))
+        changed = ex.reads(law.law, self.discretes)
         alone = read <= own and len({n.args for n in read}) <= 1 and not changed
         return f"b{STORED[law.kind]}" if alone else None
 

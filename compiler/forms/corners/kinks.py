@@ -29,6 +29,7 @@ from sysdyn.dsl.model.expression import (
     linear,
     neg,
     param,
+    reads,
     rebuild,
     sub,
     topological,
@@ -115,7 +116,7 @@ def surfaces(form: DescriptorForm, directions: frozenset[str] = frozenset()) -> 
             found = watched(node)
             if found is None:
                 continue
-            own = any(n.op == "param" and n.data in directions for n in topological([found.u]))
+            own = reads(found.u, directions)
             u = found.u if neg(found.u) not in first else neg(found.u)
             holding.setdefault(u, {})[root] = None
             if not own:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.model.interpret import over
 from sysdyn.compiler.model.parameters import Parameters
-from sysdyn.dsl.model.expression import Node, is_const, topological, variables
+from sysdyn.dsl.model.expression import Node, is_const, reads, variables
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Branch, Coupling, Network, Slope
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
@@ -37,7 +37,7 @@ class Slopes:
 
     def assigned(self, node: Node) -> bool:
         """Whether the expression reads a parameter that events assign."""
-        return any(n.op == "param" and n.data in self._network.discretes for n in topological([node]))
+        return reads(node, self._network.discretes)
 
     def flat(self, branch: Branch, slope: Node) -> bool | None:
         """Whether the slope is zero in all elements; None where it is in some of them: no form holds of them all."""

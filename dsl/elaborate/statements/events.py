@@ -184,7 +184,7 @@ def event_of(frame: ElaborationContext, draft: EventDraft, change: dict[Node, No
 
 
 def _discretes(frame: ElaborationContext, root: Node) -> bool:
-    return any(n.op == "param" and n.data in frame.parts.discretes for n in ex.topological([root]))
+    return ex.reads(root, frame.parts.discretes)
 
 
 def _watched(frame: ElaborationContext, condition: Node, place: Place) -> Node:

@@ -46,9 +46,9 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
     run->integral = run->sample + a;
     run->end = run->integral + a;
     run->middle = run->end + a;
-    run->within = run->middle + a;
+    run->work = run->middle + a;
     for (int k = 0; k < SD_PAST; k++)
-        run->past[k] = run->within + (size_t)(k + 1) * a;
+        run->past[k] = run->work + (size_t)(k + 1) * a;
     return run;
 }
 

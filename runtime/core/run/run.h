@@ -73,7 +73,7 @@ typedef struct sd_run {
                                                     * restart */
     double *power, *after, *sample, *integral, *end;   /* [audited] at the start and the end of the last step; of one
                                                         * sample; integrals over the step; of a row */
-    double *middle, *within;                           /* [audited] in the middle of the last step; work */
+    double *middle, *work;                             /* [audited] in the middle of the last step; work */
     double *past[SD_PAST], t_past[SD_PAST];            /* [audited] at the starts of the steps before it, the last one first, */
     int32_t pasts;                                     /* so many of them: since the last start */
     double *point, *point_d, *values, *largest, *slope, *memory; /* point: of a sample or a row; largest [observed]: of observe_scale;

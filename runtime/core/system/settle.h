@@ -52,7 +52,7 @@ typedef struct sd_settle {
     double *lent;                    /* room of the caller for a point [lent_room], who set it; NULL: none */
     size_t lent_room;
     double *met, *usual;             /* [unknowns + rates] what followed at the last point that settled, one behind the other;
-                                      * of steep laws: magnitudes before */
+                                      * of steep laws [unknowns]: magnitudes before */
     sd_sparse *basis;                /* of G^T, its rows over the weights: what follows pivots first; or NULL */
     int32_t basis_entries;           /* of its matrix */
     int32_t *basis_column, *basis_row;            /* its pattern: [rows + 1], unknowns and rates of each row */

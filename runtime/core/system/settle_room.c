@@ -11,7 +11,8 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
     sd_settle *settle = calloc(1, sizeof *settle);
     if (!settle)
         return NULL;
-    size_t m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1, steep = system->scales > 0 ? n : 0;
+    size_t m = (size_t)system->rows + 1, n = (size_t)(system->unknowns + rates) + 1;
+    const size_t steep = system->scales > 0 ? (size_t)system->unknowns : 0;
     settle->memory = calloc(m + 2 * n + steep, sizeof(double));
     settle->taken = linear ? calloc((size_t)linear->entries + 1, sizeof(double)) : NULL;
     if (!settle->memory || (linear && !settle->taken)) {

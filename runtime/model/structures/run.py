@@ -233,7 +233,7 @@ class Run(c.Structure):
         ("t_from", D),
         ("t_row", D),
         ("t_begun", D),
-        *[(name, P) for name in ["power", "after", "sample", "integral", "end", "middle", "within"]],
+        *[(name, P) for name in ["power", "after", "sample", "integral", "end", "middle", "work"]],
         ("past", P * PAST),
         ("t_past", D * PAST),
         ("pasts", I),

@@ -138,7 +138,7 @@ static int integrate_past(sd_run *run, double to)
     enum { POINTS = SD_PAST + 3 };
     static const double simpson[POINTS] = {1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0};
     const double *rows[POINTS] = {run->power, run->middle, run->sample}, from = run->t_from, h = to - from;
-    double at[POINTS] = {0.0, 0.5, 1.0}, difference[POINTS], *open = run->within;
+    double at[POINTS] = {0.0, 0.5, 1.0}, difference[POINTS], *open = run->work;
     if (run->pasts < SD_PAST)
         return 0;
     for (int k = 0; k < SD_PAST; k++) {
@@ -173,8 +173,8 @@ static void integrate_lobatto(sd_run *run, double to)
     for (int k = -1; k <= 1; k += 2) {
         double t = from + (0.5 + k * inner) * h;
         look(run, t);
-        powers(run, t, run->point, run->point_d, run->within);
-        weigh(run, run->within, 49.0 / 180.0 * h);
+        powers(run, t, run->point, run->point_d, run->work);
+        weigh(run, run->work, 49.0 / 180.0 * h);
     }
     weigh(run, run->power, 0.05 * h);
     weigh(run, run->middle, 16.0 / 45.0 * h);
