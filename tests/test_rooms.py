@@ -35,7 +35,9 @@ def test_every_room_has_a_page_of_files_that_exist(room):
     assert text.startswith(f"# {room.name}: ")
     assert len(text.splitlines()) <= 60, "one page"
     places = [room, *room.parents[: len(room.relative_to(ROOT).parts)]]
-    for name in re.findall(r"`([a-z_/]+\.(?:py|c|h|lark|toml|js))`", text):
+    notes = room / "decisions.md"
+    pages = text + (notes.read_text(encoding="utf-8") if notes.is_file() else "")
+    for name in re.findall(r"`([a-z_/]+\.(?:py|c|h|lark|toml|js|md))`", pages):
         assert any((place / name).is_file() for place in places), name
     for name in re.findall(r"`([a-z_/]+/)`", text):
         assert (room / name).is_dir(), name
