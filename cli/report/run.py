@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
-from sysdyn.cli.run.start.starting import described
+from sysdyn.cli.run.start.author import name_of
+from sysdyn.cli.run.start.starting import moved
 from sysdyn.compiler.binding.certificate import certificate
 from sysdyn.runtime.model.description import BESIDE
 from sysdyn.runtime.structure.order import freedom
@@ -53,10 +54,11 @@ def start(study: Study) -> str:
     """What the start changed, and where it begins."""
     state, system = study.started.state, study.started.system
     parts = []
-    if state.moved:
-        rows = [[escape(n), f"{before:.6g}", f"{after:.6g}", escape(why)] for n, before, after, why in state.moved]
+    moves = moved(study.prepared, state)
+    if moves:
+        rows = [[escape(n), f"{before:.6g}", f"{after:.6g}", escape(why)] for n, before, after, why in moves]
         more = f'<p class="soft">… {len(rows) - SHOWN} more</p>' if len(rows) > SHOWN else ""
-        parts.append(f"<p>{len(described(state))} guesses were moved.</p>")
+        parts.append(f"<p>{len(moves)} guesses were moved.</p>")
         parts.append(table(("guess", "as written", "at the start", "why"), rows[:SHOWN], left=(0, 3)) + more)
     else:
         parts.append("<p>No written guess was moved.</p>")
@@ -70,7 +72,7 @@ def start(study: Study) -> str:
         for k in range(family.size):
             if family.kind not in BESIDE and position < state.y.size and len(rows) <= SHOWN:
                 rate = f"{state.yd[position]:.6g}" if np.isfinite(state.yd[position]) else "–"
-                rows.append([escape(family.named(k)), f"{state.y[position]:.6g}", rate])
+                rows.append([escape(name_of(study.network, family.named(k))), f"{state.y[position]:.6g}", rate])
             position += 1
     more = '<p class="soft">…</p>' if len(rows) > SHOWN else ""
     values = table(("unknown", "value", "rate"), rows[:SHOWN], left=(0,)) + more

@@ -119,6 +119,13 @@ class Family(_Elements):
     shape: Shape
     elements: Elements = ()
 
+    def named(self, position: int, name: str = "") -> str:
+        """What an element is called, as the text writes it: the index behind its owner: `x[2]'`."""
+        name = name or self.name
+        if self.elements or not name.startswith(self.owner):
+            return named(name, self.shape, self.elements, position)[0]
+        return element(self.owner, self.shape, position) + name[len(self.owner) :]
+
 
 @dataclass(frozen=True, slots=True)
 class RowFamily(_Elements):

@@ -18,17 +18,24 @@ Moved = tuple[str, float, float, str]
 
 
 def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
-    """Labels of the constraint rows that an unknown stands in."""
+    """Labels of the rows that an unknown stands in: of the one that it alone meets, where there is one, or of the
+    constraints; guesses are none.
+    """
     found: list[str] = []
     values = starter.jacobian(t, x)
-    silent = starter.rows[starter.moves("unsaid")[starter.columns]]
-    mine = starter.rows[(starter.columns == place) & (values != 0.0)]
+    held = values != 0.0
+    guesses = starter.moves("unsaid") | starter.moves("slack")
+    silent = starter.rows[guesses[starter.columns]]
+    mine = starter.rows[(starter.columns == place) & held]
+    beside = starter.rows[(starter.columns != place) & held & starter.free[starter.columns]]
     for row in sorted(set(mine.tolist()).difference(silent.tolist())):  # without numpy.ma, 7 ms of a short command
         label = starter.settled.row_label(row)
         base = label.kind.split("_")[0]
-        text = f"{base} {label.label}"
+        text = f"init of line {label.line}" if base == "initial" else f"{base} {label.label}"
         if base in ("phi", "psi", "gamma", "momentum", "initial") and text not in found:
             found.append(text)
+        if base == "dynamics" and not (beside == row).any():
+            return f"asked for by {label.label}"
     return "asked for by " + ", ".join(found[:4]) if found else "asked for by the balance of efforts"
 
 

@@ -297,6 +297,16 @@ def test_what_the_start_moved_is_said(tmp_path, capsys):
     assert "y: -2.1 -> -2.11556, asked for by phi rod" in capsys.readouterr().err
 
 
+def test_what_the_start_moved_is_said_by_the_names_of_the_text(tmp_path, capsys):
+    """A node's effort, not the multiplier that stands for it; the element whose law alone says what it is."""
+    model = Path(__file__).parents[2] / "models" / "gallery" / "heat_exchanger.sd"
+    options = "--set", "n=3", "--set", "C=1 J/K", "-o", str(tmp_path / "x.h5")
+    assert run_json(capsys, "simulate", str(model), *options)[1]["result"]["moved"] == [
+        "h[0].e: 293.15 -> 363.15, asked for by inlet_h",
+        "c[4].e: 293.15 -> 288.15, asked for by inlet_c",
+    ]
+
+
 def test_what_cannot_be_is_said_with_a_code(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
     assert run(["simulate", path, "--level", "a=b"]) == 2

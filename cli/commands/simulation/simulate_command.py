@@ -42,7 +42,8 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
         return console.unable()
     console.result = _result(ran)
     found = sought(ran.started.state)
-    for text in (*shortened(described(ran.started.state)), *([found] if found else []), *ran.outcome.warnings):
+    moves = shortened(described(ran.prepared, ran.started.state))
+    for text in (*moves, *([found] if found else []), *ran.outcome.warnings):
         console.say(text)
     if ran.outcome.judgement is not None and not ran.outcome.met:
         for claim in ran.claims:
@@ -140,7 +141,7 @@ def _result(ran: Ran) -> dict[str, Any]:
         "not_met": [missed.to_json() for missed in o.judgement.not_met] if o.judgement else [],
         "conserved": o.judgement.kept() if o.judgement else [],
         "expects": [{"text": c.text, "ok": c.ok, "value": c.value, "time": c.time} for c in ran.claims],
-        "moved": described(ran.started.state),
+        "moved": described(ran.prepared, ran.started.state),
         "warnings": list(o.warnings),
         "failure": ran.failure,
     }

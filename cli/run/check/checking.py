@@ -107,7 +107,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
         "ok": not report.failed,
         "formulation": prepared.formulation,
         **facts.counts,
-        "moved": described(started.state),
+        "moved": described(prepared, started.state),
         "passivity": {
             "verdict": judged.verdict,
             "proven": judged.proven,

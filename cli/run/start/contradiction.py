@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared, place_at
+from sysdyn.cli.run.start.author import name_of
 from sysdyn.cli.run.start.flat_laws import by_element
 from sysdyn.dsl.model.dimensions import TIME
 from sysdyn.dsl.model.expression import variables
@@ -135,22 +136,12 @@ def _without_inertia(prepared: Prepared, name: str) -> bool:
 
 def _listed(prepared: Prepared, error: InconsistentStart) -> str:
     """The fixed values to free, as the author writes them: `x'`, and `shaft.f` of a node or an element."""
-    elements = {n.name for n in prepared.network.nodes} | {b.name for b in prepared.network.branches}
     places = [place_of(prepared, c) for c in error.candidates]
     shown = []
     for c, place in zip(error.candidates, places, strict=True):
-        name = c.label.removesuffix("'")
         written = re.match(r"init\s+([^=~:]+?)\s*[=~]", place.source.text[place.span.start : place.span.end])
-        if written and ".." not in written[1] and places.count(place) == 1:
-            shown.append(written[1])
-            continue
-        held = c.label.removesuffix(".multiplier")  # the effort of a node
-        for owner, kind in ((held, "e"), (name, "f")):
-            if owner != c.label and re.sub(r"\[.*", "", owner) in elements:
-                shown.append(f"{owner}.{kind}")
-                break
-        else:
-            shown.append(c.label)
+        alone = written and ".." not in written[1] and places.count(place) == 1
+        shown.append(written[1] if written and alone else name_of(prepared.network, c.label))
     return ", ".join(f"'{name}'" for name in dict.fromkeys(shown))
 
 

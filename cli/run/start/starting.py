@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared, prepare
+from sysdyn.cli.run.start.author import name_of
 from sysdyn.cli.run.start.contradiction import inconsistent, place_of
 from sysdyn.cli.run.verdict.last_state import LastState
 from sysdyn.dsl import load
@@ -23,6 +24,7 @@ from sysdyn.runtime.model.description import describe
 from sysdyn.runtime.model.failures import InconsistentStart, SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import NotFiniteError
+from sysdyn.runtime.start.moved import Moved
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.implicit import undetermined
 from sysdyn.runtime.structure.inertia import negative_inertia
@@ -133,9 +135,14 @@ def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None
         return None
 
 
-def described(state: ConsistentState) -> list[str]:
-    """What the start moved, a line each."""
-    return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in state.moved]
+def moved(prepared: Prepared, state: ConsistentState) -> list[Moved]:
+    """What the start moved, by the author's names."""
+    return [(name_of(prepared.network, name), *rest) for name, *rest in state.moved]
+
+
+def described(prepared: Prepared, state: ConsistentState) -> list[str]:
+    """The same, a line each."""
+    return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in moved(prepared, state)]
 
 
 def sought(state: ConsistentState) -> str:
