@@ -307,6 +307,14 @@ def test_what_the_start_moved_is_said_by_the_names_of_the_text(tmp_path, capsys)
     ]
 
 
+def test_the_balance_of_energy_is_finite_within_steps_that_time_does_not_resolve(tmp_path, capsys):
+    """Where the valve turns, steps share their instant; a balance by those before was infinite there."""
+    text = (Path(__file__).parents[2] / "models" / "gallery" / "fluid_tank.sd").read_text()
+    claim = "scene fill of fluid_tank {\n  expect always: abs(audit.energy) <= 10 J"
+    path = write(tmp_path, text.replace("scene fill of fluid_tank {", claim))
+    assert run(["simulate", path, "--scene", "fill", "-o", str(tmp_path / "out.h5")]) == 0, capsys.readouterr().err
+
+
 def test_what_cannot_be_is_said_with_a_code(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
     assert run(["simulate", path, "--level", "a=b"]) == 2

@@ -132,7 +132,7 @@ static int sure(const sd_run *run, const double *open)
 /* By the polynomial through powers at the ends and in the middle of the step, and at the starts p of those before it: Simpson's rule
  * and, in parts s of the step, w = s (s - 1/2) (s - 1),
  *     int w (s - p_1) ds f[0, 1/2, 1, p_1, p_2] + int w (s - p_1) (s - p_2) ds f[0, 1/2, 1, p_1, p_2, p_3],
- * where int w = int w (s - 1/2)^2 = 0, int w (s - 1/2) = -1/120.  0: the last term is not little. */
+ * where int w = int w (s - 1/2)^2 = 0, int w (s - 1/2) = -1/120.  0: the last term is not little, or there is none. */
 static int integrate_past(sd_run *run, double to)
 {
     enum { POINTS = SD_PAST + 3 };
@@ -152,6 +152,8 @@ static int integrate_past(sd_run *run, double to)
         for (int j = 3; j < POINTS; j++)
             product *= i == j ? 1.0 : at[i] - at[j];
         difference[i] = 1.0 / product;
+        if (!isfinite(difference[i])) /* steps below the resolution of time share an instant */
+            return 0;
     }
     for (int i = 0; i < POINTS; i++) {
         const double last = higher * difference[i];
