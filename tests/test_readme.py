@@ -1,5 +1,6 @@
 """The README shows what is in the repository."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -61,3 +62,14 @@ def test_the_python_example_runs(tmp_path, monkeypatch, capsys):
 def test_gallery_table_names_every_model():
     for path in (ROOT / "models/gallery").glob("*.sd"):
         assert f"`{path.stem}`" in README
+
+
+def test_the_page_of_measurements_names_every_program():
+    bench = ROOT / "tests/bench"
+    page = (bench / "README.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"([\w/]+\.py)\b", page))
+    for name in named:
+        assert (bench / name).is_file() or (ROOT / name).is_file(), name
+    assert {path.name for path in bench.glob("*.py")} <= named
+    for line in page.splitlines():
+        assert len(line) <= (200 if line.startswith("|") else 120), line

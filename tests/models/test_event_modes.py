@@ -264,7 +264,7 @@ def test_the_core_makes_what_the_handler_does(name, way, tmp_path, asked, monkey
     if way == "dopri" and any(word in MANY[name] for word in ("phi ", "psi ", "abs(")):
         pytest.skip("constraints that hold at times")
     if (name, way) == ("twists", "bdf"):
-        pytest.skip("chatters behind its Zeno point: runtime/events/README.md")
+        pytest.skip("chatters behind its Zeno point: runtime/events/decisions.md")
     options = {"formulation": way} if way in ("hamiltonian", "kane") else {"method": way}
     one, two = both(MANY[name], tmp_path, monkeypatch, accuracy=1e-6, **options)
     assert [(e.name, e.element) for e in one.events] == [(e.name, e.element) for e in two.events]
