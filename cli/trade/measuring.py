@@ -23,18 +23,20 @@ from sysdyn.cli.run.request.asked import ACCURACY, Request, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, begin, finding, ready, run_from
 from sysdyn.cli.run.start.starting import Started
+from sysdyn.cli.trade import work
 from sysdyn.cli.trade.errors import error_of
 from sysdyn.cli.trade.traded import INDICES, Combination, Measured, Refusal
-from sysdyn.cli.trade.work import counted, of_rows
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.runtime.accuracy.options import Options, choose_index
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
+from sysdyn.runtime.model.system import System
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
 METHODS = ("dopri", "rosenbrock", "radau", "bdf")
+CONSTRAINTS = ("phi", "psi", "phi_rate", "psi_rate", "phi_acceleration")
 LARGE = 20_000
 """Unknowns of a model of which other formulations are not kept beside its own: gigabytes each."""
 MOST = 32
@@ -47,15 +49,15 @@ Said = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """A formulation at its start.  again: it has events, and every run finds its own start; sizes: (unknowns, entries)
-    by index form.
+    """A formulation at its start.  again: it has events, and every run finds its own start; sizes: by index
+    form.
     """
 
     prepared: Prepared
     options: Options
     started: Started
     again: bool
-    sizes: dict[str, tuple[int, int]]
+    sizes: dict[str, work.Size]
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,15 +248,16 @@ class Bench:
             error = error_of(found, reference, self.judged(reference), self.accuracy, until)
             if not math.isfinite(error):
                 reason = reason or "a quantity is no number"
-        fixed = of_rows(found.time.size, self.size(combination), combination.method)
         numbers = {key: n for key, n in outcome.statistics.items() if isinstance(n, int)}
+        size, method = self.size(combination), combination.method
+        fixed = work.fixed(found.time.size, size, method)
         return Measured(
             combination,
             tolerance,
             error,
             outcome.timings["cpu_integrate_s"],
             outcome.statistics["steps"],
-            fixed + self._work(combination, numbers),
+            fixed + work.counted(numbers, size, method),
             fixed,
             float(np.max(np.abs(found["audit.energy"].values), initial=0.0)),
             float(np.max(found["audit.constraints"].values, initial=0.0)),
@@ -263,22 +266,23 @@ class Bench:
             said,
         )
 
-    def _work(self, combination: Combination, statistics: dict[str, int]) -> float:
-        facts = self.carried[combination.formulation, combination.level].started.facts
-        projected = combination.index in ("0", "1") and (facts.index or 0) > 1
-        return counted(statistics, self.size(combination), combination.method, projected=projected)
-
-    def size(self, combination: Combination) -> tuple[int, int]:
-        """Rows and entries of the Jacobian's pattern in a combination's form."""
+    def size(self, combination: Combination) -> work.Size:
+        """Of a combination's form."""
         carried = self.carry(combination)
         if carried is None:
-            return 1, 1
+            return work.Size(1, 1, bent=False)
         form = choose_index(combination.index, carried.started.facts)[0]
         if form not in carried.sizes:
             system = carried.started.system
             system = system if system.form.name == form else system.another(form)
-            carried.sizes[form] = system.rows, system.pattern.entries
+            carried.sizes[form] = work.Size(system.unknowns, system.pattern.entries, bent=_bent(system))
         return carried.sizes[form]
+
+
+def _bent(system: System) -> bool:
+    """Whether slopes of constraints change."""
+    kernels = [k for block in CONSTRAINTS for k in system.description.blocks.get(block, ())]
+    return any(kernel.bent is None or bool(kernel.bent) for kernel in kernels)
 
 
 def _levels(network: Network, given: tuple[tuple[str, str], ...], own: str) -> dict[str, tuple[tuple[str, str], ...]]:

@@ -136,8 +136,8 @@ def page(found: Traded, command: str) -> str:
         f"<p><strong>{escape(verdict(found))}</strong></p>",
         f"<pre>{escape(command)}</pre>" if command else "",
         f'<p class="soft">Errors are relative to the magnitudes of {escape(", ".join(found.judged))}{until}, from '
-        f"{escape(known.first)}, which {escape(known.second)} confirms to {known.uncertainty:.1e}. Work is counted in "
-        "matrix entries touched: the same on every machine.</p>",
+        f"{escape(known.first)}, which {escape(known.second)} confirms to {known.uncertainty:.1e}. Work is counted, "
+        "in ns of one machine: the same on every other.</p>",
         hint(),
         _figure(found),
         table(HEADS, [[escape(cell) for cell in cells(found, m)] for m in found.measured], left=(0, 1, 2, 3, 12)),

@@ -39,9 +39,8 @@ class Combination:
 @dataclass(frozen=True, slots=True)
 class Measured:
     """One run.  tolerance: the solver's own; error: largest relative error of the judged quantities (None: no trace to
-    its end); cpu_s: of the integration; work: counted, in matrix entries (work.py), fixed: that of the trace's rows in
-    it, which no tolerance changes; energy: largest balance [J]; constraints: largest norm; reason: why it is never
-    chosen, "" where it may be.
+    its end); cpu_s: of the integration; work: counted (work.py), fixed: the part of it that no tolerance changes;
+    energy: largest balance [J]; constraints: largest norm; reason: why it is never chosen, "" where it may be.
     """
 
     combination: Combination

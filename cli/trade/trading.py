@@ -15,13 +15,13 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.many.crew import company
 from sysdyn.cli.run.request import targets
 from sysdyn.cli.run.request.asked import Request, check_tolerances
+from sysdyn.cli.trade import work
 from sysdyn.cli.trade.ahead import Asked, ahead
 from sysdyn.cli.trade.journal import journal as journal_of
 from sysdyn.cli.trade.measuring import Bench, Limits
 from sysdyn.cli.trade.reference import reference
 from sysdyn.cli.trade.search import FIRST, Search, tolerance
 from sysdyn.cli.trade.traded import Combination, Measured, Refusal, Runs, Traded
-from sysdyn.cli.trade.work import HISTORY
 from sysdyn.dsl.text.diagnostics import Report
 
 SECONDS = 300.0
@@ -90,7 +90,8 @@ def trade(
 
     def measure(combination: Combination, tolerance: float, most: float) -> Measured | str:
         left = wall()
-        steps = max(math.ceil(most / (HISTORY * bench.size(combination)[0])), LEAST) if math.isfinite(most) else None
+        step = work.step(bench.size(combination), combination.method)
+        steps = max(math.ceil(most / step), LEAST) if math.isfinite(most) else None
         made = made_before.get((combination, tolerance))
         if made is None or (isinstance(made, Measured) and steps is not None and made.steps >= steps):
             made = bench.measure(combination, tolerance, kept, known.until, Limits(steps, left))

@@ -1,34 +1,69 @@
-"""Counted work of a run: matrix entries touched, the same on every machine.
+"""Counted work of a run, the same on every machine: what its counters cost in ns of one.
 
-work = rows of the trace + HISTORY x unknowns x steps + entries x (residuals + Jacobians + FACTOR x factorisations),
-with the entries of the Jacobian's pattern in the index form of the run.  Fitted to the CPU time of 60 runs of seed
-models at 1e-9 (bdf, radau, dopri; 2 to 50 unknowns): within 35 % of it among the methods of one model.
+work = run + rows (row + row_entry x entries) + steps (step + step_unknown x unknowns)
+           + entries (evaluation x residuals + matrix x (Jacobians + factorisations))
+
+with the size of the index form of the run; row_bent in the place of row_entry where slopes of constraints change: each
+row of the trace is then settled by factors of its own.  Steps that were refused count.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-HISTORY = 12.0
-"""Passes over the unknowns in a step: predicting, correcting, weighing errors."""
-PROJECTED = 12.0
-"""More of them where a form of index 1 or 0 is brought back to its constraints after each step."""
-FACTOR = {"radau": 5.0}
-"""A real and a complex matrix; one of the others."""
-ROW, ROW_OF = 12.0, {"dopri": 9.0}
-"""Passes over the entries for a row of the trace: it is interpolated, settled, observed, its energies are read."""
+from sysdyn.values import dataclass
 
 
-def counted(statistics: Mapping[str, int], size: tuple[int, int], method: str, *, projected: bool) -> float:
-    """Work of the steps of one run.  statistics: as the trace holds them; size: unknowns, entries of the form."""
-    unknowns, entries = size
-    passes = HISTORY + (PROJECTED if projected and method != "dopri" else 0.0)
-    matrices = statistics["residual_evaluations"] + statistics["jacobian_evaluations"]
-    factored = FACTOR.get(method, 1.0) * statistics["factorisations"]
-    tried = statistics["steps"] + statistics["rejected_steps"]
-    return passes * unknowns * tried + entries * (matrices + factored)
+@dataclass(frozen=True, slots=True)
+class Size:
+    """Of an index form: unknowns, entries of the Jacobian's pattern; bent: slopes of its constraints change."""
+
+    unknowns: int
+    entries: int
+    bent: bool
 
 
-def of_rows(number: int, size: tuple[int, int], method: str) -> float:
-    """Work of the rows of a trace, whatever the tolerance."""
-    return ROW_OF.get(method, ROW) * size[1] * number
+@dataclass(frozen=True, slots=True)
+class Costs:
+    """ns of a two-core cloud machine.  run: the start of one, with code that is read for the first time."""
+
+    run: float
+    row: float
+    row_entry: float
+    row_bent: float
+    step: float
+    step_unknown: float
+    evaluation: float
+    matrix: float
+
+
+COSTS = {
+    "dopri": Costs(39200.0, 271.0, 20.6, 14.0, 283.0, 218.0, 0.0, 0.0),
+    "rosenbrock": Costs(49000.0, 191.0, 16.3, 101.0, 771.0, 0.0, 0.0, 14.9),
+    "radau": Costs(83300.0, 302.0, 15.2, 100.0, 0.0, 151.0, 4.5, 9.5),
+    "bdf": Costs(55000.0, 236.0, 14.4, 105.0, 317.0, 13.2, 2.8, 7.3),
+}
+"""Least squares of the relative difference from the CPU time of NNNN runs (PPPP)."""
+
+
+COUNTED = ("steps", "rejected_steps", "residual_evaluations", "jacobian_evaluations", "factorisations")
+
+
+def counted(statistics: Mapping[str, int], size: Size, method: str) -> float:
+    """Work of the steps of one run.  statistics: as the trace holds them."""
+    cost = COSTS[method]
+    steps = statistics["steps"] + statistics["rejected_steps"]
+    matrices = statistics["jacobian_evaluations"] + statistics["factorisations"]
+    once = size.entries * (cost.evaluation * statistics["residual_evaluations"] + cost.matrix * matrices)
+    return steps * (cost.step + cost.step_unknown * size.unknowns) + once
+
+
+def step(size: Size, method: str) -> float:
+    """Work of a step at least: one that evaluates the residual once."""
+    return counted({**dict.fromkeys(COUNTED, 0), "steps": 1, "residual_evaluations": 1}, size, method)
+
+
+def fixed(rows: int, size: Size, method: str) -> float:
+    """Work of a run and the rows of its trace, whatever the tolerance."""
+    cost = COSTS[method]
+    return cost.run + rows * (cost.row + (cost.row_bent if size.bent else cost.row_entry) * size.entries)
