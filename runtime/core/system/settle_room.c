@@ -5,6 +5,16 @@
 #include <stdlib.h>
 
 #define SMALL_POINT 20000 /* unknowns and rates up to which room for slopes is kept */
+#define FIRST 24          /* points before an order of their matrix is looked for: that costs as much as it saves of these */
+
+/* the matrix of the least change, which many rows of a trace may need */
+static void take(sd_settle *settle, sd_linear *linear)
+{
+    settle->linear = linear;
+    sd_linear_replayed(linear);
+    if (linear->elimination)
+        linear->elimination->first = FIRST;
+}
 
 sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
 {
@@ -20,7 +30,8 @@ sd_settle *sd_settle_new(sd_system *system, sd_linear *linear, int32_t rates)
         return NULL;
     }
     settle->system = system;
-    settle->linear = linear;
+    if (linear)
+        take(settle, linear);
     settle->unknowns = system->unknowns;
     settle->rates = rates;
     settle->rows = system->rows;
@@ -99,7 +110,7 @@ int sd_settle_take(sd_settle *settle, sd_linear *linear)
     settle->taken = calloc((size_t)linear->entries + 1, sizeof(double));
     if (!settle->taken)
         return 2;
-    settle->linear = linear;
+    take(settle, linear);
     settle->matrix = settle->taken;
     return 0;
 }

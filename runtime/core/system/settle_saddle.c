@@ -124,9 +124,10 @@ double sd_settle_move(sd_settle *settle, double *y, double *yd, double *state)
     for (int32_t k = 0; k < settle->rates; k++)
         yd[settle->rate[k]] += settle->step[n + k] * settle->scale[n + k];
     for (int32_t j = 0; j < moves; j++) {
-        largest = fmax(largest, fabs(settle->step[j]));
-        if (settle->state[j] == SD_CARRIES)
-            *state = fmax(*state, fabs(settle->step[j]));
+        const double size = fabs(settle->step[j]);
+        largest = size > largest ? size : largest;
+        if (settle->state[j] == SD_CARRIES && size > *state)
+            *state = size;
     }
     for (int32_t k = 0; k < settle->pairs; k++) {
         const int32_t i = settle->pair[2 * k], j = settle->pair[2 * k + 1];

@@ -10,7 +10,7 @@
 
 #define GROWTH 1e4         /* of multipliers, where a solution is a correction that the next one corrects */
 #define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
-#define FIRST 3            /* matrices seen before an order is looked for: one-off systems do not pay for it, */
+#define FIRST 3            /* matrices seen before an order is looked for, if nobody says more: one-off systems do not pay, */
 #define SHARE 8            /* nor do large ones before this part of n */
 #define MISSES 3           /* matrices that an order did not serve, each of which costs a fortieth of a search, before another is */
 #ifdef SD_COMPLEX
@@ -64,7 +64,7 @@ void sd_elimination_forget(sd_elimination *elimination)
     e->samples = e->seen = e->missed = 0;
     e->tries = e->since = e->served = 0;
     e->serves = e;
-    e->wait = FIRST > e->n / SHARE ? FIRST : e->n / SHARE;
+    e->wait = e->first > e->n / SHARE ? e->first : e->n / SHARE;
 }
 
 void sd_elimination_free(sd_elimination *elimination)
@@ -94,6 +94,7 @@ sd_elimination *sd_elimination_new(int32_t n, const int32_t *column, const int32
     e->pivot_column = e->pivot_row + n;
     e->growth = GROWTH;
     e->orders = SD_ORDERS;
+    e->first = FIRST;
     sd_elimination_forget(e);
     return e;
 }

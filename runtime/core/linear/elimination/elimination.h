@@ -39,6 +39,7 @@ struct sd_elimination {
     int64_t interpreted;         /* operations so far */
     struct sd_code *code;        /* NULL: interpreted */
     sd_elimination *other;       /* with another order; NULL: there is none */
+    int32_t first;               /* of the first: matrices seen before an order is looked for */
     int32_t orders;              /* of the first: that it keeps at most, SD_ORDERS or as its owner says */
     sd_elimination *serves;      /* of the first: the one whose factors were the last that served */
     int64_t tries;               /* of the first: matrices so far */
