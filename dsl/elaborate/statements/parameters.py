@@ -164,8 +164,9 @@ class Parameters(ElaborationContext):
         return si(dimension)
 
     def _is_run_constant(self, node: Node, statement: syntax.Param, given: Argument | None) -> None:
+        discretes = self.parts.discretes
         for inner in ex.topological([node]):
-            if inner.op in ("var", "time"):
+            if inner.op in ("var", "time") or (inner.op == "param" and inner.data in discretes):
                 message = f"parameter '{statement.decl.name}' depends on '{inner}': a parameter is a constant"
                 vary = f"numbers and parameters alone; 'input {statement.decl.name}' could vary"
                 raise self._wrong("E807", message, statement, given, help=None if given is None else vary)
