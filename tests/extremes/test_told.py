@@ -43,6 +43,7 @@ def test_rows_within_a_step_taken_for_its_state_are_of_that_step(tmp_path):
         (117, "hamiltonian", 1e-5, "auto"),
     ],
 )
+@pytest.mark.one_in(2)
 def test_what_is_told_as_met_is(number, formulation, accuracy, method, tmp_path):
     found = told(tmp_path, drawn(number), formulation, accuracy, method, [])
     assert found.met
