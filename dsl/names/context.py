@@ -362,7 +362,7 @@ class Context:
             help_ = f"a number without unit: param {text} = 3" if text.isidentifier() else "a number without unit"
             raise self.fail("E805", message, expression.span, help=help_, subject=f"unit of {text}")
         for node in ex.topological([value.node]):
-            if node.op in ("var", "time", "table"):
+            if node.op in ("var", "time", "table") or (node.op == "param" and node.data in self.discretes):
                 raise self.fail(
                     "E807", f"{what} depends on '{index_text(node)}', which is no constant", expression.span
                 )

@@ -131,16 +131,18 @@ Run = Callable[[float, float], Sampled]
 """Integrates with a tolerance and a longest step as part of the span."""
 
 
-def _shrink(law: Law, power: float, step: float, longer: float, *, jumps: bool) -> float:
-    """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step and whose steps are
-    `longer` times larger; beyond law.far nothing more is credited.  jumps: events happen, which may hold the steps: of
-    no shorter ones the tolerance says nothing.
+def _shrink(law: Law, power: float, step: float, coarse: Sampled, fine: Sampled) -> float:
+    """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step times larger; beyond
+    law.far nothing more is credited.  Of longer steps the tolerance says nothing, of hardly shorter ones where events
+    happen, which may hold them.
     """
+    longer, jumps = fine.steps / max(coarse.steps, 1), fine.jumps
     ratio = max(10.0 ** (-power * step), law.far**law.credit)
-    if jumps and longer <= ALIKE:
+    if longer <= ALIKE if jumps else longer < 1.0 and not law.order:
         ratio = max(ratio, UNSEEN)
     if law.order:
-        ratio = max(ratio, min(max(longer, 1.0) ** -law.order, UNSEEN))
+        order = law.order if fine.steps >= LENGTHY else min(law.order, law.fronts)
+        ratio = max(ratio, min(max(longer, 1.0) ** -order, UNSEEN))
     return float(law.safety * ratio / (1.0 - ratio))
 
 
@@ -233,9 +235,8 @@ class _Estimate:
                 if power > self._fastest(fine):  # by chance: the pair before speaks for the last run
                     luck = 10.0 ** ((power - credit) * step_before)
         if shrink is None:
-            longer = fine.steps / max(coarse.steps, 1)
             power = credit if self._power is None else min(self._power, credit)
-            shrink = _shrink(self.law, power, step, longer, jumps=fine.jumps)
+            shrink = _shrink(self.law, power, step, coarse, fine)
         self._before = (over, step) if shorter is None and not lost else None  # what is lost has no power
         least = self.law.least * fine.tolerance
         shrink *= luck

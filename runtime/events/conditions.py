@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from sysdyn.runtime.events.plan import Assignment, Condition, Relation
 from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.rank import least_squares
+from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
 from sysdyn.values import dataclass
 
 
@@ -42,12 +43,17 @@ def holds(condition: Condition, sides: Floats, relations: Sequence[Relation], cr
 
 
 def with_momenta(settled: System, t: float, y: Floats, yd: Floats) -> Floats:
-    """Y with the momenta that follow from flows that were assigned: the rows of block momentum, solved for p."""
+    """Y with the momenta that follow from flows that were assigned: the rows of block momentum, solved for p;
+    SolverFailure where that comes to no numbers.
+    """
     rows = np.flatnonzero(settled.of_groups("momentum"))
     p = np.flatnonzero(settled.kinds == "p")
     for _ in range(3 if rows.size else 0):
         jy, _ = settled.jacobian(t, y, yd)
         matrix = settled.dense(jy)[np.ix_(rows, p)]
         y = y.copy()
-        y[p] -= least_squares(matrix, settled.residual(t, y, yd)[rows])
+        try:
+            y[p] -= least_squares(matrix, settled.residual(t, y, yd)[rows])
+        except NotFiniteError as error:
+            raise SolverFailure("nonfinite", t, 0.0, row=settled.row_label(int(rows[0]))) from error
     return y

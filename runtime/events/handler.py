@@ -293,6 +293,7 @@ class Handler(Watching):
                 raise SolverFailure("newton", t, 0.0)
             self._renew(t, *found)
             return found
+        self.restart.bounded(t, y, yd)
         try:
             found, anew = self.succession.after(t, y, yd, touched, stalled=self.stalled > 0)
         except NoActiveSetError as error:

@@ -134,6 +134,23 @@ class Instant:
         with np.errstate(all="ignore"):
             return bool((r > BROKEN * size)[flows].any())
 
+    def unbounded(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[str, int] | None:
+        """The row at the point of a store that holds something, though its law lets it hold one value, whatever its
+        effort or flow (a capacitance that becomes zero): its energy had no bound, no fast rise leads on ("overfull");
+        a row that is no number ("nonfinite"); None: there is none.
+        """
+        contents, sloping = np.isin(self.system.kinds, ("q", "p", "s")), np.zeros(self.system.rows, dtype=bool)
+        for at in (y, y + magnitude):  # where a law is flat at rest alone it holds more
+            slope = self.system.jacobian(t, at, yd)[0]
+            sloping[self._row[(slope != 0.0) & ~contents[self._column]]] = True
+        size = np.bincount(self._row, np.abs(slope) * np.maximum(magnitude, np.abs(y))[self._column], self.system.rows)
+        off = np.where(self._now(self._states), np.abs(self.system.residual(t, y, yd)), 0.0)
+        full = np.isposinf(off) | (~sloping & (off > BROKEN * size))
+        for cause, wrong in (("overfull", full), ("nonfinite", np.isnan(off))):
+            if wrong.any():
+                return cause, int(np.argmax(wrong))
+        return None
+
     def _now(self, rows: Mask) -> Mask:
         """Those of the rows that hold now."""
         found = rows.copy()

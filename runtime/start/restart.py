@@ -55,8 +55,9 @@ class Restart:
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
         """y, yd [unknowns as written] on the far side at t; None where none was found, SolverFailure where a balance
-        over the instant is not met.
+        over the instant is not met, or where there is no balance (`bounded`).
         """
+        self.bounded(t, y, yd)
         try:
             found = self._struck(t, y, yd, self.magnitude(y.size))
         except UnbalancedError as error:
@@ -66,6 +67,12 @@ class Restart:
     def failure(self, t: float, error: UnbalancedError) -> SolverFailure:
         """What a balance over the instant t that is not met is told as."""
         return SolverFailure("unbalanced", t, 0.0, row=self.settler.system.row_label(error.row))
+
+    def bounded(self, t: float, y: Floats, yd: Floats) -> None:
+        """SolverFailure where what a store holds at the point is none that its law lets it hold."""
+        found = self.instant.unbounded(t, y, yd, self.magnitude(y.size))
+        if found is not None:
+            raise SolverFailure(found[0], t, 0.0, row=self.settler.system.row_label(found[1]))
 
     def struck(self, t: float, y: Floats, yd: Floats, *, quickly: bool = False) -> tuple[Floats, Floats, Floats] | None:
         """The same with the impulses [unknowns as written] that took the flows there, of a set of constraints that is

@@ -96,6 +96,15 @@ def test_a_parameter_is_a_constant():
     assert found == ("E807", "parameter 'a' depends on 't': a parameter is a constant", "2 s + t")
 
 
+def test_neither_a_parameter_nor_an_index_is_a_discrete_variable():
+    """The value of the start had been kept, whatever events assigned."""
+    part = "component part {\nparam r: ohm\nbranch: electrical\nlaw e = r*f\n}\n"
+    said = made(f"{part}model m {{\ndiscrete k = 1 ohm\nnode a: electrical\nP: part(r = k) a -> ground\n}}")[1]
+    assert ("E807", "parameter 'r' depends on 'k': a parameter is a constant", "r = k") in said
+    said = made("model m { discrete n = 1; state x[1..3] = 1; for i in 1..3 { dynamic x[i]' = -x[n]/(1 s) } }")[1]
+    assert ("E807", "an index depends on 'n', which is no constant", "n") in said
+
+
 # -- declarations ------------------------------------------------------------------------------------------------------
 
 

@@ -205,3 +205,13 @@ def test_no_event_of_a_polynomial(tmp_path):
 def test_the_same_for_ever():
     assert Circuit(5).text == Circuit(5).text
     assert len({Circuit(seed).text for seed in range(60)}) == 60
+
+
+@pytest.mark.one_in(2)
+def test_what_floating_nodes_have_in_common_makes_no_sizes(tmp_path):
+    """They begin at 1e12 V/s, which moves nothing: of sizes of 800 kA leaks turned diodes every 20 ns."""
+    file = tmp_path / "model.sd"
+    file.write_text(Circuit(24).text.replace("50 ms", "2 ms"))
+    one, other = (simulate(file, output=tmp_path / f, formulation=f, max_wall=20.0) for f in FORMULATIONS[::2])
+    assert other.statistics["steps"] < 1000
+    assert np.abs(voltage(one) - voltage(other)).max() < 2e-4 * np.abs(voltage(one)).max()

@@ -148,23 +148,25 @@ def test_an_inductor_of_zero_between_nodes_is_a_wire(tmp_path):
         assert np.abs(trace_of(tmp_path, text, formulation=formulation)["b.e"] - alone).max() < 1e-6, formulation
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.parametrize("given", ["param", "discrete"])
 @pytest.mark.parametrize("formulation", FOUR)
-def test_what_is_fixed_of_a_store_that_holds_nothing_is_not_forgotten(tmp_path, formulation):
-    """A capacitor of 0 F at 1 V where a divider says 3 V: the primal forms had begun at 3 V without a word."""
-    text = """
-    model divider {
-      param C0 = 0 F
+def test_what_is_fixed_of_a_store_that_holds_nothing_is_not_forgotten(tmp_path, formulation, given):
+    """A capacitor of 0 F at 1 V where a divider says 3 V: all forms had begun at 3 V without a word."""
+    text = f"""
+    model divider {{
+      {given} C0 = 0 F
       node a, b: electrical
       supply: effort(e = 5 V) a -> ground
       upper: dissipator(e = 2 ohm*f) a -> b
       lower: dissipator(e = 3 ohm*f) b -> ground
       C: potential(q = C0*e) b -> ground
       init C.e = 1 V
-    }
-    scene go of divider {
+    }}
+    scene go of divider {{
       time 0 s to 1 s
       trace b.e
-    }
+    }}
     """
     ran, report = attempt(tmp_path, text, formulation=formulation)
     assert ran is None

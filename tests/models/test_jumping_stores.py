@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from model_runs import FOUR
+from model_runs import FOUR, attempt
 from sysdyn import api
 from sysdyn.runtime.integrate.jumps import pieces
 
@@ -140,3 +140,21 @@ def test_a_store_that_jumps_along_a_motion_is_not_met(tmp_path, energy):
     )
     with pytest.raises(api.NotMet, match="ledger is off"):
         api.simulate(path, output=tmp_path / "m.h5")
+
+
+@pytest.mark.one_in(2)
+@pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.parametrize("store", ["kinetic(p = k*f)", "potential(q = k*e)"])
+def test_what_comes_to_hold_nothing_and_holds_something_is_refused(tmp_path, store, formulation):
+    """A mass drained through a damper at once in the complementary forms, a capacitor in the others, told as met."""
+    domain, unit, ohm, told = ("translation", "kg", "N.s/m", "f = 2 m/s")
+    if store.startswith("potential"):
+        domain, unit, ohm, told = "electrical", "F", "ohm", "e = 2 V"
+    text = (
+        f"model m {{\ndiscrete k = 1 {unit}\nnode x: {domain}\nM: {store} x -> ground\ninit x.{told}\n"
+        f"D: dissipator(e = (2 {ohm})*f) x -> ground\nwhen t >= 0.5 s {{ k := 0 {unit} }}\n}}\n"
+        "scene s of m { time 0 s to 1 s; trace D.e every 0.1 s }\n"
+    )
+    ran, report = attempt(tmp_path, text, formulation=formulation)
+    assert (ran.outcome.failure.cause, ran.outcome.failure.time) == ("overfull", pytest.approx(0.5))
+    assert [d.code for d in report if d.severity == "error"] == ["E933"]

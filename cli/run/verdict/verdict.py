@@ -47,6 +47,7 @@ _CAUSES = {
     "slides": ("E930", "a law jumps there and both its branches drive it back: no motion follows either"),
     "drives": ("E933", "the bound c of dry friction, c*setsign(u) or c*abs(u), falls below zero: it would drive"),
     "unbalanced": ("E930", "what jumps there is not where a fast rise would lead"),
+    "overfull": ("E933", "a store can hold nothing there, and holds something: its effort, or its flow, has no bound"),
     "endless": ("E933", "a pulse meets a finite resistance there: the power has no integral"),
     "pulsed": ("E933", "a dynamic variable that the model reads would jump there: its curved rate has a pulse"),
     "conflict": ("E704", "two events assign one variable at one instant"),
@@ -54,7 +55,18 @@ _CAUSES = {
 }
 AT_REST = 1e-8
 """Of what there was of its kind at the start: an unknown that has come to rest."""
-_OF_EVENTS = ("max_events", "chatter", "zeno", "complementarity", "conflict", "slides", "drives", "endless", "pulsed")
+_OF_EVENTS = (
+    "max_events",
+    "chatter",
+    "zeno",
+    "complementarity",
+    "conflict",
+    "slides",
+    "drives",
+    "overfull",
+    "endless",
+    "pulsed",
+)
 LOOSER = "a looser --accuracy"
 _REMEDIES = {
     "E704": "one event for both, or conditions that do not become true together",
@@ -70,6 +82,7 @@ _REMEDIES_OF_CAUSES = {
     "drives": "a bound of zero or more: abs(c), max(c, 0); the other sign of a reaction (floor.on(y) is the effort"
     " along y); or an earlier end: --until",
     "unbalanced": "another --formulation, or a ramp in place of the jump",
+    "overfull": "a value other than zero there, or a switch or a stop that empties it before",
     "endless": "a ramp in place of the jump, or something that stores between the two",
     "pulsed": "a ramp in place of the jump, or the store's own displacement or momentum in place of the integral",
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",

@@ -14,7 +14,7 @@ where the text fixes it, else it is chosen.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Sequence, Set
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
@@ -33,6 +33,7 @@ from sysdyn.compiler.network.primal.incidence import (
     ranges_over,
 )
 from sysdyn.compiler.network.primal.integrals import line
+from sysdyn.compiler.network.primal.laws import Laws
 from sysdyn.compiler.network.primal.overlaps import initially, inside, meeting, narrowed, ranges_of, untold
 from sysdyn.compiler.network.primal.reading import Ranges, Rewriter, touches_network
 from sysdyn.compiler.network.primal.series import Member
@@ -81,10 +82,11 @@ def told(b: Branch, initials: Iterable[Initial], sizes: Sizes) -> Iterator[tuple
 
 
 def at_stores(
-    network: Network, constant: Set[Branch], incidence: Incidence, reader: Rewriter, *, reflected: bool
+    network: Network, said: Laws, incidence: Incidence, reader: Rewriter, *, reflected: bool
 ) -> Iterator[Initial]:
     """Initial conditions; efforts of potential stores, and of nodes that a linear one holds to ground, as contents, but
-    for those that hold the same (`constant`) at any effort.
+    for those that hold the same at any effort; fixed efforts that are unknowns as efforts too, for at the start the
+    store may hold nothing.
     """
     kinds = {b.name: b.kind for b in network.branches}
     for initial in network.initials:
@@ -92,15 +94,15 @@ def at_stores(
         name, kind, _ = initial.target.data if told else ("", "", 0)
         if kind == "ne":
             for part in _at_store(initial, incidence.cells.get(name, ()), reader):
-                yield from _as_content(part, constant, reader)
+                yield from _as_content(part, said, reader)
             continue
         apart = kind in ("be", "bf") and kinds[name] not in TELLING
         if kind == "nf" and reflected:
             apart = not any(_holds(touch) for cell in incidence.cells.get(name, ()) for touch in cell.touches)
-        yield from _as_content(replace(initial, apart=apart and not initial.fixed), constant, reader)
+        yield from _as_content(replace(initial, apart=apart and not initial.fixed), said, reader)
 
 
-def _as_content(initial: Initial, constant: Set[Branch], reader: Rewriter) -> Iterator[Initial]:
+def _as_content(initial: Initial, said: Laws, reader: Rewriter) -> Iterator[Initial]:
     """Where a law tells it, what the store holds at the effort."""
     target = initial.target
     if target.op != "var" or target.data[1:] != ("be", 0) or variables(initial.value):
@@ -108,17 +110,20 @@ def _as_content(initial: Initial, constant: Set[Branch], reader: Rewriter) -> It
         return
     mark = index("#v")  # the value is over the statement's own loops: put in after the law's were replaced
 
-    def content(ranges: Ranges) -> Node | None:
+    def content(ranges: Ranges) -> tuple[Node | None, bool]:
         piece = reader.piece(target.data[0], target.args, ranges)
         branch = piece.element.branch
-        found = None if branch in constant else held_at(branch, "be", mark)
-        return None if found is None else substitute(reader.at_piece(found, piece, target.args), {mark: initial.value})
+        found = None if branch in said.constant else held_at(branch, "be", mark)
+        if found is None:
+            return None, True
+        value = substitute(reader.at_piece(found, piece, target.args), {mark: initial.value})
+        return value, initial.fixed and branch in said.implicit
 
-    for loops, value in reader.cut(initial.loops, initial.place, content):
-        if value is None:
-            yield replace(initial, loops=loops)
-        else:
+    for loops, (value, effort) in reader.cut(initial.loops, initial.place, content):
+        if value is not None:
             yield replace(initial, target=var(target.data[0], "bq", *target.args), value=value, loops=loops)
+        if effort:
+            yield replace(initial, loops=loops)
 
 
 def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> Iterator[Initial]:

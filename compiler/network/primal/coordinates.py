@@ -45,9 +45,8 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     book = EliminationTable(pieces, said.efforts, said.momenta, potentials.read, functions=said.functions)
     book.sticking = _sticking(network)
     reader = Rewriter(sizes, book)
-    initials = foremost(
-        tuple(at_stores(network, said.constant, incidence, reader, reflected=reflected)), network.branches, sizes
-    )
+    told = at_stores(network, said, incidence, reader, reflected=reflected)
+    initials = foremost(tuple(told), network.branches, sizes)
     read = _charges(network)
     contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected, read=read)
     guesses, stores = measured(network, said.constant, initials, sizes, reader, reflected=reflected)

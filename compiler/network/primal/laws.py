@@ -80,6 +80,7 @@ class Laws:
     functions: dict[int, dict[str, Node]] = field(default_factory=dict)
     slopes: tuple[Slope, ...] = ()
     constant: set[Branch] = field(default_factory=set)  # what they hold is the same whatever their effort
+    implicit: set[Branch] = field(default_factory=set)  # their efforts are unknowns
     tables: dict[str, Table] = field(default_factory=dict)
 
 
@@ -204,6 +205,7 @@ class _Statement:
     def _implicit(self) -> None:
         """An implicit effort closed by a gamma; with a momentum as state, p' = e."""
         b, number, found = self.branch, self.element.number, self.found
+        found.implicit.add(b)
         part = self.names[number, "e"]
         found.unknowns.setdefault(part.name, Unknown(part.name, shape_of(part.box), b.domain.effort, b.place))
         effort = var(part.name, "e", *b.at)

@@ -164,10 +164,13 @@ class Parameters(ElaborationContext):
         return si(dimension)
 
     def _is_run_constant(self, node: Node, statement: syntax.Param, given: Argument | None) -> None:
+        discretes = self.parts.discretes
         for inner in ex.topological([node]):
-            if inner.op in ("var", "time"):
+            assigned = inner.op == "param" and inner.data in discretes
+            if assigned or inner.op in ("var", "time"):
                 message = f"parameter '{statement.decl.name}' depends on '{inner}': a parameter is a constant"
-                vary = f"numbers and parameters alone; 'input {statement.decl.name}' could vary"
+                varies = f"a law could read '{inner}'" if assigned else f"'input {statement.decl.name}' could vary"
+                vary = f"numbers and parameters alone; {varies}"
                 raise self._wrong("E807", message, statement, given, help=None if given is None else vary)
 
     def _is_of_constants(self, body: Body, statement: syntax.Param, given: bool) -> None:

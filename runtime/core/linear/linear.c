@@ -312,6 +312,22 @@ void sd_linear_again(sd_linear *linear)
     linear->replayed = 0;
 }
 
+/* rest := what x leaves of the right side that is there; of rows that are left over, how much of an unknown */
+static void note_rest(sd_linear *linear, const sd_number *x, sd_number *rest)
+{
+    const sd_matrix matrix = scaled_matrix(linear);
+    double most = 1.0;
+    linear->left_over = 0.0;
+    for (int32_t j = 0; j < linear->n; j++) {
+        const sd_number *value = sd_column_of(&matrix, j);
+        most = fmax(most, sd_size(x[j]));
+        for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
+            rest[linear->row[e]] -= *value++ * x[j];
+    }
+    for (int32_t i = 0; i < linear->n && linear->rank < linear->n; i++)
+        linear->left_over = fmax(linear->left_over, sd_size(rest[i]) / most);
+}
+
 static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
 {
     int32_t n = linear->n;
@@ -323,13 +339,9 @@ static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
     for (int32_t i = 0; i < n; i++)
         rest[i] = x[i] *= linear->row_scale[i];
     scaled_solve(linear, x);
+    if (linear->smallest < REFINE || linear->rank < n)
+        note_rest(linear, x, rest);
     if (linear->smallest < REFINE) {
-        const sd_matrix matrix = scaled_matrix(linear);
-        for (int32_t j = 0; j < n; j++) {
-            const sd_number *value = sd_column_of(&matrix, j);
-            for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++)
-                rest[linear->row[e]] -= *value++ * x[j];
-        }
         scaled_solve(linear, rest);
         for (int32_t i = 0; i < n; i++)
             x[i] += isfinite(sd_size(rest[i])) ? rest[i] : 0.0;

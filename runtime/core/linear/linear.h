@@ -48,6 +48,7 @@ typedef struct sd_linear {
     const int32_t *idle;         /* [n] 1: the column may be left; of the caller */
     int32_t *place;              /* [n] column that is eliminated k-th */
     int32_t rank;                /* of the last factors: n where no column was left */
+    double left_over;            /* of the rows beyond the rank, in units of their largest term: what the last solution missed */
     sd_number *null;             /* [nulls][n] orthonormal, what the last factors map to zero */
     size_t null_room;
     int32_t nulls;               /* n - rank, or 0 where those would be too many */

@@ -104,6 +104,27 @@ static int like_sizes(const sd_sizing *s, const sd_system *system, double time, 
     return 0;
 }
 
+/* rate [n] := how fast unknowns move by what their rows gain (jyd yd): nodes that stores only tie together have a rate in
+ * common that moves nothing, and may be any where a leak grounds them.  jyd NULL: as yd says.  0; -1: no memory */
+static int carried_rates(const sd_system *system, const double *jyd, const double *yd, double *rate)
+{
+    double *gain = calloc((size_t)system->rows + 1, sizeof *gain);
+    if (!gain)
+        return -1;
+    for (int32_t j = 0; j < system->unknowns && jyd; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            gain[system->row[e]] += jyd[e] * yd[j];
+    for (int32_t j = 0; j < system->unknowns; j++) {
+        double most = -1.0;
+        for (int32_t e = system->column[j]; e < system->column[j + 1] && jyd; e++)
+            if (jyd[e] != 0.0)
+                most = sd_larger(most, fabs(gain[system->row[e]] / jyd[e]));
+        rate[j] = most >= 0.0 && most < fabs(yd[j]) ? most : fabs(yd[j]);
+    }
+    free(gain);
+    return 0;
+}
+
 /* the shortest of: a part of the span, y / y', sqrt(q / f'), what moves with t; size, reach [n], most [kinds]: room; -1: no
  * memory */
 static double time_scale(const sd_sizing *s, const sd_system *system, double span, double quick, const double *y,
@@ -111,10 +132,11 @@ static double time_scale(const sd_sizing *s, const sd_system *system, double spa
 {
     const sd_balance *b = s->balance;
     double found = sd_smaller(PART * span, quick), least = INFINITY;
-    if (like_sizes(s, system, found, y, yd, motion, size, reach, most))
+    if (like_sizes(s, system, found, y, yd, motion, size, reach, most) ||
+        carried_rates(system, motion->rate ? motion->jyd : NULL, yd, reach))
         return -1.0;
     for (int32_t k = 0; k < b->unknowns; k++) {
-        double rate = fabs(yd[k]);
+        double rate = reach[k];
         /* values that are nothing beside what their rate makes of them are round-off */
         if ((s->kind[k] & SD_STATE) && size[k] > FRESH * rate * found && rate > 0.0)
             least = sd_smaller(least, size[k] / rate);
@@ -122,7 +144,7 @@ static double time_scale(const sd_sizing *s, const sd_system *system, double spa
     found = least < found ? least : found;
     least = INFINITY;
     for (int32_t k = 0; k < system->kinematics; k++) {
-        double q = size[system->k_q[k]], rate = fabs(yd[system->k_f[k]]);
+        double q = size[system->k_q[k]], rate = reach[system->k_f[k]];
         if (q > 0.0 && rate > 0.0)
             least = sd_smaller(least, sqrt(q / rate));
     }

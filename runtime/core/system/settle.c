@@ -30,11 +30,12 @@ static double measure(sd_settle *settle, double t, const double *y, const double
     sd_residual(settle->system, t, y, yd, settle->r);
     for (int32_t i = 0; i < settle->rows; i++) {
         double v = fabs(settle->r[i] * settle->row_scale[i]);
-        if (!(v <= worst))
+        v = isnan(v) ? INFINITY : v; /* else the next row would be larger */
+        if (v > worst)
             worst = v;
         if (settle->sort[i] == SD_CONSTRAINT)
             sum += v * v;
-        if (settle->sort[i] != SD_RATE && !(v <= own))
+        if (settle->sort[i] != SD_RATE && v > own)
             own = v;
     }
     settle->own = own;

@@ -38,6 +38,7 @@ class Linear(c.Structure):
         ("idle", P),
         ("place", P),
         ("rank", I),
+        ("left_over", D),
         ("null", P),
         ("null_room", c.c_size_t),
         ("nulls", I),

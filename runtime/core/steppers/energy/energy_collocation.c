@@ -95,7 +95,7 @@ static int sweep(sd_energy *energy, sd_collocation *stage, double t, double h, i
             double turn = (rate[k] - energy->old_rate[k]) / energy->ivp.magnitude[k];
             double size = fabs(h * turn);
             if (!(size <= largest))
-                largest = size;
+                largest = isnan(size) ? INFINITY : size; /* else the next one would be larger */
             if (i == S / 2) {
                 double move = (y[k] - energy->old_y[k]) / energy->ivp.magnitude[k];
                 turned += turn * turn;

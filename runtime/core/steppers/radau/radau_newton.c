@@ -296,6 +296,8 @@ static double walk(sd_radau *radau, size_t way, double tolerance, int first, int
     sd_radau_leave_below(radau, SD_LEAST_PIVOT);
     if (*cause)
         return 0.0;
+    if (columns_left(radau) && radau->state_size <= tolerance && radau->linear->left_over > FINEST_ROW)
+        return 0.0; /* a column whose row tells something is not to be left */
     if (radau->state_size <= tolerance && sd_radau_residuals(radau) == SD_FINE &&
         (rows_hold(radau, tolerance, 1) || rows_at_round_off(radau, tolerance, !first)))
         return -1.0;

@@ -38,10 +38,23 @@ typedef struct factoring {
     int failed[SD_PAIRS + 1];
 } factoring;
 
-/* of columns: where pivots are left out they are small or not beside the unknowns themselves, whatever the step */
+/* of columns: where pivots are left out they are small or not beside the unknowns themselves, as large as they are at the
+ * stages (`terms`), whatever the step */
 static const double *column_scale(const sd_radau *radau)
 {
-    return radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->ivp.magnitude : radau->scale;
+    return radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->terms : radau->scale;
+}
+
+/* terms := the same: a node that a source only begins to move is not as small as it was (its row, of the leaks of diodes,
+ * counted for more than the resistor that grounds the others) */
+static void size_columns(sd_radau *radau)
+{
+    for (int32_t i = 0; i < radau->ivp.n; i++) {
+        double most = radau->ivp.magnitude[i];
+        for (int s = 0; s < radau->method->stages; s++)
+            most = fmax(most, fabs(radau->phi[i] + radau->z[s][i]));
+        radau->terms[i] = most;
+    }
 }
 
 /* part 0: J + gamma/h E and its factors; part k: those of J + lambda/h E of pair k - 1 */
@@ -88,6 +101,8 @@ static int factorise_all(sd_radau *radau)
 {
     factoring all = {radau, {0}};
     int failed = 0;
+    if (column_scale(radau) != radau->scale)
+        size_columns(radau);
     if (sd_radau_sparing(radau))
         scale_all(radau);
     if (large(radau))
