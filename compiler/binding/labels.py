@@ -108,7 +108,8 @@ class Labels:
         label than that of before, behind the last of another than that of behind.
         """
         nodes = topological(self._watched.arguments)
-        found, exact = [], all(n.op != "call" or n.data in EXACT for n in nodes)
+        exact = all(n.op != "call" or n.data in EXACT for n in nodes)
+        found: list[Array] = []
         for way, side in zip((-1.0, 1.0), sides, strict=True):
             t = np.clip(first + way * AROUND * np.spacing(first), low, high)
             label = self.at(np.tile(index, len(AROUND)), t.ravel()).reshape(t.shape)

@@ -121,6 +121,7 @@ SLIPS = [
     ("let y = (x if x > 0 m else 2*x)", "E113", "if c then a else b"),
     ("let y = sin(2*pi*50 Hz t)", "E113", "write '50 Hz*t'"),
     ("let y = (2*x)²", "E113", "^2"),
+    ("node q1: mechanical", "E202", "'translation' or 'rotation'"),
     ("let y = 2*x(t)", "E101", "x"),
     ("param k = 2; let y = k(x + 1 m)", "E101", "k*(x + 1 m)"),
     ("let y = x^2 m", "E204", "^2*m; '2 m' is a quantity"),
