@@ -97,8 +97,8 @@ class Arithmetic(Context):
         if exponent.dimension not in (None, NONE):
             help_ = None
             if isinstance(e.exponent, syntax.Quantity):
-                power, what = e.exponent.text, e.exponent.unit.text
-                help_ = f"factors are joined by '*': ^{power}*{what}; '{power} {what}' is a quantity"
+                number, unit = e.exponent.text, e.exponent.unit.text
+                help_ = f"factors are joined by '*': ^{number}*{unit}; '{number} {unit}' is a quantity"
             raise self.fail("E204", f"the exponent is in {dim.show(exponent.dimension)}", e.exponent.span, help=help_)
         if not base.dimension:
             return Typed(ex.power(base.node, exponent.node), base.dimension if exponent.dimension else NONE)
