@@ -14,12 +14,20 @@ def test_the_first_block_is_the_pendulum_of_the_gallery():
     assert BLOCKS[0] == (ROOT / "models/gallery/pendulum.sd").read_text()
 
 
-def test_the_first_command_draws_a_picture(tmp_path):
+def test_the_first_command_prints_what_is_shown(tmp_path, monkeypatch, capsys):
+    """Word for word but for the CPU's time, and numbers of round-off."""
     from sysdyn.cli.main import run
 
-    trace, picture = tmp_path / "pendulum-swing.h5", tmp_path / "pendulum.svg"
-    assert run(["simulate", "-q", str(ROOT / "models/gallery/pendulum.sd"), "-o", str(trace)]) == 0
-    assert run(["plot", "-q", str(trace), "-o", str(picture)]) == 0
+    def told(text):
+        return re.sub(r"[0-9.]+ ms|constraints .*|[0-9.e+-]+(?= of 28)", "_", text).splitlines()
+
+    monkeypatch.chdir(tmp_path)
+    printed = ""
+    for command in (["simulate", str(ROOT / "models/gallery/pendulum.sd")], ["plot", "pendulum-swing.h5"]):
+        assert run(command) == 0
+        printed += "".join(reversed(capsys.readouterr()))
+    assert sorted(told(printed)) == sorted(told(BLOCKS[2]))
+    assert (tmp_path / "pendulum-swing.png").read_bytes().startswith(b"\x89PNG")
     assert (ROOT / "models/gallery/pendulum.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -172,7 +172,7 @@ def compile_model(
 ) -> Module:
     """Compile a model of a file, of a scene where one is named (without what that does not need).
 
-    index: 3 as written, 2 stabilised, 2v, 1, 0 (yd - F(t, y)); auto: the one that `simulate` takes.
+    index: 3 as written, 2 stabilised, 2v, 1, 0 (yd - F(t, y)); auto: the one that `simulate` takes by radau.
     """
     index = str(index)
     known(formulation, backend, index)

@@ -49,7 +49,7 @@ class Formed:
 
 
 def choose(prepared: Prepared, started: Started, index: str | None) -> Formed:
-    """The form of --index, else the scene's, else the one `simulate` takes.  Raises NoSuchForm."""
+    """The form of --index, else the scene's, else the one `simulate` takes by radau and bdf.  Raises NoSuchForm."""
     scene = prepared.network.scene
     wanted = index or (scene.index(prepared.binding.evaluate) if scene else None) or "auto"
     policy = (scene.redundancy if scene else None) or "error"

@@ -55,6 +55,7 @@ class Stopped(Exception):  # noqa: N818 (no fault of the program)
         super().__init__(message)
 
 
+@ex.fresh()
 def run(request: Request, also: Floats | None = None) -> Run:
     """Simulate at the request's accuracy, or the scene's own where that is finer (its expectations want it).
 
@@ -94,21 +95,20 @@ def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
     target = targets.one(document, request.file, request.model, request.scene, report)
     if target is None:
         return None
-    with ex.fresh():
-        prepared = ready(request, target, report)
-        own = replace(request, accuracy=None)
-        options = None if prepared is None else options_of(own, target, prepared, report, time.monotonic(), None)
-        if prepared is None or options is None:
-            return None
-        if request.accuracy is not None:
-            finest = min([request.accuracy, options.accuracy or 1.0, *(a for _, a in options.accuracy_on)])
-            options = replace(options, accuracy=finest, accuracy_on=())
-        even = np.linspace(options.t_start, options.t_end, INSTANTS + 1)
-        wanted = even if also is None else np.union1d(even, also)
-        wanted = wanted[np.diff(wanted, prepend=-np.inf) > APART * (options.t_end - options.t_start)]
-        inside = wanted[(wanted >= options.t_start) & (wanted <= options.t_end)]
-        options = replace(options, output=None, every=None, at=tuple(inside.tolist()))
-        return integrate(target, prepared, options, report)
+    prepared = ready(request, target, report)
+    own = replace(request, accuracy=None)
+    options = None if prepared is None else options_of(own, target, prepared, report, time.monotonic(), None)
+    if prepared is None or options is None:
+        return None
+    if request.accuracy is not None:
+        finest = min([request.accuracy, options.accuracy or 1.0, *(a for _, a in options.accuracy_on)])
+        options = replace(options, accuracy=finest, accuracy_on=())
+    even = np.linspace(options.t_start, options.t_end, INSTANTS + 1)
+    wanted = even if also is None else np.union1d(even, also)
+    wanted = wanted[np.diff(wanted, prepend=-np.inf) > APART * (options.t_end - options.t_start)]
+    inside = wanted[(wanted >= options.t_start) & (wanted <= options.t_end)]
+    options = replace(options, output=None, every=None, at=tuple(inside.tolist()))
+    return integrate(target, prepared, options, report)
 
 
 def _structure(ran: Ran, trace: Arrays) -> dict[str, Any]:

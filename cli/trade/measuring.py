@@ -29,6 +29,7 @@ from sysdyn.cli.trade.traded import INDICES, Combination, Measured, Refusal
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
+from sysdyn.runtime.accuracy.common_instants import GOLDEN
 from sysdyn.runtime.accuracy.options import Options, choose_index
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.model.system import System
@@ -42,7 +43,7 @@ LARGE = 20_000
 MOST = 32
 """Combinations of levels that are measured."""
 GRID = 200
-"""Intervals of the trace where the scene leaves them to the solver."""
+"""Intervals of the trace where the scene leaves them to the solver, and a part that no period of samples divides."""
 Said = dict[str, Any]
 """A finding in CONTRACT's shape."""
 
@@ -143,7 +144,9 @@ class Bench:
                 said = reasons[0]
                 self.refusals.append(Refusal(what.formulation, said.message, said.to_json(), level=what.level))
             return None
-        every = options.every or (options.t_end - options.t_start) / GRID
+        sampled = any(event.period is not None for event in prepared.network.events)
+        every = None if sampled else options.every  # rows of its own may all be at samples, where nothing is compared
+        every = every or (options.t_end - options.t_start) / (GRID + GOLDEN)
         options = replace(options, every=every, watch=None, sampled_at=(), sample_steps=False)
         again = bool(prepared.network.events or prepared.network.switches)
         level = _text((*what.levels, *_chosen(prepared.network)))
@@ -247,8 +250,10 @@ class Bench:
         if outcome.final:
             error = error_of(found, reference, self.judged(reference), self.accuracy, until)
             if not math.isfinite(error):
-                reason = reason or "a quantity is no number"
-        numbers = {key: n for key, n in outcome.statistics.items() if isinstance(n, int)}
+                numbers = all(np.isfinite(found[name].values).all() for name in found.names)
+                lack = "apart from events it has no instants to compare" if numbers else "a quantity is no number"
+                reason = reason or lack
+        counts = {key: n for key, n in outcome.statistics.items() if isinstance(n, int)}
         size, method = self.size(combination), combination.method
         fixed = work.fixed(found.time.size, size, method)
         return Measured(
@@ -257,12 +262,12 @@ class Bench:
             error,
             outcome.timings["cpu_integrate_s"],
             outcome.statistics["steps"],
-            fixed + work.counted(numbers, size, method),
+            fixed + work.counted(counts, size, method),
             fixed,
             float(np.max(np.abs(found["audit.energy"].values), initial=0.0)),
             float(np.max(found["audit.constraints"].values, initial=0.0)),
             reason,
-            tuple(numbers.items()),
+            tuple(counts.items()),
             said,
         )
 

@@ -6,30 +6,26 @@ Each has a label that is constant on smooth pieces: the sign of its argument, th
 its table.  Where the argument is affine in time the candidates are computed; otherwise it is sampled ever more
 densely, between the instants of what stands inside it, until the number of changes stays.  Bisection then ends at two
 neighbouring doubles, evaluated by the operations that the generated code does, so that the instant is the very double
-at which the text changes.
+at which the text changes; where round-off turns it to and fro around there, the first and the last of these are given.
 
 Received: a descriptor form and a binding; returned: `Instants`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from sysdyn.compiler.binding.binding import Binding
+from sysdyn.compiler.binding.labels import Array, Label, Labels, Watched, Whole
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, DescriptorForm
-from sysdyn.compiler.model.interpret import Value, evaluate, grid
+from sysdyn.compiler.model.interpret import grid
 from sysdyn.compiler.model.parameters import Parameters
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.expression import Node, topological, topological_unbound, variables
 from sysdyn.dsl.model.network import Loop, Table
 from sysdyn.values import dataclass
-
-Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
-Label = Callable[[list[Array]], Array]
 
 MOST = 10_000
 """Instants beyond which none is given: restarts would cost more than the steps they save."""
@@ -41,9 +37,6 @@ PER_PIECE = 8
 """Samples at least between two instants of what stands inside an argument."""
 ROUND_OFF = 1e-14
 """Of the span: what begins nearer to t0 began at t0."""
-JUMP = 1e-9
-"""Of a value: what it differs by less right behind an instant is no jump."""
-_HALVINGS = 1100
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,19 +45,6 @@ class Instants:
 
     times: Array
     note: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Watched:
-    """An operation that changes in time alone: its arguments, its label, and where the label of an affine argument
-    changes: levels of the argument (None: at whole numbers).
-    """
-
-    node: Node
-    arguments: tuple[Node, ...]
-    label: Label
-    levels: Array | None
-    nest: Nest
 
 
 class _TooManyError(Exception):
@@ -230,7 +210,7 @@ class _Search:
     def times(self) -> Array:
         """Everything found so far."""
         every = distinct(np.zeros(0), *self._found.values())
-        if every.size > MOST:
+        if np.count_nonzero(np.diff(every) > ROUND_OFF * (self.t1 - self.t0)) >= MOST:
             raise _TooManyError
         return every
 
@@ -243,7 +223,7 @@ class _Search:
         if 2 * number > BUDGET:
             self.note = f"instants in the text of {number} elements are not searched for: they are integrated through"
             return
-        labels = _Labels(watched, columns, self._parameters.lookup)
+        labels = Labels(watched, columns, self._parameters.lookup)
         try:
             brackets = self._affine(watched, labels, number) or self._sampled(watched, labels, number)
         except KeyError:  # a constant that is known at the start only
@@ -259,7 +239,7 @@ class _Search:
         self._found[watched.node] = distinct(before, found)
         self.times()
 
-    def _affine(self, watched: Watched, labels: _Labels, number: int) -> tuple[Whole, Array, Array] | None:
+    def _affine(self, watched: Watched, labels: Labels, number: int) -> tuple[Whole, Array, Array] | None:
         """Brackets around the computed crossings; None where the argument is not affine."""
         arguments = watched.arguments
         whole = watched.levels is None and watched.node.data == "mod"
@@ -295,7 +275,7 @@ class _Search:
         around = 1e-12 * np.maximum(max(abs(self.t0), abs(self.t1)), np.abs(t))
         return index, np.maximum(t - around, self.t0), np.minimum(t + around, self.t1)
 
-    def _sampled(self, watched: Watched, labels: _Labels, number: int) -> tuple[Whole, Array, Array]:
+    def _sampled(self, watched: Watched, labels: Labels, number: int) -> tuple[Whole, Array, Array]:
         """Brackets between neighbouring samples of different labels, on pieces smooth inside."""
         inside = [self._found[n] for n in topological(watched.arguments) if n in self._found]
         edges = distinct(np.array([self.t0, self.t1]), *inside)
@@ -317,74 +297,3 @@ class _Search:
             if k.size == before or 2 * each * left.size * number > BUDGET:
                 return k, t[piece, place], t[piece, place + 1]
             before, each = k.size, 2 * each
-
-
-class _Labels:
-    """The label of one operation at any iteration and time."""
-
-    def __init__(self, watched: Watched, columns: dict[str, Array], lookup: Callable[..., Value]) -> None:
-        self._watched, self._columns, self._lookup = watched, columns, lookup
-
-    def _values(self, index: Whole, t: Array, nodes: tuple[Node, ...] | None = None) -> list[Array]:
-        """Of the arguments, or of other nodes."""
-
-        def look(node: Node, args: list[Value]) -> Value:
-            if node.op == "time":
-                return t
-            if node.op == "index" and node.data in self._columns:
-                return self._columns[node.data][index]
-            return self._lookup(node, args)
-
-        found = evaluate(nodes or self._watched.arguments, look)
-        return [np.broadcast_to(np.asarray(v, dtype=float), t.shape) for v in found]
-
-    def at(self, index: Whole, t: Array) -> Array:
-        """Labels [k] in iterations index [k] at t [k]."""
-        with np.errstate(all="ignore"):
-            return np.nan_to_num(self._watched.label(self._values(index, t)))
-
-    def jumps(self, index: Whole, t: float, later: float) -> bool:
-        """Whether the operation has another value right behind t (s), in any of the iterations; beside its value at
-        `later` (s).
-        """
-        if self._watched.node.op == "table":  # of those that jump, what holds behind an instant holds at it
-            return False
-        times = (np.full(index.size, instant) for instant in (t, np.nextafter(t, np.inf), later))
-        at, behind, beyond = (self._values(index, instants, (self._watched.node,))[0] for instants in times)
-        return bool((np.abs(behind - at) > JUMP * np.maximum(np.abs(at), np.abs(beyond))).any())
-
-    def measure(self, index: Whole, t: Array, *, quotient: bool) -> Array:
-        """What crosses the levels: the argument, the difference or the quotient of the two."""
-        values = self._values(index, t)
-        with np.errstate(all="ignore"):
-            if len(values) == 1:
-                return values[0].copy()
-            return values[0] / values[1] if quotient else values[0] - values[1]
-
-    def bisect(self, index: Whole, low: Array, high: Array, early: float) -> Array:
-        """The first double of the new label in each bracket; where a zero lies between, the last of it too.  Up to
-        `early` any will do.
-        """
-        start, end = self.at(index, low), self.at(index, high)
-        take = start != end
-        index, low, high, start, end = index[take], low[take], high[take], start[take], end[take]
-        first = self._flip(index, low, high, start, early)
-        middle = self.at(index, first)
-        again = middle != end
-        last = self._flip(index[again], first[again], high[again], middle[again], early)
-        # a zero on a single double: the far side begins behind it, which the restart knows
-        last = np.where(np.nextafter(first[again], np.inf) == last, first[again], np.nextafter(last, -np.inf))
-        return np.concatenate([first, last])
-
-    def _flip(self, index: Whole, low: Array, high: Array, start: Array, early: float) -> Array:
-        """The first double whose label is not `start` any more."""
-        low, high = low.copy(), high.copy()
-        for _ in range(_HALVINGS):
-            middle = low + 0.5 * (high - low)
-            open_ = np.flatnonzero((middle > low) & (middle < high) & (high > early))
-            if not open_.size:
-                break
-            same = self.at(index[open_], middle[open_]) == start[open_]
-            low[open_[same]] = middle[open_[same]]
-            high[open_[~same]] = middle[open_[~same]]
-        return high

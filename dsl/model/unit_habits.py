@@ -211,6 +211,10 @@ class Chained:
     right: str
 
 
+TIMES_TIME = "*t"
+"""Behind a unit and a blank `t` is the time, never the tonne: `50 Hz t`."""
+
+
 def chained(text: str, offset: int) -> Chained | None:
     """The quantity around an offset whose unit was written as a product: `3 kN*s/m` or `3 N m`; None where none is."""
     first = text.rfind("\n", 0, offset) + 1
@@ -218,10 +222,11 @@ def chained(text: str, offset: int) -> Chained | None:
     line = text[first : last if last >= 0 else len(text)]
     for match in _quantity().finditer(line):
         if match.start() + first <= offset < match.end() + first:
-            unit = re.sub(r"[ \t]*([.*/·])[ \t]*", r"\1", match.group(2))
+            written, time = match.group(2), re.search(r"[ \t]+t$", match.group(2))
+            unit = re.sub(r"[ \t]*([.*/·])[ \t]*", r"\1", written[: time.start()] if time else written)
             unit = re.sub(r"[ \t]+", ".", unit)
             right = _normal(unit)
-            found = f"{match.group(1)} {right}"
+            found = f"{match.group(1)} {right}{TIMES_TIME if time else ''}"
             return Chained(match.start() + first, match.end() + first, found) if right else None
     return None
 

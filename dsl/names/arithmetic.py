@@ -95,7 +95,11 @@ class Arithmetic(Context):
         """The exponent is a number without unit, and a rational constant where the base has a unit (E204)."""
         base, exponent = self.scalar(e.base), self.scalar(e.exponent)
         if exponent.dimension not in (None, NONE):
-            raise self.fail("E204", f"the exponent is in {dim.show(exponent.dimension)}", e.exponent.span)
+            help_ = None
+            if isinstance(e.exponent, syntax.Quantity):
+                number, unit = e.exponent.text, e.exponent.unit.text
+                help_ = f"factors are joined by '*': ^{number}*{unit}; '{number} {unit}' is a quantity"
+            raise self.fail("E204", f"the exponent is in {dim.show(exponent.dimension)}", e.exponent.span, help=help_)
         if not base.dimension:
             return Typed(ex.power(base.node, exponent.node), base.dimension if exponent.dimension else NONE)
         if not ex.is_const(exponent.node):

@@ -13,7 +13,17 @@ from sysdyn.dsl.model.units import NONE, Dimension, multiply
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Context, Value
 from sysdyn.dsl.names.failures import Failed, SeveralError
-from sysdyn.dsl.names.symbols import Definition, FunctionSymbol, Space, TableSymbol, Typed, Vector, nearest
+from sysdyn.dsl.names.symbols import (
+    Definition,
+    FunctionSymbol,
+    ParameterSymbol,
+    Space,
+    TableSymbol,
+    Typed,
+    UnknownSymbol,
+    Vector,
+    nearest,
+)
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.tree import syntax
 from sysdyn.dsl.tree.walking import children
@@ -113,6 +123,9 @@ class Calls(Context):
             raise self.fail("E319", "quasi(w) is what a work acts on", e.span, help="work E on quasi(w)")
         if e.name not in dim.FUNCTIONS:
             texts = [self.source.text[a.span.start : a.span.end] for a in e.args]
+            if isinstance(symbol, (ParameterSymbol, UnknownSymbol, Definition)):
+                meant = e.name if texts == ["t"] else f"{e.name}*({', '.join(texts)})"
+                raise self.fail("E101", f"'{e.name}' is a value, no function", e.span, help=meant)
             remedy = habits.function(e.name, texts)
             if remedy is not None and not self.scope.is_broken(e.name):
                 raise self.remedied("E101", f"unknown function '{e.name}'", e.span, remedy)

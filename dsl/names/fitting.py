@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.unit_habits import common
@@ -41,6 +42,7 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
         return None
     pairs = [*zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False)]
     divided = next(filter(None, (_divided(sight, e, factor) for e, factor in pairs)), None)
+    divided = divided or _by_quantities(sight, have, want, within)
     if divided:
         return divided
     without = [habits.unitless(*found, factor) for e, factor in pairs if factor and (found := bare(sight, e))]
@@ -83,6 +85,51 @@ def _divided(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | 
             text = f"{e.text} {e.unit.text}"
             return f"'{e.text} {before} / {last.name}' divides by the variable {last.name}: in '{text}' it is the unit"
     return None
+
+
+def _by_quantities(sight: Sight, have: Dimension, want: Dimension, within: Sequence[syntax.Expr]) -> str | None:
+    """A number over a quantity, `1/2 m`, where a part of it is meant: of the unit, or of a variable of that name."""
+    found = [(k, number, by) for k, e in enumerate(within[:2]) for number, by in _quotients(e)]
+    off, said = [have, want], ""
+    for k, number, by in found:
+        own = _dimension(by.unit)
+        fraction, unit = f"{number.text}/{by.text}", by.unit.text
+        symbol = sight.scope.find(unit)
+        if isinstance(symbol, (ParameterSymbol, UnknownSymbol)) and not symbol.shape:
+            other = symbol.dimension
+            part = f"'{fraction}*{unit}' multiplies by the variable {unit}"
+        else:
+            other = own
+            part = f"'({fraction})*1 {unit}' is that part of a unit"
+        if own is None or other is None:
+            return None
+        off[k] = multiply(multiply(off[k], own), other)
+        said = said or f"'{fraction} {unit}' divides by {by.text} {unit}; {part}"
+    return said if found and off[0] == off[1] else None
+
+
+def _dimension(unit: syntax.Unit) -> Dimension | None:
+    """The dimension of a unit that is made of the language's own; None for any other."""
+    dimension = NONE
+    for factor in unit.factors:
+        found = known(factor.name)
+        if found is None:
+            return None
+        dimension = multiply(dimension, found[0], -factor.exponent if factor.op == "/" else factor.exponent)
+    return dimension
+
+
+def _quotients(expression: syntax.Expr) -> Iterator[tuple[syntax.Number, syntax.Quantity]]:
+    """Numbers over quantities among the factors of what an expression adds."""
+    stack: list[object] = [expression]
+    while stack:
+        e = stack.pop()
+        if isinstance(e, (syntax.Sum, syntax.Negative, syntax.Group, syntax.Product)):
+            stack += children(e)
+        if isinstance(e, syntax.Product):
+            for (_, number), (sign, by) in itertools.pairwise(e.factors):
+                if sign == "/" and isinstance(number, syntax.Number) and isinstance(by, syntax.Quantity):
+                    yield number, by
 
 
 def _rate(sight: Sight, expression: syntax.Expr, factor: Dimension, sense: int) -> str | None:
@@ -149,7 +196,7 @@ def in_unit(number: syntax.Expr, wanted: Dimension) -> str:
 def _prefixed(number: syntax.Number | syntax.Quantity, unit: str) -> str:
     """A unit with the prefix that the quantity was written with, where it bears one: uF of `1 uH`."""
     names = [factor.name for factor in number.unit.factors] if isinstance(number, syntax.Quantity) else []
-    alone = names[0] if len(names) == 1 else ""
+    alone = names[0] if len(names) == 1 and names != ["kg"] else ""  # the k of kg says nothing of sizes
     whole, base = (known(name) for name in (alone, alone[1:]))
     prefixed = bool(whole and base and whole[0] == base[0] and whole[1] != base[1] and known(alone[0] + unit))
     return alone[0] + unit if prefixed else unit

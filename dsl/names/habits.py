@@ -79,6 +79,14 @@ _VARIABLES = {
 _ENDINGS = ("_dot", "dot", "_d", "_prime", "Dot")
 
 
+DOMAINS = {"mechanical": "'translation' or 'rotation'", "mechanics": "'translation' or 'rotation'"} | {
+    **dict.fromkeys(("fluid", "pneumatic", "hydraulics"), "'hydraulic'"),
+    **dict.fromkeys(("rotational", "angular"), "'rotation'"),
+    **dict.fromkeys(("translational", "linear"), "'translation'"),
+}
+"""Domains of other languages -> those of the prelude."""
+
+
 @dataclass(frozen=True, slots=True)
 class Remedy:
     """What to write; meant: what certainly belongs at start..end (of the name, where None) instead."""

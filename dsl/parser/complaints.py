@@ -154,8 +154,10 @@ def connection() -> Complaint:
     return "E109", "a statement cannot begin with a connection", _CONTINUE
 
 
-def conditional() -> Complaint:
-    """`if` inside an expression."""
+def conditional(after: str) -> Complaint:
+    """`if` inside an expression; after: the rest of its line."""
+    if re.match(r"(?!.*\bthen\b).*\belse\b", after):  # u if t > 1 s else 0
+        return "E113", "a choice begins with its condition", "if c then a else b"
     message = "a conditional in a relation or inside an expression needs parentheses"
     return "E110", message, "(if ... then ... else ...)"
 

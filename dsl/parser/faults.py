@@ -69,7 +69,7 @@ class Faults:
             text = remark if remark in ("//", "/*") else text
             self._error(complaints.first_token(text, kind, body), self._token())
         elif kind == "if" and automaton.accepts("("):
-            self._error(complaints.conditional(), self._token())
+            self._error(complaints.conditional(scanner.text[scanner.end :].partition("\n")[0]), self._token())
         elif self._other_level(word, kind, body):
             where = "a scene" if body == "statement" else "a component"
             here = "a model" if body == "statement" else "a scene"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 
-from sysdyn.dsl.model.unit_habits import PREFIXED, UNGROUPED, chained, grouped, respelled, scaled
+from sysdyn.dsl.model.unit_habits import PREFIXED, TIMES_TIME, UNGROUPED, chained, grouped, respelled, scaled
 from sysdyn.dsl.model.units import known
 from sysdyn.dsl.parser.complaints import Complaint
 from sysdyn.dsl.text.source import Span
@@ -89,6 +90,8 @@ def around(text: str, start: int, end: int, kind: str) -> Slip | None:
     if quantity is not None and apart and (kind == "<name>" or sign in ("·", "⋅", "×", "*")):
         written = text[quantity.start : quantity.end]
         said = f"'{written}': a unit is written without spaces, its factors are joined by dots"
+        if quantity.right.endswith(TIMES_TIME):
+            said = f"'{written}': factors are joined by '*'"
         return Slip(("E113", said, f"write '{quantity.right}'"), quantity.right, Span(quantity.start, quantity.end))
     return _known_sign(text, Span(start, end), kind, line)
 
@@ -118,6 +121,9 @@ def _known_sign(text: str, span: Span, kind: str, line: str) -> Slip | None:
         module = line.split()[1] if len(line.split()) > 1 else "std.electrical"
         said = "names are imported one by one, never all with '*'"
         return Slip(("E113", said, f"from {module} import NAME, NAME: sysdyn std lists them"))
+    power = unicodedata.normalize("NFKC", sign)
+    if kind == "<name>" and power.isascii() and power.isdigit():
+        return Slip(("E113", f"'{sign}': a power is written with '^'", f"^{power}"), f"^{power}", span)
     if kind in ("<name>", "(") and line.endswith(")"):
         return Slip(("E113", "a product is written with its sign", f")*{sign}"))
     if sign == "°" and text[span.end : span.end + 1] == "C":

@@ -40,7 +40,12 @@ def run(model: Elaborator, known: Values, read: frozenset[str], report: Report) 
 
 def _count(branch: Branch, known: Values) -> float:
     """How many elements a branch statement makes."""
-    return math.prod(known.number(loop.last) - known.number(loop.first) + 1 for loop in branch.loops)
+    return _size(((loop.first, loop.last) for loop in branch.loops), known)
+
+
+def _size(ranges: Iterable[tuple[Node, Node]], known: Values) -> float:
+    """How many elements ranges span: none, where one ends before it begins (2..n of n = 0)."""
+    return math.prod(max(known.number(last) - known.number(first) + 1, 0.0) for first, last in ranges)
 
 
 def _ends(branches: Iterable[Branch]) -> Iterable[tuple[Branch, Terminal]]:
@@ -53,10 +58,14 @@ def _ends(branches: Iterable[Branch]) -> Iterable[tuple[Branch, Terminal]]:
 def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report: Report) -> None:
     """E409: a node that fewer than two elements touch (common flow, or one of a family: none) and nothing reads."""
     touched: dict[str, float] = {}
+    empty: dict[str, list[str]] = {}
     boxes: dict[str, list[Box]] = {}
     for branch, terminal in _ends(model.parts.branches):
         assert terminal.node is not None
-        touched[terminal.node] = touched.get(terminal.node, 0.0) + _count(branch, known)
+        count = _count(branch, known)
+        touched[terminal.node] = touched.get(terminal.node, 0.0) + count
+        if count == 0.0:
+            empty.setdefault(terminal.node, []).append(branch.name)
         if terminal.at:
             found = tuple(known.bounds(at, branch.loops) for at in terminal.at)
             boxes.setdefault(terminal.node, []).append(tuple((min(b), max(b)) for b in found))
@@ -65,14 +74,14 @@ def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report
     for node in model.parts.nodes:
         alike.setdefault(_beginning(node), []).append(node.name)
     for node in model.parts.nodes:
-        size = math.prod(known.number(b) - known.number(a) + 1 for a, b in node.shape)
+        size = _size(node.shape, known)
         wanted = (2.0 if node.domain.common == "effort" else 1.0) * (size if not node.shape else 1.0)
         count = touched.get(node.name, 0.0)
         if node.name in mentioned or node.name in PREDEFINED or not size > 0 or math.isnan(count):
             continue
         near = alike[_beginning(node)][: NEAR + 1]
         if count < wanted:
-            _lonely(node, count, near, report)
+            _lonely(node, count, near, empty.get(node.name, []), report)
         elif node.shape and (left := _left(node, boxes.get(node.name, []), known)) is not None:
             message = f"node '{node.name}[{shown(left)}]' touches no element"
             report.error("E409", message, node.place, help="connect it to an element, or declare fewer nodes")
@@ -91,11 +100,13 @@ def _beginning(node: NodeFamily) -> str:
     return node.name.lower()[:2]
 
 
-def _lonely(node: NodeFamily, count: float, alike: list[str], report: Report) -> None:
+def _lonely(node: NodeFamily, count: float, alike: list[str], empty: list[str], report: Report) -> None:
     how = "no element" if not count else "one element only" if node.domain.common == "effort" else "no element"
     near = [n for n in alike if n != node.name]
     help_ = f"near names: {', '.join(near[:NEAR])}; " if near else ""
     help_ += "connect it to an element, or delete it; ground it if that is meant"
+    if empty:
+        help_ = f"a range that is not empty: no element of '{empty[0]}' exists"
     report.error("E409", f"node '{node.name}' touches {how}", node.place, help=help_)
 
 

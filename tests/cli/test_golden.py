@@ -367,3 +367,18 @@ def test_a_golden_is_a_trace(project):
         assert np.all(np.diff(file["time"]) > 0)
     assert run(["diff", "-q", "golden/pendulum/swing.h5", "golden/pendulum/swing.h5"]) == 0
     assert run(["plot", "-q", "golden/pendulum/swing.h5", "-o", "a.png"]) in (0, 5)
+
+
+def test_a_golden_of_a_scene_that_needs_a_part_holds_the_structure_of_the_whole(tmp_path, monkeypatch):
+    """An array with initial values that nothing asks for: a fault in sysdyn before (exit 4)."""
+    walls = (
+        "  node room, wall[1..2]: heat\n  air: potential(q = 60 kJ/K*e) room -> ground\n  for i in 1..2 {\n"
+        "    store[i]: potential(q = 20 kJ/K*e) wall[i] -> ground\n"
+        "    skin[i]: dissipator(f = 15 W/K*e) room -> wall[i]\n    init wall[i].e = 293 K\n  }\n"
+    )
+    (tmp_path / "spring.sd").write_text(SPRING.replace("  coord", walls + "  coord"))
+    monkeypatch.chdir(tmp_path)
+    assert run(["golden", "record", "spring.sd"]) == 0
+    structure = json.loads(Path("golden/spring/ring.json").read_text())
+    assert "store" in json.dumps(structure)
+    assert run(["golden", "check"]) == 0

@@ -334,5 +334,14 @@ def test_a_trade_without_a_run_names_the_statement(tmp_path, capsys):
     assert said["message"].startswith("there is no reference: lagrangian index 0 dopri: the solver stopped")
 
 
+def test_samples_at_every_row_leave_instants_to_compare(tmp_path, capsys):
+    """Every row of the trace stood at a sample: "a quantity is no number" in each of 58 runs, all of them right."""
+    text = "model m {\n  discrete b = 1\n  state x = 0\n  every 50 us { b := -b }\n  dynamic x' = (b - x)/(1 ms)\n}\n"
+    text += "scene s of m { time 0 s to 1 ms; trace x every 50 us }\n"
+    code, found = run_json(capsys, "trade", write(tmp_path, text), "--method", "radau", "--formulation", "lagrangian")
+    assert code == 0
+    assert found["result"]["chosen"]["error"] < 1e-9
+
+
 def test_tolerances_stand_at_half_decades():
     assert [tolerance(k) for k in (2, 3, 4, 24)] == [0.1, 0.0316, 0.01, 1e-12]

@@ -56,6 +56,9 @@ def test_a_family_is_touched_as_a_whole():
     body = "param n = {}\nnode a[1..n]: electrical\nfor i in 1..2 {{ R[i]: " + R + " a[i] -> a[i + 1] }}"
     assert said(body.format(3)) == []
     assert [message for _, message, _ in said("node a[1..5]: electrical")] == ["node 'a' touches no element"]
+    # a range that ends before it begins has no element, not less than none: 2..n of n = 0
+    ladder = f"param n = 0\nnode a: electrical\nR: {R} a -> ground\nS: {R} a -> ground\n"
+    assert said(ladder + "for i in 2..n { P[i]: " + R + " a -> ground }") == []
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,21 @@ model m {
         ("let y = min(x, 3)", "E206", "write '3 m'"),
         ("let y = min(x, t)", "E206", "both in m"),
         (
+            "energy T* = 1/2 kg*x'^2",
+            "E208",
+            "'1/2 kg' divides by 2 kg; '(1/2)*1 kg' is that part of a unit",
+        ),
+        (
+            "param N = 2 kg; energy T* = 1/2 N*x'^2",
+            "E208",
+            "'1/2 N' divides by 2 N; '1/2*N' multiplies by the variable N",
+        ),
+        (
+            "let y = 1/12 A/V^3*(1 V)^4 - 1/2 A/V*(1 V)^2",
+            "E203",
+            "'1/2 A/V' divides by 2 A/V; '(1/2)*1 A/V' is that part of a unit",
+        ),
+        (
             "param V = 2 m^3; let y = 3 kg/V + 2 kg/m^3",  # s^3.A/m^2 by volts
             "E203",
             "'3 kg / V' divides by the variable V: in '3 kg/V' it is the unit",

@@ -74,6 +74,10 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
         case "fixed" if any(row.kind == "initial" for row in error.rows):
             message = f"an initial value contradicts the constraints: residual {_residual(prepared, error)}"
             report.error("E903", message, where, help="the value that they leave, or '~' for '='")
+        case "fixed" if len({row.label for row in error.rows}) == 1:  # nothing contradicts it
+            message = f"no start was found near the guesses: {_residual(prepared, error)} is left over in {names}"
+            help_ = "a guess, 0 where none is written, from which it can be reached: coord x: translation ~ 1 m"
+            report.error("E510", message, where, help=f"{help_}; or correct it")
         case "fixed":
             left = _residual(prepared, error)
             report.error(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.scenes.stopping import RANGE
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Expectation
+from sysdyn.dsl.model.network import Expectation, Parameter
 from sysdyn.dsl.model.units import quantity
 from sysdyn.dsl.text.diagnostics import Related, Report
 from sysdyn.runtime.events.start import eventful_start
@@ -192,10 +193,25 @@ def _structural(
         report.error("E509", message, where, related=beside)
     elif facts.index is None and facts.undetermined and not facts.singular:  # a singular one does not tell multipliers
         names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
-        message = f"the equations do not determine {names}"
-        report.error(
-            "E516", message, prepared.network.place, help="inertia, stiffness, dissipation or a constraint is missing"
-        )
+        message, help_ = f"the equations do not determine {names}", "inertia, stiffness, dissipation or a constraint"
+        zero = next(iter(_of_inertias(prepared, lambda v: v == 0.0)), None)
+        if zero is not None:
+            message = f"with {zero.name} = {quantity(0.0, zero.unit)} {message}"
+            report.error("E516", message, zero.place, help=f"{zero.name} other than zero, or {help_}")
+            return
+        report.error("E516", message, prepared.network.place, help=f"{help_} is missing")
+
+
+def _of_inertias(prepared: Prepared, such: Callable[[float], bool]) -> list[Parameter]:
+    """Parameters of such values that kinetic energies read."""
+    kinetic = [e.expression for e in prepared.network.energies if e.function in ("T*", "T")]
+    read = {n.data for root in kinetic for n in ex.topological([root]) if n.op == "param"}
+    values = prepared.binding.values
+    return [
+        p
+        for p in prepared.network.parameters
+        if p.name in read and np.ndim(v := values.get(p.name, 1.0)) == 0 and such(float(v))
+    ]
 
 
 def _without_primal_rows(prepared: Prepared) -> bool:
@@ -221,11 +237,7 @@ def _inertia(prepared: Prepared, system: System, state: ConsistentState, report:
     places |= {n.name: n.place for n in prepared.network.nodes}
     energies = [e.place for e in prepared.network.energies if e.function in ("T*", "T")]
     where = energies[0] if len(energies) == 1 else places.get(family, prepared.network.place)
-    negative = [
-        p for p in prepared.network.parameters if np.ndim(v := prepared.binding.values.get(p.name, 0)) == 0 and v < 0
-    ]
-    read = {n.data for e in prepared.network.energies for n in ex.topological([e.expression]) if n.op == "param"}
-    guilty = [p for p in negative if p.name in read]
+    guilty = _of_inertias(prepared, lambda v: v < 0.0)
     shown = ", ".join(f"{p.name} = {quantity(prepared.binding.values[p.name], p.unit)}" for p in guilty)
     what = f"the inertia along {name} is negative: {shown or f'{value:g} in SI units'}; T* has no minimum"
     related = tuple(Related("negative", p.place) for p in guilty)

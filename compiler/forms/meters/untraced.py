@@ -30,7 +30,7 @@ def with_coordinates_observed(model: EnergyModel, network: Network) -> tuple[Ene
     kinds = [(c, model.mirror.coordinate, "q") for c in model.coordinates] + [(s, "s", "s") for s in model.states]
     for family, kind, unit in kinds:
         box = parameters.extents(family.shape)
-        number = math.prod(last - first + 1 for first, last in box)
+        number = math.prod(max(last - first + 1, 0) for first, last in box)
         if number > MOST:
             whole, one = shown(f"{family.name}[0..{number - 1}]", own), shown(f"{family.name}[0]", own)
             whole, one = (whole, one) if owner(family.name, own) else (family.name, f"{family.name}[...]")

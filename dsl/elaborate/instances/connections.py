@@ -48,7 +48,9 @@ class Connections(Statements):
             if node.op == "index":
                 shape.append(self.bounds(index))
             elif any(n.op == "index" for n in ex.topological([node])):
-                raise self.resolver.fail("E806", "a label is indexed by a loop variable or a number", index.span)
+                help_ = f"{s.decl.name}[{own[-1].index}] in a 'for' over the range that is meant" if own else None
+                message = "a label is indexed by a loop variable or a number"
+                raise self.resolver.fail("E806", message, index.span, help=help_)
             else:
                 shape.append((node, node))
         used = set(at)
@@ -66,7 +68,7 @@ class Connections(Statements):
                 plus, minus = self.end(connection.node, domain), None
             case syntax.On():
                 value = self.resolver.scalar(connection.expr)
-                self._is_displacement(value.node, connection.expr)
+                self._is_displacement(value.node, connection.expr, s.decl.name)
                 own = self._domain_on(connection.expr, value)
                 if own is not None and domain is not None and own.name != domain.name:
                     message = f"'{s.decl.name}' is {domain.name}, '{self._text(connection.expr)}' is {own.name}"

@@ -16,6 +16,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import ElementSetting, Parameter
+from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Unit
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.paths import Located
@@ -154,7 +155,8 @@ class Settings:
                 "E207", f"'{symbol.name}' is {'a condition' if symbol.truth else 'a number'}", s.value.span
             )
         if value.dimension is not None and value.dimension != symbol.dimension:
-            message = f"'{symbol.name}' is in {dim.show(symbol.dimension)} but set to {dim.show(value.dimension)}"
+            own = common(symbol.dimension) if symbol.dimension else dim.show(symbol.dimension)
+            message = f"'{symbol.name}' is in {own} but set to {dim.show(value.dimension)}"
             help_ = self.resolver.missing(value.dimension, symbol.dimension, s.value)
             if help_ is not None and help_.endswith(f": '{symbol.name}'?"):  # itself is no factor of what it is set to
                 factor = dim.quotient(symbol.dimension or NONE, value.dimension)

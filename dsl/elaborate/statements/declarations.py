@@ -13,6 +13,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Coordinate, Initial, Loop, NodeFamily, State, Unknown
 from sysdyn.dsl.model.units import NONE, Dimension, si
+from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Use
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.symbols import (
@@ -235,4 +236,5 @@ class Declarations(Parameters):
         if self.scope.is_broken(word.name):
             raise Failed
         help_ = f"'{near}'" if near else f"one of {', '.join(domains)}"
+        help_ = habits.DOMAINS.get(word.name, help_)
         raise self.resolver.fail("E202", f"'{word.name}' is not a domain", word.span, help=help_)

@@ -127,7 +127,9 @@ class Parameters(ElaborationContext):
         dimension = unit.dimension if unit is not None else (known[0] if known else NONE)
         for item in items:
             if item.dimension is not None and item.dimension != dimension:
+                literal = written.operand if isinstance(written, syntax.Negative) else written
                 have, want = dim.show(item.dimension), dim.show(dimension)
+                have = literal.unit.text if isinstance(literal, syntax.Quantity) else have
                 is_ = "dimensionless" if have == "dimensionless" else f"in {have}"
                 message = f"'{statement.decl.name}' is declared {want} but its {what} is {is_}"
                 if unit is None:

@@ -117,23 +117,24 @@ class Statements(Declarations):
             help_ = "w = a*x' + b*y' with a, b of displacements"
             raise self.resolver.fail("E319", f"{what} {error}", span, help=help_) from None
 
-    def _is_displacement(self, node: Node, where: syntax.Expr) -> None:
+    def _is_displacement(self, node: Node, where: syntax.Expr, element: str = "") -> None:
+        """E319: a work, or an element, acts on an expression of displacements."""
+        acts, remedy = (f"'{element}' acts", "between nodes: a -> b") if element else ("work", "work E on q")
         others = [n for n in ex.variables(node) if n.op == "var" and n.data[1] not in ("q", "nq", "bq", "s")]
         others.sort(key=lambda n: n.number)
         if others:
-            what = (
-                f"the flow {others[0]}"
-                if others[0].data[1] in ("f", "nf", "bf")
-                else f"{others[0]}, which is no displacement"
-            )
-            message = f"work on an expression that contains {what}"
+            flow = others[0].data[1] in ("f", "nf", "bf")
+            what = f"the flow {others[0]}" if flow else f"{others[0]}, which is no displacement"
+            message = f"{acts} on an expression that contains {what}"
             text = self.source_text(where.span)
-            help_ = f"work ... on {text.replace(chr(39), '')}" if "'" in text else "work E on q, or work E on quasi(w)"
+            kept = "... on " if element else "work ... on "
+            along = f"on x - y, of displacements; or {remedy}" if element else f"{remedy}, or work E on quasi(w)"
+            help_ = f"{kept}{text.replace(chr(39), '')}" if "'" in text else along
             raise self.resolver.fail("E319", message, where.span, help=help_)
         read = ex.variables(node) - {ex.time()}
         if read and all(n.op == "var" and n.data[1] == "s" for n in read):
             states = ", ".join(sorted(map(str, read)))
-            message, help_ = f"work on {states}, which no effort moves", "a coord, or a term in the state's dynamic"
+            message, help_ = f"{acts} on {states}, which no effort moves", "a coord, or a term in the state's dynamic"
             raise self.resolver.fail("E319", message, where.span, help=help_)
 
     def _dynamic(self, s: syntax.Dynamic) -> None:
