@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import ctypes as c
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -130,6 +131,18 @@ class Integration:
         if self.system.unknowns > LARGE and self.forms is not None:
             self.system.put_away(whole=True)
             self._put_away_of(self.forms)
+
+    @contextmanager
+    def room_left(self) -> Iterator[None]:
+        """What a large run evaluates its condensed points in goes meanwhile; nothing is evaluated there."""
+        if self.forms is None or self.system.unknowns <= LARGE:
+            yield
+            return
+        self.forms.room.rest()
+        yield
+        self.forms.bind()
+        room, run = self.forms.room, self.driver.run
+        run.point, run.point_d = lib.pointer(room.y), lib.pointer(room.yd)
 
     def _rest_of_start(self) -> None:
         """Lets go of the start of a large run of what is kept, under way; the next one finds it where it is."""
@@ -368,6 +381,8 @@ class Integration:
                 break
             before = time.process_time()
             cross(self, self.segments[at])
+            if at + 1 == len(self.segments) and self.pieces is self.corners is None:
+                self.sizes.spare_resolved()
             if self.corners is not None:
                 self.corners.at = at
             self._put_away()

@@ -92,8 +92,8 @@ class Form:
     """A choice of calls with the layout of y and of the rows.
 
     written: unknowns as written (nu, and those of the start alone, stand behind them); at: places of the families,
-    audit families behind all (`extended`); kind: (kind, number) of unknowns one after the other; k_row, k_q, k_f: the
-    rows q' - f, and k_span: their stretches;
+    audit families behind all (`extended`); kind: (kind, number) of unknowns one after the other; k_q, k_f: of the rows
+    q' - f, and k_span: their stretches;
     groups: (name of the group, row family, first row), ascending; scales: calls of the scale blocks of steep rows.
     """
 
@@ -105,12 +105,16 @@ class Form:
     at: Ints
     calls: tuple[Planned, ...]
     kind: tuple[tuple[str, int], ...]
-    k_row: Ints
     k_q: Ints
     k_f: Ints
     k_span: Ints
     groups: tuple[tuple[str, int, int], ...]
     scales: tuple[Planned, ...]
+
+    @property
+    def k_row(self) -> Ints:
+        """The rows q' - f: the first ones."""
+        return np.arange(self.k_q.size, dtype=np.int32)
 
     @property
     def base(self) -> str:
@@ -119,7 +123,7 @@ class Form:
 
     def row_label(self, description: Description, row: int) -> RowLabel:
         """The author's label of a row."""
-        if row < self.k_row.size:
+        if row < self.k_q.size:
             place = int(self.k_q[row])
             return RowLabel(f"{unknown_name(description, self, place)}' = f", "kinematic")
         for group, family, first in reversed(self.groups):
@@ -236,11 +240,11 @@ def plan(description: Description, name: str) -> Form:
     unknowns = written
     if "kinematics" not in description.layouts:  # the same in every form
         made = _kinematics(description, at)
-        description.layouts["kinematics"] = *made, np.arange(made[0].size, dtype=np.int32)
-    k_q, k_f, first, k_rows = description.layouts["kinematics"]
+        description.layouts["kinematics"] = made
+    k_q, k_f, first = description.layouts["kinematics"]
     bare = name in BARE
     if bare:
-        k_q = k_f = k_rows = np.zeros(0, np.int32)
+        k_q = k_f = np.zeros(0, np.int32)
     number = int(k_q.size)
     # rows of each group of blocks, one behind the other; a block adds to those of its group
     nu = at.copy()
@@ -288,10 +292,9 @@ def plan(description: Description, name: str) -> Form:
         at=at,
         calls=tuple(calls),
         kind=tuple(kind),
-        k_row=k_rows,
         k_q=k_q,
         k_f=k_f,
-        k_span=stretches(k_rows, k_q, k_f),
+        k_span=stretches(np.arange(k_q.size, dtype=np.int32), k_q, k_f),
         groups=tuple(groups),
         scales=tuple(scales),
     )

@@ -110,7 +110,7 @@ class System(Facts):
     @property
     def plain(self) -> bool:
         """Whether blocks alone write into the matrix, whatever holds."""
-        return not self.form.k_row.size and not self._may_hold[0].size
+        return not self.form.k_q.size and not self._may_hold[0].size
 
     def put_away(self, *, whole: bool) -> None:
         """Lets go of the pattern, found again when it is asked for; whole: of the places of the Jacobian's entries too.
@@ -155,7 +155,7 @@ class System(Facts):
         for k, scale in enumerate(form.scales):
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
-        ones = np.broadcast_to(1.0, form.k_row.size)
+        ones = np.broadcast_to(1.0, form.k_q.size)
         self.kinematic_scale: Floats = ones.copy() if form.name == "2" else ones
         self.work = self._work(layout.entries)
         self._keep += [calls]
@@ -167,10 +167,9 @@ class System(Facts):
             rows=form.rows,
             entries=layout.pattern.entries,
             calls=len(form.calls),
-            kinematics=form.k_row.size,
+            kinematics=form.k_q.size,
             k_spans=len(form.k_span),
             call=c.addressof(calls),
-            k_row=lib.pointer(form.k_row),
             k_q=lib.pointer(form.k_q),
             k_f=lib.pointer(form.k_f),
             k_span=lib.pointer(form.k_span),
@@ -349,10 +348,14 @@ class System(Facts):
         buffer[: len(x)] = x
         return buffer
 
+    def _read(self, x: Floats) -> Floats:
+        """X as blocks of equations read it, which know no audit families: itself where they are compiled."""
+        return np.ascontiguousarray(x) if self._core.together and x.size >= self.unknowns else self._buffer(x)
+
     def residual(self, t: float, y: Floats, yd: Floats) -> Floats:
         """F(t, y, yd) [rows]."""
         r = np.empty(max(self.rows, 1))
-        a, b = self._buffer(y), self._buffer(yd)
+        a, b = self._read(y), self._read(yd)
         lib.core.sd_residual(c.byref(self._core), t, lib.pointer(a), lib.pointer(b), lib.pointer(r))
         self.failure.check()
         return r[: self.rows]
@@ -360,7 +363,7 @@ class System(Facts):
     def jacobian(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
         """Values of dF/dy and dF/dyd [entries] on the pattern."""
         jy, jyd = np.empty(self.pattern.entries + 1), np.empty(self.pattern.entries + 1)
-        a, b = self._buffer(y), self._buffer(yd)
+        a, b = self._read(y), self._read(yd)
         at, slopes = ([lib.pointer(item) for item in pair] for pair in ((a, b), (jy, jyd)))
         lib.core.sd_jacobian(c.byref(self.core), t, *at, None, *slopes)
         self.failure.check()
@@ -371,7 +374,7 @@ class System(Facts):
         if self.unknowns <= LARGE:
             return self.jacobian(t, y, yd)[rate]
         found = np.empty(self.pattern.entries + 1)
-        a, b = self._buffer(y), self._buffer(yd)
+        a, b = self._read(y), self._read(yd)
         for side in (not rate, rate):
             lib.core.sd_slopes(c.byref(self.core), t, lib.pointer(a), lib.pointer(b), side, lib.pointer(found))
             self.failure.check()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.integrate.weights.round_off import open_unknowns
+from sysdyn.runtime.integrate.weights.unknown_roles import Roles
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import GROUP, ROUND_OFF, UNKNOWN, group_maximum, magnitudes, noise
 from sysdyn.runtime.model.system import LARGE, System
@@ -93,6 +94,10 @@ class Sizes:
         rough = number > LARGE and not self._request.events  # (core/run/events/modes.h)
         return np.zeros(number, dtype=np.float32) if rough else np.zeros(number)
 
+    def spare_resolved(self) -> None:
+        """Behind the last jump: nobody asks for it again."""
+        self.__dict__.pop("resolved", None)
+
     def let_go(self) -> None:
         """Of what the start knows: found again if asked."""
         self._origin = None
@@ -168,9 +173,9 @@ class Sizes:
         found, _ = magnitudes(self.system, t, end, y, rate, far)
         return np.where(found == UNKNOWN, 0.0, found)
 
-    def resolve(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
-        """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; carries
-        [unknowns]: the state.
+    def resolve(self, t: float, y: Floats, rate: Floats, roles: Roles) -> None:
+        """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; rate
+        [unknowns]: of what has one.
         """
         if (np.abs(y) <= 2.0 * self.resolved).all():
             return
@@ -179,13 +184,15 @@ class Sizes:
         if spared:
             self.hand_down()
             self.put_away()
-        jy = self.system.slopes(t, y, yd, rate=False)
-        open_ = noise(self.system, y, jy, self.time)
-        del jy
+        jy = self.system.slopes(t, y, np.where(roles.differential, rate, 0.0), rate=False)
+        pattern = self.system.pattern
         if spared:
             self.system.put_away(whole=True)
+        open_ = noise(self.system, pattern, y, jy, self.time)
+        del jy
+        if spared:
             self.system.spare()
-        open_[carries] = 0.0
+        open_[roles.state] = 0.0
         self._at_least(open_)
 
     def resolve_by_rows(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:

@@ -65,7 +65,6 @@ class System(c.Structure):
         ("column", P),
         ("row", P),
         ("call", P),
-        ("k_row", P),
         ("k_q", P),
         ("k_f", P),
         ("k_slot_q", P),
