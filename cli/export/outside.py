@@ -242,7 +242,7 @@ def _slopes(m: _Model, t: float, state: _Floats, p: _Floats) -> tuple[_Floats, _
     yd[form.k_q] = y[form.k_f]
     if chosen["direct"]:
         y[unknown[~rate]] = yd[unknown[rate]] = 0.0
-    first = len(form.k_q)
+    first = len(form.k_row)
     for _ in range(1 if chosen["direct"] else _NEWTON):
         r = form.residual(t, y, yd, p)
         step = -_solver(m, *form.jacobian(t, y, yd, p))(r[first:])
@@ -259,7 +259,7 @@ def _state_jacobian(m: _Model, t: float, state: _Floats, cj: float, p: _Floats) 
     form, chosen, places = m.form, m.state["selection"], m.state["places"]
     y, yd = _slopes(m, t, state, p)
     jy, jyd = form.jacobian(t, y, yd, p)
-    first, n = len(form.k_q), len(chosen["unknown"])
+    first, n = len(form.k_row), len(chosen["unknown"])
     number = np.full(form.unknowns, -1)
     number[places] = np.arange(m.n)
     take = (form.row >= first) & (number[form.columns] >= 0)

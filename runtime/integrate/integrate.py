@@ -113,9 +113,7 @@ class Integration:
         self.origin = None
         self.sizes.let_go()
         if self.forms is not None:  # of what is kept the method has its own
-            few, none = np.zeros(0, dtype=np.int8), np.zeros(0, dtype=np.bool_)
-            common = self.roles.common[:0].copy()
-            self.roles = replace(self.roles, test=few, power=few, smooth=none, idle=none, common=common)
+            self.roles = self.roles.put_away()
 
     def _spare(self) -> None:
         """Lets go of what a large model found on its way here, and would find again."""

@@ -223,8 +223,7 @@ def noise(system: System, pattern: Pattern, y: Floats, jy: Floats, time: float) 
     displacements over it, and multipliers balance what flows make of that.  pattern: the system's, which may have let
     go of it.
     """
-    found, bare = np.zeros(system.unknowns), lib.System.from_buffer_copy(system.bare)
-    bare.column, bare.row = lib.pointer(pattern.column), lib.pointer(pattern.row)
+    found, (bare, _held) = np.zeros(system.unknowns), system.bare(pattern)
     arrays = map(lib.pointer, (*noisy(system), np.ascontiguousarray(y), jy))
     if lib.core.sd_noise(c.byref(bare), *arrays, time, SWEEPS, GROUP, lib.pointer(found)):
         raise MemoryError
@@ -289,6 +288,7 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
     rows = lib.Balance(unknowns=like.size, kinds=1 + int(like.max(initial=0)), kind=lib.pointer(like))  # none is read
     tables = lib.Sizing(balance=c.addressof(rows), nominal=lib.pointer(nominal), kind=lib.pointer(kind))
     arrays = lib.pointer(met), lib.pointer(magnitude), lib.pointer(found)
-    if lib.core.sd_confirmed(c.byref(tables), c.byref(system.bare), span, *arrays):
+    bare, _held = system.bare()
+    if lib.core.sd_confirmed(c.byref(tables), c.byref(bare), span, *arrays):
         raise MemoryError
     return found

@@ -28,8 +28,7 @@ static const double *expand(const sd_rows_of_start *s, const double *x, double *
     memset(yd, 0, (size_t)s->extended * sizeof *yd);
     for (int32_t k = 0; k < s->rates; k++)
         yd[s->rate[k]] = x[s->written + k];
-    for (int32_t k = 0; k < s->kinematics; k++)
-        yd[s->k_q[k]] = x[s->k_f[k]];
+    sd_follow_flows(s->k_span, s->k_spans, x, yd);
     if (s->system->together)
         return x;
     memset(y, 0, (size_t)s->extended * sizeof *y);

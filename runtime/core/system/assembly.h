@@ -133,4 +133,12 @@ static inline int sd_finite(int32_t n, const double *x)
     return 1;
 }
 
+/* yd[q] := y[f] of all rows q' - f in these stretches [spans][4] */
+static inline void sd_follow_flows(const int32_t *span, int32_t spans, const double *y, double *yd)
+{
+    for (const int32_t *end = span + 4 * (size_t)spans; span < end; span += 4)
+        for (int32_t i = 0; i < span[0]; i++)
+            yd[span[2] + i] = y[span[3] + i];
+}
+
 #endif
