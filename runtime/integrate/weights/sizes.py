@@ -25,6 +25,17 @@ MET = -1.0
 """Stands for a magnitude that is the largest |y| met."""
 
 
+NO_POWER = np.iinfo(np.int16).min
+"""Of two, of zero."""
+
+
+def _powers(y: Floats) -> NDArray[np.int16]:
+    """The power of two that |y| is less than, and no less than half of; above any of what is no number."""
+    found = np.where(y == 0.0, NO_POWER, np.frexp(y)[1]).astype(np.int16)
+    found[~np.isfinite(y)] = np.iinfo(np.int16).max
+    return found
+
+
 class Sizes:
     """magnitude [unknowns] in SI units, time (s): the scale of the start."""
 
@@ -88,11 +99,22 @@ class Sizes:
         return self._met
 
     @cached_property
-    def resolved(self) -> Floats | NDArray[np.float32]:
-        """|y| of which is known what round-off leaves open [unknowns], roughly where the core does not read it too."""
+    def resolved(self) -> Floats | NDArray[np.int16]:
+        """|y| of which is known what round-off leaves open [unknowns], by powers of two where the core does not read it
+        too.
+        """
         number = self.system.unknowns
         rough = number > LARGE and not self._request.events  # (core/run/events/modes.h)
-        return np.zeros(number, dtype=np.float32) if rough else np.zeros(number)
+        return np.full(number, NO_POWER, dtype=np.int16) if rough else np.zeros(number)
+
+    def _grown(self, y: Floats) -> bool:
+        """Whether some |y| may be more than twice what it was when asked before; it is as large as now, then."""
+        known = self.resolved
+        size, most = (_powers(y), known) if known.dtype == np.int16 else (np.abs(y), 2.0 * known)
+        if (size <= most).all():
+            return False
+        np.maximum(known, size, out=known)
+        return True
 
     def spare_resolved(self) -> None:
         """Behind the last jump: nobody asks for it again."""
@@ -177,9 +199,8 @@ class Sizes:
         """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; rate
         [unknowns]: of what has one.
         """
-        if (np.abs(y) <= 2.0 * self.resolved).all():
+        if not self._grown(y):
             return
-        np.maximum(self.resolved, np.abs(y), out=self.resolved, casting="same_kind")
         spared = self.system.unknowns > LARGE and self._own is not None
         if spared:
             self.hand_down()
