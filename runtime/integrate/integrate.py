@@ -71,9 +71,9 @@ class Integration:
         self.origin: Origin | None = origin or Origin(system, start, request.index)
         origin = self.origin
         self._factors = origin.factors
-        self.y, self.yd, self.start_rate = origin.point(own=alone)
         self.underlying: Underlying | None = None
         self.sizes = Sizes(system, start, request, origin)
+        self.y, self.yd, self.start_rate = origin.point(own=alone)
         self.roles: Roles = origin.roles
         if request.method in ON_UNDERLYING:
             self._solved, self.roles = origin.explicit
