@@ -40,7 +40,7 @@ def _levels(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[Mask, ..
     return said_p, said_q, others, said & placed, unsaid_p, at, unsaid_q & ~placed, unsaid & hollow
 
 
-def _inert(starter: Starter, t: float, x: Floats) -> Floats:
+def inertias(starter: Starter, t: float, x: Floats) -> Floats:
     """Inertia of each flow, as the balances say what stores hold [unknowns as written]; none where these are shared."""
     system, known = starter.system, starter.equations
     if not known.balanced:
@@ -56,7 +56,7 @@ def weights(starter: Starter, t: float, x: Floats, scale: Floats, inert: Floats)
     """Of changes in magnitudes [unknowns]: unknowns of one kind and unit are moved by one measure, whatever their
     values; those that hold what stores do by their contents, flows by their momenta.  What follows moves freely, by
     its values alone (by momenta 1e-9 of a pressure at a valve at rest were lost): where rows leave multipliers open
-    they share alike.  inert: as `_inert` says.
+    they share alike.  inert: as `inertias` says.
     """
     known, content = starter.equations, scale.copy()
     np.multiply(content[: inert.size], np.abs(inert), out=content[: inert.size], where=inert != 0.0)
@@ -78,7 +78,7 @@ def problem_of(
 
     least: the state moves least in the order of what is said of it, however much what follows has to; else by weights.
     """
-    inert = _inert(starter, t, x)
+    inert = inertias(starter, t, x)
     starter.spare()  # of a large model the room counts
     scale = starter.scale(t, x)
     ordered = least and max(int(rows.sum()), int(free.sum())) <= DENSE
