@@ -7,8 +7,7 @@ from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
-from sysdyn.runtime.start.least import problem_of
-from sysdyn.runtime.start.least import inertias
+from sysdyn.runtime.start.least import inertias, problem_of
 from sysdyn.runtime.start.least import weights as weights_of
 from sysdyn.runtime.start.settled import columns_of_rates, flows_open, inertial_rows, rates_of
 from sysdyn.runtime.start.starter import Starter
