@@ -87,7 +87,8 @@ def problem_of(
         scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
     weight = weights(starter, t, x, scale, inert)
     del inert
-    scale = np.where(starter.pinned & ~free, np.abs(x), scale)
+    fixed = starter.pinned & ~free
+    scale = np.where(fixed, np.abs(x), scale) if fixed.any() else scale  # of a large model the room counts
     starter.spare()
     return Problem(
         residual=lambda z: starter.residual(t, z),

@@ -358,6 +358,7 @@ def _state(starter: Starter, t: float, guess: Floats, best: Solution, strategy: 
     small = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: starter.system.form.written]
     zeros = Stretches(small) if small.size > LARGE else small
     del largest, small  # of a large model the room counts
+    starter.spare()
     moved = tuple(moved_guesses(starter, t, best.x, starter.scale(t, best.x)))
     fixed = np.abs(best.x[starter.pinned])
     nothing = NOTHING * min(1.0, float(fixed[fixed > 0.0].min(initial=1.0)))
