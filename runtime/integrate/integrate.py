@@ -379,7 +379,7 @@ class Integration:
                 break
             before = time.process_time()
             cross(self, self.segments[at])
-            if at + 1 == len(self.segments) and self.pieces is self.corners is None:
+            if at + 1 == len(self.segments) and self.pieces is None and self.corners is None:
                 self.sizes.spare_resolved()
             if self.corners is not None:
                 self.corners.at = at

@@ -27,7 +27,8 @@ from sysdyn.values import dataclass
 BALANCED = 1e-12
 """Sum of a row of dF/dyd over that of its magnitudes that is round-off."""
 
-Few, Mask = NDArray[np.int8], NDArray[np.bool_]
+Few = NDArray[np.int8]
+Mask = NDArray[np.bool_]
 BESIDE = 1e-3
 """Relative move of displacements: an inertia that vanishes at the start by chance does not vanish beside it."""
 
