@@ -148,7 +148,7 @@ def _system(name: str, system: Assembled) -> Iterable[str]:
             yield ints(f"{name}_{table}_{k}", getattr(call, table))
         calls.append(_call(name, k, call))
     yield f"static const sd_call {name}_call[] = {{\n" + "\n".join(calls or ["    {0}"]) + "\n};"
-    fields = ("k_row", "k_q", "k_f", "k_slot_q", "k_slot_f", "held_row", "held_unknown", "held_slot", "cleared")
+    fields = ("k_q", "k_f", "k_slot_q", "k_slot_f", "held_row", "held_unknown", "held_slot", "cleared")
     for field in ("column", "row", *fields):
         yield ints(f"{name}_{field}", getattr(system, field))
     spans = stretches(system.k_row, system.k_q, system.k_f)

@@ -138,7 +138,7 @@ def _pattern(system: System, selection: Selection, places: Ints) -> tuple[Ints, 
     from scipy.sparse import coo_array, csc_array
     from scipy.sparse.csgraph import connected_components
 
-    solved, first = selection.unknown.size, system.form.k_row.size
+    solved, first = selection.unknown.size, system.form.kinematics
     matrix = selection.pattern
     joined = coo_array(
         (np.ones(matrix.entries), (matrix.row, solved + matrix.columns_of())), shape=(2 * solved, 2 * solved)
@@ -181,7 +181,7 @@ def state_jacobian(tables_: Tables, system: System, t: float, y: Floats, yd: Flo
     chosen, places = tables_.state.selection, tables_.state.places
     jy, jyd = system.jacobian(t, y, yd)
     values = np.where(chosen.from_rate > 0, jyd[chosen.source], jy[chosen.source])
-    solved, first, n = chosen.unknown.size, system.form.k_row.size, places.size
+    solved, first, n = chosen.unknown.size, system.form.kinematics, places.size
     number = np.full(system.unknowns, -1, dtype=np.int64)
     number[places] = np.arange(n)
     columns = system.pattern.columns_of()

@@ -96,7 +96,7 @@ def rows(formed: Formed) -> list[dict[str, Any]]:
                 found += _labels(family.name, family, "slope", form.families[k].place)
         return found
     for k, family in enumerate(families):
-        if family.kind == "q" and system.form.k_row.size:
+        if family.kind == "q" and system.form.kinematics:
             found += _labels(family.name, family, "kinematic", form.families[k].place)
     for group, k, _ in system.form.groups:
         row = form.rows[k]

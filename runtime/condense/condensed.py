@@ -230,7 +230,7 @@ class Condensed:
     def _own_rows(self) -> Ints:
         """Kept rows q' - f as stretches (core/system/condensed.h), where no block adds to any and none is held."""
         whole, form = self.whole, self.whole.form
-        firsts = [planned.to[(planned.to >= 0) & (planned.to < form.k_row.size)] for planned in form.calls]
+        firsts = [planned.to[(planned.to >= 0) & (planned.to < form.kinematics)] for planned in form.calls]
         row = numbers_of(whole.rows, self.kept_rows)[form.k_row]
         q = numbers_of(whole.unknowns, self.kept)[form.k_q]
         here = row >= 0
@@ -262,7 +262,7 @@ class Condensed:
         self._keep.append(elsewhere)
         made = elsewhere.core
         made.kinematics = int(here.sum())
-        made.k_row = made.k_q = made.k_f = None  # told by their stretches
+        made.k_q = made.k_f = None  # told by their stretches
         made.k_slot_q, made.k_slot_f = slot_q, slot_f
         made.k_scale = None
         made.k_span, made.k_spans = self._hold(spans), 0 if self._own.size else len(spans)
@@ -294,7 +294,7 @@ class Condensed:
         del self._number
         unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
         rate = self._spans(self.kept, self._rated())
-        rest = self._spans(self.kept_rows, self.kept_rows >= (whole.form.k_row.size if self._own.size else 0))
+        rest = self._spans(self.kept_rows, self.kept_rows >= (whole.form.kinematics if self._own.size else 0))
         self.condensed = lib.Condensed(
             full=c.addressof(self._trim),
             unknowns=self.unknowns,

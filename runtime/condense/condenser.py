@@ -106,6 +106,7 @@ class _Condenser:
         whole = self.whole
         large, zero = whole.unknowns > LARGE, np.zeros(whole.unknowns)
         constant = whole.residual(t, zero, zero)
+        del zero
         jy = None if large else whole.slopes(t, y, yd, rate=False)
         allowed = definable(whole, whole.slopes(t, y, yd, rate=False) if jy is None else jy, constant, y)
         if self._found is None or not np.array_equal(allowed, self._allowed):
@@ -116,7 +117,7 @@ class _Condenser:
         if few or not np.isfinite(jy[found.entry]).all():
             return None
         numbers = sums(whole, found, jy, constant)
-        del jy, zero, constant
+        del jy, constant
         if not np.isfinite(numbers.constant).all():
             return None
         if large:  # the room counts: other numbers find all anew

@@ -108,15 +108,15 @@ def definable(system: System, jy: Floats, constant: Floats, y: Floats) -> Mask:
     size = np.abs(jy)
     del jy
     size[~np.isfinite(size)] = 0.0
-    by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
     here, gone, carried = system.once("may leave", lambda: _candidates(system))
     i, j = rows[here], columns[here]
-    term = size[here] * np.abs(y[j])
+    weight, term = size[here], y[j]
+    np.multiply(weight, np.abs(term, out=term), out=term)
     terms = np.abs(constant)
     np.fmax.at(terms, i, term)
     cancels = (term < HEALTHY * terms[i]) & (term > NOISE * terms[i])
     del term, terms
-    weight = size[here]
+    by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
     weight *= by_row[i]
     weight *= by_column[j]
     del size, by_row, by_column, columns  # of a large one the room counts

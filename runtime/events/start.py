@@ -17,7 +17,7 @@ from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, SolverFailure
 from sysdyn.runtime.model.scales import magnitudes
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 
 SAMPLES = 4
@@ -48,6 +48,13 @@ def eventful_start(system: System, t0: float, plan: Plan, until: float | None = 
     is the one behind them, if that is as guessed: nothing moves while no time passes (a charge pump by switches whose
     pulses begin at t0).  until: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
     """
+    found = _sampled_start(system, t0, plan, until)
+    if system.unknowns > LARGE:
+        found.put_away()
+    return found
+
+
+def _sampled_start(system: System, t0: float, plan: Plan, until: float | None) -> ConsistentState:
     begun: Standing | None = None
     if plan.sampled and any(c.kind == "guarded" for c in plan.contacts):
         system.own_numbers()

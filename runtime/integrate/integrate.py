@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import ctypes as c
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -70,9 +71,9 @@ class Integration:
         self.origin: Origin | None = origin or Origin(system, start, request.index)
         origin = self.origin
         self._factors = origin.factors
-        self.y, self.yd, self.start_rate = origin.point(own=alone)
         self.underlying: Underlying | None = None
         self.sizes = Sizes(system, start, request, origin)
+        self.y, self.yd, self.start_rate = origin.point(own=alone)
         self.roles: Roles = origin.roles
         if request.method in ON_UNDERLYING:
             self._solved, self.roles = origin.explicit
@@ -112,9 +113,7 @@ class Integration:
         self.origin = None
         self.sizes.let_go()
         if self.forms is not None:  # of what is kept the method has its own
-            few, none = np.zeros(0, dtype=np.int8), np.zeros(0, dtype=np.bool_)
-            common = self.roles.common[:0].copy()
-            self.roles = replace(self.roles, test=few, power=few, smooth=none, idle=none, common=common)
+            self.roles = self.roles.put_away()
 
     def _spare(self) -> None:
         """Lets go of what a large model found on its way here, and would find again."""
@@ -130,6 +129,18 @@ class Integration:
         if self.system.unknowns > LARGE and self.forms is not None:
             self.system.put_away(whole=True)
             self._put_away_of(self.forms)
+
+    @contextmanager
+    def room_left(self) -> Iterator[None]:
+        """What a large run evaluates its condensed points in goes meanwhile; nothing is evaluated there."""
+        if self.forms is None or self.system.unknowns <= LARGE:
+            yield
+            return
+        self.forms.room.rest()
+        yield
+        self.forms.bind()
+        room, run = self.forms.room, self.driver.run
+        run.point, run.point_d = lib.pointer(room.y), lib.pointer(room.yd)
 
     def _rest_of_start(self) -> None:
         """Lets go of the start of a large run of what is kept, under way; the next one finds it where it is."""
@@ -368,6 +379,8 @@ class Integration:
                 break
             before = time.process_time()
             cross(self, self.segments[at])
+            if at + 1 == len(self.segments) and self.pieces is None and self.corners is None:
+                self.sizes.spare_resolved()
             if self.corners is not None:
                 self.corners.at = at
             self._put_away()

@@ -27,19 +27,30 @@ class Origin:
 
     def __init__(self, system: System, start: ConsistentState, index: int) -> None:
         self.system, self.start, self.t = system, start, start.t
-        self.y, self.rate = start.for_form(system)
+        y, rate = start.for_form(system)
+        self._point = None if system.unknowns > LARGE else (y, rate)
         self._index = index
         self._matrix: tuple[Floats, Floats] | None = None
         rates = self._rates()
-        self.yd = np.where(system.differential(rates), self.rate, 0.0)
+        self.yd = np.where(system.differential(rates), rate, 0.0)
         if system.unknowns <= LARGE:
             self.roles = roles(system, start.t, rates, index)
-        del rates
+        del rates, y, rate
         self._sized: tuple[float, tuple[Floats, float]] | None = None
         self._explicit: tuple[System, Roles] | None = None
         self.kept: Roles | None = None
         """Roles of what is left where unknowns leave the runs (condense/)."""
         self.factors = Factors()
+
+    @property
+    def y(self) -> Floats:
+        """As the start has it, of a large system whenever it is asked for."""
+        return (self._point or self.start.for_form(self.system))[0]
+
+    @property
+    def rate(self) -> Floats:
+        """The same of its rates."""
+        return (self._point or self.start.for_form(self.system))[1]
 
     def point(self, *, own: bool) -> tuple[Floats, Floats, Floats]:
         """y, yd, rate [unknowns]; own: nobody else changes them."""

@@ -82,7 +82,7 @@ def _solved_for(system: System) -> tuple[Ints, Ints, Ints]:
     column = np.full(system.unknowns, -1, dtype=np.int32)
     column[unknown] = np.arange(unknown.size)
     rate = np.where(system.are("f", "p"), 2, np.where(system.are("s"), 1, 0)).astype(np.int32)
-    read = system.structural()[1] & (system.pattern.row < system.form.k_row.size + unknown.size)
+    read = system.structural()[1] & (system.pattern.row < system.form.kinematics + unknown.size)
     rate[system.are("f") & ~system.differential(read.astype(float))] = 0
     return unknown, column, rate[unknown]
 
@@ -159,7 +159,7 @@ class Accelerations:
     def _select(self) -> tuple[NDArray[np.bool_], Ints, Ints, Pattern]:
         """Which entries of dF/dy, dF/dy' stand in the matrix, where from, and its pattern."""
         system = self.system
-        pattern, first = system.pattern, system.form.k_row.size
+        pattern, first = system.pattern, system.form.kinematics
         columns = pattern.columns_of()
         in_y, in_rate = system.structural()
         counted = (pattern.row >= first) & (pattern.row < first + self._unknown.size)

@@ -128,7 +128,7 @@ class Facts:
     @property
     def family_of(self) -> Ints:
         """Number of the family of each unknown (nu: -1); read-only."""
-        return self.once("family_of", self._family_of)
+        return self.once_if_small("family_of", self._family_of)
 
     def _family_of(self) -> Ints:
         found = np.full(self.unknowns, -1, dtype=np.int32)

@@ -22,6 +22,8 @@ from sysdyn.runtime.model.description import BASE, BESIDE, SCALE, START, Descrip
 from sysdyn.runtime.model.failures import ContractError, RowLabel
 from sysdyn.values import dataclass
 
+FEW = 10_000
+"""Rows q' - f up to which their places are held as they are."""
 NOWHERE = -(2**30)
 """A table's entry for a family that this call must not touch: any place made of it is out of range."""
 
@@ -92,8 +94,8 @@ class Form:
     """A choice of calls with the layout of y and of the rows.
 
     written: unknowns as written (nu, and those of the start alone, stand behind them); at: places of the families,
-    audit families behind all (`extended`); kind: (kind, number) of unknowns one after the other; k_row, k_q, k_f: the
-    rows q' - f, and k_span: their stretches;
+    audit families behind all (`extended`); kind: (kind, number) of unknowns one after the other; kinematics: number of
+    the rows q' - f, the first ones; k_span: their stretches; k_few: k_q and k_f where they are few;
     groups: (name of the group, row family, first row), ascending; scales: calls of the scale blocks of steep rows.
     """
 
@@ -105,12 +107,34 @@ class Form:
     at: Ints
     calls: tuple[Planned, ...]
     kind: tuple[tuple[str, int], ...]
-    k_row: Ints
-    k_q: Ints
-    k_f: Ints
+    kinematics: int
     k_span: Ints
+    k_few: tuple[Ints, Ints] | None
     groups: tuple[tuple[str, int, int], ...]
     scales: tuple[Planned, ...]
+
+    @property
+    def k_row(self) -> Ints:
+        """The rows q' - f."""
+        return np.arange(self.kinematics, dtype=np.int32)
+
+    @property
+    def k_q(self) -> Ints:
+        """Place of q in each of them."""
+        return self._along(0)
+
+    @property
+    def k_f(self) -> Ints:
+        """Place of its f."""
+        return self._along(1)
+
+    def _along(self, part: int) -> Ints:
+        if self.k_few is not None:
+            return self.k_few[part]
+        number, first, begin = self.k_span[:, 0], self.k_span[:, 1], self.k_span[:, 2 + part]
+        found = np.repeat(begin - first, number)
+        found += np.arange(found.size, dtype=np.int32)
+        return found
 
     @property
     def base(self) -> str:
@@ -119,7 +143,7 @@ class Form:
 
     def row_label(self, description: Description, row: int) -> RowLabel:
         """The author's label of a row."""
-        if row < self.k_row.size:
+        if row < self.kinematics:
             place = int(self.k_q[row])
             return RowLabel(f"{unknown_name(description, self, place)}' = f", "kinematic")
         for group, family, first in reversed(self.groups):
@@ -229,6 +253,10 @@ def stretches(row: Ints, q: Ints, f: Ints) -> Ints:
     return np.ascontiguousarray(np.stack([number, *parts[:, begin]], axis=1), dtype=np.int32)
 
 
+def _stretches(q: Ints, f: Ints) -> Ints:
+    return stretches(np.arange(q.size, dtype=np.int32), q, f)
+
+
 def plan(description: Description, name: str) -> Form:
     """The calls and tables of one index form."""
     own = START if name == "start" else ()
@@ -236,12 +264,14 @@ def plan(description: Description, name: str) -> Form:
     unknowns = written
     if "kinematics" not in description.layouts:  # the same in every form
         made = _kinematics(description, at)
-        description.layouts["kinematics"] = *made, np.arange(made[0].size, dtype=np.int32)
-    k_q, k_f, first, k_rows = description.layouts["kinematics"]
+        few = made[:2] if made[0].size <= FEW else None  # of a large model the room counts
+        description.layouts["kinematics"] = int(made[0].size), _stretches(*made[:2]), few, made[2]
+    kinematics, k_span, k_few, first = description.layouts["kinematics"]
     bare = name in BARE
     if bare:
-        k_q = k_f = k_rows = np.zeros(0, np.int32)
-    number = int(k_q.size)
+        nothing = np.zeros(0, dtype=np.int32)
+        kinematics, k_span, k_few = 0, k_span[:0], (nothing, nothing)
+    number = kinematics
     # rows of each group of blocks, one behind the other; a block adds to those of its group
     nu = at.copy()
     tables: dict[str, Ints] = {}
@@ -288,10 +318,9 @@ def plan(description: Description, name: str) -> Form:
         at=at,
         calls=tuple(calls),
         kind=tuple(kind),
-        k_row=k_rows,
-        k_q=k_q,
-        k_f=k_f,
-        k_span=stretches(k_rows, k_q, k_f),
+        kinematics=kinematics,
+        k_span=k_span,
+        k_few=k_few,
         groups=tuple(groups),
         scales=tuple(scales),
     )

@@ -25,7 +25,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_places, with_flows
-from sysdyn.runtime.model.patterns import read_only
+from sysdyn.runtime.model.patterns import Pattern, read_only
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.values import dataclass
 
@@ -123,13 +123,21 @@ def _displaced(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 def alike(system: System) -> Ints:
     """Number of the kind and unit of each unknown [unknowns]; read-only."""
-    return system.once("alike", lambda: _alike(system))
+    begin, number = _groups(system)
+    return system.once_if_small("alike", lambda: read_only(np.repeat(number, np.diff(begin, append=system.unknowns))))
 
 
-def _alike(system: System) -> Ints:
+def _groups(system: System) -> tuple[Ints, Ints]:
+    """Where stretches of one kind and unit begin among the unknowns, and the number of each."""
+    return system.once("groups of unknowns", lambda: _alike(system))
+
+
+def _alike(system: System) -> tuple[Ints, Ints]:
     families, numbers = system.description.families, kinds_and_units(system)
     number = [*(numbers[family.kind, family.unit] for family in families), len(numbers)]
-    return read_only(np.array(number, dtype=np.int32)[system.family_of])
+    every = np.array(number, dtype=np.int32)[system.family_of]
+    begin = np.flatnonzero(np.diff(every, prepend=-1)).astype(np.int32)
+    return begin, every[begin]
 
 
 def kinds_and_units(system: System) -> dict[tuple[str, str], int]:
@@ -142,7 +150,8 @@ def kinds_and_units(system: System) -> dict[tuple[str, str], int]:
 
 def group_maximum(system: System, values: Floats) -> Floats:
     """Largest value among the unknowns of the same kind and unit."""
-    return largest_of_group(alike(system), values)
+    begin, of = _groups(system)
+    return _largest(begin, of, values)
 
 
 def group_maxima(system: System, values: Floats) -> Floats:
@@ -174,10 +183,14 @@ def largest_of_group(group: NDArray[np.integer], values: Floats) -> Floats:
     new = np.ones(group.size, dtype=bool)
     np.not_equal(group[1:], group[:-1], out=new[1:])
     begin = np.flatnonzero(new)
-    of = group[begin]
-    largest = np.zeros(int(of.max()) + 1)
-    np.maximum.at(largest, of, np.maximum.reduceat(values, begin))
-    return np.repeat(largest[of], np.diff(begin, append=group.size))
+    return _largest(begin, group[begin], values)
+
+
+def _largest(begin: NDArray[np.integer], of: NDArray[np.integer], values: Floats) -> Floats:
+    largest = np.zeros(int(of.max(initial=-1)) + 1)
+    if begin.size:
+        np.maximum.at(largest, of, np.maximum.reduceat(values, begin))
+    return np.repeat(largest[of], np.diff(begin, append=values.size))
 
 
 def balanced(system: System, y: Floats, jy: Floats) -> Floats:
@@ -205,13 +218,14 @@ def _holding(system: System) -> NDArray[np.bool_]:
     return system.of_groups(*(g for g in dict.fromkeys(g for g, _, _ in system.form.groups) if g[:3] in _HOLDS))
 
 
-def noise(system: System, y: Floats, jy: Floats, time: float) -> Floats:
+def noise(system: System, pattern: Pattern, y: Floats, jy: Floats, time: float) -> Floats:
     """What round-off leaves open of each unknown [unknowns] in steps of `time` (s): flows are differences of their
-    displacements over it, and multipliers balance what flows make of that.
+    displacements over it, and multipliers balance what flows make of that.  pattern: the system's, which may have let
+    go of it.
     """
-    found = np.zeros(system.unknowns)
+    found, (bare, _held) = np.zeros(system.unknowns), system.bare(pattern)
     arrays = map(lib.pointer, (*noisy(system), np.ascontiguousarray(y), jy))
-    if lib.core.sd_noise(c.byref(system.core), *arrays, time, SWEEPS, GROUP, lib.pointer(found)):
+    if lib.core.sd_noise(c.byref(bare), *arrays, time, SWEEPS, GROUP, lib.pointer(found)):
         raise MemoryError
     return found
 
@@ -243,9 +257,9 @@ def magnitudes(
     else needs these entries, which are overwritten: of a large system the room counts.
     """
     span = max(t_end - t0, 0.0) or 1.0
-    a = system._buffer(np.where(np.isfinite(y), y, 0.0))
+    a = system._read(_finite(y))
     del y  # of a large system the room counts
-    b = system._buffer(np.where(np.isfinite(yd), yd, 0.0))
+    b = system._read(_finite(yd))
     found, tau = np.zeros(system.unknowns), np.zeros(1)
     motion = (None, None, None, None) if far is None else (*map(lib.pointer, far[:3]), far[3])
     answers = lib.pointer(found), lib.pointer(tau)
@@ -259,6 +273,12 @@ def magnitudes(
     return found, float(tau[0])
 
 
+def _finite(x: Floats) -> Floats:
+    """X with zeros for what is no number."""
+    finite = np.isfinite(x)
+    return x if finite.all() else np.where(finite, x, 0.0)
+
+
 def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Floats:
     """Magnitudes after a run [unknowns]: the largest |y| it met and a thousandth of that among unknowns of the same
     kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
@@ -268,6 +288,7 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
     rows = lib.Balance(unknowns=like.size, kinds=1 + int(like.max(initial=0)), kind=lib.pointer(like))  # none is read
     tables = lib.Sizing(balance=c.addressof(rows), nominal=lib.pointer(nominal), kind=lib.pointer(kind))
     arrays = lib.pointer(met), lib.pointer(magnitude), lib.pointer(found)
-    if lib.core.sd_confirmed(c.byref(tables), c.byref(system.bare), span, *arrays):
+    bare, _held = system.bare()
+    if lib.core.sd_confirmed(c.byref(tables), c.byref(bare), span, *arrays):
         raise MemoryError
     return found

@@ -110,7 +110,7 @@ class System(Facts):
     @property
     def plain(self) -> bool:
         """Whether blocks alone write into the matrix, whatever holds."""
-        return not self.form.k_row.size and not self._may_hold[0].size
+        return not self.form.kinematics and not self._may_hold[0].size
 
     def put_away(self, *, whole: bool) -> None:
         """Lets go of the pattern, found again when it is asked for; whole: of the places of the Jacobian's entries too.
@@ -121,6 +121,7 @@ class System(Facts):
         self.description.layouts.pop(self._layout_key, None)
         self._layout, self._away = None, whole
         self._core.column = self._core.row = None
+        self._kinematics(())
         if whole:
             self._slots = []
             self._told(_NOWHERE)
@@ -155,7 +156,7 @@ class System(Facts):
         for k, scale in enumerate(form.scales):
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
-        ones = np.broadcast_to(1.0, form.k_row.size)
+        ones = np.broadcast_to(1.0, form.kinematics)
         self.kinematic_scale: Floats = ones.copy() if form.name == "2" else ones
         self.work = self._work(layout.entries)
         self._keep += [calls]
@@ -167,12 +168,9 @@ class System(Facts):
             rows=form.rows,
             entries=layout.pattern.entries,
             calls=len(form.calls),
-            kinematics=form.k_row.size,
+            kinematics=form.kinematics,
             k_spans=len(form.k_span),
             call=c.addressof(calls),
-            k_row=lib.pointer(form.k_row),
-            k_q=lib.pointer(form.k_q),
-            k_f=lib.pointer(form.k_f),
             k_span=lib.pointer(form.k_span),
             k_scale=lib.pointer(self.kinematic_scale) if form.name == "2" else None,
             scales=len(form.scales),
@@ -193,7 +191,13 @@ class System(Facts):
         self._slots, self._away = list(layout.slots), False
         self._core.column, self._core.row = lib.pointer(layout.pattern.column), lib.pointer(layout.pattern.row)
         self._told(lambda k: lib.pointer(layout.slots[k]))
+        self._kinematics((self.form.k_q, self.form.k_f))
         return layout
+
+    def _kinematics(self, places: tuple[Ints, ...]) -> None:
+        """Where q and f of the rows q' - f stand, or (): nobody reads it for a while."""
+        self._k = places
+        self._core.k_q, self._core.k_f = map(lib.pointer, places or (None, None))
 
     def _told(self, address: Callable[[int], int | None]) -> None:
         """Where the entries of each part of the matrix stand."""
@@ -208,10 +212,13 @@ class System(Facts):
             self._bring_back()
         return self._core
 
-    @property
-    def bare(self) -> lib.System:
-        """The same where nothing asks for its matrix."""
-        return self._core
+    def bare(self, pattern: Pattern | None = None) -> tuple[lib.System, tuple[Ints, ...]]:
+        """The same where nothing asks for the places of entries, and what it reads: rows q' - f, this pattern."""
+        made, arrays = lib.System.from_buffer_copy(self._core), (self.form.k_q, self.form.k_f)
+        made.k_q, made.k_f = map(lib.pointer, arrays)
+        if pattern is not None:
+            made.column, made.row = lib.pointer(pattern.column), lib.pointer(pattern.row)
+        return made, arrays
 
     @property
     def pattern(self) -> Pattern:
@@ -349,10 +356,14 @@ class System(Facts):
         buffer[: len(x)] = x
         return buffer
 
+    def _read(self, x: Floats) -> Floats:
+        """X as blocks of equations read it, which know no audit families: itself where they are compiled."""
+        return np.ascontiguousarray(x) if self._core.together and x.size >= self.unknowns else self._buffer(x)
+
     def residual(self, t: float, y: Floats, yd: Floats) -> Floats:
         """F(t, y, yd) [rows]."""
         r = np.empty(max(self.rows, 1))
-        a, b = self._buffer(y), self._buffer(yd)
+        a, b = self._read(y), self._read(yd)
         lib.core.sd_residual(c.byref(self._core), t, lib.pointer(a), lib.pointer(b), lib.pointer(r))
         self.failure.check()
         return r[: self.rows]
@@ -360,7 +371,7 @@ class System(Facts):
     def jacobian(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
         """Values of dF/dy and dF/dyd [entries] on the pattern."""
         jy, jyd = np.empty(self.pattern.entries + 1), np.empty(self.pattern.entries + 1)
-        a, b = self._buffer(y), self._buffer(yd)
+        a, b = self._read(y), self._read(yd)
         at, slopes = ([lib.pointer(item) for item in pair] for pair in ((a, b), (jy, jyd)))
         lib.core.sd_jacobian(c.byref(self.core), t, *at, None, *slopes)
         self.failure.check()
@@ -371,7 +382,7 @@ class System(Facts):
         if self.unknowns <= LARGE:
             return self.jacobian(t, y, yd)[rate]
         found = np.empty(self.pattern.entries + 1)
-        a, b = self._buffer(y), self._buffer(yd)
+        a, b = self._read(y), self._read(yd)
         for side in (not rate, rate):
             lib.core.sd_slopes(c.byref(self.core), t, lib.pointer(a), lib.pointer(b), side, lib.pointer(found))
             self.failure.check()

@@ -254,7 +254,7 @@ def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
 
 def _in_core(problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, most: int, *, measure: bool) -> Solution:
     """The same of a small problem (core/start/search.h); measure: x as it is, of any."""
-    found, scaled = x.copy(), np.zeros(problem.number)
+    found, scaled = np.ascontiguousarray(x) if measure else x.copy(), np.zeros(problem.number)
     use, free, work = problem.use.astype(np.int32), problem.free.astype(np.int32), problem.work
     masks = lib.pointer(use), lib.pointer(free)
     numbers = lib.pointer(problem.guess), lib.pointer(problem.scale), lib.pointer(problem.weight)

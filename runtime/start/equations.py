@@ -169,9 +169,8 @@ class Equations:
         balance = Balance(settled.rows, self.rows, self.columns, self.alike)
         found.system, found.balance, found.extended = c.addressof(settled.core), balance.core, settled.form.extended
         found.written, found.rates = self.n, self.rates.size
-        found.plain, found.rated, found.kinematics = self.plain, self.rated, form.k_q.size
-        arrays = self.rates, form.k_q, form.k_f
-        found.rate, found.k_q, found.k_f = map(lib.pointer, arrays)
+        found.plain, found.rated, found.k_spans = self.plain, self.rated, len(form.k_span)
+        found.rate, found.k_span = map(lib.pointer, (self.rates, form.k_span))
         places = self._places(settled)
         if self.unknowns > LARGE and settled.plain:  # the room counts
             both = redirected(settled, *self._numbered(settled, *places), self.plain + self.rated)

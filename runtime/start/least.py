@@ -40,23 +40,26 @@ def _levels(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[Mask, ..
     return said_p, said_q, others, said & placed, unsaid_p, at, unsaid_q & ~placed, unsaid & hollow
 
 
-def weights(starter: Starter, t: float, x: Floats, scale: Floats) -> Floats:
+def inertias(starter: Starter, t: float, x: Floats) -> Floats:
+    """Inertia of each flow, as the balances say what stores hold [unknowns as written]; none where these are shared."""
+    system, known = starter.system, starter.equations
+    if not known.balanced:
+        return np.zeros(0)
+    y, yd = starter.expand(x)
+    some = known.momentum.size > 0
+    jy, jyd = system.jacobian(t, y, yd) if some else (None, system.slopes(t, y, yd, rate=True))
+    del y, yd
+    return own_inertia(system, jy, jyd)
+
+
+def weights(starter: Starter, t: float, x: Floats, scale: Floats, inert: Floats) -> Floats:
     """Of changes in magnitudes [unknowns]: unknowns of one kind and unit are moved by one measure, whatever their
     values; those that hold what stores do by their contents, flows by their momenta.  What follows moves freely, by
     its values alone (by momenta 1e-9 of a pressure at a valve at rest were lost): where rows leave multipliers open
-    they share alike.
+    they share alike.  inert: as `inertias` says.
     """
-    system, known, inert = starter.system, starter.equations, np.zeros(0)
-    if known.balanced:
-        y, yd = starter.expand(x)
-        some = known.momentum.size > 0
-        jy, jyd = system.jacobian(t, y, yd) if some else (None, system.slopes(t, y, yd, rate=True))
-        del y, yd
-        inert = own_inertia(system, jy, jyd)
-        del jy, jyd
-    content = scale.copy()
+    known, content = starter.equations, scale.copy()
     np.multiply(content[: inert.size], np.abs(inert), out=content[: inert.size], where=inert != 0.0)
-    del inert
     content /= largest_of_group(starter.measures, content)
     if x.size > LARGE:
         starter.__dict__.pop("measures", None)
@@ -75,13 +78,17 @@ def problem_of(
 
     least: the state moves least in the order of what is said of it, however much what follows has to; else by weights.
     """
+    inert = inertias(starter, t, x)
+    starter.spare()  # of a large model the room counts
     scale = starter.scale(t, x)
     ordered = least and max(int(rows.sum()), int(free.sum())) <= DENSE
     levels = _levels(starter, t, x, free) if ordered else ()
     if least:
         scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
-    weight = weights(starter, t, x, scale)
-    scale = np.where(starter.pinned & ~free, np.abs(x), scale)
+    weight = weights(starter, t, x, scale, inert)
+    del inert
+    fixed = starter.pinned & ~free
+    scale = np.where(fixed, np.abs(x), scale) if fixed.any() else scale  # of a large model the room counts
     starter.spare()
     return Problem(
         residual=lambda z: starter.residual(t, z),

@@ -119,15 +119,16 @@ def _flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray
 class Settler:
     """Moves points onto the settled rows.
 
-    settled: the System in form "settled"; magnitude [unknowns] of y; rate_magnitude [rates];
-    state [unknowns] bool: unknowns that carry the state and should move least.  condensed: what is left of the settled
-    form; the other unknowns follow.  common [unknowns]: groups of which differences alone are states (`Roles.common`).
+    settled: the System in form "settled"; kinematics: `Form.k_span` of the runs; magnitude [unknowns] of y;
+    rate_magnitude [rates]; state [unknowns] bool: unknowns that carry the state and should move least.  condensed: what
+    is left of the settled form; the other unknowns follow.  common [unknowns]: groups of which differences alone are
+    states (`Roles.common`).
     """
 
     def __init__(
         self,
         settled: System,
-        kinematics: tuple[Ints, Ints],
+        kinematics: Ints,
         magnitude: Floats,
         time_scale: float,
         state: NDArray[np.bool_],
@@ -150,7 +151,7 @@ class Settler:
         self._pairs = self._between = np.zeros((0, 2), dtype=np.int32)
         if common is not None and (common >= 0).any():
             self._by_differences(common, np.arange(n, dtype=np.int32) if condensed is None else condensed.kept)
-        self._k = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in kinematics)
+        self._kinematics = kinematics
         self.scale, self._time = np.concatenate([magnitude, magnitude[self.rates] / time_scale]), time_scale
         self.linear: Any = None
         if self._moves <= LATER:
@@ -278,8 +279,7 @@ class Settler:
         else:
             self._placed()
         core.sort = lib.pointer(self._sort)
-        core.k_q, core.k_f = (lib.pointer(item) for item in self._k)
-        core.kinematics = self._k[0].size
+        core.k_span, core.k_spans = lib.pointer(self._kinematics), len(self._kinematics)
         lib.reader(core.scale, self._moves)[:] = self.scale
         if self._moves > LARGE:  # the core has its own
             self.scale = self.scale[:0].copy()

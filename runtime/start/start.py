@@ -67,7 +67,7 @@ class ConsistentState:
     moved: tuple[tuple[str, float, float, str], ...]
     residual: float
     strategy: str = ""
-    zeros: Mask | None = None
+    zeros: Mask | Stretches[np.bool_] | None = None
     displaced: bool = False
     kept: bool = True
     sampled: bool = False
@@ -100,8 +100,8 @@ class ConsistentState:
         """Its y in any layout with these zeros."""
         if self.zeros is None:
             return y
-        clean = y.copy()
-        clean[: self.zeros.size][self.zeros] = 0.0
+        clean, zeros = y.copy(), whole_of(self.zeros)
+        clean[: zeros.size][zeros] = 0.0
         return clean
 
 
@@ -355,8 +355,10 @@ def _state(starter: Starter, t: float, guess: Floats, best: Solution, strategy: 
     largest = np.maximum(starter.scale(t, guess), starter.largest_alike(best.x))
     state = starter.free & ~starter.following(t, best.x)
     kept = bool((np.abs(best.x - guess) <= EXACT * largest)[state].all())
-    zeros = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: starter.system.form.written]
-    del largest  # of a large model the room counts
+    small = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: starter.system.form.written]
+    zeros = Stretches(small) if small.size > LARGE else small
+    del largest, small  # of a large model the room counts
+    starter.spare()
     moved = tuple(moved_guesses(starter, t, best.x, starter.scale(t, best.x)))
     fixed = np.abs(best.x[starter.pinned])
     nothing = NOTHING * min(1.0, float(fixed[fixed > 0.0].min(initial=1.0)))

@@ -233,6 +233,8 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
     """Index of the form as written, and the unknowns that the pencil leaves open at the state: where they are open
     there alone the index is that beside it.
     """
+    if system.unknowns > DENSE:  # of a large model the room counts: nobody holds its point meanwhile
+        return _growth_index(system, list(system.jacobian(state.t, *state.for_form(system)))), ()
     point = state.t, *state.for_form(system)
     index, undetermined = _index_at(system, *point)
     return _index_beside(system, *point, undetermined) if undetermined else index, undetermined
@@ -263,8 +265,6 @@ def _index_at(system: System, t: float, y: Floats, yd: Floats) -> tuple[int | No
     """The same at a point."""
     if system.unknowns == 0:
         return 0, ()
-    if system.unknowns > DENSE:
-        return _growth_index(system, list(system.jacobian(t, y, yd))), ()
     jy, jyd = system.jacobian(t, y, yd)
     if system.unknowns <= SMALL and system.rows == system.unknowns:
         found = _small_index(system, jy, jyd)
@@ -324,16 +324,15 @@ def _highest_index(system: System, state: ConsistentState) -> tuple[int | None, 
 def structure(system: System, state: ConsistentState) -> Structure:
     """Facts of a model at a consistent state; system: any form."""
     system = system if system.form.name == "3" else system.another("3")
-    y, yd = state.for_form(system)
     index, undetermined = _highest_index(system, state)
-    found = reactions(system, system.slopes(state.t, y, yd, rate=False))
+    found = reactions(system, system.slopes(state.t, *state.for_form(system), rate=False))
     left = dependent(found)
     zero = vanished(system, state)
     lowest = np.union1d(left, zero).size if zero.size else left.size
     if left.size:
         # a rank that is smaller here alone is the configuration's, not the constraints'
         for point in nearby(system, state):
-            there = reactions(system, system.jacobian(state.t, point, yd)[0])
+            there = reactions(system, system.jacobian(state.t, point, state.for_form(system)[1])[0])
             fewer = dependent(there)
             if fewer.size < left.size:
                 found, left = there, fewer

@@ -45,6 +45,10 @@ def test_factors_of_a_sum_are_those_of_its_entries_bit_by_bit(kind, number):
     call = {name: getattr(lib.core, f"sd_linear{z}_{name}") for name in ("new", "factor", "solve", "free")}
     call |= {name: getattr(lib.core, f"sd_linear{z}_{name}") for name in ("borrow", "scale_sum", "factor_sum")}
     plain, spare = (call["new"](n, *map(lib.pointer, pattern)) for _ in range(2))
+    begin, turned = there.indptr, np.arange(n)[::-1]  # columns stand where `at` says
+    at = np.zeros(n, dtype=np.int32)
+    at[turned] = np.append(0, np.cumsum(np.diff(begin)[turned]))[:-1]
+    place = np.concatenate([np.arange(begin[j], begin[j + 1]) for j in turned])
     work, held = np.full(n + 1, np.nan, dtype=number), np.zeros(n)
     assert call["borrow"](spare, lib.pointer(work), None, lib.pointer(held) if number is complex else None) == 0
     for k in range(3):
@@ -52,7 +56,8 @@ def test_factors_of_a_sum_are_those_of_its_entries_bit_by_bit(kind, number):
         held[:] = scale
         values = np.ascontiguousarray(a + c[0] * b, dtype=number)
         assert call["factor"](plain, lib.pointer(values), lib.pointer(scale)) == 0
-        call["scale_sum"](spare, *map(lib.pointer, (a, b, c, scale)))
+        laid = (a[place], b[place], at) if k == 1 else (a, b, None)
+        call["scale_sum"](spare, *map(lib.pointer, (*laid, c, scale)))
         assert call["factor_sum"](spare) == 0
         scale[:] = np.nan  # nobody reads it any more
         x = rng.normal(size=n).astype(number)

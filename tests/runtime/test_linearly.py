@@ -17,7 +17,7 @@ def settled(f, *parts, **more):
     state, y = np.zeros(system.unknowns, dtype=bool), np.ones(system.unknowns)
     state[[names.index("q_x"), names.index("f_x")]] = True
     y[names.index("f_x")] = f
-    kinematics = system.form.k_q, system.form.k_f
+    kinematics = system.form.k_span
     return Settler(system, kinematics, np.full(system.unknowns, f), 1.0, state), y, state
 
 

@@ -86,7 +86,7 @@ def test_noise_of_flows_is_that_of_displacements_over_a_step_and_multipliers_bal
     flows = 10.0 * EPS * np.array([32 / 6, 4.0])
     kappa = max(0.5 * flows[0] / 6.0, 2.0 * flows[1] / 8.0)
     expected = values(system, q_x=32 / 6 * EPS, q_y=4 * EPS, f_x=flows[0], f_y=flows[1], kappa_rod=kappa)
-    assert noise(system, y, jy, 0.1) == pytest.approx(expected, rel=1e-14, abs=0.0)
+    assert noise(system, system.pattern, y, jy, 0.1) == pytest.approx(expected, rel=1e-14, abs=0.0)
 
 
 # --- after a run ------------------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
-from sysdyn.runtime.start.least import problem_of
+from sysdyn.runtime.start.least import inertias, problem_of
 from sysdyn.runtime.start.least import weights as weights_of
 from sysdyn.runtime.start.settled import columns_of_rates, flows_open, inertial_rows, rates_of
 from sysdyn.runtime.start.starter import Starter
@@ -80,7 +80,7 @@ def test_momenta_are_paired_with_their_flows_and_flows_weigh_by_them():
     assert [(names[p], names[f]) for p, f in zip(momenta, flows, strict=True)] == [("p_1", "f_1"), ("p_2", "f_2")]
     x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
     scale = np.ones(x.size)
-    weight = by_name(found, weights_of(found, 0.0, x, scale))
+    weight = by_name(found, weights_of(found, 0.0, x, scale, inertias(found, 0.0, x)))
     # of 2 kg a flow of 1 m/s holds 2 N s, twice what a momentum of 1 N s does
     assert weight["f_1"] == pytest.approx(weight["f_2"])
     assert found.measures[momenta[0]] == found.measures[flows[0]]

@@ -25,7 +25,8 @@ int sd_linear_z_factor(sd_linear_z *linear, const double complex *values, const 
 void sd_linear_z_solve(sd_linear_z *linear, double complex *x);
 /* as sd_linear_borrow, sd_linear_scale_sum, sd_linear_factor_sum */
 int sd_linear_z_borrow(sd_linear_z *linear, double complex *work, double *row_scale, double *column_scale);
-void sd_linear_z_scale_sum(sd_linear_z *linear, const double *a, const double *b, const double complex *c, const double *scale);
+void sd_linear_z_scale_sum(sd_linear_z *linear, const double *a, const double *b, const int32_t *at, const double complex *c,
+                           const double *scale);
 int sd_linear_z_factor_sum(sd_linear_z *linear);
 /* as sd_linear_rest */
 void sd_linear_z_rest(sd_linear_z *linear);

@@ -101,8 +101,9 @@ static void equilibrate_sum(sd_linear *linear, const double *scale)
         linear->row_scale[i] = 0.0;
     for (int32_t j = 0; j < linear->n; j++) {
         const double s = scale[j];
+        const int32_t at = sum->at[j] - linear->column[j];
         for (int32_t e = linear->column[j]; e < linear->column[j + 1]; e++) {
-            double size = sd_size(sd_entry_of_sum(sum, e, s));
+            double size = sd_size(sd_entry_of_sum(sum, at + e, s));
             if (size > linear->row_scale[linear->row[e]])
                 linear->row_scale[linear->row[e]] = size;
         }
@@ -249,11 +250,13 @@ void sd_linear_rest(sd_linear *linear)
     }
 }
 
-void sd_linear_scale_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale)
+void sd_linear_scale_sum(sd_linear *linear, const double *a, const double *b, const int32_t *at, const sd_number *c,
+                         const double *scale)
 {
     sd_matrix *sum = linear->sum;
     sum->a = a;
     sum->b = b;
+    sum->at = at ? at : linear->column;
     sum->c = *c;
     sum->column_scale = linear->column_scale; /* a copy of scale, which changes */
     equilibrate_sum(linear, scale);

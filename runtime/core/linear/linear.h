@@ -76,9 +76,10 @@ void sd_linear_left(const sd_linear *linear, char *left);
  * which is free whenever they factorise or solve.  row_scale, column_scale [n]: where the scales of the last factors stand from
  * then on (NULL: in room of their own; those of another matrix of the pattern serve).  0 done, 2 no memory */
 int sd_linear_borrow(sd_linear *linear, sd_number *work, double *row_scale, double *column_scale);
-/* What is factorised next is A + c B in such scales: a, b [entries] stay as they are until the next one; scale [n] of columns,
- * where they are its own */
-void sd_linear_scale_sum(sd_linear *linear, const double *a, const double *b, const sd_number *c, const double *scale);
+/* What is factorised next is A + c B in such scales: a, b, of which the entries of a column begin at `at` [n] (NULL: as in the
+ * pattern), stay as they are until the next one; scale [n] of columns, where they are its own */
+void sd_linear_scale_sum(sd_linear *linear, const double *a, const double *b, const int32_t *at, const sd_number *c,
+                         const double *scale);
 /* as sd_linear_factor, of that */
 int sd_linear_factor_sum(sd_linear *linear);
 /* lets go of the numbers of sparse factors, and of scales of their own where they borrowed: nothing is solved before the next

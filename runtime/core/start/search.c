@@ -20,25 +20,29 @@
 #define ROUND_OFF 2e-15
 #define BESIDE 1e-8
 
-static void expand(const sd_rows_of_start *s, const double *x, double *y, double *yd)
+/* The rates yd [extended], and y as blocks read it, in room [extended] behind them: where they are compiled x serves, for they
+ * know no audit families. */
+static const double *expand(const sd_rows_of_start *s, const double *x, double *yd)
 {
-    memset(y, 0, (size_t)s->extended * sizeof *y);
+    double *y = yd + s->extended;
     memset(yd, 0, (size_t)s->extended * sizeof *yd);
-    memcpy(y, x, (size_t)s->written * sizeof *y);
     for (int32_t k = 0; k < s->rates; k++)
         yd[s->rate[k]] = x[s->written + k];
-    for (int32_t k = 0; k < s->kinematics; k++)
-        yd[s->k_q[k]] = y[s->k_f[k]];
+    sd_follow_flows(s->k_span, s->k_spans, x, yd);
+    if (s->system->together)
+        return x;
+    memset(y, 0, (size_t)s->extended * sizeof *y);
+    memcpy(y, x, (size_t)s->written * sizeof *y);
+    return y;
 }
 
 int sd_start_residual(const sd_rows_of_start *s, double t, const double *x, double *r)
 {
-    double *y = malloc(2 * (size_t)s->extended * sizeof *y + 8);
-    if (!y)
+    double *yd = malloc(2 * (size_t)s->extended * sizeof *yd + 8);
+    if (!yd)
         return -2;
-    expand(s, x, y, y + s->extended);
-    sd_residual(s->system, t, y, y + s->extended, r);
-    free(y);
+    sd_residual(s->system, t, expand(s, x, yd), yd, r);
+    free(yd);
     return 0;
 }
 
@@ -58,17 +62,15 @@ static int beside_roots(const sd_rows_of_start *s, double t, const double *y, co
 int sd_start_jacobian(const sd_rows_of_start *s, double t, const double *x, double *values)
 {
     int32_t entries = s->both ? 0 : s->system->entries, whole = 1;
-    double *y = malloc((2 * (size_t)s->extended + (size_t)entries + 1) * sizeof *y), *yd = y + s->extended;
-    if (!y)
+    double *yd = malloc((2 * (size_t)s->extended + (size_t)entries + 1) * sizeof *yd), *slope = yd + 2 * s->extended;
+    if (!yd)
         return -2;
+    const double *y = expand(s, x, yd);
     if (s->both) { /* of a large system the room counts */
-        expand(s, x, y, yd);
         int missing = sd_both_slopes(s->both, t, y, yd, values);
-        free(y);
+        free(yd);
         return missing;
     }
-    double *slope = yd + s->extended;
-    expand(s, x, y, yd);
     /* one side after the other: of a large system the room counts */
     for (int rate = 0; rate < 2 && whole; rate++) {
         sd_slopes(s->system, t, y, yd, rate, slope);
@@ -77,7 +79,7 @@ int sd_start_jacobian(const sd_rows_of_start *s, double t, const double *x, doub
             values[k] = slope[s->entry[k]];
     }
     int failed = whole ? 0 : beside_roots(s, t, y, yd, values);
-    free(y);
+    free(yd);
     return failed;
 }
 

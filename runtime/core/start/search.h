@@ -15,10 +15,10 @@ typedef struct sd_rows_of_start {
     sd_balance balance;               /* of all entries: those of y, of rates */
     int32_t written, rates;
     int32_t plain, rated;             /* entries of dF/dy that some block writes; of dF/dy' in the columns of the rates */
-    int32_t kinematics;
+    int32_t k_spans;
     const int32_t *rate;              /* [rates] place in y */
     const int32_t *entry;             /* [plain + rated] place in the system's pattern; NULL beside `both` */
-    const int32_t *k_q, *k_f;         /* [kinematics] places of displacements and of their flows */
+    const int32_t *k_span;            /* [k_spans][4] rows q' - f (assembly.h) */
     int32_t extended;                 /* length of y as blocks see it */
     const sd_system *both;            /* the system with slots in the entries of these equations (sd_both_slopes), or NULL */
 } sd_rows_of_start;

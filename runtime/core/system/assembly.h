@@ -9,7 +9,7 @@
  *   y, yd [unknowns]   r [rows]   column [unknowns + 1]   row, jy, jyd [entries]
  *   v [largest list of entries]           NULL: found for each Jacobian, as of a large system, where the room counts
  *   slot_dy [n_dy], slot_dyd [n_dyd]      place in jy / jyd of each entry of the block's list
- *   k_row, k_q, k_f, k_slot_q, k_slot_f [kinematics]      the rows q' - f and their two entries
+ *   k_q, k_f, k_slot_q, k_slot_f [kinematics]             the rows q' - f and their two entries
  *   k_span [k_spans][4]                the same rows as stretches: number, first row, q and f
  *   k_scale [kinematics]               factors of these rows: beside Phi_q^T nu they are the inverse metric of q; NULL: ones
  *   held_row, held_unknown, held_slot [held]   rows that read "unknown = 0" in the place of their equation (the
@@ -61,7 +61,7 @@ struct sd_system {
     int32_t unknowns, rows, entries, calls, kinematics, k_spans;
     const int32_t *column, *row;
     const sd_call *call;
-    const int32_t *k_row, *k_q, *k_f, *k_slot_q, *k_slot_f;
+    const int32_t *k_q, *k_f, *k_slot_q, *k_slot_f;
     const int32_t *k_span;
     const double *k_scale;
     int32_t held, clear;
@@ -131,6 +131,14 @@ static inline int sd_finite(int32_t n, const double *x)
         if (x[i] - x[i] != 0.0)
             return 0;
     return 1;
+}
+
+/* yd[q] := y[f] of all rows q' - f in these stretches [spans][4] */
+static inline void sd_follow_flows(const int32_t *span, int32_t spans, const double *y, double *yd)
+{
+    for (const int32_t *end = span + 4 * (size_t)spans; span < end; span += 4)
+        for (int32_t i = 0; i < span[0]; i++)
+            yd[span[2] + i] = y[span[3] + i];
 }
 
 #endif

@@ -194,10 +194,13 @@ static void finish(sd_settle *settle, double t, double *y, double *yd, int done,
         stays &= *open == 0.0;
         *open = 0.0; /* not nearly: relative errors are taken of it */
     }
-    for (int32_t i = 0; i < settle->kinematics && !settle->system->left; i++) {
-        stays &= yd[settle->k_q[i]] == y[settle->k_f[i]];
-        yd[settle->k_q[i]] = y[settle->k_f[i]];
+    for (int32_t k = 0; k < settle->k_spans && stays && !settle->system->left; k++) {
+        const int32_t *span = settle->k_span + 4 * (size_t)k;
+        for (int32_t i = 0; i < span[0]; i++)
+            stays &= yd[span[2] + i] == y[span[3] + i];
     }
+    if (!settle->system->left)
+        sd_follow_flows(settle->k_span, settle->k_spans, y, yd);
     if (!stays)
         measure(settle, t, y, yd);
 }
@@ -252,7 +255,7 @@ static int strays(const sd_settle *settle)
     return 0;
 }
 
-/* sd_settle_point with the unknowns of the system itself; the rows are measured once more where yd[k_q] = y[k_f] */
+/* sd_settle_point with the unknowns of the system itself; the rows are measured once more where q' = f */
 static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 {
     const double close = fmax(CLOSE, settle->enough);
@@ -333,8 +336,7 @@ static void follow_kept(const sd_settle *settle, const double *z, const double *
     const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
     sd_condensed_expand(condensed, z, y, 0);
     sd_condensed_put(condensed, zd, yd);
-    for (int32_t i = 0; i < settle->kinematics; i++)
-        yd[settle->k_q[i]] = y[settle->k_f[i]];
+    sd_follow_flows(settle->k_span, settle->k_spans, y, yd);
     sd_condensed_complete(condensed, yd, 1); /* what follows from displacements follows them in its rate */
 }
 

@@ -43,8 +43,8 @@ typedef struct sd_settle {
     double time;                     /* s in which unknowns change: their magnitudes over it are those of rates, at least */
     double within;                   /* s of the step within which points are; 0: of none */
     const int32_t *sort;             /* [rows] SD_CONSTRAINT: counts in the norm of constraints; SD_RATE; SD_LEFT_OUT */
-    const int32_t *k_q, *k_f;        /* [kinematics] yd[k_q] := y[k_f] afterwards */
-    int32_t kinematics;
+    const int32_t *k_span;           /* [k_spans][4] stretches of rows q' - f: yd[q] := y[f] afterwards */
+    int32_t k_spans;
     double *jy, *jyd;                /* [entries]; of large ones where they are wanted alone, like the matrix of a basis and its
                                       * pattern */
     double *matrix, *row_scale, *r, *x, *x0, *step; /* all but row_scale: of one point alone */

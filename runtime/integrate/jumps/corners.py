@@ -71,7 +71,7 @@ class Corners:
         masks = run.roles.state, run.roles.differential, run.sizes.unnamed
         core.state, core.differential, core.unnamed = (self._array(mask, np.int32) for mask in masks)
         group = alike(system)
-        core.group, core.groups = lib.pointer(group), int(group.max(initial=-1)) + 1
+        core.group, core.groups = self._array(group, np.int32), int(group.max(initial=-1)) + 1
         core.system = c.addressof(system.core)
         core.constraint, core.balance, core.multiplier, core.flow = (self._array(m, np.uint8) for m in noisy(system))
 

@@ -76,10 +76,11 @@ def go_on(run: Integration, t: float, label: float, point: list[Floats]) -> None
     run.start_rate[:n] = point.pop()
     y[:n] = run.driver.arrive(t, point.pop(), run.start_rate[:n], run.sizes.magnitude)
     run.method.rest()
-    yd = np.where(run.roles.differential, run.start_rate, 0.0)
     run.sizes.begin_to_move(t, run.method.contents.t_end, y, run.start_rate)
-    run.sizes.resolve(t, y, yd, run.roles.state)
-    run.sizes.hand_down()
+    with run.room_left():
+        run.sizes.resolve(t, y, run.start_rate, run.roles)
+        run.sizes.hand_down()
+    yd = np.where(run.roles.differential, run.start_rate, 0.0)
     run.method.begin(y, yd)
     lib.core.sd_run_restart(run.driver.core, t, label, lib.pointer(y), lib.pointer(yd))
     if run.pieces is None:  # the next restart has its own

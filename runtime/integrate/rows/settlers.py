@@ -12,7 +12,8 @@ from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.integrate.weights.sizes import Sizes
 from sysdyn.runtime.integrate.weights.unknown_roles import Roles
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.start.restart import Restart, still
 from sysdyn.runtime.start.settled import Settler, flows_open
 
@@ -45,12 +46,11 @@ class Settlers:
     ) -> None:
         self.system, self._forms, self._request, self._sizes = system, forms, request, sizes
         n = system.form.written
-        self.keeps: NDArray[np.bool_] = roles.state[:n]
-        """Unknowns as written that carry the state."""
+        self._keeps = Stretches(roles.state[:n]) if n > LARGE else roles.state[:n]
         self._common = roles.common[:n]
         t, y, yd = point
         self._point = (t, y[:n], yd[:n]) if system.unknowns <= RATED else None
-        self.settler = self.of("settled" if forms is not None else self.whole_form, self.keeps)
+        self.settler = self.of("settled" if forms is not None else self.whole_form)
         # where constraints come and go what is left of a zero counts
         still = 0.0 if request.switched else SLACK * request.tolerance
         sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
@@ -61,6 +61,11 @@ class Settlers:
         self.settler.by_basis(slack, determined=request.switched or flat)
         self.settler.core.contents.still = still
         self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
+
+    @property
+    def keeps(self) -> NDArray[np.bool_]:
+        """Unknowns as written that carry the state."""
+        return whole_of(self._keeps)
 
     @cached_property
     def whole_form(self) -> str:
@@ -76,14 +81,17 @@ class Settlers:
         settled = system.another("settled")
         return "rated" if flows_open(settled, *self._point, self.keeps, turning=turning) else "settled"
 
-    def of(self, name: str, state: NDArray[np.bool_], *, whole: bool = False) -> Settler:
-        """Of the rows of a form; whole: with every unknown, whatever leaves the runs."""
+    def of(self, name: str, state: NDArray[np.bool_] | None = None, *, whole: bool = False) -> Settler:
+        """Of the rows of a form; state: what should move least, if not what carries the state; whole: with every
+        unknown, whatever leaves the runs.
+        """
         form = self.system.form
         left = self._forms.settled if self._forms is not None and name == "settled" and not whole else None
         system = self.system.another(name)
         magnitude = self._sizes.magnitude[: form.written]
-        common = self._common if state is self.keeps else None
-        return Settler(system, (form.k_q, form.k_f), magnitude, self._sizes.time, state, left, common)
+        common = self._common if state is None else None
+        state = self.keeps if state is None else state
+        return Settler(system, form.k_span, magnitude, self._sizes.time, state, left, common)
 
     def projection(self) -> Settler | None:
         """Of the constraints alone, onto which accepted points are moved; None where no row lets them drift."""
@@ -96,7 +104,7 @@ class Settlers:
         """Finds consistent points behind jumps, with every unknown."""
         settler = self.settler
         if self._forms is not None:
-            settler = self.of(self.whole_form, self.keeps, whole=True)
+            settler = self.of(self.whole_form, whole=True)
             settler.by_basis(0.0, determined=True)
         return Restart(settler, self.keeps)
 
@@ -105,7 +113,7 @@ class Settlers:
         of the unknowns tells.  None where no point was found.
         """
         if self._forms is not None and self.whole_form == "settled":
-            found = still(self.settler, t, (y, yd), self.keeps, self._sizes.magnitude[: self.keeps.size])
+            found = still(self.settler, t, (y, yd), self.keeps, self._sizes.magnitude[: self.system.form.written])
             if found is not None:
                 return found
         return self.restart.across(t, y if self._forms is None else self._forms.completed(t, y), yd)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.integrate.origin import UNRESOLVED, Origin
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.integrate.weights.round_off import open_unknowns
+from sysdyn.runtime.integrate.weights.unknown_roles import Roles
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import GROUP, ROUND_OFF, UNKNOWN, group_maximum, magnitudes, noise
 from sysdyn.runtime.model.system import LARGE, System
@@ -22,6 +23,17 @@ from sysdyn.runtime.start.start import ConsistentState
 
 MET = -1.0
 """Stands for a magnitude that is the largest |y| met."""
+
+
+NO_POWER = np.iinfo(np.int16).min
+"""Of two, of zero."""
+
+
+def _powers(y: Floats) -> NDArray[np.int16]:
+    """The power of two that |y| is less than, and no less than half of; above any of what is no number."""
+    found = np.where(y == 0.0, NO_POWER, np.frexp(y)[1]).astype(np.int16)
+    found[~np.isfinite(y)] = np.iinfo(np.int16).max
+    return found
 
 
 class Sizes:
@@ -87,11 +99,26 @@ class Sizes:
         return self._met
 
     @cached_property
-    def resolved(self) -> Floats | NDArray[np.float32]:
-        """|y| of which is known what round-off leaves open [unknowns], roughly where the core does not read it too."""
+    def resolved(self) -> Floats | NDArray[np.int16]:
+        """|y| of which is known what round-off leaves open [unknowns], by powers of two where the core does not read it
+        too.
+        """
         number = self.system.unknowns
         rough = number > LARGE and not self._request.events  # (core/run/events/modes.h)
-        return np.zeros(number, dtype=np.float32) if rough else np.zeros(number)
+        return np.full(number, NO_POWER, dtype=np.int16) if rough else np.zeros(number)
+
+    def _grown(self, y: Floats) -> bool:
+        """Whether some |y| may be more than twice what it was when asked before; it is as large as now, then."""
+        known = self.resolved
+        size, most = (_powers(y), known) if known.dtype == np.int16 else (np.abs(y), 2.0 * known)
+        if (size <= most).all():
+            return False
+        np.maximum(known, size, out=known)
+        return True
+
+    def spare_resolved(self) -> None:
+        """Behind the last jump: nobody asks for it again."""
+        self.__dict__.pop("resolved", None)
 
     def let_go(self) -> None:
         """Of what the start knows: found again if asked."""
@@ -168,24 +195,25 @@ class Sizes:
         found, _ = magnitudes(self.system, t, end, y, rate, far)
         return np.where(found == UNKNOWN, 0.0, found)
 
-    def resolve(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
-        """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; carries
-        [unknowns]: the state.
+    def resolve(self, t: float, y: Floats, rate: Floats, roles: Roles) -> None:
+        """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; rate
+        [unknowns]: of what has one.
         """
-        if (np.abs(y) <= 2.0 * self.resolved).all():
+        if not self._grown(y):
             return
-        np.maximum(self.resolved, np.abs(y), out=self.resolved, casting="same_kind")
         spared = self.system.unknowns > LARGE and self._own is not None
         if spared:
             self.hand_down()
             self.put_away()
-        jy = self.system.slopes(t, y, yd, rate=False)
-        open_ = noise(self.system, y, jy, self.time)
-        del jy
+        jy = self.system.slopes(t, y, np.where(roles.differential, rate, 0.0), rate=False)
+        pattern = self.system.pattern
         if spared:
             self.system.put_away(whole=True)
+        open_ = noise(self.system, pattern, y, jy, self.time)
+        del jy
+        if spared:
             self.system.spare()
-        open_[carries] = 0.0
+        open_[roles.state] = 0.0
         self._at_least(open_)
 
     def resolve_by_rows(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:

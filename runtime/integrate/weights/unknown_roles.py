@@ -20,6 +20,7 @@ from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.components import components
 from sysdyn.runtime.numerics.points import uniform
+from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.structure.rates import unique
 from sysdyn.values import dataclass
 
@@ -27,6 +28,7 @@ BALANCED = 1e-12
 """Sum of a row of dF/dyd over that of its magnitudes that is round-off."""
 
 Few = NDArray[np.int8]
+Mask = NDArray[np.bool_]
 BESIDE = 1e-3
 """Relative move of displacements: an inertia that vanishes at the start by chance does not vanish beside it."""
 
@@ -38,15 +40,32 @@ class Roles:
     state [unknowns]: carry the state across a jump; differential [unknowns]: their derivative occurs;
     smooth [unknowns]: it is determined; common [unknowns]: number of the group of flows of which differences alone are
     states (-1: of none); idle [unknowns]: steep laws may leave them open where their slopes underflow.
+    Of a large run under way states are held by their stretches, and the method has the rest.
     """
 
     test: Few
     power: Few
-    state: NDArray[np.bool_]
-    differential: NDArray[np.bool_]
+    held_state: Mask | Stretches[np.bool_]
+    held_differential: Mask | Stretches[np.bool_]
     smooth: NDArray[np.bool_]
     idle: NDArray[np.bool_]
     common: Ints
+
+    @property
+    def state(self) -> Mask:
+        """Made where it is held by its stretches."""
+        return whole_of(self.held_state)
+
+    @property
+    def differential(self) -> Mask:
+        """As state."""
+        return whole_of(self.held_differential)
+
+    def put_away(self) -> Roles:
+        """Of a large run under way."""
+        few, none = np.zeros(0, dtype=np.int8), np.zeros(0, dtype=np.bool_)
+        common = self.common[:0].copy()
+        return Roles(few, few, Stretches(self.state), Stretches(self.differential), none, none, common)
 
     def groups(self) -> tuple[Ints, Ints]:
         """Where each group begins among the unknowns of all groups, and these [in groups], as the core has them."""
@@ -59,7 +78,7 @@ class Roles:
         common = self.common
         if (common >= 0).any():
             common = np.where(np.isin(common, np.delete(common, places)), -1, common)
-        arrays = (common if f.name == "common" else getattr(self, f.name) for f in fields(Roles))
+        arrays = (common if f.name == "common" else whole_of(getattr(self, f.name)) for f in fields(Roles))
         return Roles(*(np.ascontiguousarray(array[places]) for array in arrays))
 
 
@@ -145,8 +164,8 @@ def without_rate(found: Roles, flows: NDArray[np.bool_]) -> Roles:
     return replace(
         found,
         test=np.where(flows, -1, found.test).astype(np.int8),
-        state=found.state & ~flows,
-        differential=found.differential & ~flows,
+        held_state=found.state & ~flows,
+        held_differential=found.differential & ~flows,
         smooth=found.smooth & ~flows,
         idle=found.idle | flows,
         common=np.broadcast_to(np.int32(-1), found.common.size),

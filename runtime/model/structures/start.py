@@ -46,11 +46,10 @@ class RowsOfStart(c.Structure):
         ("rates", I),
         ("plain", I),
         ("rated", I),
-        ("kinematics", I),
+        ("k_spans", I),
         ("rate", P),
         ("entry", P),
-        ("k_q", P),
-        ("k_f", P),
+        ("k_span", P),
         ("extended", I),
         ("both", P),
     ]

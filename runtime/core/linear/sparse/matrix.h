@@ -13,16 +13,17 @@ typedef struct sd_matrix sd_matrix;
 struct sd_matrix {
     const int32_t *column, *row;
     const sd_number *value;         /* [entries]; NULL: the sum */
-    const double *a, *b;            /* [entries] A, B */
+    const double *a, *b;            /* A, B, whose entries of a column begin at `at`: columns that are alike may stand once */
+    const int32_t *at;              /* [columns] */
     const double *row_scale, *column_scale; /* of R, C */
     sd_number c;
     sd_number *room;                /* [entries of the longest column] */
 };
 
-/* an entry of (A + c B) C, s: of C */
-static inline sd_number sd_entry_of_sum(const sd_matrix *matrix, int32_t e, double s)
+/* an entry of (A + c B) C, s: of C; place: where it stands in A and B */
+static inline sd_number sd_entry_of_sum(const sd_matrix *matrix, int32_t place, double s)
 {
-    return (matrix->a[e] + matrix->c * matrix->b[e]) * s;
+    return (matrix->a[place] + matrix->c * matrix->b[place]) * s;
 }
 
 /* entry e, which stands in column c */
@@ -30,7 +31,8 @@ static inline sd_number sd_entry_of(const sd_matrix *matrix, int32_t e, int32_t 
 {
     if (matrix->value)
         return matrix->value[e];
-    return sd_entry_of_sum(matrix, e, matrix->column_scale[c]) * matrix->row_scale[matrix->row[e]];
+    const int32_t place = matrix->at[c] + e - matrix->column[c];
+    return sd_entry_of_sum(matrix, place, matrix->column_scale[c]) * matrix->row_scale[matrix->row[e]];
 }
 
 /* the entries of column c from its first one on, until the next column is asked for */
@@ -40,8 +42,9 @@ static inline const sd_number *sd_column_of(const sd_matrix *matrix, int32_t c)
     if (matrix->value)
         return matrix->value + first;
     const double s = matrix->column_scale[c];
+    const int32_t at = matrix->at[c];
     for (int32_t i = 0; i < number; i++)
-        matrix->room[i] = sd_entry_of_sum(matrix, first + i, s) * matrix->row_scale[matrix->row[first + i]];
+        matrix->room[i] = sd_entry_of_sum(matrix, at + i, s) * matrix->row_scale[matrix->row[first + i]];
     return matrix->room;
 }
 

@@ -81,8 +81,7 @@ static void clean(const sd_many *many, const double *anchor, double *y, double *
     for (int32_t k = 0; k < settle->rates; k++)
         if (fabs(yd[settle->rate[k]]) <= SD_MANY_NOTHING * settle->scale[settle->unknowns + k])
             yd[settle->rate[k]] = 0.0;
-    for (int32_t i = 0; i < settle->kinematics; i++)
-        yd[settle->k_q[i]] = y[settle->k_f[i]];
+    sd_follow_flows(settle->k_span, settle->k_spans, y, yd);
 }
 
 /* 1: y, yd settled, the anchored as they were, everything finite, on the root of the nominal start; magnitude: by which,

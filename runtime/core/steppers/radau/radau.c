@@ -121,7 +121,7 @@ void sd_radau_start(void *self, double t, const double *y, const double *yd, dou
     radau->longest = radau->follows = 0.0;
     radau->behind = radau->ivp.steps > 0;
     radau->pressed = radau->balances;
-    radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = radau->strained = radau->turned = 0;
+    radau->lasting = radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = radau->strained = radau->turned = 0;
     sd_radau_leave_below(radau, radau->linear->idle ? SD_LEAST_PIVOT : 0.0);
     radau->theta = 1.0;
 }
@@ -161,7 +161,9 @@ static void note_led(sd_radau *radau)
     const sd_system *system = radau->ivp.system;
     for (int32_t j = 0; j < radau->ivp.n; j++) {
         double pull = 0.0;
-        for (int32_t e = system->column[j]; e < system->column[j + 1] && radau->smooth[j] != SD_UNPULLED; e++)
+        const int32_t first = radau->at ? radau->at[j] : system->column[j];
+        const int32_t end = first + system->column[j + 1] - system->column[j];
+        for (int32_t e = first; e < end && radau->smooth[j] != SD_UNPULLED; e++)
             if (radau->jyd[e] != 0.0)
                 pull = fmax(pull, radau->ivp.h * fabs(radau->jy[e] / radau->jyd[e]));
         radau->led[j] = radau->smooth[j] && pull < PULLED;

@@ -74,6 +74,7 @@ typedef struct sd_radau {
     int32_t balances;         /* balances are steep: in rates, whose round-off grows as steps shrink */
     int32_t pressed;          /* a steep law lets no length of step do: corrections are shortened at once */
     int32_t ready, old_jacobian, rejected;
+    int32_t lasting;          /* 1: of a large system: slopes are what they were, wherever they are taken */
     const sd_radau_method *method, *used;           /* of the step at hand, of the last accepted one */
     int32_t since;                                  /* steps accepted since the method changed */
     int32_t hold;                                   /* steps that still take three stages */
@@ -100,8 +101,10 @@ typedef struct sd_radau {
                                                * their sum */
     double *at_zero;          /* [entries] dF/dy where all unknowns are zero, of steep laws; made when first needed */
     char *open;               /* [n] columns that factors left */
-    double *y, *rate, *terms, *jy, *jyd, *g, *work; /* work: the memory of all vectors but phi and yd; a weight that is
+    double *y, *rate, *terms, *jy, *jyd, *g, *work; /* work: the memory of all vectors but phi, yd and slopes; a weight that is
                                * NULL is made where it is read */
+    int32_t *at;              /* [n] of a large system whose columns are alike: where those of each begin in jy, jyd; else NULL,
+                               * and they stand as in the pattern */
     double *newton_weight, *scale, *powered; /* of Newton's norm (NULL: as weight), of columns; their memory where powers of
                                               * h count */
     double complex *w[SD_PAIRS]; /* right sides and solutions */
@@ -171,6 +174,10 @@ void sd_radau_stage(sd_radau *radau, int s, double *y, double *rate);
 int sd_radau_factorise(sd_radau *radau, int at_end);
 /* 1: so large that the room of matrices counts, which are then made where they are factorised */
 int sd_radau_sparing(const sd_radau *radau);
+/* radau_rooms.c: jy, jyd [entries] may be written, 0; -1: no memory.  Then, of a large system, columns that are alike from one to
+ * the next, as those of a line, stand there once (`at`). */
+int sd_radau_room_for_slopes(sd_radau *radau);
+void sd_radau_share_slopes(sd_radau *radau);
 int sd_radau_lean(sd_radau *radau, int where);
 int sd_radau_residuals(sd_radau *radau);
 double sd_radau_correct(sd_radau *radau);

@@ -115,6 +115,8 @@ static int fill(sd_radau *radau, sd_coupled *coupled, int i)
 {
     sd_system *system = radau->ivp.system;
     double t = radau->ivp.t + radau->method->c[i] * radau->ivp.h;
+    if (sd_radau_room_for_slopes(radau))
+        return SD_MEMORY;
     sd_radau_stage(radau, i, radau->y, radau->rate);
     int32_t bad = sd_jacobian(system, t, radau->y, radau->rate, radau->ivp.magnitude, radau->jy, radau->jyd);
     radau->old_jacobian = 0;

@@ -4,6 +4,7 @@
 #include "system/condensed.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #define OWN 4              /* vectors that every step hands on to the next one */
 #define SPARE 64           /* numbers behind each set of vectors: two sets are room for what has a few more than they */
@@ -39,13 +40,70 @@ static int borrow(sd_radau *radau)
 /* lets go of the room */
 static void leave_room(sd_radau *radau)
 {
+    free(radau->jy);
+    free(radau->at);
     free(radau->work);
     free(radau->beside);
     free(radau->point_y);
     free(radau->led);
     radau->work = radau->ivp.ee = radau->ivp.weight = radau->last = radau->point_y = NULL;
+    radau->jy = NULL;
+    radau->at = NULL;
     radau->led = NULL;
     radau->beside = NULL;
+}
+
+int sd_radau_room_for_slopes(sd_radau *radau)
+{
+    const size_t nnz = (size_t)radau->ivp.system->entries + 1;
+    if (radau->jy && !radau->at)
+        return 0;
+    free(radau->jy);
+    free(radau->at);
+    radau->at = NULL;
+    radau->jy = malloc(2 * nnz * sizeof *radau->jy);
+    radau->jyd = radau->jy + nnz;
+    return radau->jy ? 0 : -1;
+}
+
+/* whether columns j - 1 and j have the same slopes, number for number; before: where those of j - 1 begin in jy, jyd */
+static int same_slopes(const sd_radau *radau, int32_t j, int32_t before)
+{
+    const int32_t *column = radau->ivp.system->column, first = column[j], number = column[j + 1] - first;
+    const size_t size = (size_t)number * sizeof(double);
+    return number == first - column[j - 1] && !memcmp(radau->jy + before, radau->jy + first, size) &&
+           !memcmp(radau->jyd + before, radau->jyd + first, size);
+}
+
+/* The columns are looked at twice: where few are alike they stay where they are. */
+void sd_radau_share_slopes(sd_radau *radau)
+{
+    const sd_system *system = radau->ivp.system;
+    const int32_t n = radau->ivp.n, *column = system->column;
+    if (!sd_radau_sparing(radau))
+        return;
+    int32_t left = column[1];
+    for (int32_t j = 1; j < n && left <= system->entries / 2; j++)
+        left += same_slopes(radau, j, column[j - 1]) ? 0 : column[j + 1] - column[j];
+    int32_t *at = left <= system->entries / 2 ? malloc((size_t)n * sizeof *at) : NULL;
+    if (!at)
+        return;
+    at[0] = 0;
+    left = column[1];
+    for (int32_t j = 1; j < n; j++) {
+        at[j] = same_slopes(radau, j, at[j - 1]) ? at[j - 1] : left;
+        if (at[j] < left)
+            continue;
+        for (int32_t e = column[j]; e < column[j + 1]; e++, left++) {
+            radau->jy[left] = radau->jy[e];
+            radau->jyd[left] = radau->jyd[e];
+        }
+    }
+    memmove(radau->jy + left, radau->jyd, (size_t)left * sizeof(double));
+    double *few = realloc(radau->jy, 2 * (size_t)left * sizeof *few);
+    radau->jy = few ? few : radau->jy;
+    radau->jyd = radau->jy + left;
+    radau->at = at;
 }
 
 int sd_radau_provide(sd_radau *radau)
@@ -65,7 +123,7 @@ int sd_radau_provide(sd_radau *radau)
         return 0;
     radau->in_place = kept && sd_condensed_in_place(left) && 2 * m <= (size_t)left->full->unknowns + 8;
     all -= radau->in_place ? 2 : 0;
-    radau->work = calloc(all * m + sets * SPARE + (steep ? 3 : 2) * nnz, sizeof(double));
+    radau->work = calloc(all * m + sets * SPARE + (steep ? nnz : 0), sizeof(double));
     radau->led = calloc((size_t)radau->ivp.n + 1, sizeof *radau->led);
     if (!radau->work || !radau->led) {
         leave_room(radau);
@@ -88,15 +146,13 @@ int sd_radau_provide(sd_radau *radau)
         radau->y = radau->in_place ? radau->d[1] : (double *)radau->w[0];
         radau->rate = radau->y + m;
     }
-    radau->jy = next;
-    radau->jyd = radau->jy + nnz;
     if (sparing)
         radau->ivp.ee = radau->d[0];
-    if (sparing && borrow(radau)) {
+    if (sparing ? borrow(radau) : sd_radau_room_for_slopes(radau)) {
         leave_room(radau);
         return -1;
     }
-    radau->g = steep ? radau->jyd + nnz : radau->linear->scaled; /* rows of steep laws are judged by the matrix as it is */
+    radau->g = steep ? next : radau->linear->scaled; /* rows of steep laws are judged by the matrix as it is */
     return 0;
 }
 

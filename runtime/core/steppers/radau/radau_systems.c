@@ -88,10 +88,10 @@ static void scale_all(sd_radau *radau)
 {
     const sd_radau_method *method = radau->method;
     const double real = method->gamma / radau->ivp.h, *scale = column_scale(radau);
-    sd_linear_scale_sum(radau->linear, radau->jy, radau->jyd, &real, scale);
+    sd_linear_scale_sum(radau->linear, radau->jy, radau->jyd, radau->at, &real, scale);
     for (int k = 0; k < method->pairs; k++) {
         const double complex both = method->lambda[k] / radau->ivp.h;
-        sd_linear_z_scale_sum(radau->complex_linear[k], radau->jy, radau->jyd, &both, scale);
+        sd_linear_z_scale_sum(radau->complex_linear[k], radau->jy, radau->jyd, radau->at, &both, scale);
     }
 }
 
@@ -159,7 +159,10 @@ static int32_t slopes(sd_radau *radau, double t, const double *y, const double *
 int sd_radau_factorise(sd_radau *radau, int at_end)
 {
     sd_system *system = radau->ivp.system;
+    radau->old_jacobian |= radau->lasting;
     if (!radau->old_jacobian) {
+        if (sd_radau_room_for_slopes(radau))
+            return SD_MEMORY;
         if (at_end)
             sd_radau_stage(radau, radau->method->stages - 1, radau->y, radau->rate);
         int32_t bad = slopes(radau, at_end ? radau->ivp.t + radau->ivp.h : radau->ivp.t, at_end ? radau->y : radau->phi,
@@ -170,7 +173,9 @@ int sd_radau_factorise(sd_radau *radau, int at_end)
             radau->ivp.bad_row = bad;
             return SD_NONFINITE;
         }
+        sd_radau_share_slopes(radau);
         radau->old_jacobian = 1;
+        radau->lasting = system->steady && sd_radau_sparing(radau);
     }
     radau->ready = 0;
     int failed = factorise_all(radau);
