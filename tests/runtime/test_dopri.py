@@ -180,6 +180,22 @@ def test_a_step_ends_where_the_text_jumps():
     assert columns["x"][-1] == pytest.approx(0.5 * (3.0 - 1.2345) ** 2, rel=1e-12)
 
 
+def test_a_rail_that_jumps_between_stages_is_passed_in_small_steps():
+    """No stage sees it: the projection would carry the mass across, 2 m in no time, and no error test would know."""
+    made = models.small(
+        "x y",
+        "(f_x**2 + f_y**2)/2",
+        "q_x**2/2",
+        phi={"rail": "q_y - tanh(1e6*(t - 1.003))"},
+        initial={"q_x": (1, True), "f_x": (0, True), "q_y": (-1, False)},
+        observe={"x": "q_x", "v": "f_y"},
+    )
+    t = 1.003 + 1e-7 * np.linspace(-9, 9, 37)
+    columns = dopri(made, 3.0, t, rtol=1e-6)[1]
+    assert columns["v"][:-1] == pytest.approx(1e6 / np.cosh(1e6 * (t - 1.003)) ** 2, abs=10.0)
+    assert columns["x"][-1] == pytest.approx(np.cos(3.0), abs=1e-5)
+
+
 def test_sparse_and_dense_factors_give_the_same(monkeypatch):
     system = System({"structure": chain.structure()}, chain.binding(6), load(chain.Chain), "0")
     state = consistent_start(system, 0.0)
