@@ -152,12 +152,16 @@ COUNTS = {
 }  # fmt: skip
 
 
-def test_work_is_what_is_touched():
-    """3 unknowns, 7 entries: 12 x 3 x 12 passes and 7 x (34 + 5) entries; five times the factors for radau."""
-    assert work.counted(COUNTS, (3, 7), "bdf", projected=False) == 432.0 + 273.0
-    assert work.counted(COUNTS, (3, 7), "bdf", projected=True) == 864.0 + 273.0
-    assert work.counted(COUNTS, (3, 7), "radau", projected=False) == 432.0 + 7.0 * 59.0
-    assert work.of_rows(100, (3, 7), "dopri") == 6300.0
+def test_work_counts_steps_entries_and_rows():
+    """3 unknowns, 7 entries; steps that were refused count, rows cost more where constraints bend."""
+    size, bent = work.Size(3, 7, bent=False), work.Size(3, 7, bent=True)
+    assert work.counted(COUNTS, size, "bdf") == 12 * (369.0 + 3 * 3.2) + 7 * 2.58 * COUNTS["residual_evaluations"]
+    matrices = COUNTS["jacobian_evaluations"] + COUNTS["factorisations"]
+    evaluated = 3.85 * COUNTS["residual_evaluations"] + 31.9 * matrices
+    assert work.counted(COUNTS, size, "radau") == pytest.approx(12 * 3 * 8.8 + 7 * evaluated)
+    assert work.fixed(100, size, "radau") == pytest.approx(105000.0 + 100 * (293.0 + 12.6 * 7))
+    assert work.fixed(100, bent, "radau") == pytest.approx(105000.0 + 100 * (293.0 + 71.0 * 7))
+    assert work.step(size, "radau") == pytest.approx(3 * 8.8 + 7 * 3.85)
 
 
 def trace(time, values, events=()):

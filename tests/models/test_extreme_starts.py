@@ -1,5 +1,6 @@
 """Starts of models whose contents, stiffnesses and time constants lie far apart, against closed forms."""
 
+import re
 import time
 
 import numpy as np
@@ -36,10 +37,10 @@ LAWS = {"e": "law e = 1 V*(exp(q/(1 C)) - 1)", "q": "law q = 1 C*ln(1 + e/(1 V))
 
 
 def named(state, system, *names):
-    """Places of the unknowns of the first of these names."""
-    found = {system.name(k).partition("[")[0]: [] for k in range(state.y.size)}
+    """Places of the unknowns of the first of these names, whose indices stand before a prime."""
+    found = {}
     for k in range(state.y.size):
-        found[system.name(k).partition("[")[0]].append(k)
+        found.setdefault(re.sub(r"\[.*\]", "", system.name(k)), []).append(k)
     return next(np.array(found[name]) for name in names if name in found)
 
 

@@ -138,7 +138,7 @@ def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None
 
 def moved(prepared: Prepared, state: ConsistentState) -> list[Moved]:
     """What the start moved, by the author's names."""
-    return [(name_of(prepared.network, name), *rest) for name, *rest in state.moved]
+    return [(name_of(prepared.network, name), before, after, why) for name, before, after, why in state.moved]
 
 
 def described(prepared: Prepared, state: ConsistentState) -> list[str]:
