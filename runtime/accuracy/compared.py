@@ -88,7 +88,7 @@ class Compared:
         jump = np.append(self._jump[quantities.places], np.full(len(quantities.meters), np.inf))
         passed = np.where(rows[:, 1:2].astype(np.int32) & RELAXING, rows[:, 2:4], 0.0)
         found = Sampled(
-            tolerance, values, sizes, steps, noise, open_, between, late, there, jump, bool(finished.events), passed
+            tolerance, values, sizes, steps, noise, open_, between, late, there, jump, len(finished.events), passed
         )
         self.samplings = (*self.samplings[-1:], found)
         return found

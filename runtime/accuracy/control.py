@@ -3,11 +3,8 @@
 A draft with longer steps is followed by a run at the tolerance that should do, a fifth to a thirtieth of it or, where
 the draft took many steps, less, and both are compared at instants of the draft's own rows; a run behind them at
 instants of the last one's.  Where little happens in a draft of radau, the run behind it is one of the bdf.
-With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as
-measured over three runs, at most what the method's law credits; where it is more than errors ever fall with, one of the
-runs is good by chance, and the last is as much better than the first as is credited.  Where the estimate misses what
-was asked, a finer run follows and is compared with the last one.
-The finest run is handed back with its estimate; laws.py says what tolerances promise.
+Where the estimate (estimate.py) misses what was asked, a finer run follows and is compared with the last one.  The
+finest run is handed back with its estimate; laws.py says what tolerances promise.
 Each run finds the magnitudes of its unknowns for itself: those that an earlier run met late would hide what is small
 early and grows.  Two runs that took the same steps say nothing: a third takes steps of half the length elsewhere.
 """
@@ -17,8 +14,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from sysdyn.runtime.accuracy.estimate import DEAR, LENGTHY, STRETCH, Estimate, is_held
 from sysdyn.runtime.accuracy.laws import Law
-from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, left_at_rest, parted, passed_over
+from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, parted
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -33,61 +31,13 @@ WORTH = 0.3
 """Of the last tolerance: a run with more than that says little beside it."""
 CHANCES = ("newton", "error_test", "singular")
 """Of a step at an event: another tolerance may pass there."""
-ROOT = 0.5
-"""Part of what is credited where a quantity ends as a root of the state, from the pair on that shows it."""
-SHORT = 60
-"""Steps of a run below which its error does not follow its tolerance as theory says."""
-FIRST_DROP = 1e-2
-AIM, LEFT = 2.0, 0.3
-"""How far below what was asked the next run aims, and the most that is left of its tolerance."""
-DIFFER, FAR_OFF, DEEP, MORE, DEEPEST = 0.3, 10.0, 3.0, 1.7, 1e-6
-"""Difference of two runs, and times what was asked, that says only that they have nothing in common (the phase of a
-relaxation oscillation is lost), their tolerances less than these decades apart: the next one is then as small as
-takes MORE times the steps, by what the last drop cost, at least this part.  Where that has nothing in common with the
-run before either, a hundredth of it follows (with 2 times and without that van der Pol costs 1.03 of it)."""
-SLOWEST = 0.6
-"""The least power with which errors are taken to fall when the next tolerance is chosen."""
-STRETCH = 1.5
-"""Of the longest step of a run over that of a finer one: where it, and not the tolerance, holds both, their steps still
-differ, and the error of a method of order 5 or more by as much as ten times the tolerance makes it."""
 DRAFT = 3.0
 """Longest step of a draft over that of the run behind it: its tolerance holds its error, and where the longest step
 holds both runs, what no step can see differs by more than the safety.  CPU of a price's two runs over that with 1.5:
 0.97 (46 seed models), with 5 the same."""
-HOLDS, SHORTEN = 1.2, 1.0 / 32.0
-"""Steps of a run over those of the longest length, up to which that length holds them and the tolerance does not (what
-algebra alone determines has no error that a step could test), in both runs of a pair; the least that the next run's is
-of it."""
-BY_STEPS, TOWARDS, ENOUGH = 2.0, 2.5, 20_000
-"""The power of the steps with which such errors fall at least, and mostly (rates of what is interpolated: 2.3 to 3);
-steps of a run behind which none is shortened."""
 TAME = 1e-6
 """Tolerance of the next run at most where the first two ran away alike (Robertson's falls through zero), and of a
 draft where Newton's failures say so before."""
-LENGTHY, DEAR = 1000, 1e-8
-"""Steps of a run in which so much happens that every method's loose runs have nothing in common, and a finer one costs
-less than another method's draft (the ring modulator at 1e-2, 1e-3, 1e-6: 0.10, 0.16, 0.6 s for 0.27, 0.63, 1.1);
-tolerance below which methods of more stages or steps cost less."""
-UNSEEN = 0.5
-"""Of an error, what is credited at most to a finer run whose steps are hardly shorter."""
-ALIKE = 1.1
-"""Times the steps of the coarser run: with no more than that events hold most, where both are as far off."""
-AT_EVENTS, SLOW, STALLS = 0.2, 0.5, 0.5
-"""Where events happen: the power by which is told (of 475 such pairs 14 were over 1.5 times what the credit told, one
-what this does); a power measured, below which no smaller tolerance is credited, for knocks make of errors what they
-make of phases; part of the difference before, from which on a pair does not show that errors fall, and the next is not
-believed on its own (play: 0.17, 0.18, 0.0055 of runs that were 0.016 off), unless it agrees BY_FAR better."""
-BY_FAR = 1e-3
-MET = 1.0 - 1e-15
-"""Of what was asked: what is told of a run that meets it, at most."""
-SURE = 2.0
-"""Of what is told, the safety at least."""
-LAST, BY_CHANCE = 10.0, 1.5
-"""Times the finest tolerance: behind such a run there is none that tells; the power of its errors that is believed."""
-STEPPED = 5.0
-"""Power of the steps with which what is told falls at most."""
-TINY = 1e-30
-"""An estimate beside what was asked below which it counts as none."""
 QUIET, AGREE = 5, 2.0
 """Steps of a draft beyond those of its longest step, up to which little happens in it: a lighter method follows, and
 a run of its own differs from the draft by its own error, AGREE times of which is the estimate (on 175 runs of eleven
@@ -131,21 +81,6 @@ Run = Callable[[float, float], Sampled]
 """Integrates with a tolerance and a longest step as part of the span."""
 
 
-def _shrink(law: Law, power: float, step: float, coarse: Sampled, fine: Sampled) -> float:
-    """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step times larger; beyond
-    law.far nothing more is credited.  Of longer steps the tolerance says nothing, of hardly shorter ones where events
-    happen, which may hold them.
-    """
-    longer, jumps = fine.steps / max(coarse.steps, 1), fine.jumps
-    ratio = max(10.0 ** (-power * step), law.far**law.credit)
-    if longer <= ALIKE if jumps else longer < 1.0 and not law.order:
-        ratio = max(ratio, UNSEEN)
-    if law.order:
-        order = law.order if fine.steps >= LENGTHY else min(law.order, law.fronts)
-        ratio = max(ratio, min(max(longer, 1.0) ** -order, UNSEEN))
-    return float(law.safety * ratio / (1.0 - ratio))
-
-
 def _achieved(estimate: float, met: bool, runs: int, tolerance: float, *, lost: bool = False) -> Achieved:
     """A finite estimate, or none at all."""
     if not np.isfinite(estimate):
@@ -181,114 +116,6 @@ def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
                 raise
             if failure.cause == "strained":
                 tolerance = min(tolerance, TAME * law.ratio / RETRIED[tried])
-
-
-class _Estimate:
-    """The estimate of the last of two runs, and the power with which the errors fall.
-
-    over: beside what was asked, as it mostly is; apart: what is told, relative, hardly ever less than it is, but no
-    more than what was asked where that is met; alone: no pair before says how errors fall; stalled: the pair before
-    did not show that they do; root: a quantity ends as a root of the state: what tolerances do for it comes before
-    shorter steps.
-    """
-
-    def __init__(self, law: Law, target: Floats) -> None:
-        self.law, self.target = law, target
-        self.over = self.apart = np.inf
-        self._deep, self.lost, self._unknown, self.alone = 1.0, False, False, True
-        self.stalled = self._stalls = False
-        self._before: tuple[float, float] | None = None
-        self._power: float | None = None
-        self.root = False
-
-    def compare(self, coarse: Sampled, fine: Sampled, shorter: float | None = None) -> float:
-        """Takes the pair in; returns the plain difference.  shorter: the longest step of the finer over that of the
-        coarser run, where it holds both.
-        """
-        step = float(np.log10(coarse.tolerance / fine.tolerance))
-        apart, over = difference(coarse, fine, self.target)
-        left, left_over = left_at_rest(coarse, fine, self.target, known=self.root)
-        self.root |= left > 0.0
-        if self.root and step > 0.0:
-            shorter = None
-        self.stalled = self._stalls and self._before is not None and over > BY_FAR * self._before[0]
-        self.alone = shorter is None and (self._before is None or self.stalled)
-        lost = apart > DIFFER and over > FAR_OFF
-        self._unknown = lost and (step >= DEEP or self.lost)
-        self._deep = _affordable(coarse, fine) if lost and not self._unknown else 1.0
-        self.lost = lost
-        shrink, luck, slow, self._stalls = None, 1.0, False, False
-        credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
-        credit *= ROOT if self.root else 1.0
-        if shorter is not None:
-            part = shorter ** (ROOT * BY_STEPS if self.root else BY_STEPS)
-            shrink = self.law.safety * part / (1.0 - part)
-        elif self._before is not None:
-            over_before, step_before = self._before
-            self._stalls = fine.jumps and over > STALLS * over_before
-            slow = fine.jumps and over > 0.0 and over > over_before * 10.0 ** (-SLOW * step_before)
-            if over > over_before or slow:
-                shrink, slow = 1.0, True  # no convergence seen: no credit for the smaller tolerance
-            elif over > 0.0 and np.isfinite(over_before):
-                power = np.log10(over_before / over) / step_before
-                self._power = float(np.clip(power, 0.3, 1.0))
-                if power > self._fastest(fine):  # by chance: the pair before speaks for the last run
-                    luck = 10.0 ** ((power - credit) * step_before)
-        if shrink is None:
-            power = credit if self._power is None else min(self._power, credit)
-            shrink = _shrink(self.law, power, step, coarse, fine)
-        self._before = (over, step) if shorter is None and not lost else None  # what is lost has no power
-        least = self.law.least * fine.tolerance
-        shrink *= luck
-        told = self._told(step, coarse, fine) if shorter is None and not slow else SURE
-        told = max(shrink, min(told, MET / over)) if over > 0.0 else shrink
-        self.apart, self.over = max(apart * told, least), max(over * shrink, least / float(np.min(self.target)))
-        self.apart, self.over = max(self.apart, left), max(self.over, left_over)
-        off, off_over = passed_over(coarse, fine, self.target, self.law.safety * UNSEEN / (1.0 - UNSEEN))
-        self.apart, self.over = max(self.apart, off), max(self.over, off_over)
-        return apart
-
-    def _told(self, step: float, coarse: Sampled, fine: Sampled) -> float:
-        """Error of the finer run over its difference from the coarser one, at most; step: decades of tolerance."""
-        law = self.law
-        power = min(law.sure, AT_EVENTS) if fine.jumps else law.sure
-        ratio = max(10.0 ** (-power * step), law.far**power, (fine.steps / max(coarse.steps, 1)) ** -STEPPED)
-        ratio = min(ratio, UNSEEN)
-        return float(max(law.safety, SURE) * ratio / (1.0 - ratio))
-
-    def _fastest(self, fine: Sampled) -> float:
-        """The power beyond which differences fall by chance; with events at the finest tolerances round-off is what is
-        left, which events that follow from each other let grow.
-        """
-        last = fine.jumps and fine.tolerance <= LAST * self.law.finest
-        return min(self.law.fastest, BY_CHANCE) if last else self.law.fastest
-
-    def shorter(self) -> float:
-        """How much shorter the longest step of the next run is where that is what holds the steps."""
-        return float(np.clip((AIM * self.over) ** (-1.0 / TOWARDS), SHORTEN, 1.0 / STRETCH))
-
-    def next_tolerance(self, tolerance: float) -> float:
-        """The tolerance at which the next run should do, with the estimate's own safety.
-
-        What a draft beyond all bounds says of the run behind it is not taken for more than FIRST_DROP.
-        """
-        if self._unknown:  # the coarser run says nothing of a much finer one: another beside that will
-            return max(FIRST_DROP * tolerance, self.law.finest)
-        power = self.law.power if self._power is None else max(self._power, SLOWEST)
-        drop = max(AIM * self.over, TINY) ** (-1.0 / power)
-        least, most = (FIRST_DROP, self.law.little) if self._power is None else (1e-3, LEFT)
-        return max(min(float(np.clip(drop, least, most)), self._deep) * tolerance, self.law.finest)
-
-
-def _affordable(coarse: Sampled, fine: Sampled) -> float:
-    """Part of the tolerance at which a run takes MORE times the steps, as they grew between the two."""
-    growth = np.log(max(fine.steps, 1) / max(coarse.steps, 1)) / np.log(coarse.tolerance / fine.tolerance)
-    return float(np.clip(MORE ** (-1.0 / max(growth, 1e-2)), DEEPEST, FIRST_DROP))
-
-
-def _held(run: Sampled, longest: float) -> bool:
-    """Whether the longest step, and not the tolerance, holds the steps."""
-    return run.steps * longest < HOLDS and run.steps < ENOUGH
 
 
 def _quiet(draft: Sampled) -> bool:
@@ -337,7 +164,7 @@ def control(
     wanted = float(np.min(target, initial=1.0))
     tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
     last = _draft(run, min(tolerance, TAME * law.ratio) if tame else tolerance, law)
-    estimate, longest = _Estimate(law, target), LONGEST
+    estimate, longest = Estimate(law, target), LONGEST
     still = _quiet(last)
     shorter: float | None = None
     number, away = 1, False
@@ -363,7 +190,7 @@ def control(
         dear = estimate.lost or estimate.next_tolerance(now.tolerance) <= DEAR
         if law.brief and dear and now.steps < LENGTHY:
             return _achieved(estimate.apart, False, number, now.tolerance, lost=estimate.lost)
-        before, still = still, _held(now, longest)
+        before, still = still, is_held(now, longest)
         held, finest = before and still, now.tolerance <= 1.01 * law.finest
         if finest and not held:
             last = now

@@ -50,7 +50,7 @@ class Sampled:
     event, between an event of this run and the same one of the run before it (None: no instant is); late [instants,
     quantities]: what the dense output of each value moves by within the time tolerance (TIMING): on a steep front no
     more is asked; there: values and late at instants of its own, for the run behind it (None: those are the same);
-    jumps: events happened; passed [instants, 2]: where a first step behind a restart passes over
+    jumps: how many events happened; passed [instants, 2]: where a first step behind a restart passes over
     what relaxes at once, how many times as long it is, and the most that this may be, of its largest; zeros elsewhere.
     """
 
@@ -64,7 +64,7 @@ class Sampled:
     late: Floats | float = 0.0
     there: tuple[Floats, Floats | float] | None = None
     jump: Floats | float = np.inf
-    jumps: bool = False
+    jumps: int = 0
     passed: Floats | None = None
 
     @property

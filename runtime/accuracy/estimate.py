@@ -1,0 +1,201 @@
+"""What two runs at different tolerances say of the finer one's error.
+
+With error ~ tolerance^p the error of the finer run is difference x / (1 - x), x = (ratio of the tolerances)^p; p as
+measured over three runs, at most what the method's law credits (laws.py); where it is more than errors ever fall with,
+one of the runs is good by chance, and the last is as much better than the first as is credited.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from sysdyn.runtime.accuracy.laws import Law
+from sysdyn.runtime.accuracy.pairs import Sampled, difference, left_at_rest, passed_over
+from sysdyn.runtime.model.description import Floats
+
+ROOT = 0.5
+"""Part of what is credited where a quantity ends as a root of the state, from the pair on that shows it."""
+SHORT = 60
+"""Steps of a run below which its error does not follow its tolerance as theory says."""
+FIRST_DROP = 1e-2
+AIM, LEFT = 2.0, 0.3
+"""How far below what was asked the next run aims, and the most that is left of its tolerance."""
+DIFFER, FAR_OFF, DEEP, MORE, DEEPEST = 0.3, 10.0, 3.0, 1.7, 1e-6
+"""Difference of two runs, and times what was asked, that says only that they have nothing in common (the phase of a
+relaxation oscillation is lost), their tolerances less than these decades apart: the next one is then as small as
+takes MORE times the steps, by what the last drop cost, at least this part.  Where that has nothing in common with the
+run before either, a hundredth of it follows (with 2 times and without that van der Pol costs 1.03 of it)."""
+SLOWEST = 0.6
+"""The least power with which errors are taken to fall when the next tolerance is chosen."""
+STRETCH = 1.5
+"""Of the longest step of a run over that of a finer one: where it, and not the tolerance, holds both, their steps still
+differ, and the error of a method of order 5 or more by as much as ten times the tolerance makes it."""
+HOLDS, SHORTEN = 1.2, 1.0 / 32.0
+"""Steps of a run over those of the longest length, up to which that length holds them and the tolerance does not (what
+algebra alone determines has no error that a step could test), in both runs of a pair; the least that the next run's is
+of it."""
+BY_STEPS, TOWARDS, ENOUGH = 2.0, 2.5, 20_000
+"""The power of the steps with which such errors fall at least, and mostly (rates of what is interpolated: 2.3 to 3);
+steps of a run behind which none is shortened."""
+LENGTHY, DEAR = 1000, 1e-8
+"""Steps of a run in which so much happens that every method's loose runs have nothing in common, and a finer one costs
+less than another method's draft (the ring modulator at 1e-2, 1e-3, 1e-6: 0.10, 0.16, 0.6 s for 0.27, 0.63, 1.1);
+tolerance below which methods of more stages or steps cost less."""
+UNSEEN = 0.5
+"""Of an error, what is credited at most to a finer run whose steps are hardly shorter."""
+ALIKE = 1.1
+"""Times the steps of the coarser run: with no more than that events hold most, where both are as far off."""
+AT_EVENTS, SLOW, STALLS = 0.2, 0.5, 0.5
+"""Where events happen: the power by which is told (of 475 such pairs 14 were over 1.5 times what the credit told, one
+what this does); a power measured, below which no smaller tolerance is credited, for knocks make of errors what they
+make of phases; part of the difference before, from which on a pair does not show that errors fall, and the next is not
+believed on its own (play: 0.17, 0.18, 0.0055 of runs that were 0.016 off), unless it agrees BY_FAR better."""
+BY_FAR = 1e-3
+OTHERS, GROWN = 0.1, 1.3
+"""Part of the events by which two runs differ, and times the steps that the smaller tolerance asks of the order, from
+which on the finer run has met what the other has not seen: nothing is credited then.  Of 1329 runs of knocks, clutches
+and belts 21 take a third run by it, 10 of which were met and up to 6 times further off than was asked."""
+MET = 1.0 - 1e-15
+"""Of what was asked: what is told of a run that meets it, at most."""
+SURE = 2.0
+"""Of what is told, the safety at least."""
+LAST, BY_CHANCE = 10.0, 1.5
+"""Times the finest tolerance: behind such a run there is none that tells; the power of its errors that is believed."""
+STEPPED = 5.0
+"""Power of the steps with which what is told falls at most."""
+TINY = 1e-30
+"""An estimate beside what was asked below which it counts as none."""
+
+
+def is_held(run: Sampled, longest: float) -> bool:
+    """Whether the longest step, and not the tolerance, holds the steps."""
+    return run.steps * longest < HOLDS and run.steps < ENOUGH
+
+
+def _shrink(law: Law, power: float, step: float, coarse: Sampled, fine: Sampled) -> float:
+    """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step times larger; beyond
+    law.far nothing more is credited.  Of longer steps the tolerance says nothing, of hardly shorter ones where events
+    happen, which may hold them.
+    """
+    longer, jumps = fine.steps / max(coarse.steps, 1), fine.jumps
+    ratio = max(10.0 ** (-power * step), law.far**law.credit)
+    if longer <= ALIKE if jumps else longer < 1.0 and not law.order:
+        ratio = max(ratio, UNSEEN)
+    if law.order:
+        order = law.order if fine.steps >= LENGTHY else min(law.order, law.fronts)
+        ratio = max(ratio, min(max(longer, 1.0) ** -order, UNSEEN))
+    return float(law.safety * ratio / (1.0 - ratio))
+
+
+def _unlike(law: Law, coarse: Sampled, fine: Sampled) -> bool:
+    """Whether the finer run has met what the other has not seen."""
+    if abs(fine.jumps - coarse.jumps) > OTHERS * max(fine.jumps, coarse.jumps):
+        return True
+    if not law.order or not SHORT <= fine.steps < LENGTHY:
+        return False
+    asked = (coarse.tolerance / fine.tolerance) ** (1.0 / law.order)
+    return fine.steps > GROWN * asked * coarse.steps
+
+
+def _affordable(coarse: Sampled, fine: Sampled) -> float:
+    """Part of the tolerance at which a run takes MORE times the steps, as they grew between the two."""
+    growth = np.log(max(fine.steps, 1) / max(coarse.steps, 1)) / np.log(coarse.tolerance / fine.tolerance)
+    return float(np.clip(MORE ** (-1.0 / max(growth, 1e-2)), DEEPEST, FIRST_DROP))
+
+
+class Estimate:
+    """The estimate of the last of two runs, and the power with which the errors fall.
+
+    over: beside what was asked, as it mostly is; apart: what is told, relative, hardly ever less than it is, but no
+    more than what was asked where that is met; alone: no pair before says how errors fall; stalled: the pair before
+    did not show that they do; root: a quantity ends as a root of the state: what tolerances do for it comes before
+    shorter steps.
+    """
+
+    def __init__(self, law: Law, target: Floats) -> None:
+        self.law, self.target = law, target
+        self.over = self.apart = np.inf
+        self._deep, self.lost, self._unknown, self.alone = 1.0, False, False, True
+        self.stalled = self._stalls = False
+        self._before: tuple[float, float] | None = None
+        self._power: float | None = None
+        self.root = False
+
+    def compare(self, coarse: Sampled, fine: Sampled, shorter: float | None = None) -> float:
+        """Takes the pair in; returns the plain difference.  shorter: the longest step of the finer over that of the
+        coarser run, where it holds both.
+        """
+        step = float(np.log10(coarse.tolerance / fine.tolerance))
+        apart, over = difference(coarse, fine, self.target)
+        left, left_over = left_at_rest(coarse, fine, self.target, known=self.root)
+        self.root |= left > 0.0
+        if self.root and step > 0.0:
+            shorter = None
+        self.stalled = self._stalls and self._before is not None and over > BY_FAR * self._before[0]
+        self.alone = shorter is None and (self._before is None or self.stalled)
+        lost = apart > DIFFER and over > FAR_OFF
+        self._unknown = lost and (step >= DEEP or self.lost)
+        self._deep = _affordable(coarse, fine) if lost and not self._unknown else 1.0
+        self.lost = lost
+        shrink, luck, slow, self._stalls = None, 1.0, False, False
+        credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
+        credit *= ROOT if self.root else 1.0
+        if shorter is not None:
+            part = shorter ** (ROOT * BY_STEPS if self.root else BY_STEPS)
+            shrink = self.law.safety * part / (1.0 - part)
+        elif self._before is not None:
+            over_before, step_before = self._before
+            self._stalls = fine.jumps and over > STALLS * over_before
+            slow = fine.jumps and over > 0.0 and over > over_before * 10.0 ** (-SLOW * step_before)
+            if over > over_before or slow:
+                shrink, slow = 1.0, True  # no convergence seen: no credit for the smaller tolerance
+            elif over > 0.0 and np.isfinite(over_before):
+                power = np.log10(over_before / over) / step_before
+                self._power = float(np.clip(power, 0.3, 1.0))
+                if power > self._fastest(fine):  # by chance: the pair before speaks for the last run
+                    luck = 10.0 ** ((power - credit) * step_before)
+        if shrink is None and _unlike(self.law, coarse, fine):
+            shrink, slow = 1.0, True
+        if shrink is None:
+            power = credit if self._power is None else min(self._power, credit)
+            shrink = _shrink(self.law, power, step, coarse, fine)
+        self._before = (over, step) if shorter is None and not lost else None  # what is lost has no power
+        least = self.law.least * fine.tolerance
+        shrink *= luck
+        told = self._told(step, coarse, fine) if shorter is None and not slow else SURE
+        told = max(shrink, min(told, MET / over)) if over > 0.0 else shrink
+        self.apart, self.over = max(apart * told, least), max(over * shrink, least / float(np.min(self.target)))
+        self.apart, self.over = max(self.apart, left), max(self.over, left_over)
+        off, off_over = passed_over(coarse, fine, self.target, self.law.safety * UNSEEN / (1.0 - UNSEEN))
+        self.apart, self.over = max(self.apart, off), max(self.over, off_over)
+        return apart
+
+    def _told(self, step: float, coarse: Sampled, fine: Sampled) -> float:
+        """Error of the finer run over its difference from the coarser one, at most; step: decades of tolerance."""
+        law = self.law
+        power = min(law.sure, AT_EVENTS) if fine.jumps else law.sure
+        ratio = max(10.0 ** (-power * step), law.far**power, (fine.steps / max(coarse.steps, 1)) ** -STEPPED)
+        ratio = min(ratio, UNSEEN)
+        return float(max(law.safety, SURE) * ratio / (1.0 - ratio))
+
+    def _fastest(self, fine: Sampled) -> float:
+        """The power beyond which differences fall by chance; with events at the finest tolerances round-off is what is
+        left, which events that follow from each other let grow.
+        """
+        last = fine.jumps and fine.tolerance <= LAST * self.law.finest
+        return min(self.law.fastest, BY_CHANCE) if last else self.law.fastest
+
+    def shorter(self) -> float:
+        """How much shorter the longest step of the next run is where that is what holds the steps."""
+        return float(np.clip((AIM * self.over) ** (-1.0 / TOWARDS), SHORTEN, 1.0 / STRETCH))
+
+    def next_tolerance(self, tolerance: float) -> float:
+        """The tolerance at which the next run should do, with the estimate's own safety.
+
+        What a draft beyond all bounds says of the run behind it is not taken for more than FIRST_DROP.
+        """
+        if self._unknown:  # the coarser run says nothing of a much finer one: another beside that will
+            return max(FIRST_DROP * tolerance, self.law.finest)
+        power = self.law.power if self._power is None else max(self._power, SLOWEST)
+        drop = max(AIM * self.over, TINY) ** (-1.0 / power)
+        least, most = (FIRST_DROP, self.law.little) if self._power is None else (1e-3, LEFT)
+        return max(min(float(np.clip(drop, least, most)), self._deep) * tolerance, self.law.finest)
