@@ -92,7 +92,7 @@ def _unlike(law: Law, coarse: Sampled, fine: Sampled) -> bool:
         return True
     if not law.order or not SHORT <= fine.steps < LENGTHY:
         return False
-    asked = (coarse.tolerance / fine.tolerance) ** (1.0 / law.order)
+    asked: float = (coarse.tolerance / fine.tolerance) ** (1.0 / law.order)
     return fine.steps > GROWN * asked * coarse.steps
 
 
@@ -144,8 +144,8 @@ class Estimate:
             shrink = self.law.safety * part / (1.0 - part)
         elif self._before is not None:
             over_before, step_before = self._before
-            self._stalls = fine.jumps and over > STALLS * over_before
-            slow = fine.jumps and over > 0.0 and over > over_before * 10.0 ** (-SLOW * step_before)
+            self._stalls = fine.jumps > 0 and over > STALLS * over_before
+            slow = fine.jumps > 0 and over > 0.0 and over > over_before * 10.0 ** (-SLOW * step_before)
             if over > over_before or slow:
                 shrink, slow = 1.0, True  # no convergence seen: no credit for the smaller tolerance
             elif over > 0.0 and np.isfinite(over_before):
@@ -181,7 +181,7 @@ class Estimate:
         """The power beyond which differences fall by chance; with events at the finest tolerances round-off is what is
         left, which events that follow from each other let grow.
         """
-        last = fine.jumps and fine.tolerance <= LAST * self.law.finest
+        last = fine.jumps > 0 and fine.tolerance <= LAST * self.law.finest
         return min(self.law.fastest, BY_CHANCE) if last else self.law.fastest
 
     def shorter(self) -> float:
