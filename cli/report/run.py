@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
-from sysdyn.cli.run.start.author import name_of
+from sysdyn.cli.run.start.author import names_of
 from sysdyn.cli.run.start.starting import moved
 from sysdyn.compiler.binding.certificate import certificate
 from sysdyn.runtime.model.description import BESIDE
@@ -72,8 +72,10 @@ def start(study: Study) -> str:
         for k in range(family.size):
             if family.kind not in BESIDE and position < state.y.size and len(rows) <= SHOWN:
                 rate = f"{state.yd[position]:.6g}" if np.isfinite(state.yd[position]) else "–"
-                rows.append([escape(name_of(study.network, family.named(k))), f"{state.y[position]:.6g}", rate])
+                rows.append([family.named(k), f"{state.y[position]:.6g}", rate])
             position += 1
+    names = names_of(study.network, (name for name, *_ in rows))
+    rows = [[escape(name), *numbers] for name, (_, *numbers) in zip(names, rows, strict=True)]
     more = '<p class="soft">…</p>' if len(rows) > SHOWN else ""
     values = table(("unknown", "value", "rate"), rows[:SHOWN], left=(0,)) + more
     parts.append(f"<details><summary>state at the start, SI units</summary>{values}</details>")

@@ -286,8 +286,8 @@ class Bench:
 
 def _bent(system: System) -> bool:
     """Whether slopes of constraints change."""
-    kernels = [k for block in CONSTRAINTS for k in system.description.blocks.get(block, ())]
-    return any(kernel.bent is None or bool(kernel.bent) for kernel in kernels)
+    blocks = system.description.blocks
+    return not all(kernel.steady for block in CONSTRAINTS for kernel in blocks.get(block, ()))
 
 
 def _levels(network: Network, given: tuple[tuple[str, str], ...], own: str) -> dict[str, tuple[tuple[str, str], ...]]:

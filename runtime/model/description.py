@@ -176,6 +176,11 @@ class Kernel:
     bent: frozenset[int] | None = None
     rows: tuple[Reference, ...] = ()
 
+    @property
+    def steady(self) -> bool:
+        """Its slopes never change."""
+        return self.bent is not None and not self.bent
+
 
 @dataclass(frozen=True, slots=True)
 class Initial:

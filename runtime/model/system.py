@@ -177,7 +177,7 @@ class System(Facts):
             scale=c.addressof(scales),
             v=lib.pointer(self.work),
             stop=lib.pointer(self.failure.flag),
-            steady=all(not kernel.bent and kernel.bent is not None for kernel in planned),
+            steady=all(kernel.steady for kernel in planned),
             together=isinstance(self.carrier, LibraryCarrier),
         )
         self._bring_back()

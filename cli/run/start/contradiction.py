@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared, place_at
-from sysdyn.cli.run.start.author import name_of
+from sysdyn.cli.run.start.author import names_of
 from sysdyn.cli.run.start.flat_laws import by_element
 from sysdyn.dsl.model.dimensions import TIME
 from sysdyn.dsl.model.expression import variables
@@ -141,11 +141,12 @@ def _without_inertia(prepared: Prepared, name: str) -> bool:
 def _listed(prepared: Prepared, error: InconsistentStart) -> str:
     """The fixed values to free, as the author writes them: `x'`, and `shaft.f` of a node or an element."""
     places = [place_of(prepared, c) for c in error.candidates]
+    names = names_of(prepared.network, (c.label for c in error.candidates))
     shown = []
-    for c, place in zip(error.candidates, places, strict=True):
+    for name, place in zip(names, places, strict=True):
         written = re.match(r"init\s+([^=~:]+?)\s*[=~]", place.source.text[place.span.start : place.span.end])
         alone = written and ".." not in written[1] and places.count(place) == 1
-        shown.append(written[1] if written and alone else name_of(prepared.network, c.label))
+        shown.append(written[1] if written and alone else name)
     return ", ".join(f"'{name}'" for name in dict.fromkeys(shown))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared, prepare
-from sysdyn.cli.run.start.author import name_of
+from sysdyn.cli.run.start.author import names_of
 from sysdyn.cli.run.start.contradiction import inconsistent, place_of
 from sysdyn.cli.run.verdict.last_state import LastState
 from sysdyn.dsl import load
@@ -138,7 +138,8 @@ def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None
 
 def moved(prepared: Prepared, state: ConsistentState) -> list[Moved]:
     """What the start moved, by the author's names."""
-    return [(name_of(prepared.network, name), before, after, why) for name, before, after, why in state.moved]
+    names = names_of(prepared.network, (name for name, *_ in state.moved))
+    return [(name, before, after, why) for name, (_, before, after, why) in zip(names, state.moved, strict=True)]
 
 
 def described(prepared: Prepared, state: ConsistentState) -> list[str]:
