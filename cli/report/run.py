@@ -74,8 +74,8 @@ def start(study: Study) -> str:
                 rate = f"{state.yd[position]:.6g}" if np.isfinite(state.yd[position]) else "–"
                 rows.append([family.named(k), f"{state.y[position]:.6g}", rate])
             position += 1
-    names = names_of(study.network, (name for name, *_ in rows))
-    rows = [[escape(name), *numbers] for name, (_, *numbers) in zip(names, rows, strict=True)]
+    called = names_of(study.network, (name for name, *_ in rows))
+    rows = [[escape(name), *numbers] for name, (_, *numbers) in zip(called, rows, strict=True)]
     more = '<p class="soft">…</p>' if len(rows) > SHOWN else ""
     values = table(("unknown", "value", "rate"), rows[:SHOWN], left=(0,)) + more
     parts.append(f"<details><summary>state at the start, SI units</summary>{values}</details>")

@@ -17,12 +17,11 @@ Moved = tuple[str, float, float, str]
 """Name, guess, value at the start, what asked for that."""
 
 
-def _asked(starter: Starter, t: float, x: Floats, place: int) -> str:
+def _asked(starter: Starter, values: Floats, place: int) -> str:
     """Labels of the rows that an unknown stands in: of the one that it alone meets, where there is one, or of the
     constraints; guesses are none.
     """
     found: list[str] = []
-    values = starter.jacobian(t, x)
     held = values != 0.0
     guesses = starter.moves("unsaid") | starter.moves("slack")
     silent = starter.rows[guesses[starter.columns]]
@@ -44,23 +43,26 @@ def moved_guesses(starter: Starter, t: float, x: Floats, scale: Floats) -> Itera
     guess, missed = starter.guess, starter.moves("slack")
     size = np.where(missed, scale, np.maximum(np.abs(guess), 1e-3 * scale))
     told = starter.written & starter.free & (np.abs(x - guess) > NOTED * size)
+    if not told.any():
+        return
+    values = starter.jacobian(t, x)
     for place in np.flatnonzero(told)[:100].tolist():
         if missed[place]:
-            yield _missed(starter, t, x, place)
+            yield _missed(starter, values, x, place)
         else:
-            yield starter.settled.name(place), float(guess[place]), float(x[place]), _asked(starter, t, x, place)
+            yield starter.settled.name(place), float(guess[place]), float(x[place]), _asked(starter, values, place)
 
 
-def _missed(starter: Starter, t: float, x: Floats, place: int) -> Moved:
+def _missed(starter: Starter, values: Floats, x: Floats, place: int) -> Moved:
     """Name of what an expression guesses, its value, the start's.
 
     Where a row guesses several unknowns at once its label stands for them, and 0 for what it would miss.
     """
-    row, values, miss = starter.rows[starter.columns == place][0], starter.jacobian(t, x), float(x[place])
+    row, miss = starter.rows[starter.columns == place][0], float(x[place])
     mine = (starter.rows == row) & (starter.columns != place) & (values != 0.0)
     own = np.flatnonzero(mine & ~starter.written[starter.columns])
     if own.size == 1:
         k = int(starter.columns[own[0]])
-        return starter.settled.name(k), float(x[k] - miss / values[own[0]]), float(x[k]), _asked(starter, t, x, k)
+        return starter.settled.name(k), float(x[k] - miss / values[own[0]]), float(x[k]), _asked(starter, values, k)
     label = starter.settled.row_label(int(row))
     return f"guess of line {label.line}", 0.0, miss, "what its two sides differ by"
