@@ -12,7 +12,7 @@ from dataclasses import replace
 from itertools import islice, product
 
 from sysdyn.compiler.model.energies import EnergyModel, Family, Quantity
-from sysdyn.compiler.model.parameters import Parameters
+from sysdyn.compiler.model.parameters import Parameters, extents
 from sysdyn.compiler.network.authors import Authors, owner, shown
 from sysdyn.dsl.model.expression import const, var
 from sysdyn.dsl.model.network import Network
@@ -30,7 +30,7 @@ def with_coordinates_observed(model: EnergyModel, network: Network) -> tuple[Ene
     kinds = [(c, model.mirror.coordinate, "q") for c in model.coordinates] + [(s, "s", "s") for s in model.states]
     for family, kind, unit in kinds:
         box = parameters.extents(family.shape)
-        number = math.prod(max(last - first + 1, 0) for first, last in box)
+        number = math.prod(extents(box))
         if number > MOST:
             whole, one = shown(f"{family.name}[0..{number - 1}]", own), shown(f"{family.name}[0]", own)
             whole, one = (whole, one) if owner(family.name, own) else (family.name, f"{family.name}[...]")
