@@ -23,6 +23,7 @@ class _Made:
     def __init__(self, pattern: Pattern, order: Order, *, complex_: bool) -> None:
         self.pattern, self.order, self.complex = pattern, order, complex_
         self.linear: Any = order.complex_linear(pattern) if complex_ else order.linear(pattern)
+        self.beside: Any = None
 
     def again(self) -> None:
         """As new, but for what was learnt."""
@@ -37,12 +38,21 @@ class _Made:
 class Factorisation:
     """The core's factorisation of matrices of one pattern, until nobody holds it.
 
-    linear: its structure, of complex ones its address.
+    linear: its structure, of complex ones its address; beside: what its last holder learnt of its own, for the next.
     """
 
     def __init__(self, made: _Made, factors: Factors) -> None:
         self._made, self._factors = made, factors
         self.linear: Any = made.linear
+
+    @property
+    def beside(self) -> Any:
+        """None where nobody left anything."""
+        return self._made.beside
+
+    @beside.setter
+    def beside(self, learnt: Any) -> None:
+        self._made.beside = learnt
 
     def __del__(self) -> None:
         # where both are garbage at once the other may have gone first

@@ -214,6 +214,26 @@ class Accelerations:
         return Names(self.system, self._unknown[places], self._rate[places])
 
 
+class _Core:
+    """The core's structure on one factorisation, kept with it from run to run: tables and machine code stay as they are
+    for the system and the rows that it holds.
+    """
+
+    def __init__(self, system: System, linear: Any) -> None:
+        self.system, self.held = system, system.held[0]
+        self.at: Any = lib.core.sd_underlying_new(c.byref(system.core), linear)
+        if not self.at:
+            raise MemoryError
+
+    def serves(self, system: System) -> bool:
+        """Whether it is of this system and of the rows that it holds now."""
+        return self.system is system and np.array_equal(self.held, system.held[0])
+
+    def __del__(self) -> None:
+        if getattr(self, "at", None):
+            lib.core.sd_underlying_free(self.at)
+
+
 class Underlying(Accelerations):
     """system: of `underlying_form`; magnitude [unknowns], kept and read by the core; factors: where the matrix has its
     factorisation from.
@@ -226,14 +246,15 @@ class Underlying(Accelerations):
         self._order = system.once("order of accelerations", lambda: Order(column_order(self.pattern)))
         self._taken = (factors or Factors()).take(self.pattern, self._order)
         self.linear = self._taken.linear
-        self.core: Any = lib.core.sd_underlying_new(c.byref(system.core), self.linear)
-        if not self.core:
-            raise MemoryError
+        if self._taken.beside is None or not self._taken.beside.serves(system):
+            self._taken.beside = _Core(system, self.linear)
+        self.core: Any = self._taken.beside.at
         self._systems(self.core.contents)
         core = self.core.contents
         core.unknown, core.rate, core.column = map(lib.pointer, (self._unknown, self._rate, self._column))
         core.source, core.from_rate = lib.pointer(self._source), lib.pointer(self._from_rate)
         core.magnitude, core.tolerance = lib.pointer(magnitude), 1e-14
+        core.ready, core.drift = 0, 0.0  # of the run before
 
     def _systems(self, core: Any) -> None:
         """The core's own systems, as rows are held now."""
@@ -286,10 +307,6 @@ class Underlying(Accelerations):
         self.system.failure.check()
         if cause:
             raise SolverFailure(lib.CAUSES[cause], t, 0.0)
-
-    def __del__(self) -> None:
-        if getattr(self, "core", None):
-            lib.core.sd_underlying_free(self.core)
 
 
 def underlying_form(system: System, state: ConsistentState) -> tuple[System, Sequence[str]]:
