@@ -90,11 +90,16 @@ static int meets(sd_run *run, double t)
     return 0;
 }
 
-/* The point of a row moved there; where only runs are compared by it, roughly, or not where states alone are seen.  rated:
- * its rates are wanted too */
+/* whether a row is for comparison alone, or of a draft, which shows states alone: it stays as the dense output has it */
+static int stays(const sd_run *run, int32_t kind)
+{
+    return run->bare && (kind == SD_COMPARED || run->unsummed > 1);
+}
+
+/* The point of a row moved there; where only runs are compared by it, roughly.  rated: its rates are wanted too */
 static void settle_row(sd_run *run, double t, int32_t kind, int rated)
 {
-    if (run->settle && (rated || (!(kind == SD_COMPARED && run->bare) && !meets(run, t)))) {
+    if (run->settle && (rated || (!stays(run, kind) && !meets(run, t)))) {
         double enough = run->settle->enough;
         if (kind == SD_COMPARED)
             run->settle->enough = fmax(enough, run->rough);
@@ -190,13 +195,13 @@ static void find_slopes(sd_run *run, double t)
 }
 
 /* What stands before the quantities of a row: label, kind, energies and their balance by the powers summed so far (left: not,
- * they are no numbers), constraints; what is observed reads the same behind y. */
-static void write_head(sd_run *run, double label, double kind, const double powers[2], int left, double *row)
+ * they are no numbers), constraints (stays: nor is this); what is observed reads the same behind y. */
+static void write_head(sd_run *run, double label, double kind, const double powers[2], int left, int stays, double *row)
 {
     const double *out = run->end;
     double dissipated = left ? NAN : powers[0], supplied = left ? NAN : powers[1];
     double energy = out[0] + out[1] - run->stored + dissipated - supplied;
-    double constraints = run->settle ? run->settle->constraints : 0.0;
+    double constraints = stays ? NAN : run->settle ? run->settle->constraints : 0.0;
     double head[SD_ROW_HEAD] = {label, kind, out[0], out[1], dissipated, supplied, energy, constraints};
     double drift = fmax(run->settle ? run->settle->drift : 0.0, run->projected && run->started ? *run->projected : 0.0);
     double behind[7] = {energy, out[0], out[1], dissipated, supplied, constraints, drift};
@@ -244,7 +249,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         run->stored = run->end[0] + run->end[1];
     const double powers[2] = {at_step ? run->dissipated : run->step_dissipated + sum[0],
                               at_step ? run->supplied : run->step_supplied + sum[1]};
-    write_head(run, label, kind, powers, unsummed, row);
+    write_head(run, label, kind, powers, unsummed, !begun && stays(run, (int32_t)kind), row);
     write_quantities(run, t, !(compared && alone && !begun), row);
     if ((int32_t)kind & SD_COMPARED)
         run->t_row = label;

@@ -95,7 +95,7 @@ typedef struct sd_run {
     double t_clear, t_seen;           /* within the last step, between which something watched has been seen to change */
     double turns;                     /* s: in which something that is read turns; 0: nothing does */
     double *looked;                   /* [SD_PARTS + 2][observed] values at the ends of parts, and within one */
-    int32_t noded;                    /* the powers at the method's nodes of the last step are known: */
+    int32_t noded;                    /* powers at so many nodes of the last step are known; -1: at none; 0: nobody asked yet */
     double node_power[SD_NODES][2];   /* dissipated, supplied */
 } sd_run;
 

@@ -8,6 +8,14 @@
  * what is left behind the last term is less by as much again: sums over a run are off by 0.001 to 0.007 tolerances (a grid, a
  * ladder).  With a tenth every second step needs two points more. */
 #define LITTLE 1.0
+/* Rows within a step from which on the powers at SD_NODES of its points tell all their sums: a row of its own takes two to four */
+#define MANY 4
+
+/* inner points of Lobatto's rule of eight, and the end; its weights behind that of the start, which is that of the end */
+static const double lobatto[SD_NODES] = {0.06412992574519594, 0.2041499092834289, 0.39535039104876046, 0.6046496089512394,
+                                         0.7958500907165711, 0.9358700742548041, 1.0};
+static const double lobatto_weight[SD_NODES] = {0.10535211357175306, 0.1705613462417522, 0.20622939732935197, 0.20622939732935197,
+                                                0.1705613462417522, 0.10535211357175306, 1.0 / 56.0};
 
 void sd_run_audit(const sd_run *run, double t, const double *y, const double *yd, double *out)
 {
@@ -49,9 +57,9 @@ static void look_at_end(sd_run *run, double to)
         run->stepper->dense(run->stepper->self, to, run->point, run->point_d);
 }
 
-/* share [nodes + 1]: int_0^to of the polynomials of degree `nodes` that are 1 at the step's start, at each node, and 0 at
- * the others, by Gauss's rule of degree 3 or 7 */
-static void shares(const sd_stepper *stepper, double to, double *share)
+/* share [nodes + 1]: int_0^to of the polynomials of degree `nodes` that are 1 at the step's start, at each node place
+ * [nodes], and 0 at the others, by Gauss's rule of degree 3 or 7 */
+static void shares(int32_t nodes, const double *place, double to, double *share)
 {
     static const double gauss[2][4] = {{-0.28867513459481288225, 0.28867513459481288225},
                                        {-0.43056815579702628761, -0.16999052179242812840, 0.16999052179242812840,
@@ -59,9 +67,9 @@ static void shares(const sd_stepper *stepper, double to, double *share)
     static const double weight[2][4] = {{0.5, 0.5},
                                         {0.17392742256872692869, 0.32607257743127307131, 0.32607257743127307131,
                                          0.17392742256872692869}};
-    int high = stepper->nodes > 3, points = stepper->nodes + 1;
+    int high = nodes > 3, points = nodes + 1;
     double node[SD_NODES + 1] = {0.0};
-    memcpy(node + 1, stepper->node, (size_t)stepper->nodes * sizeof *node);
+    memcpy(node + 1, place, (size_t)nodes * sizeof *node);
     for (int k = 0; k < points; k++)
         share[k] = 0.0;
     for (int p = 0; p < (high ? 4 : 2); p++) {
@@ -93,9 +101,9 @@ static void integrate_nodes(sd_run *run, double part)
 {
     const sd_stepper *stepper = run->stepper;
     double from = run->t_from, h = length_of(run), share[SD_NODES + 1];
-    run->noded = stepper->collocated;
+    run->noded = stepper->collocated ? stepper->nodes : 0;
     if (part < 1.0) { /* the whole step takes nothing of its start */
-        shares(stepper, part, share);
+        shares(stepper->nodes, stepper->node, part, share);
         weigh(run, run->power, h * share[0]);
     }
     for (int32_t k = 0; k < stepper->nodes; k++) {
@@ -217,21 +225,58 @@ int sd_run_integrate(sd_run *run, double to)
     return !run->sampled;
 }
 
+/* whether as many rows stand within the last step, all of which counts, of a method that has no polynomial of its own */
+static int is_crowded(const sd_run *run)
+{
+    const sd_stepper *stepper = run->stepper;
+    int32_t last = run->next + MANY - 2; /* the first of them is being written */
+    return run->audit && !stepper->collocated && !stepper->part_y && run->t_to == stepper->ivp->t && last < run->instants
+        && run->instant[last] < run->t_to;
+}
+
+/* Powers at Lobatto's points of the last step, of which the integrals over it are known.  0: they miss these by more than what
+ * they are judged by, as where a law has a corner within the step */
+static int look_within(sd_run *run)
+{
+    const double from = run->t_from, h = run->t_to - from;
+    double missed[2], size[2];
+    for (int i = 0; i < 2; i++) {
+        missed[i] = h * lobatto_weight[SD_NODES - 1] * run->power[2 + i] - run->integral[2 + i];
+        size[i] = fabs(run->integral[2 + i]);
+    }
+    for (int32_t k = 0; k < SD_NODES; k++) {
+        const double *values = run->after;
+        if (k < SD_NODES - 1) {
+            look(run, from + lobatto[k] * h);
+            powers(run, from + lobatto[k] * h, run->point, run->point_d, run->work);
+            values = run->work;
+        }
+        for (int i = 0; i < 2; i++) {
+            run->node_power[k][i] = values[2 + i];
+            missed[i] += h * lobatto_weight[k] * values[2 + i];
+        }
+    }
+    return fabs(missed[0]) + fabs(missed[1]) <= LITTLE * run->stepper->ivp->rtol * (size[0] + size[1]);
+}
+
 int sd_run_sum(sd_run *run, double to, double sum[2])
 {
     const sd_stepper *stepper = run->stepper;
-    if (!run->noded) {
+    if (!run->noded)
+        run->noded = is_crowded(run) && look_within(run) ? SD_NODES : -1;
+    if (run->noded < 0) {
         int there = sd_run_integrate(run, to);
         memcpy(sum, run->integral + 2, 2 * sizeof *sum);
         return there;
     }
     double share[SD_NODES + 1], h = length_of(run);
-    shares(stepper, (to - run->t_from) / (stepper->ivp->t - run->t_from), share);
+    const double *node = stepper->collocated ? stepper->node : lobatto, *moves = stepper->collocated ? stepper->moves : NULL;
+    shares(run->noded, node, (to - run->t_from) / (stepper->ivp->t - run->t_from), share);
     for (int i = 0; i < 2; i++) {
         sum[i] = share[0] * run->power[2 + i];
-        for (int32_t k = 0; k < stepper->nodes; k++)
+        for (int32_t k = 0; k < run->noded; k++)
             sum[i] += share[k + 1] * run->node_power[k][i];
-        sum[i] = h * sum[i] + (stepper->moves ? stepper->moves[2 + i] : 0.0);
+        sum[i] = h * sum[i] + (moves ? moves[2 + i] : 0.0);
     }
     return 0;
 }

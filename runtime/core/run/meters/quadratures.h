@@ -1,6 +1,7 @@
 /* Energies and powers at a point of a run, and the integrals of the powers over its last step: what the ledgers balance.
  *
- * By the quadrature of the method where it has one, at its own nodes; else by Lobatto's rule of four points.
+ * By the quadrature of the method where it has one, at its own nodes; else by what the steps before tell, or by Lobatto's rule
+ * of five points.  Sums up to rows within a step are those of one polynomial where many rows stand there.
  */
 #ifndef SYSDYN_QUADRATURES_H
 #define SYSDYN_QUADRATURES_H
