@@ -73,10 +73,19 @@ def _of(node: Node, args: list[Reals]) -> Reals:
 
 def _sum(parts: Iterable[Reals]) -> Reals:
     parts = list(parts)
-    low, high = math.fsum(p.low for p in parts), math.fsum(p.high for p in parts)
+    low, high = _added((p.low for p in parts), -math.inf), _added((p.high for p in parts), math.inf)
     upward = all(p.low >= 0.0 for p in parts) and any(p.sign > 0 for p in parts)
     downward = all(p.high <= 0.0 for p in parts) and any(p.sign < 0 for p in parts)
     return Reals(low, high, upward or downward or low > 0.0 or high < 0.0)
+
+
+def _added(ends: Iterable[float], open_: float) -> float:
+    """The sum of lower or of upper ends; open_: what it is where one of them is that, or it is no double."""
+    ends = list(ends)
+    try:
+        return open_ if open_ in ends else math.fsum(ends)
+    except OverflowError:
+        return open_
 
 
 def _times(a: Reals, b: Reals) -> Reals:
@@ -89,9 +98,18 @@ def _power(base: Reals, exponent: float) -> Reals:
         base = Reals(max(base.low, 0.0), max(base.high, 0.0), base.strict)
     if exponent < 0:
         return _reciprocal(_power(base, -exponent), always=exponent != int(exponent) or exponent % 2 == 0)
-    ends = [abs(x) ** exponent * (math.copysign(1.0, x) if exponent % 2 == 1 else 1.0) for x in (base.low, base.high)]
+    ends = [_raised(x, exponent) for x in (base.low, base.high)]
     low = 0.0 if exponent % 2 == 0 and base.low < 0.0 < base.high else min(ends)
     return Reals(low, max(ends), base.strict)
+
+
+def _raised(x: float, exponent: float) -> float:
+    """A power that is no less than zero."""
+    try:
+        size = abs(x) ** exponent
+    except OverflowError:
+        size = math.inf
+    return math.copysign(size, x) if exponent % 2 == 1 else size
 
 
 def _reciprocal(a: Reals, *, always: bool) -> Reals:

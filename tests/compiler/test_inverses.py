@@ -147,6 +147,9 @@ def test_intervals_hold_what_they_enclose():
     assert reals(x.power(u, x.const(-1.0)), known) == Reals(-np.inf, np.inf, True)
     assert reals(x.power(u, x.const(-1.5)), known).sign == 1  # where it is defined
     assert reals(call("exp", u), known).sign == 1
+    far = known | {u: Reals(1e200, 2e200, True)}  # powers beyond doubles
+    assert reals(x.power(u, x.const(3.0)), far).sign == 1
+    assert reals(x.sub(x.power(u, x.const(-2.0)), x.power(u, x.const(4.0))), far).sign == -1
     assert reals(call("sin", u), known) == Reals(-1.0, 1.0)
     assert reals(call("tan", u), known) == ALL
     choice = x.conditional(x.compare("<", u, x.const(0.0)), p, x.const(-2.0))
