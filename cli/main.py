@@ -11,6 +11,7 @@ import platform
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NoReturn
 
@@ -108,8 +109,11 @@ def main(arguments: Sequence[str] | None = None, *, held: Iterable[int] | None =
 
     Most of what a command makes lives as long as it: cycles are looked for seldom, and not at its end.  The matrices of
     LAPACK are small: threads of its own cost a short command 40 ms, and change last digits.  Python would start a
-    process to ask for the processor's name, as h5py does unknowingly.
+    process to ask for the processor's name, as h5py does unknowingly.  What is no double is told by findings: NumPy's
+    warnings of it are for tests.
     """
+    if arguments is None:
+        warnings.simplefilter("ignore", RuntimeWarning)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     vars(platform.uname()).setdefault("processor", "")
     keep()

@@ -24,6 +24,8 @@ ROUNDING = 1e-9
 FEW_DIGITS = float(np.finfo(float).tiny)
 """Numbers below it have few digits (the kinetic energy behind the tail of a pulse: 6.7e-322 J), and so has what they
 are multiplied with (a diode that blocks: 1e-320 S times 1e162 V/s)."""
+FARTHEST = 1e150
+"""Products of two numbers beyond it, or below its inverse, are no doubles."""
 NEARBY = (1e-2, 0.3)
 """Distances of the points from the start, of the unknowns' magnitudes."""
 
@@ -58,7 +60,7 @@ def _compare(prepared: Prepared, started: Started, until: float) -> None:
         wrong = _apart(module, sample, points)
         if wrong.any():  # perhaps terms of terms cancel: their rounding is no difference
             sample = oracle.sample(block, points, careful=True)
-            wrong = _apart(module, sample, points)
+            wrong = _apart(module, sample, points) & ~_beyond(points, prepared.binding.p)
         if wrong.any():
             k, row = np.argwhere(wrong)[0]
             place = int(sample.rows[row])
@@ -80,6 +82,18 @@ def _apart(found: Array, sample: Sample, points: Points) -> NDArray[np.bool_]:
     return wrong
 
 
+def _beyond(points: Points, p: Array) -> NDArray[np.bool_]:
+    """Points [points, 1] at which products of two numbers are no doubles, or of few digits: which ones depends on the
+    order of the factors, and that is not the same in both.
+    """
+    return np.array([[any(map(_extreme, (*point, p)))] for point in zip(points.y, points.yd, strict=True)])
+
+
+def _extreme(numbers: Array) -> bool:
+    sizes = np.abs(numbers[numbers != 0.0])
+    return bool(~np.all((sizes > FARTHEST**-1) & (sizes < FARTHEST)))
+
+
 def _points(system: System, whole: System, started: Started, oracle: SampledRows, until: float) -> Points:
     """The start, and points at which nothing vanishes by chance; whole: with all families."""
     t0 = started.state.t
@@ -98,7 +112,8 @@ def _points(system: System, whole: System, started: Started, oracle: SampledRows
     for which, (target, x) in enumerate(((points.y, y), (points.yd, yd))):
         beside = order.size - x.size
         x = np.concatenate([x, np.zeros(beside)])
-        size = np.concatenate([scale / max(time, 1e-300) if which else scale, np.ones(beside)])
+        with np.errstate(over="ignore"):  # such a point is beyond what is compared
+            size = np.concatenate([scale / max(time, 1e-300) if which else scale, np.ones(beside)])
         target[0] = x[order]
         for k, distance in enumerate(NEARBY):
             way = _way(2 * k + which, order.size)

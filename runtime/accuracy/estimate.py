@@ -186,7 +186,8 @@ class Estimate:
 
     def shorter(self) -> float:
         """How much shorter the longest step of the next run is where that is what holds the steps."""
-        return float(np.clip((AIM * self.over) ** (-1.0 / TOWARDS), SHORTEN, 1.0 / STRETCH))
+        most = 1.0 / STRETCH
+        return float(np.clip((AIM * self.over) ** (-1.0 / TOWARDS), SHORTEN, most)) if self.over else most
 
     def next_tolerance(self, tolerance: float) -> float:
         """The tolerance at which the next run should do, with the estimate's own safety.

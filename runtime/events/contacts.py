@@ -29,6 +29,8 @@ UNTOLD = 1e-9
 
 BESIDE = 1e-20
 """m/s and the like: a flow in the plane that is no flow yet, and has a direction."""
+SHORTEST = 1e-150
+"""Seconds; the square of less is no double."""
 EDGE = 2.0
 """Times what is zero of a flow: within it is what an event is located by, and what a step ends beyond."""
 BEYOND = 1e-6
@@ -69,13 +71,13 @@ class Contacts:
         """Least sizes of values, rates and multipliers: FAINT of those of the unknowns (magnitude [unknowns]) and of a
         change of them in `time` (s), so that noise is no size where nothing has happened yet.
         """
-        self.time = time
+        self.time = time = max(time, SHORTEST)
         kinds, largest = self.system.kinds, self.observer.largest
         for contact, place in zip(self.contacts, self.multiplier, strict=True):
             own = kinds == ("q" if contact.kind == "phi" else "f")
             alike = own & (self._units == self.observer.unit(contact.value))
             size = FAINT * float(magnitude[: kinds.size][alike if alike.any() else own].max(initial=0.0))
-            rows = ((contact.value, size), (contact.rate, size / time), (contact.acceleration, size / time**2))
+            rows = ((contact.value, size), (contact.rate, size / time), (contact.acceleration, size / time / time))
             loaded = FAINT * float(magnitude[place]) if place >= 0 else 0.0
             for row, least in (*rows, (contact.multiplier, loaded)):
                 if row >= 0:

@@ -93,7 +93,7 @@ class Impacts:
             c, back = contacts.contacts[k], -contacts.contacts[k].restitution * speed[k]
             self.fastest[k] = max(self.fastest[k], -speed[k])
             # what rises less than round-off of its gap cannot be told from rest
-            risen = back**2 > -2.0 * values[c.acceleration] * UNSEEN * terms[c.value]
+            risen = back * back > -2.0 * values[c.acceleration] * UNSEEN * terms[c.value]
             aim[k] = back if risen and back > max(self.rest * self.fastest[k], zero(c.rate)) else 0.0
         for k in contacts.finite(t, y, yd):
             if contacts.active[k]:

@@ -64,7 +64,7 @@ def _worst(run: Integration) -> str | None:
     method, n = run.method.contents, run.stepped.unknowns
     if not method.ee:
         return None
-    with np.errstate(over="ignore"):  # a correction that has no bounds
+    with np.errstate(over="ignore", invalid="ignore"):  # a correction that has no bounds
         change = np.abs(lib.reader(method.ee, n) * lib.reader(method.weight, n))
     change = np.where(np.isfinite(change), change, np.inf)
     test = run.told.test

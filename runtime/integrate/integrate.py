@@ -359,7 +359,7 @@ class Integration:
         self.sizes.share(y)
         self.sizes.resolve_by_rows(self.method.contents.t, y, yd, self.roles.state)
         self.sizes.hand_down()
-        if not (self.sizes.at(y)[1] > 2.0 * before).any():
+        if not (0.5 * self.sizes.at(y)[1] > before).any():
             return False
         self.method.start(self.method.contents.t, y, yd)
         return True

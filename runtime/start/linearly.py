@@ -80,6 +80,8 @@ class Rows:
         np.add.at(matrix, (self.rows[free], self.columns[free]), here[free])
         matrix[~asked] = 0.0
         residual = np.where(asked, self.residual(x), 0.0)
+        if not (np.isfinite(matrix).all() and np.isfinite(residual).all()):
+            return False
         by_row, by_column = factors(matrix)
         even, change = by_row[:, None] * matrix * by_column, np.zeros(x.size)
         for _ in range(REFINED):

@@ -242,7 +242,7 @@ class Impulses:
         size = np.maximum(magnitude, np.abs(way))
         for number in PARTS:
             y, gained = self._followed((before, behind), size, others, number)
-            if last is not None and (np.abs(gained - last) <= AGREED * np.abs(gained).max()).all():
+            if last is not None and (np.abs(gained - last) <= AGREED * np.abs(gained).max(initial=0.0)).all():
                 near = np.abs(y - before.y - way) <= AWAY * size
                 return gained if near[self._carries].all() else None
             last = gained

@@ -69,7 +69,8 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
         for place, *before in beside:
             moved = t, place + change, yd + change / step
             for least, now, was in zip(opened, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
-                np.fmin(least, MARGIN * np.abs(now - was), out=least)
+                with np.errstate(invalid="ignore"):  # of what has no bounds
+                    np.fmin(least, MARGIN * np.abs(now - was), out=least)
             del moved  # of a large system the room counts
         for largest, least in zip(found, opened, strict=True):
             np.fmax(largest, np.where(np.isfinite(least), least, 0.0), out=largest)
@@ -146,7 +147,8 @@ def _eliminated(system: System, entries: tuple[Ints, Ints, Floats], size: Floats
     """
     rows, columns, values = entries
     row, column = sparse_factors(rows, columns, np.abs(values), (system.rows, system.unknowns))
-    scaled = np.abs(values) * row[rows] * column[columns]
+    with np.errstate(over="ignore"):
+        scaled = np.abs(values) * row[rows] * column[columns]
     largest, brought = np.zeros(system.unknowns), np.zeros(system.unknowns)
     np.maximum.at(largest, columns, scaled)
     pivot = (scaled >= PIVOT * largest[columns]) & (values != 0.0)
