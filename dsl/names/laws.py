@@ -186,7 +186,9 @@ def ratio_of(
             other = "gyrator" if kind == "transformer" else "transformer"
             message = f"{kind} '{name}' given as {side} against {wrong}{3 - number}: that is a {other}"
             raise context.fail("E316", message, span, help=f"'{other}({side} = ...)'")
-        raise context.fail("E303", f"the law of '{name}' gives {side} from {expected}{3 - number}", span)
+        needed = f"{expected}{3 - number}"
+        message = f"the law of {kind} '{name}' gives {side} without {needed}: its two sides would not act on each other"
+        raise context.fail("E303", message, span, help=f"{side} = n*{needed}, with a ratio n other than 0")
     ratio = derivative(node, far[expected])
     rest = ex.substitute(node, {far[expected]: ex.const(0.0)})
     own = [n for n in ex.variables(ratio) if n.op == "var" and n.data[0] in (me.family.name, partner.family.name)]

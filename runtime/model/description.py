@@ -148,7 +148,7 @@ class RowFamily(_Elements):
     def at(self, position: int) -> RowLabel:
         """The label of one row."""
         name, file, line = named(self.label, self.shape, self.elements, position)
-        return RowLabel(name, self.kind, file or self.file, line or self.line)
+        return RowLabel(name, self.kind, file or self.file, line or self.line, unit=self.unit)
 
 
 @dataclass(frozen=True, slots=True)
