@@ -90,7 +90,7 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             report.error("E903", message, there, help="initial values of all that it ties: init ... = ...")
         case _ if not names:
             message = "no start was found: wherever it was sought the equations are no numbers"
-            help_ = "a guess of what stands below a division, in a root or a logarithm: init ... ~ ..."
+            help_ = "a guess of what stands below a division, in a root, a logarithm or an exponential: init ... ~ ..."
             report.error("E903", message, where, help=help_)
         case _:
             message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
