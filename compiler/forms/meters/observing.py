@@ -44,15 +44,19 @@ def begun(model: EnergyModel, seen: frozenset[str]) -> frozenset[str]:
     is no displacement.
     """
     tied = []
-    for target in model.initials:
-        read = variables(target.target) | variables(target.value)
-        tied.append((read, {n.data[0] for n in read if n.op == "var" and n.data[1] == model.mirror.coordinate}))
+    for read in map(_unknowns, model.initials):
+        names = {n.data[0] for n in read if n.data[1] == model.mirror.coordinate}
+        tied.append((names, any(n.data[1] != model.mirror.coordinate for n in read)))
     before: frozenset[str] | None = None
     while seen != before:
         before = seen
-        for read, names in tied:
-            seen = seen | names if names & seen or len(names) < len(read) else seen
+        for names, more in tied:
+            seen = seen | names if more or names & seen else seen
     return seen
+
+
+def _unknowns(target: Target) -> list[Node]:
+    return [n for n in variables(target.target) | variables(target.value) if n.op == "var"]
 
 
 def read(model: EnergyModel, carriers: frozenset[str], root: Node) -> Node:
@@ -109,7 +113,7 @@ def pins_and_equations(
             family = numbers[node.data[:2]]
             pins.append(Pin(family, node.args, target.value, target.fixed, target.nest, target.place))
             continue
-        told = variables(node) | variables(target.value)
+        told = _unknowns(target)
         if told and all(n.data[1] == model.mirror.coordinate and n.data[:2] not in numbers for n in told):
             continue
         equations.append(Equation(f"#init {len(equations)}", target))
