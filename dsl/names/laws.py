@@ -104,6 +104,11 @@ def _in_dimension(context: Context, branch: BranchSymbol, side: str, value: synt
     if meant in other and context.bare(value) is None:
         said = message.format(dim.show(found))
         raise context.fail("E208", said, value.span, help=f"{meant} = ..., which is in {dim.show(found)}")
+    lacking = None if found is None else dim.quotient(dimension, found)
+    for own in "efqp":
+        if lacking and own != side and lacking == branch_dimension(branch.domain, own) and found != dimension:
+            said = message.format(dim.show(found))
+            raise context.fail("E208", said, value.span, help=f"a factor in {dim.show(lacking)} is missing: ...*{own}")
     return context.fitting(read, value, dimension, "E208", message)
 
 

@@ -152,8 +152,8 @@ def _listed(prepared: Prepared, error: InconsistentStart) -> str:
 
 
 def _residual(error: InconsistentStart) -> str:
-    """What is left over, in the unit of the row."""
-    row = error.rows[0] if error.rows else RowLabel("")
+    """What is left over, in the unit of the row, or of what is fixed twice."""
+    row = next(iter((*error.rows, *error.candidates)), RowLabel(""))
     known = read_unit(row.unit)
     unit = si(multiply(known.dimension, TIME, -RATES.get(row.kind, 0))).text if known else "1"
     return f"{error.residual:.3g}{f' {unit}' if unit != '1' else ''}"
