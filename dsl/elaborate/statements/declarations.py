@@ -149,7 +149,9 @@ class Declarations(Parameters):
                 init, decls = syntax.Initial("fixed", value, value.span), (decl,)
             case _:
                 return
-        for decl in decls if init is not None else ():
+        if init is None:
+            return
+        for decl in decls:
             symbol = self.scope.symbols.get(decl.name)
             if not isinstance(symbol, UnknownSymbol | NodeSymbol) or symbol.place != self.place(decl.span):
                 raise Failed
