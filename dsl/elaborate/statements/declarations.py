@@ -57,11 +57,14 @@ class Declarations(Parameters):
         self._begun: dict[tuple[Node, tuple[Loop, ...], int], Initial] = {}  # by target, loops, depth
 
     def declare_all(self, body: Body, do: Callable[[syntax.Statement], None], more: tuple[type, ...] = ()) -> None:
-        """The names of a body by `do`, in any order: what takes its unit from a value comes behind what has one, values
-        to begin with behind all names.  more: kinds of statements that `do` reads besides.
+        """The names of a body by `do`, in any order: what takes its unit from a value comes behind what that reads,
+        values to begin with behind all names.  more: kinds of statements that `do` reads besides.
         """
         statements = body.with_loops((*DECLARED, *more))
-        self.each(sorted(statements, key=lambda nested: _takes_its_unit(nested[0])), do)
+        self.each([s for s in statements if not _takes_its_unit(s[0])], do)
+        if late := [s for s in statements if _takes_its_unit(s[0])]:
+            named = {s.decl.name: (s, at) for s, at in late if isinstance(s, syntax.State | syntax.Discrete)}
+            self.each(late if len(named) < len(late) else self.by_dependence(named), do)
         self.each(body.of(BEGINNING), self.begin)
 
     def declare(self, statement: syntax.Statement) -> None:
