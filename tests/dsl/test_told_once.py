@@ -66,6 +66,7 @@ from std.mechanical import inertia
 from std.control import pid
 model drive {
   param setpoint = 1000 rpm
+  param rate = 1000
   node a, b: electrical
   node shaft: rotation
   P: pid(kp = 2 V.s/rad, ki = 1 V/rad, lo = 0 V, hi = 24 V, r = setpoint, y = shaft.f)
@@ -95,6 +96,8 @@ SLIPS = [
     ("node a, b: electrical", "node a b: electrical", "E113", "found 'b'", "node a, b"),
     ("node a, b: electrical", "node a, b electrical", "E113", "found 'electrical'", "node a, b: electrical"),
     ("resistor, inductor", "resistor inductor", "E113", "found 'inductor'", "import resistor, inductor"),
+    ("time 0 s to 2 s", "time 0 s to 2 m", "E208", "the end '2 m' is in m, wants s", "write '2 min'"),
+    ("every 1 ms", "every 1/rate", "E208", "the interval", "'rate' is a number without unit; in s^-1"),
     (
         "init shaft.f = 0 rad/s", "init shaft.f = 0 rad/s; init J.f = 1 rad/s", "E903", "residual 1 1/s", "free one",
     ),

@@ -103,7 +103,7 @@ class SceneReader:
         except SeveralError as several:
             self.resolver.spread(several, statement.span)
         except Failed:
-            self._lost |= isinstance(statement, syntax.TraceItem)
+            self._lost |= isinstance(statement, syntax.Trace | syntax.TraceItem)
 
     def _one(self, word: str, target: syntax.Expr) -> None:
         """What a scene gives to one target once."""
