@@ -133,10 +133,10 @@ class Model:
         if not options.keys() <= _RUN:
             raise UsageError(f"run() has no option {', '.join(sorted(options.keys() - _RUN))}: give it to load()")
         given = {name: value for name, value in {"until": until, "at": at, **options}.items() if value is not None}
-        report = Report()
+        report, values = Report(), dict(_pairs({} if set is None else set))
         if given:
-            return _handed(self._loaded.run(set or {}, report, alone=True, **_changes(given)), report, unmet)
-        found = self._loaded.trace(set or {}, report)
+            return _handed(self._loaded.run(values, report, alone=True, **_changes(given)), report, unmet)
+        found = self._loaded.trace(values, report)
         return found if isinstance(found, Trace) else _handed(found, report, unmet)
 
     def sweep(
@@ -230,9 +230,16 @@ def check(text: str, name: str = "<text>") -> list[Diagnostic]:
 def _request(path: str, options: dict[str, Any]) -> Request:
     given = dict(options)
     settings = given.pop("set", None) or given.pop("settings", ())
-    pairs: Iterable[tuple[str, Any]] = settings.items() if isinstance(settings, Mapping) else settings
-    given["settings"] = tuple((name, text_of(value)) for name, value in pairs)
+    given["settings"] = tuple((name, text_of(value)) for name, value in _pairs(settings))
     return _made(Request, path, **_changes(given))
+
+
+def _pairs(settings: Any) -> Iterable[tuple[str, Any]]:
+    """Names and values of a mapping, or of pairs."""
+    try:
+        return tuple(dict(settings).items())
+    except (TypeError, ValueError):
+        raise UsageError(f"set {settings!r}: names with their values, such as {{'R.R': '10 ohm'}}") from None
 
 
 def _made(make: Any, *arguments: Any, **options: Any) -> Request:

@@ -21,7 +21,14 @@ from sysdyn.compiler.forms.coverage import Cover, cover, inside, outside
 from sysdyn.compiler.forms.descriptor import AUDIT, DescriptorForm, Equations, Unknowns
 from sysdyn.compiler.forms.efforts import Effort, efforts
 from sysdyn.compiler.forms.meters.audit import add_audit
-from sysdyn.compiler.forms.meters.observing import add_initials, add_observations, missing, observed, pins_and_equations
+from sysdyn.compiler.forms.meters.observing import (
+    add_initials,
+    add_observations,
+    begun,
+    missing,
+    observed,
+    pins_and_equations,
+)
 from sysdyn.compiler.forms.momenta import given, inertial, jumping, resolved, shared
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
@@ -174,10 +181,8 @@ class _Lowering:
         # an integrated psi makes nothing tangible, but its displacements are variables
         pieces = [t.expression for row in m.of_kind("phi") for t in row.terms]
         held = {n.data[0] for piece in pieces for n in local_variables(piece, m.mirror.coordinate)}
-        seen = observed(m, self.carriers) | held
-        found = [
-            Unknowns(c.shown, "q", c.name, c.units["q"], c.place) for c in m.coordinates if c.tangible or c.name in seen
-        ]
+        seen = begun(m, observed(m, self.carriers) | held | {c.name for c in m.coordinates if c.tangible})
+        found = [Unknowns(c.shown, "q", c.name, c.units["q"], c.place) for c in m.coordinates if c.name in seen]
         rates = [f"({c.shown})'" if c.less else f"{c.name}'" for c in m.coordinates]
         found += [Unknowns(r, "f", c.name, c.units["f"], c.place) for c, r in zip(m.coordinates, rates, strict=True)]
         found += [

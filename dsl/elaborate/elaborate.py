@@ -19,7 +19,6 @@ from sysdyn.dsl.elaborate.instances.instances import Instances
 from sysdyn.dsl.elaborate.instances.moulds import Likeness, law_of_cast, required_of
 from sysdyn.dsl.elaborate.instances.port_efforts import NotSaidError, conjugate_of
 from sysdyn.dsl.elaborate.parts import flatten
-from sysdyn.dsl.elaborate.statements.declarations import DECLARED
 from sysdyn.dsl.elaborate.statements.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Branch, Derived, Dynamic, Initial, Loop, Observation, State, loop_indices
@@ -60,7 +59,7 @@ class Elaborator(Instances):
                 assert isinstance(statement, syntax.Broken)
                 self.scope.broken |= statement.names
             self.declare_parameters(self._body, {})
-            self.each(self._body.with_loops((*DECLARED, *_ALONE)), self._declared)
+            self.declare_all(self._body, self._declared, _ALONE)
             self.bodies.append((self.space, self._body))
 
     def _declared(self, statement: syntax.Statement) -> None:

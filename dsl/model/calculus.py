@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import partial
 
 from sysdyn.dsl.model.expression import (
     Node,
@@ -85,6 +86,29 @@ def _times(factors: Sequence[tuple[float, Node]]) -> Callable[[Node], Node]:
     return lambda node: product(1.0, [*factors, (1.0, node)])
 
 
+def _lowered(others: Sequence[tuple[float, Node]], exponent: float, base: Node, dot: Node) -> Node:
+    """base^(exponent - 1) dot, and the other factors.
+
+    The differential of 1/(c + w exp(v)) is exp(v)/(c + w exp(v))^2, inf/inf where the value itself is zero: in its
+    place stands 1/((c + w exp(v)) (w + c exp(-v))), which is a number wherever that is.
+    """
+    terms = dict(zip(base.args, base.data[1], strict=True)) if base.op == "sum" and exponent < 0.0 else {}
+    found = ((n, f) for n in terms for f in (n.args if n.op == "mul" else (n,)) if f.op == "call" and f.data == "exp")
+    for own, steep in found:
+        if _divides(steep, own) and _divides(steep, dot):
+            rest = linear(base.data[0], [(w, n) for n, w in terms.items() if n is not own])
+            scaled = product(terms[own], ((1.0, own), (-1.0, steep)))
+            opposite = add(scaled, mul(rest, call("exp", neg(steep.args[0]))))
+            return product(1.0, [*others, (exponent, base), (-1.0, opposite), (-1.0, steep), (1.0, dot)])
+    return product(1.0, [*others, (exponent - 1.0, base), (1.0, dot)])
+
+
+def _divides(factor: Node, dot: Node) -> bool:
+    """Whether a product has a factor."""
+    inner = dot.args[0] if dot.op == "sum" and len(dot.args) == 1 and dot.data[0] == 0.0 else dot
+    return inner is factor or (inner.op == "mul" and (1.0, factor) in zip(inner.data, inner.args, strict=True))
+
+
 def _along(dot: Node, scaled: Callable[[Node], Node]) -> Node:
     """A linear function of a differential; of one that conditions make zero, within these: sqrt(max(x, 0)) is flat
     below 0, and not infinity times zero.
@@ -125,8 +149,9 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
             parts: list[tuple[float, Node]] = []
             for k, dot in enumerate(dots):
                 if dot is not zero:
-                    factors = [(e - (j == k), a) for j, (e, a) in enumerate(zip(node.data, node.args, strict=True))]
-                    parts.append((node.data[k], _along(dot, _times(factors))))
+                    others = [(e, a) for j, (e, a) in enumerate(zip(node.data, node.args, strict=True)) if j != k]
+                    lower = partial(_lowered, others, node.data[k], node.args[k])
+                    parts.append((node.data[k], _along(dot, lower)))
             return linear(0.0, parts)
         case "pow":
             base, exponent = node.args

@@ -272,8 +272,8 @@ class Initial:
     """target = value (fixed) or ~ value (a guess) at the start; target may be any expression of the unknowns.
 
     Where target is an unknown itself (var q, f, p, s, e) it pins that unknown; otherwise it is an equation.
-    store: whose content a guess is about, by which it is measured; said: whether the text guesses it; unit: of a
-    displacement, of the rate of a momentum; apart: a guess of what no store holds, which pins no flow that a store has.
+    store: whose content a guess is about, by which it is measured; said: whether the text guesses it; unit: of target,
+    but of a momentum that of its rate; apart: a guess of what no store holds, which pins no flow that a store has.
     depth: 0 of a scene, 1 of the model, 2 of its components, ...: what has less goes before what has more.
     """
 

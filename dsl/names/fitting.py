@@ -46,6 +46,8 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
     if divided:
         return divided
     without = [habits.unitless(*found, factor) for e, factor in pairs if factor and (found := bare(sight, e))]
+    turned = [(e, dim.quotient(NONE, factor)) for e, factor in pairs if factor]
+    without += [habits.unitless(*found, factor) for e, factor in turned if (found := bare(sight, e, below=True))]
     if without:
         return without[0]
     for e, wanted in zip(within, (want, have), strict=False):
@@ -160,14 +162,17 @@ def _rate(sight: Sight, expression: syntax.Expr, factor: Dimension, sense: int) 
     return f"{name} in place of {name}'?" if sense > 0 else f"{name}' in place of {name}?"
 
 
-def bare(sight: Sight, expression: syntax.Expr) -> tuple[str, str | None] | None:
-    """The one parameter among the factors of an expression that is a bare number: its name and that number."""
+def bare(sight: Sight, expression: syntax.Expr, *, below: bool = False) -> tuple[str, str | None] | None:
+    """The one parameter among the factors of an expression, or its divisors (below), that is a bare number: its name
+    and that number.
+    """
     if isinstance(expression, (syntax.Quantity, syntax.Number)):
         return None
     inner: object = expression
     while isinstance(inner, (syntax.Negative, syntax.Group)):
         inner = inner.operand if isinstance(inner, syntax.Negative) else inner.expr
-    factors = [f for op, f in inner.factors if op != "/"] if isinstance(inner, syntax.Product) else [inner]
+    single = () if below else (inner,)
+    factors = [f for op, f in inner.factors if (op == "/") == below] if isinstance(inner, syntax.Product) else single
     found = []
     for factor in factors:
         if isinstance(factor, syntax.Negative):
@@ -188,6 +193,9 @@ def in_unit(number: syntax.Expr, wanted: Dimension) -> str:
     inner = number.operand if isinstance(number, syntax.Negative) else number
     assert isinstance(inner, (syntax.Number, syntax.Quantity))
     text = f"{'-' if inner is not number else ''}{inner.text}"
+    unit = [f.name for f in inner.unit.factors] if isinstance(inner, syntax.Quantity) else []
+    if wanted == dim.TIME and unit == ["m"] and inner.value:
+        return f"write '{text} min', or '{text} s' where seconds are meant"
     if common(wanted) == "K":
         return f"celsius({text}), or '{text} K' where kelvins are meant"
     return f"write '{text} {_prefixed(inner, common(wanted))}'" if wanted else f"write '{text}', a number"

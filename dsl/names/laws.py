@@ -104,6 +104,11 @@ def _in_dimension(context: Context, branch: BranchSymbol, side: str, value: synt
     if meant in other and context.bare(value) is None:
         said = message.format(dim.show(found))
         raise context.fail("E208", said, value.span, help=f"{meant} = ..., which is in {dim.show(found)}")
+    lacking = None if found is None else dim.quotient(dimension, found)
+    for own in "efqp":
+        if lacking and own != side and lacking == branch_dimension(branch.domain, own) and found != dimension:
+            said = message.format(dim.show(found))
+            raise context.fail("E208", said, value.span, help=f"a factor in {dim.show(lacking)} is missing: ...*{own}")
     return context.fitting(read, value, dimension, "E208", message)
 
 
@@ -186,7 +191,9 @@ def ratio_of(
             other = "gyrator" if kind == "transformer" else "transformer"
             message = f"{kind} '{name}' given as {side} against {wrong}{3 - number}: that is a {other}"
             raise context.fail("E316", message, span, help=f"'{other}({side} = ...)'")
-        raise context.fail("E303", f"the law of '{name}' gives {side} from {expected}{3 - number}", span)
+        needed = f"{expected}{3 - number}"
+        message = f"the law of {kind} '{name}' gives {side} without {needed}: its two sides would not act on each other"
+        raise context.fail("E303", message, span, help=f"{side} = n*{needed}, with a ratio n other than 0")
     ratio = derivative(node, far[expected])
     rest = ex.substitute(node, {far[expected]: ex.const(0.0)})
     own = [n for n in ex.variables(ratio) if n.op == "var" and n.data[0] in (me.family.name, partner.family.name)]

@@ -194,7 +194,9 @@ class Names(Context):
                 help_ = "write its member: multiplier, residual, on(...)"
                 raise self.fail("E104", f"constraint '{symbol.name}' is not a value", span, help=help_)
             case BranchSymbol() | TwoPortSymbol() | InstanceSymbol():
-                help_ = f"a member: {symbol.name}.e or {symbol.name}.f"
+                said = symbol.spaces[0].scope.symbols if isinstance(symbol, InstanceSymbol) and symbol.spaces else {}
+                outputs = [n for n, d in said.items() if isinstance(d, Definition) and d.kind == "output"]
+                help_ = "a member: " + " or ".join(f"{symbol.name}.{n}" for n in outputs or ("e", "f"))
                 raise self.fail("E104", f"element '{symbol.name}' is not a value", span, help=help_)
             case DomainSymbol() | BundleSymbol() | ComponentSymbol() | TableSymbol() | FunctionSymbol():
                 remedy = habits.name(symbol.name, self.source.text, span.start, self._moves)

@@ -269,6 +269,14 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
         shape = f"a value stands behind '=': {SHAPES[word]}"
     if word == "param" and text == "[":
         shape = "a unit has no brackets: param k = 3 N/m"
+    if (
+        kind == "<name>"
+        and "," in accepted
+        and (word in ("from", "node", "port", "coord", "implicit") or "as" in accepted)
+    ):
+        colon = ":" in accepted and text in _DOMAINS
+        joined = f"{' '.join(line.split())}{':' if colon else ','} {text}"
+        shape = joined if word != "trace" else f"{joined}; a name of one's own: as {text}"
     if word == "trace" and text == "in":
         shape = "the unit stands before the name: trace x in mm as pos"
     return "E113", said, _hint(kind, text, line, accepted) or shape
@@ -307,6 +315,8 @@ def _listed(accepted: Collection[str]) -> str:
     return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " or " + parts[-1]
 
 
+_DOMAINS = ("translation", "rotation", "electrical", "hydraulic", "thermal", "heat", "planar")
+"""Of the prelude: what stands behind the colon of a declaration."""
 _OPENS = {")": "(", "]": "["}
 
 

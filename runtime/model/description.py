@@ -148,7 +148,7 @@ class RowFamily(_Elements):
     def at(self, position: int) -> RowLabel:
         """The label of one row."""
         name, file, line = named(self.label, self.shape, self.elements, position)
-        return RowLabel(name, self.kind, file or self.file, line or self.line)
+        return RowLabel(name, self.kind, file or self.file, line or self.line, unit=self.unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,11 +321,12 @@ def _family(value: Mapping[str, Any], shape: Shape) -> Family:
     )
 
 
-def _initial(value: Mapping[str, Any], names: Mapping[str, int]) -> Initial:
+def _initial(value: Mapping[str, Any], names: Mapping[str, int], families: Sequence[Family]) -> Initial:
     """Initial values of one statement from the binding."""
     family = value["family"]
+    place = names[family] if isinstance(family, str) else int(family)
     return Initial(
-        family=names[family] if isinstance(family, str) else int(family),
+        family=place,
         positions=np.atleast_1d(np.asarray(value["positions"], dtype=np.int32)),
         values=np.atleast_1d(np.asarray(value["values"], dtype=np.float64)),
         fixed=bool(value["fixed"]),
@@ -334,6 +335,7 @@ def _initial(value: Mapping[str, Any], names: Mapping[str, int]) -> Initial:
             "init",
             str(value.get("file") or ""),
             int(value.get("line") or 0),
+            unit=families[place].unit,
         ),
     )
 
@@ -362,7 +364,7 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
             },
         )
     own_families, own_rows, blocks = layouts["described"]
-    initial = tuple(_initial(item, names) for item in binding.get("initial", ()))
+    initial = tuple(_initial(item, names, own_families) for item in binding.get("initial", ()))
     found = Description(
         families=own_families,
         rows=own_rows,
@@ -401,7 +403,7 @@ def _again(before: Description, binding: Mapping[str, Any]) -> Description:
     own, given = before.initial, binding.get("initial", ())
     if any(old.positions is not new["positions"] for old, new in zip(own, given, strict=True)):
         names = {family.name: k for k, family in enumerate(before.families)}
-        return replace(before, initial=tuple(_initial(item, names) for item in given))
+        return replace(before, initial=tuple(_initial(item, names, before.families) for item in given))
     values = (np.atleast_1d(np.asarray(item["values"], dtype=np.float64)) for item in given)
     found = (Initial(i.family, i.positions, v, i.fixed, i.label) for i, v in zip(own, values, strict=True))
     return replace(before, initial=tuple(found))

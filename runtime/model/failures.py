@@ -15,6 +15,7 @@ from sysdyn.values import dataclass
 class RowLabel:
     """Where a row or an initial value stands in the author's text: label, kind, element index, file, line.
 
+    unit: of what the row leaves over; of a row that is a derivative by time, of the row that it is the derivative of.
     slope: what the slope of its law does at a point at which it has none: vanishes, or grows without bound.
     """
 
@@ -23,6 +24,7 @@ class RowLabel:
     file: str = ""
     line: int = 0
     slope: str = ""
+    unit: str = ""
 
     def __str__(self) -> str:
         place = f" ({self.file}:{self.line})" if self.file else ""

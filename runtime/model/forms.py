@@ -17,6 +17,8 @@ begin); nothing else distinguishes the forms (q' = f are rows of the runtime's o
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from sysdyn.runtime.model.description import BASE, BESIDE, SCALE, START, Description, Ints, RowFamily
 from sysdyn.runtime.model.failures import ContractError, RowLabel
@@ -149,9 +151,7 @@ class Form:
         for group, family, first in reversed(self.groups):
             if row >= first:
                 label = description.rows[family].at(row - first)
-                if group in BASE:
-                    return RowLabel(label.label, group, label.file, label.line)
-                return label
+                return replace(label, kind=group) if group in BASE else label
         raise ContractError(f"row {row} belongs to no family")
 
 

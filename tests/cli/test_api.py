@@ -33,6 +33,11 @@ def test_options_have_the_commands_names(tmp_path):
     trace = api.simulate(path, scene="again", **options)
     assert "timings" not in trace.attributes
     assert trace.attributes["formulation"] == "hamiltonian"
+    for wrong in ("l=2", 3, [1.0]):
+        with pytest.raises(api.UsageError, match="names with their values"):
+            api.simulate(path, scene="again", set=wrong)
+        with pytest.raises(api.UsageError, match="names with their values"):
+            api.load(path, scene="again").run(wrong)
     with pytest.raises(api.UsageError, match="colour"):
         api.simulate(path, scene="again", colour="red")
     with pytest.raises(api.UsageError, match="rtol 'fine': a number"):

@@ -148,7 +148,7 @@ def test_unknown_names_of_the_library_lead_on(name, said, capsys):
 @pytest.fixture
 def site(tmp_path, capsys):
     assert run(["help", "--html", "site.html"]) == 0
-    assert capsys.readouterr().out == ""
+    assert capsys.readouterr() == ("", "site.html\n")
     return tmp_path / "site.html"
 
 

@@ -28,6 +28,8 @@ WRONG = [
     (TIME, "  time 0 s to 1 s/(k*1 m/N - 4)\n", "E912", "from 0 s to inf s", "time"),
     (TIME, "  time 0 s to 1e-295 s\n", "E912", "1e-75 s to 1e+75 s", "time"),
     (TIME, "  time 0 s to k*1e299 s.m/N\n", "E912", "1e-75 s to 1e+75 s", "time"),
+    (TRACE, "  trace x\n  expect at 5*k*1 s.m/N: x <= 2 m\n", "E912", "at 20 s of a run from 0 s to 2 s", "expect at"),
+    (TRACE, "  trace x\n  expect at -1 s: x <= 2 m\n", "E912", "at -1 s of a run from 0 s to 2 s", "expect at"),
     (TRACE, "  trace x\n  accuracy k*1 m/N\n", "E906", "accuracy 4", "accuracy"),
     (TRACE, "  trace x\n  limit steps 0\n", "E912", "limit steps 0", "limit"),
     (TRACE, "  trace x\n  limit events -1\n", "E912", "limit events -1", "limit"),

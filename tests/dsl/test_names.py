@@ -324,7 +324,12 @@ def test_two_ports_pass_on_their_power(read, kind, side, r):
         ("transformer", "e1", "2*e2 + 1 V", "E317",
          "transformer ratio of 'T' depends on T#2.e, a flow or effort of its own ports",
          "ratios may depend on displacements and signals"),
-        ("transformer", "e1", "2 V", "E303", "the law of 'T' gives e1 from e2", None),
+        ("transformer", "e1", "2 V", "E303",
+         "the law of transformer 'T' gives e1 without e2: its two sides would not act on each other",
+         "e1 = n*e2, with a ratio n other than 0"),
+        ("gyrator", "e1", "0*f2", "E303",
+         "the law of gyrator 'T' gives e1 without f2: its two sides would not act on each other",
+         "e1 = n*f2, with a ratio n other than 0"),
     ],
 )  # fmt: skip
 def test_what_is_no_two_port_is_told_what_it_is(read, kind, side, text, code, message, help_):

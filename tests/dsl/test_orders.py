@@ -76,3 +76,37 @@ def test_an_input_may_read_an_element_that_follows(at):
     for lines in ((*nodes, *elements, reader), (*nodes, reader, *elements)):
         body = "\n  ".join(lines)
         assert check(f"from std.control import low_pass\nmodel m {{\n  {body}\n}}\n") == []
+
+
+BEGUN = """coord x[1..2]: translation = y[2]/4 + k
+state s = 3*h
+state h = r
+let k = g - y[2]
+discrete d = 2*e
+discrete e = c
+let c = 1 m
+state g: m = y[1]
+coord y[1..2]: translation = [1 m, 2 m]
+let r = 2*c
+"""
+
+
+@pytest.mark.parametrize("trace", ["s, g, x[1], x[2]", "s, g, x[1], x[2], y[1], y[2]"])
+@pytest.mark.parametrize("lines", [BEGUN.splitlines(), BEGUN.splitlines()[::-1]], ids=["written", "turned"])
+def test_a_start_may_read_what_is_declared_behind_it(lines, trace, tmp_path):
+    """Also where nothing but a start reads where y is: it has no force and is not traced."""
+    moved = "for i in 1..2 { energy T* = 1/2*(1 kg)*(x[i]'^2 + y[i]'^2) }\ndynamic s' = 1 m/s\ndynamic g' = 0 m/s"
+    moved += "\ndynamic h' = 0 m/s"
+    scene = f"scene a of m {{ time 0 s to 1 s; trace {trace}, d every 1 s }}"
+    text = "\n".join(["model m {", *lines, moved, "}", scene])
+    (path := tmp_path / "m.sd").write_text(text)
+    run = load(path).run()
+    assert {n: run[n][0] for n in ("s", "g", "x[1]", "x[2]", "d")} == pytest.approx(
+        {"s": 6.0, "g": 1.0, "x[1]": -0.5, "x[2]": -0.5, "d": 2.0}, abs=1e-12
+    )
+
+
+def test_values_to_begin_with_in_a_circle_are_told():
+    text = "model m { state s = r; state r = 2*s; dynamic s' = 0; dynamic r' = 0; discrete g = h; discrete h = g }\n"
+    said = [d.message for d in check(text) if d.severity == "error"]
+    assert said == ["circular definition: s -> r -> s", "circular definition: g -> h -> g"]

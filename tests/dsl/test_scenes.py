@@ -235,7 +235,7 @@ def solved(*equations):
         ({n: Fraction(e) for n, e in left.items()}, unit(right), f"p{k}") for k, (left, right) in enumerate(equations)
     ]
     names = {n for left, _ in equations for n in left}
-    return {n: dim.show(d) for n, d in _solved(Frame(), Statement(), names, rows).items()}
+    return {n: dim.show(d) for n, d in _solved(Frame(), Statement(), names, rows, {}).items()}
 
 
 def test_units_follow_from_what_an_instance_is_given():
@@ -256,6 +256,9 @@ def test_units_that_are_open_or_contradict_each_other():
     with pytest.raises(RefusedError) as error:
         solved(({"$u": 1}, "m"), ({"$u": 2}, "m s"))
     assert error.value.args == ("E209", "the unit variables of 'pid' contradict each other at 'p1' (off by s/m)")
+    with pytest.raises(RefusedError) as error:  # all but the second agree
+        solved(({"$y": 1, "$u": -1}, "V m^-1"), ({"$y": 1, "$u": -1}, "V"), ({"$u": 1}, "m"), ({"$y": 1}, "V"))
+    assert error.value.args == ("E209", "'p1' of 'pid' contradicts what the others say of its unit")
 
 
 ARRAYS = """model a {

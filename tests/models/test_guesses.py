@@ -164,7 +164,7 @@ scene s of held {{ time 0 s to 1 s; trace a.e, R.f }}
     ran, report = attempt(tmp_path, text)
     assert ran is None
     assert [(d.code, d.message) for d in report] == [
-        ("E903", "an initial value contradicts the constraints: residual 4")
+        ("E903", "an initial value contradicts the constraints: residual 4 V")
     ]
 
 

@@ -22,6 +22,8 @@ def command(console: Console, topic: str | None, html_file: str | None) -> int:
         from sysdyn.cli.manual.site import site
 
         write(html_file, site())
+        if html_file != "-":
+            console.say(html_file)
         console.result = {"file": html_file}
         return console.finish()
     if topic is None:

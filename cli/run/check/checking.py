@@ -87,7 +87,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     scene = network.scene
     if scene is not None:
         bare = Request(target.document.file.source.name)
-        report.extend(wrong_numbers(target, scene, prepared.binding.evaluate, bare))
+        report.extend(wrong_numbers(target, prepared.network, prepared.binding.evaluate, bare))
         if report.failed:
             return {"ok": False}
     value = prepared.binding.evaluate

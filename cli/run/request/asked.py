@@ -137,7 +137,7 @@ def options_of(
     until, at, wall = instants_of(request, target.document, report)
     t1 = until if request.until is not None else t1
     if prepared.network.scene is not None:
-        report.extend(wrong_numbers(target, scene, value, request))
+        report.extend(wrong_numbers(target, prepared.network, value, request))
     if t1 is None or report.failed:
         return None
     if not math.isfinite(t0) or not math.isfinite(t1):

@@ -2,19 +2,19 @@
 
 Those that are plain constants are told with the text (dsl/elaborate/scenes/scenes.py); these are known where
 parameters have values.  What the command line says in a scene's place is not judged here.
-Received: a target, the scene, values, a request; handed back: findings, each at its statement.
+Received: a target, a scene's network, values, a request; handed back: findings, each at its statement.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.dsl.elaborate.scenes.scenes import FINEST_ACCURACY
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Scene
+from sysdyn.dsl.model.network import Expectation, Network, Scene
 from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Span
 from sysdyn.dsl.tree import syntax
 
@@ -33,9 +33,13 @@ _ORDERS = {"bdf": (1.0, 2.0, 3.0, 4.0, 5.0), "radau": (5.0, 9.0, 13.0)}
 Value = Callable[[Node], float]
 
 
-def wrong_numbers(target: Target, scene: Scene, value: Value, request: Request) -> Iterator[Diagnostic]:
+def wrong_numbers(target: Target, network: Network, value: Value, request: Request) -> Iterator[Diagnostic]:
     """What is wrong of what the request leaves to the scene."""
+    scene = network.scene
+    assert scene is not None
     yield from _span(target, scene, value, until=request.until is not None)
+    if request.until is None:
+        yield from _claims(scene, network.expectations, value)
     said = () if request.accuracy is not None else (scene.accuracy, *(node for _, node in scene.accuracy_on))
     for wanted in dict.fromkeys(value(node) for node in said if node is not None):
         if not FINEST_ACCURACY <= wanted < 1.0:
@@ -70,6 +74,20 @@ def _span(target: Target, scene: Scene, value: Value, *, until: bool) -> Iterato
     elif not until and (t1 - t0) / every > INSTANTS:
         text = f"every {every:g} s from {t0:g} s to {t1:g} s is more than {INSTANTS:.0e} instants"
         yield Diagnostic("E912", text, place, f"every {(t1 - t0) / 1000.0:.3g} s, or none: each step is traced then")
+
+
+def _claims(scene: Scene, claims: Iterable[Expectation], value: Value) -> Iterator[Diagnostic]:
+    """Claims at instants that are not in the time of the scene."""
+    if scene.start is None or scene.end is None:
+        return
+    t0, t1 = value(scene.start), value(scene.end)
+    for claim in claims:
+        at = t0 if claim.at is None else value(claim.at)
+        if t0 < t1 and not t0 <= at <= t1:
+            text = f"a claim at {at:g} s of a run from {t0:g} s to {t1:g} s: nothing could tell whether it holds"
+            yield Diagnostic(
+                "E912", text, claim.place, f"time {min(at, t0):g} s to {max(at, t1):g} s, or another instant"
+            )
 
 
 def beyond(t0: float, t1: float) -> str:

@@ -10,6 +10,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+from sysdyn.cli.page.unit_text import read_unit
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared, place_at
 from sysdyn.cli.run.start.author import names_of
@@ -49,7 +50,7 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
         related, where = related[1:], related[0].place
     match error.kind:
         case "gamma":
-            left = f"the residual cannot fall below {_residual(prepared, error)}"
+            left = f"the residual cannot fall below {_residual(error)}"
             report.error("E519", f"gamma '{names}' has no solution at the start: {left}", where, related=related)
         case "implicit":
             report.error("E505", f"the gammas do not determine {', '.join(error.names)} at the start", where)
@@ -64,7 +65,7 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             report.error("E519", message, where)
         case _ if zero := _zero(prepared, t0):
             said = f"with {zero.name} = {quantity(0.0, zero.unit)} there is no start"
-            left = f"{_residual(prepared, error)} is left over in {names}"
+            left = f"{_residual(error)} is left over in {names}"
             free = f", or '~' for '=' of {_listed(prepared, error)}" if error.candidates else ""
             here = [Related("this is left over", where), *related]
             report.error("E903", f"{said}: {left}", zero.place, help=f"{zero.name} other than zero{free}", related=here)
@@ -72,14 +73,14 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             message, help_ = _contradicting(prepared, error, names)
             report.error("E903", message, where, help=help_, related=related)
         case "fixed" if any(row.kind == "initial" for row in error.rows):
-            message = f"an initial value contradicts the constraints: residual {_residual(prepared, error)}"
+            message = f"an initial value contradicts the constraints: residual {_residual(error)}"
             report.error("E903", message, where, help="the value that they leave, or '~' for '='")
         case "fixed" if len({row.label for row in error.rows}) == 1:  # nothing contradicts it
-            message = f"no start was found near the guesses: {_residual(prepared, error)} is left over in {names}"
+            message = f"no start was found near the guesses: {_residual(error)} is left over in {names}"
             help_ = "a guess, 0 where none is written, from which it can be reached: coord x: translation ~ 1 m"
             report.error("E510", message, where, help=f"{help_}; or correct it")
         case "fixed":
-            left = _residual(prepared, error)
+            left = _residual(error)
             report.error(
                 "E510", f"the constraints contradict each other at the start: residual {left} in {names}", where
             )
@@ -89,7 +90,7 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
             report.error("E903", message, there, help="initial values of all that it ties: init ... = ...")
         case _ if not names:
             message = "no start was found: wherever it was sought the equations are no numbers"
-            help_ = "a guess of what stands below a division, in a root or a logarithm: init ... ~ ..."
+            help_ = "a guess of what stands below a division, in a root, a logarithm or an exponential: init ... ~ ..."
             report.error("E903", message, where, help=help_)
         case _:
             message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
@@ -99,12 +100,12 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
 def _contradicting(prepared: Prepared, error: InconsistentStart, names: str) -> tuple[str, str]:
     """Fixed values that contradict each other, or rows (names); what may be freed."""
     fixed = _listed(prepared, error)
-    left = f"{names}: residual {_residual(prepared, error)}"
+    left = f"{names}: residual {_residual(error)}"
     own = {r.label.rstrip("'") for r in error.rows} <= {c.label.rstrip("'") for c in error.candidates}
     itself = own and all(not r.file for r in error.rows)
     message = f"fixed initial values of {fixed} contradict {left}"
     if itself:
-        left = _residual(prepared, error)
+        left = _residual(error)
         message, fixed = f"fixed initial values contradict each other: {fixed}, residual {left}", "them"
     among = "one of " if itself or len(set(fixed.split(", "))) > 1 else ""
     free = f"free {among}{fixed}: '~' for '='"
@@ -150,15 +151,12 @@ def _listed(prepared: Prepared, error: InconsistentStart) -> str:
     return ", ".join(f"'{name}'" for name in dict.fromkeys(shown))
 
 
-def _residual(prepared: Prepared, error: InconsistentStart) -> str:
-    """What is left over, in the unit of the row."""
-    network = prepared.network
-    label = re.sub(r"\[.*", "", error.rows[0].label) if error.rows else ""
-    units = {c.name: c.effort for c in network.coordinates} | {c.name: c.unit for c in network.constraints}
-    unit = units.get(label)
-    if unit is not None and (times := RATES.get(error.rows[0].kind)):
-        unit = si(multiply(unit.dimension, TIME, -times))
-    return f"{error.residual:.3g}{f' {unit.text}' if unit is not None and unit.text != '1' else ''}"
+def _residual(error: InconsistentStart) -> str:
+    """What is left over, in the unit of the row, or of what is fixed twice."""
+    row = next(iter((*error.rows, *error.candidates)), RowLabel(""))
+    known = read_unit(row.unit)
+    unit = si(multiply(known.dimension, TIME, -RATES.get(row.kind, 0))).text if known else "1"
+    return f"{error.residual:.3g}{f' {unit}' if unit != '1' else ''}"
 
 
 def _zero(prepared: Prepared, t0: float) -> Parameter | None:

@@ -3,14 +3,19 @@
     linear, hold     c0 + c1 (u - x_k) between two nodes
     pchip, cubic     the table between its ends, held outside
 
+An end that an inequality bounds is none: where phi keeps u - x_0 >= 0, the table goes on straight, for a slope that is
+zero beyond the end lets a body slide between its two sides, at the stop that it has reached.
+
 A method of higher order crosses a corner at the cost of many small steps; kinks.py watches each node instead.  Tables
 of many nodes stay tables, as do bilinear ones and those that stop a run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
+from dataclasses import replace
 
+from sysdyn.compiler.model.tables import evaluate
 from sysdyn.dsl.model.expression import (
     Node,
     compare,
@@ -29,8 +34,8 @@ MOST = 32
 """Nodes of a table that are watched one by one."""
 
 
-def broken(root: Node, tables: Mapping[str, Table]) -> Node:
-    """An expression with its tables of straight pieces written out."""
+def broken(root: Node, tables: Mapping[str, Table], floors: Set[Node] = frozenset()) -> Node:
+    """An expression with its tables of straight pieces written out; floors: what is never negative."""
     if not any(n.op == "table" for n in topological([root])):
         return root
     done: dict[Node, Node] = {}
@@ -39,7 +44,7 @@ def broken(root: Node, tables: Mapping[str, Table]) -> Node:
         table = tables.get(node.data[0]) if node.op == "table" else None
         apart = table is not None and _apart(table, node)
         if table is not None and apart:
-            done[node] = _pieces(table, args[0], node.data[1])
+            done[node] = _pieces(table, args[0], node.data[1], floors)
         elif table is not None and len(args) > 1 and len(table.values) <= MOST:
             done[node] = _spread(table, node, args)
         else:
@@ -68,9 +73,13 @@ def _apart(table: Table, node: Node) -> bool:
     return unknown and (straight or (table.method in ("pchip", "cubic") and table.outside == "clamp"))
 
 
-def _pieces(table: Table, u: Node, order: int) -> Node:
+def _pieces(table: Table, u: Node, order: int, floors: Set[Node]) -> Node:
     points, values = table.points[0], table.values
-    ends = [const(values[k] if order == 0 else 0.0) for k in (0, -1)]
+    bounded = (sub(u, const(points[0])) in floors, sub(const(points[-1]), u) in floors)
+    ends = [
+        _end(table, k, u, order) if on else const(0.0 if order else values[k])
+        for k, on in zip((0, -1), bounded, strict=True)
+    ]
     if table.method in ("pchip", "cubic"):
         inside = looked_up(table.name, u, order=order)
         below = conditional(compare("<", u, const(points[0])), ends[0], inside)
@@ -88,6 +97,13 @@ def _pieces(table: Table, u: Node, order: int) -> Node:
     for x, piece in zip(reversed(points), reversed(pieces[:-1]), strict=True):
         found = conditional(compare("<", u, const(x)), piece, found)
     return found
+
+
+def _end(table: Table, k: int, u: Node, order: int) -> Node:
+    """How a table goes on straight behind its first or last point (k 0, -1), and derivatives of that."""
+    x = table.points[0][k]
+    slope = evaluate(replace(table, outside="extend"), [x], (1,)) if table.method != "hold" else 0.0
+    return _line(x, table.values[k], float(slope), u, order)
 
 
 def _line(x: float, value: float, slope: float, u: Node, order: int) -> Node:

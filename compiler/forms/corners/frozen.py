@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from sysdyn.compiler.forms.corners.broken import broken
-from sysdyn.compiler.forms.corners.kinks import YES, Surface, surfaces, watched
+from sysdyn.compiler.forms.corners.kinks import YES, Surface, roots, surfaces, watched
 from sysdyn.compiler.forms.corners.peaks import peaks
 from sysdyn.compiler.forms.corners.written import written
 from sysdyn.compiler.forms.descriptor import (
@@ -66,9 +66,10 @@ def frozen(
 ) -> tuple[DescriptorForm, tuple[Parameter, ...], tuple[Diagnostic, ...]]:
     """The form of a network with frozen branches, and the parameters that hold them; notes."""
     tables, place = {t.name: t for t in network.tables}, network.place
-    whole, form = form, replace(form, blocks=tuple(_opened(b, tables) for b in form.blocks)) if tables else form
+    whole, floors = form, _floors(form, network) if tables else frozenset[Node]()
+    form = replace(form, blocks=tuple(_opened(b, tables, floors) for b in form.blocks)) if tables else form
     form = written(form, network)
-    found = surfaces(form, frozenset(n.data for s in network.switches for n in s.direction))
+    found = surfaces(form, frozenset(n.data for s in network.switches for n in s.direction), floors)
     passed, notes = peaks(form, whole, network, found)
     found += passed
     if not found:
@@ -79,10 +80,24 @@ def frozen(
     return freezer.form(place), tuple(parameters), notes
 
 
-def _opened(block: Block, tables: Mapping[str, Table]) -> Block:
+def _floors(form: DescriptorForm, network: Network) -> frozenset[Node]:
+    """What inequalities between displacements keep from being negative, and the text's own conditions do not read."""
+    gaps = {s.value for s in network.switches if s.kind == "phi" and s.guard is None}
+    block = form.block("observe") if gaps else None
+    rows = [s for kernel in (block.kernels if block else ()) if not kernel.nest for s in kernel.rows]
+    found = {s.expression for s in rows if form.rows[s.row].label in gaps}
+    own = (
+        {on.u for root, _ in roots(form) for n in topological([root]) if (on := watched(n)) is not None}
+        if found
+        else ()
+    )
+    return frozenset(found - {w for u in own for w in (u, neg(u))})
+
+
+def _opened(block: Block, tables: Mapping[str, Table], floors: frozenset[Node]) -> Block:
     """A block with its tables of straight pieces written out."""
     kernels = (
-        replace(k, rows=tuple(replace(s, expression=broken(s.expression, tables)) for s in k.rows))
+        replace(k, rows=tuple(replace(s, expression=broken(s.expression, tables, floors)) for s in k.rows))
         for k in block.kernels
     )
     return replace(block, kernels=tuple(kernels))

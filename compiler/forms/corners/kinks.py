@@ -104,17 +104,20 @@ def watched(node: Node) -> Sided | None:
     return None if any(n.op in ("index", "reduce") for n in topological([found.u])) else found
 
 
-def surfaces(form: DescriptorForm, directions: frozenset[str] = frozenset()) -> tuple[Surface, ...]:
+def surfaces(
+    form: DescriptorForm, directions: frozenset[str] = frozenset(), floors: frozenset[Node] = frozenset()
+) -> tuple[Surface, ...]:
     """All surfaces at which a row is not smooth; none where they are more than MOST.
 
-    directions: parameters of friction in the plane, which the contact itself keeps on one side.
+    directions: parameters of friction in the plane, which the contact itself keeps on one side; floors: what an
+    inequality does.
     """
     first: dict[Node, int] = {}
     holding: dict[Node, dict[Node, None]] = {}
     for root, row in roots(form):
         for node in topological([root]):
             found = watched(node)
-            if found is None:
+            if found is None or found.u in floors or neg(found.u) in floors:
                 continue
             own = reads(found.u, directions)
             u = found.u if neg(found.u) not in first else neg(found.u)

@@ -1,7 +1,7 @@
 """What is asked of a solution: traced quantities, sides of expectations, and initial conditions.
 
-An `init` of an unknown pins it; of an unknown that this formulation does not have (an intangible displacement) it is
-dropped; anything else is an equation on the initial state, a row of block `initial`.
+An `init` of an unknown pins it; of unknowns that this formulation does not have (intangible displacements) it is
+dropped; anything else is an equation on the initial state, a row of block `initial`, and what it reads an unknown.
 """
 
 from __future__ import annotations
@@ -37,6 +37,26 @@ def observed(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
         expression = read(model, carriers, quantity.expression)
         found |= {n.data[0] for n in local_variables(expression, model.mirror.coordinate)}
     return frozenset(found)
+
+
+def begun(model: EnergyModel, seen: frozenset[str]) -> frozenset[str]:
+    """Coordinates whose displacement is an unknown: those seen, and those that an initial value ties to them or to what
+    is no displacement.
+    """
+    tied = []
+    for read in map(_unknowns, model.initials):
+        names = {n.data[0] for n in read if n.data[1] == model.mirror.coordinate}
+        tied.append((names, any(n.data[1] != model.mirror.coordinate for n in read)))
+    before: frozenset[str] | None = None
+    while seen != before:
+        before = seen
+        for names, more in tied:
+            seen = seen | names if more or names & seen else seen
+    return seen
+
+
+def _unknowns(target: Target) -> list[Node]:
+    return [n for n in variables(target.target) | variables(target.value) if n.op == "var"]
 
 
 def read(model: EnergyModel, carriers: frozenset[str], root: Node) -> Node:
@@ -88,13 +108,14 @@ def pins_and_equations(
     for target in model.initials:
         node = target.target
         plain = node.op == "var" and node.data[2] == 0 and not variables(target.value)
-        if plain and not target.store and (target.fixed or not _follows(node, target)):
-            if node.data[:2] in numbers:
-                family = numbers[node.data[:2]]
-                pins.append(Pin(family, node.args, target.value, target.fixed, target.nest, target.place))
-                continue
-            if node.data[1] == model.mirror.coordinate:
-                continue
+        own = plain and not target.store and (target.fixed or not _follows(node, target))
+        if own and node.data[:2] in numbers:
+            family = numbers[node.data[:2]]
+            pins.append(Pin(family, node.args, target.value, target.fixed, target.nest, target.place))
+            continue
+        told = _unknowns(target)
+        if told and all(n.data[1] == model.mirror.coordinate and n.data[:2] not in numbers for n in told):
+            continue
         equations.append(Equation(f"#init {len(equations)}", target))
     return tuple(pins), tuple(equations)
 

@@ -217,9 +217,8 @@ class Instances(Ports):
             self._required(s, place, component, head, arguments)
         if head.inputs:
             self.bind_inputs(s, space, head, inputs)
-        declared, instances = body.with_loops(DECLARED), body.of(syntax.Instance)
-        with self.entering(space) if declared or instances else nullcontext():
-            self.each(declared, self.declare)
+        with self.entering(space) if body.with_loops(DECLARED) or body.of(syntax.Instance) else nullcontext():
+            self.declare_all(body, self.declare)
             self.bodies.append((space, body))
             self.announce(body)
 

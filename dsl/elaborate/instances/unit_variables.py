@@ -6,6 +6,7 @@ rationals.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from sysdyn.dsl.elaborate.statements.parameters import Argument
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, known, multiply, raised, si_text
 from sysdyn.dsl.names.symbols import Space, Typed
+from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
 
 if TYPE_CHECKING:
@@ -35,20 +37,20 @@ def solve_units(
     names = {f.name for unit in declared.values() for f in unit.factors if f.name.startswith("$")}
     if not names:
         return
-    equations = []
+    equations, places = [], dict[str, Place | syntax.Span]()
     for name, unit in declared.items():
         if not any(f.name.startswith("$") for f in unit.factors):
             continue
         if name in arguments:
             value = arguments[name].value
-            given = value.dimension if isinstance(value, Typed) else None
+            given, places[name] = value.dimension if isinstance(value, Typed) else None, arguments[name].place
         elif name in inputs:
-            given = frame.resolver.scalar(inputs[name]).dimension
+            given, places[name] = frame.resolver.scalar(inputs[name]).dimension, inputs[name].span
         else:
             continue
         if given is not None:
             equations.append(_equation(unit, given, name, space))
-    for name, dimension in _solved(frame, s, names, equations).items():
+    for name, dimension in _solved(frame, s, names, equations, places).items():
         space.scope.units[name] = Unit(dimension, Fraction(1), si_text(dimension))
 
 
@@ -67,16 +69,50 @@ def _equation(unit: syntax.Unit, given: Dimension, name: str, space: Space) -> E
     return exponents, rest, name
 
 
-def _solved(frame: Instances, s: syntax.Instance, names: set[str], equations: list[Equation]) -> dict[str, Dimension]:
-    """Gaussian elimination, one variable after the other."""
+def _solved(
+    frame: Instances,
+    s: syntax.Instance,
+    names: set[str],
+    equations: list[Equation],
+    places: Mapping[str, Place | syntax.Span],
+) -> dict[str, Dimension]:
+    """What the variables are; E209 where equations do not tell, or contradict each other."""
+    found = _eliminated(names, equations)
+    if isinstance(found, str):
+        message = f"unit variable {found} of '{s.decl.name}' is not determined"
+        raise frame.resolver.fail("E209", message, s.span, help="give an input or parameter that has it")
+    if isinstance(found, dict):
+        return found
+    odd = {
+        e[2]: rest
+        for e in equations
+        if isinstance(rest := _eliminated(names, [o for o in equations if o is not e]), dict)
+    }
+    if len(odd) == 1:  # the others agree
+        ((name, rest),) = odd.items()
+        exponents, left, _ = next(e for e in equations if e[2] == name)
+        for variable, power in exponents.items():
+            left = multiply(left, rest[variable], -power)
+        missing = dim.show(raised(left, -1))
+        message = f"'{name}' of '{s.decl.name}' contradicts what the others say of its unit"
+        raise frame.resolver.fail("E209", message, places.get(name, s.span), help=f"a factor in {missing} is missing")
+    message = _contradiction(s.decl.name, *found, equations)
+    raise frame.resolver.fail("E209", message, s.span)
+
+
+def _eliminated(
+    names: set[str], equations: list[Equation]
+) -> dict[str, Dimension] | tuple[Equation, dict[str, Equation]] | str:
+    """Gaussian elimination, one variable after the other: what they are; an equation that contradicts, and what each
+    was told by; or the name of one that nothing tells.
+    """
     rows = [(dict(e), d, n) for e, d, n in equations]
     solved: list[tuple[str, dict[str, Fraction], Dimension]] = []
     told: dict[str, Equation] = {}
     for variable in sorted(names):
         pivot = next((r for r in rows if r[0].get(variable)), None)
         if pivot is None:
-            message = f"unit variable {variable} of '{s.decl.name}' is not determined"
-            raise frame.resolver.fail("E209", message, s.span, help="give an input or parameter that has it")
+            return variable
         rows.remove(pivot)
         told[variable] = pivot
         factor = pivot[0][variable]
@@ -86,8 +122,7 @@ def _solved(frame: Instances, s: syntax.Instance, names: set[str], equations: li
         rows = [_without(r, variable, exponents, value) for r in rows]
     wrong = next((r for r in rows if r[1]), None)
     if wrong is not None:
-        message = _contradiction(s.decl.name, wrong, equations, told)
-        raise frame.resolver.fail("E209", message, s.span)
+        return wrong, told
     found: dict[str, Dimension] = {}
     for variable, exponents, value in reversed(solved):
         for other, power in exponents.items():
@@ -96,7 +131,7 @@ def _solved(frame: Instances, s: syntax.Instance, names: set[str], equations: li
     return found
 
 
-def _contradiction(label: str, wrong: Equation, equations: list[Equation], told: dict[str, Equation]) -> str:
+def _contradiction(label: str, wrong: Equation, told: dict[str, Equation], equations: list[Equation]) -> str:
     """What two arguments make of one unit variable; of several in one, by how much they differ."""
     alone = next(e for e in equations if e[2] == wrong[2])
     variable = next(iter(alone[0]))

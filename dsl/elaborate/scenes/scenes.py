@@ -47,6 +47,7 @@ class SceneReader:
         self.observations: list[Observation] = []
         self.given = Settings(elaborator)
         self._raw: dict[Node, str] = {}  # traced expression before its unit -> name
+        self._lost = False  # whether the scene has lost a statement, or what it traces
         self._found: dict[str, object] = {}
         self._accuracies: dict[str, Node] = {}
         self._targets: set[tuple[str, str]] = set()
@@ -86,6 +87,7 @@ class SceneReader:
             for statement in scene.body:
                 if isinstance(statement, syntax.Broken):
                     self.model.space.scope.broken |= statement.names
+                    self._lost = True
                 elif type(statement) in table:
                     self.guarded(lambda s: table[type(s)](self, s), statement)
 
@@ -101,7 +103,7 @@ class SceneReader:
         except SeveralError as several:
             self.resolver.spread(several, statement.span)
         except Failed:
-            return
+            self._lost |= isinstance(statement, syntax.Trace | syntax.TraceItem)
 
     def _one(self, word: str, target: syntax.Expr) -> None:
         """What a scene gives to one target once."""
@@ -276,6 +278,7 @@ class SceneReader:
             missing = self.resolver.missing(value.dimension, unit.dimension, item.expr)
             help_ = missing if blamed(missing) else f"in {common(value.dimension)}"
             help_ = "in rad or deg of an angle, in percent, or without 'in'" if value.dimension == NONE else help_
+            help_ = "in rad/s, deg/s or rpm of a speed of rotation, in Hz" if help_ == "in s^-1" else help_
             help_ = "in degC" if unit.text == "C" and help_ == "in K" else help_
             raise self.resolver.fail("E208", message, item.unit.span, help=help_)
         return unit
@@ -301,6 +304,8 @@ class SceneReader:
             if node not in self._raw and node.op == "var" and node.data[1] == "audit":
                 names.append(f"audit.{node.data[0]}")  # in every trace
                 continue
+            if node not in self._raw and self._lost:
+                raise Failed  # it may stand there
             if node not in self._raw:
                 text = format_expression(target)
                 raise self.resolver.fail(

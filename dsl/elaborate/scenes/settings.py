@@ -20,7 +20,16 @@ from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Unit
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.paths import Located
-from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Space, Typed, Unsupported, Vector, nearest
+from sysdyn.dsl.names.symbols import (
+    Definition,
+    InstanceSymbol,
+    ParameterSymbol,
+    Space,
+    Typed,
+    Unsupported,
+    Vector,
+    nearest,
+)
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
 
@@ -79,6 +88,9 @@ class Settings:
         near = near or (inside[0] if inside and (symbol is None or "." in shown) else None)
         started = f"init {shown} = ... sets an initial value" if symbol is not None else None
         own = [p for p in (*self.model.parts.parameters, *self.model.parts.inputs) if p.startswith(f"{shown}.")]
+        if isinstance(symbol, InstanceSymbol) and symbol.spaces:
+            said = symbol.spaces[0].scope.symbols
+            own += [f"{shown}.{n}" for n, d in said.items() if isinstance(d, Definition) and d.kind == "input"]
         if own and symbol is not None:
             near, started = None, " or ".join(f"set {p} = ..." for p in own[:3])
         help_ = f"nearest: '{near}'" if near else started

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 
+from sysdyn.dsl.elaborate.instances.head import Body
 from sysdyn.dsl.elaborate.statements import events
 from sysdyn.dsl.elaborate.statements.parameters import Parameters
 from sysdyn.dsl.model import dimensions as dim
@@ -44,6 +45,8 @@ DECLARED = (
     syntax.Discrete,
 )
 """Statements that bring names into a scope by `declare`."""
+BEGINNING = (syntax.Coord, syntax.Implicit, syntax.State, syntax.Node)
+"""Those that may say a value to begin with, which is read by `begin` once all names stand."""
 
 
 class Declarations(Parameters):
@@ -52,6 +55,17 @@ class Declarations(Parameters):
     def __init__(self, report: Report) -> None:
         super().__init__(report)
         self._begun: dict[tuple[Node, tuple[Loop, ...], int], Initial] = {}  # by target, loops, depth
+
+    def declare_all(self, body: Body, do: Callable[[syntax.Statement], None], more: tuple[type, ...] = ()) -> None:
+        """The names of a body by `do`, in any order: what takes its unit from a value comes behind what that reads,
+        values to begin with behind all names.  more: kinds of statements that `do` reads besides.
+        """
+        statements = body.with_loops((*DECLARED, *more))
+        self.each([s for s in statements if not _takes_its_unit(s[0])], do)
+        if late := [s for s in statements if _takes_its_unit(s[0])]:
+            named = {s.decl.name: (s, at) for s, at in late if isinstance(s, syntax.State | syntax.Discrete)}
+            self.each(late if len(named) < len(late) else self.by_dependence(named), do)
+        self.each(body.of(BEGINNING), self.begin)
 
     def declare(self, statement: syntax.Statement) -> None:
         """One declaration; statements of other kinds are passed over."""
@@ -64,8 +78,6 @@ class Declarations(Parameters):
                     family = self.current.family(decl.name, self.shape(decl))
                     self._unknown(decl, "e", family, unit.dimension, None, False)
                     self.parts.unknowns.append(Unknown(family.name, family.whole, unit, self.place(decl.span)))
-                    if statement.init is not None:
-                        self._own_initial(decl, "e", family, unit.dimension, statement.init)
             case syntax.State():
                 self._state(statement)
             case syntax.Node():
@@ -96,12 +108,7 @@ class Declarations(Parameters):
             return
         domain = self.domain(statement.domain)
         for decl in statement.decls:
-            symbol = self._node(decl, decl.name, domain)
-            self.enter(symbol)
-            if statement.init is not None:
-                effort = domain.common == "effort"
-                unit = domain.effort if effort else domain.displacement
-                self._own_initial(decl, "ne" if effort else "nq", symbol.family, unit.dimension, statement.init)
+            self.enter(self._node(decl, decl.name, domain))
 
     def _bundle(self, decl: syntax.Decl, name: str, bundle: BundleSymbol) -> BundleNode:
         """The nodes of a bundle, of those within it too; name: the path to it."""
@@ -135,8 +142,29 @@ class Declarations(Parameters):
                     family.name, family.whole, co, own, rate, conjugate, effort, statement.tangible, place, domain
                 )
             )
-            if statement.init is not None:
-                self._own_initial(decl, "q", family, own.dimension, statement.init)
+
+    def begin(self, statement: syntax.Statement) -> None:
+        """The value with which what a declaration names begins; nothing where the name is another's (E106)."""
+        match statement:
+            case syntax.Coord() | syntax.Implicit() | syntax.Node():
+                init, decls = statement.init, statement.decls
+            case syntax.State(decl=decl, value=value) if value is not None:
+                init, decls = syntax.Initial("fixed", value, value.span), (decl,)
+            case _:
+                return
+        if init is None:
+            return
+        for decl in decls:
+            symbol = self.scope.symbols.get(decl.name)
+            if not isinstance(symbol, UnknownSymbol | NodeSymbol) or symbol.place != self.place(decl.span):
+                raise Failed
+            if isinstance(symbol, UnknownSymbol):
+                kind, dimension = symbol.kind, symbol.dimension
+            elif symbol.domain.common == "effort":
+                kind, dimension = "ne", symbol.domain.effort.dimension
+            else:
+                kind, dimension = "nq", symbol.domain.displacement.dimension
+            self._own_initial(decl, kind, symbol.family, dimension, init)
 
     def _own_initial(
         self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, init: syntax.Initial
@@ -151,7 +179,8 @@ class Declarations(Parameters):
             )
             target = ex.var(family.name, kind, *family.prefix, *at)
             for one, value, loops in self.values_at_start(target, init.value, dimension, message, outer):
-                self.add_initial(Initial(one, value, init.kind == "fixed", loops, self.place(init.span)))
+                fixed, unit = init.kind == "fixed", si(dimension).text
+                self.add_initial(Initial(one, value, fixed, loops, self.place(init.span), unit=unit))
 
     def values_at_start(
         self, target: Node, written: syntax.Expr, dimension: Dimension, message: str, outer: int
@@ -197,9 +226,6 @@ class Declarations(Parameters):
         family = self.current.family(decl.name, self.shape(decl))
         self._unknown(decl, "s", family, unit.dimension, None, False)
         self.parts.states.append(State(family.name, family.whole, unit, self.place(decl.span)))
-        if statement.value is not None:
-            init = syntax.Initial("fixed", statement.value, statement.value.span)
-            self._own_initial(decl, "s", family, unit.dimension, init)
 
     def _definition(self, statement: syntax.Let | syntax.Output | syntax.Quasi) -> None:
         """let, output, quasi: resolved when they are read first."""
@@ -238,3 +264,8 @@ class Declarations(Parameters):
         help_ = f"'{near}'" if near else f"one of {', '.join(domains)}"
         help_ = habits.DOMAINS.get(word.name, help_)
         raise self.resolver.fail("E202", f"'{word.name}' is not a domain", word.span, help=help_)
+
+
+def _takes_its_unit(statement: syntax.Statement) -> bool:
+    """Whether a declaration has no unit but that of its value."""
+    return isinstance(statement, syntax.Discrete) or (isinstance(statement, syntax.State) and statement.unit is None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from typing import TypeVar
 
 from sysdyn.dsl.elaborate.instances.head import Body
 from sysdyn.dsl.elaborate.parts import ElaborationContext, declared
@@ -21,6 +22,8 @@ from sysdyn.dsl.text.diagnostics import Place, Related
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
+Valued = TypeVar("Valued", syntax.Param, syntax.State | syntax.Discrete)
+"""A declaration with a value."""
 Stated = tuple[syntax.Param, tuple[syntax.For, ...]]
 
 
@@ -40,7 +43,7 @@ class Parameters(ElaborationContext):
     def declare_parameters(self, body: Body, given: dict[str, Argument]) -> None:
         """Parameters in the order of their dependence (the default of one may name another); given: arguments."""
         said = len(self.report)
-        order = body.order if body.order is not None else self._by_dependence(self._first(body))
+        order = body.order if body.order is not None else self.by_dependence(self._first(body))
         if len(self.report) == said:  # what is wrong is told of each instance
             body.order = order
         for statement, loops in order:
@@ -66,8 +69,10 @@ class Parameters(ElaborationContext):
             found[name] = (statement, loops)
         return found
 
-    def _by_dependence(self, found: dict[str, Stated]) -> tuple[Stated, ...]:
-        """The parameters, those that others name before these; E105."""
+    def by_dependence(
+        self, found: dict[str, tuple[Valued, tuple[syntax.For, ...]]]
+    ) -> tuple[tuple[Valued, tuple[syntax.For, ...]], ...]:
+        """Declarations by name, those that others name before these; E105."""
         needs = {name: _names_in(*stated) & found.keys() for name, stated in found.items()}
         order, circles = in_order(found, lambda name: sorted(needs[name]))
         for circle in circles:
@@ -202,7 +207,8 @@ class Parameters(ElaborationContext):
         return self.resolver.fail(code, message, given.place, help=help, related=(where,))
 
 
-def _names_in(statement: syntax.Param, loops: tuple[syntax.For, ...]) -> set[str]:
+def _names_in(statement: syntax.Param | syntax.State | syntax.Discrete, loops: tuple[syntax.For, ...]) -> set[str]:
+    """What a declaration reads, with the loops around it."""
     bounds = [bound for loop in loops for bound in (loop.lower, loop.upper)]
     roots: list[object] = [statement.value, *statement.decl.indices, *bounds]
     return {n.name for r in roots if r is not None for n in walk(r) if isinstance(n, syntax.Name)}  # type: ignore[arg-type]

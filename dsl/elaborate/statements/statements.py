@@ -177,13 +177,15 @@ class Statements(Declarations):
             help_ = f"discrete {name} = ... there; a param as its value can be set in a scene"
             raise self.resolver.fail("E903", message, s.span, help=help_)
         message = f"'{target.node}' is in {dim.show(target.dimension)} but starts at {{}}"
-        given = self.values_at_start(target.node, s.initial.value, target.dimension or NONE, message, outer)
+        dimension = target.dimension or NONE
+        given = self.values_at_start(target.node, s.initial.value, dimension, message, outer)
         for one, value, loops in given:
             for inner in ex.variables(value):
                 message = f"the initial value of '{one}' depends on '{inner}'"
                 raise self.resolver.fail("E807", message, s.initial.value.span, help="parameters and constants only")
             fixed = s.initial.kind == "fixed"
-            self.add_initial(Initial(one, value, fixed, loops, self.place(s.span)), override)
+            begun = Initial(one, value, fixed, loops, self.place(s.span), unit=si(dimension).text)
+            self.add_initial(begun, override)
 
     def _sliced(self, target: syntax.Expr, stack: ExitStack) -> syntax.Expr:
         """`x[1..n].f` becomes a loop over x[i].f."""
