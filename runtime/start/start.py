@@ -36,7 +36,6 @@ from sysdyn.runtime.start.strategies import (
     around,
     first,
     hopeful,
-    unmoved,
 )
 from sysdyn.values import dataclass
 
@@ -187,8 +186,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | 
     best = Solution(x, np.inf)
     for name, strategy in hopeful(starter, t, x, free, itertools.islice(applicable(starter, t, x), most)):
         found, holds = first(strategy(starter, t, x, guess, free), x)
-        where = unmoved(starter, t, found, guess, free) if holds else None
-        again, sure = (where, True) if where is not None else anew(starter, t, found, x, guess, free)
+        again, sure = anew(starter, t, found, x, guess, free)
         exact = sharp(starter, t, again, free) if holds or sure else None
         if exact is not None:
             return exact, name
