@@ -308,11 +308,6 @@ class Starter:
         return found
 
     @functools.cached_property
-    def measures(self) -> Ints:
-        """As `Equations.measures` tells."""
-        return self.equations.measures(self.settled)
-
-    @functools.cached_property
     def momenta(self) -> Mask:
         """What is moved by the measure of momenta, of displacements in the complementary family [unknowns]."""
         return np.asarray(self.equations.moving(self.settled) != self.system.description.complementary)
