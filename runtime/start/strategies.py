@@ -122,7 +122,8 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     follows, nearly = free & starter.following(t, x), False
     begun: Floats | None = x
     if _beyond(starter, t, x, follows):
-        begun = _on_its_rows(starter, t, x, guess, free & ~follows, follows)
+        small = x.size <= DENSE  # a long chain is pulled straight at once
+        begun = _on_its_rows(starter, t, x, guess, free & ~follows, follows) if small else None
     if begun is not None:
         flat, whole = off_the_flat(starter, t, begun, follows), [(begun, follows)]
         for beside, may in itertools.chain(flat, whole) if x.size <= DENSE else itertools.chain(whole, flat):
