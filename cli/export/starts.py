@@ -29,7 +29,7 @@ def start_tables(system: System, state: ConsistentState) -> Start | None:
         assembled(starter.settled),
         starter.n,
         starter.rates.astype(np.int32),
-        np.flatnonzero(starter.given.written).astype(np.int32),
+        np.flatnonzero(starter.written[: starter.n]).astype(np.int32),
         starter.system.form.k_q,
         starter.system.form.k_f,
         x,

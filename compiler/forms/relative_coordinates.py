@@ -15,7 +15,7 @@ Received: an EnergyModel whose rows are as written.  Returned: the same model in
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from sysdyn.compiler.forms.momenta import moved
@@ -208,8 +208,10 @@ def _is_linear_in_flows(root: Node, group: _Anchors, rate: str) -> bool:
 
 
 def _without_conjugates(model: EnergyModel, names: set[str]) -> bool:
+    """Whether statements read these coordinates by their displacements and flows alone."""
     m = model.mirror
-    return all(n.data[1] in (m.coordinate, m.rate) for n in _unknowns(model) if n.data[0] in names)
+    read = (n for root in model.expressions() for n in ordered_variables(root) if n.op == "var" and n.data[0] in names)
+    return all(n.data[1] in (m.coordinate, m.rate) for n in read)
 
 
 class _Along:
@@ -249,12 +251,6 @@ def _meet(a: tuple[tuple[Node, Node], ...], b: tuple[tuple[Node, Node], ...]) ->
     """Whether the text lets both hold one element."""
     apart = (sub(low, high) for x, y in zip(a, b, strict=True) for low, high in ((x[0], y[1]), (y[0], x[1])))
     return not any(is_const(gap) and gap.data > 0.0 for gap in apart)
-
-
-def _unknowns(model: EnergyModel) -> Iterable[Node]:
-    """Every variable of a coordinate that any statement reads."""
-    names = {c.name for c in model.coordinates}
-    return (n for root in model.expressions() for n in ordered_variables(root) if n.op == "var" and n.data[0] in names)
 
 
 def _changed(model: EnergyModel, change: _Anchors) -> EnergyModel:

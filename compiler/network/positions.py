@@ -90,33 +90,27 @@ def _springs(network: Network, wanted: frozenset[Wanted]) -> Iterator[_Join]:
 
 def with_positions(network: Network, wanted: frozenset[Wanted]) -> Network:
     """Positions as unknowns of the start, in parts where displacements are said or stores may stand in loops; wanted:
-    displacements with quadratures.  Where the text tells every position of a part, contents begin at the differences.
+    displacements with quadratures.
     """
     springs = tuple(_springs(network, wanted))
     read = (n for n in ex.topological(expressions(network, "initials")) if n.op == "var")
     said = {n.data[0] for n in read if n.data[1] in ("nq", "bq", "be")}
     parts = _parts(network, springs, said | {name for name, _ in wanted}, open_=_says_of_others(network))
-    told = _told(network, springs, parts, said)
 
     def position(end: Terminal) -> Node:
-        if end.node in told:
-            return told[end.node].value
         return ex.const(0.0) if end.node is None else ex.var(f"{end.node}.start", "start", *end.at)
 
     def begun(join: _Join) -> Initial:
         apart = ex.sub(position(join.plus), position(join.minus))
-        if all(name in told for name in join.nodes):
-            return Initial(join.content, apart, all(told[n].fixed for n in join.nodes), join.loops, join.place)
         return Initial(ex.sub(join.content, apart), ex.const(0.0), True, join.loops, join.place, join.name)
 
     def positioned(root: Node) -> Node:
         found = _positions([root])
         return ex.substitute(root, {n: position(Terminal(n.data[0], n.args)) for n in found}) if found else root
 
-    nodes = [n for n in network.nodes if n.name in parts and n.name not in told]
+    nodes = [n for n in network.nodes if n.name in parts]
     points = (_point_of(n) for n in network.nodes if n.name in parts and (n.name, "nq") in wanted)
-    left = tuple(i for i in network.initials if i not in told.values())
-    kept = rewritten(replace(network, initials=left), positioned, ("initials",)).initials
+    kept = rewritten(network, positioned, ("initials",)).initials
     return replace(
         network,
         positions=tuple(State(f"{n.name}.start", n.shape, n.domain.displacement, n.place) for n in nodes),
@@ -160,16 +154,3 @@ def _parts(network: Network, springs: Sequence[_Join], said: set[str], *, open_:
     asked = {parts.first(name) for name in said}
     heads = {n.name: parts.first(n.name) for n in network.nodes if n.domain.common == "flow"}
     return {name: head for name, head in heads.items() if head in asked}
-
-
-def _told(
-    network: Network, springs: Sequence[_Join], parts: dict[str, str], said: set[str]
-) -> dict[str | None, Initial]:
-    """Positions by the text of single nodes, in parts of which it tells all of them and no content."""
-    found: dict[str | None, list[Initial]] = {}
-    for i in network.initials:
-        if i.target.op == "var" and i.target.data[1:] == ("nq", 0) and not ex.variables(i.value):
-            found.setdefault(i.target.data[0], []).append(i)
-    open_ = {parts[n.name] for n in network.nodes if n.name in parts and (n.shape or len(found.get(n.name, ())) != 1)}
-    open_ |= {parts[name] for j in springs if j.name in said for name in j.nodes if name in parts}
-    return {name: items[0] for name, items in found.items() if name in parts and parts[name] not in open_}

@@ -31,7 +31,6 @@ from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.numerics.tall import free_unknowns
 from sysdyn.runtime.start.integrated import BROKEN, integrated, missed
 from sysdyn.runtime.start.settled import inertial_rows
-from sysdyn.values import dataclass
 
 FOLLOWS = ("f", "p", "e", "kappa", "mu")
 LOOSE = 1e3
@@ -41,27 +40,13 @@ ROUND_OFF = 1e-14
 ITERATIONS = 30
 CONVERGED = 1e-10
 """Of their magnitudes: a step of Newton's method behind which the next is round-off."""
-POINTS = (2, 4, 8, 16, 32)
-"""Points of Gauss's rule, until two agree within BROKEN."""
+POINTS = 24
+"""Of Gauss's rule, by which powers up to the 47th have their mean."""
 
 Entries = tuple[NDArray[Any], NDArray[Any], Floats, Floats]
 """Row, column, value, its mean over the way so far.  Row 2 k is row k behind the instant, 2 k + 1 its integral; column
 2 k is unknown k, 2 k + 1 its integral over the instant, of flows and momenta their rate behind it.
 """
-
-
-@dataclass(frozen=True, slots=True)
-class _Rows:
-    """Rows [rows] that hold behind the instant, in unknowns that move [unknowns]; rows [rows] whose integrals must be
-    met; the entries of those that are linear in moves and integrals, from dF/dy, dF/dyd and y; ease [unknowns]: times
-    their magnitudes, how far these may move.
-    """
-
-    behind: Mask
-    moves: Mask
-    met: Mask
-    integrals: Callable[[Floats, Floats, Floats], Entries]
-    ease: Floats | float = 1.0
 
 
 class UnbalancedError(Exception):
@@ -185,8 +170,8 @@ class Instant:
         behind = self._given.copy()
         behind[self.system.held[0]] = True  # they read "multiplier = 0"
         # other dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
-        rows = _Rows(behind, (self.system.kinds != "s") | jumps, met, lambda *_: (i, j, v, v), ease)
-        found, impulse = self._jump((t, y, yd), magnitude, rows)
+        moves = (self.system.kinds != "s") | jumps
+        found, impulse = self._jump((t, y, yd), magnitude, behind, moves, met, lambda *_: (i, j, v, v), ease)
         found = np.where(jumps, found, y)
         return found, self._pushed(slope, found - y, impulse, inertia * magnitude[self._column])
 
@@ -242,24 +227,21 @@ class Instant:
             return i, j, slopes, np.append(means[taken], slopes[taken.size :])
 
         aim = np.stack([np.zeros(self.system.rows) if aims is None else aims, -push], axis=1)
-        meant = _Rows(behind, moves, met, integrals, ease)
         begun = self._sloping(t, y, yd, magnitude)
-        return self._jump((t, y, yd), magnitude, meant, begun, aim, asked=aims is not None)
+        return self._jump(
+            (t, y, yd), magnitude, behind, moves, met, integrals, ease, begun=begun, aims=aim, asked=aims is not None
+        )
 
     def _mean(self, t: float, way: tuple[Floats, Floats], yd: Floats, jyd: Floats) -> Floats:
         """Mean of dF/dyd [entries] along the straight way, jyd at its end: times the jumps of flows and contents what
         momenta and contents of nonlinear stores jump by, whatever the way is.
         """
-        (begin, end), last = way, jyd
-        if np.array_equal(last, self.system.jacobian(t, 0.5 * (begin + end), yd)[1], equal_nan=True):
-            return last
-        for number in POINTS:
-            parts, weights = np.polynomial.legendre.leggauss(number)
-            at = [begin + 0.5 * (1.0 + part) * (end - begin) for part in parts.tolist()]
-            found = 0.5 * np.asarray(weights) @ [self.system.jacobian(t, y, yd)[1] for y in at]
-            if (np.abs(found - last) <= BROKEN * np.abs(found)).all():
-                break
-            last = found
+        begin, end = way
+        if np.array_equal(jyd, self.system.jacobian(t, 0.5 * (begin + end), yd)[1], equal_nan=True):
+            return jyd
+        parts, weights = np.polynomial.legendre.leggauss(POINTS)
+        at = (begin + 0.5 * (1.0 + part) * (end - begin) for part in parts.tolist())
+        found = 0.5 * np.asarray(weights) @ [self.system.jacobian(t, y, yd)[1] for y in at]
         return np.where(np.isfinite(found), found, 0.0)
 
     def _leaves_open(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> bool:
@@ -284,27 +266,33 @@ class Instant:
         self,
         before: tuple[float, Floats, Floats],
         magnitude: Floats,
-        meant: _Rows,
+        behind: Mask,
+        moves: Mask,
+        met: Mask,
+        integrals: Callable[[Floats, Floats, Floats], Entries],
+        ease: Floats | float,
+        *,
         begun: Floats | None = None,
         aims: Floats | float = 0.0,
-        *,
         asked: bool = False,
     ) -> tuple[Floats, Floats]:
         """The least change of y that meets the rows, from where it has begun, without its round-off; impulses of forces
         [unknowns]; UnbalancedError.  Where that comes to no numbers y is as it was, and there are none.
 
-        before: t, y, yd; aims [rows, 2]: what the rows behind the instant shall be, and the integrals.  asked: numbers
-        there must be, else NotFiniteError.
+        before: t, y, yd; behind [rows]: what holds behind the instant, in what moves [unknowns]; met [rows]: whose
+        integrals must be met; integrals: entries linear in moves and integrals, from dF/dy, dF/dyd and y; ease
+        [unknowns]: times their magnitudes, how far these may move; aims [rows, 2]: what the rows behind the instant
+        shall be, and the integrals.  asked: numbers there must be, else NotFiniteError.
         """
         t, start, yd = before
         y, integral, step = start if begun is None else begun, np.zeros(start.size), np.inf
-        here = meant.behind[self._row] & meant.moves[self._column]
-        scale = np.stack([magnitude * meant.ease, np.full(start.size, np.nan)], axis=1).ravel()
+        here = behind[self._row] & moves[self._column]
+        scale = np.stack([magnitude * ease, np.full(start.size, np.nan)], axis=1).ravel()
         for _ in range(ITERATIONS):
             jy, jyd = (np.where(np.isfinite(item), item, 0.0) for item in self.system.jacobian(t, y, yd))
-            i, j, v, mean = meant.integrals(jy, jyd, y)
+            i, j, v, mean = integrals(jy, jyd, y)
             aim = np.zeros((self.system.rows, 2)) + aims
-            aim[meant.behind, 0] -= self.system.residual(t, y, yd)[meant.behind]
+            aim[behind, 0] -= self.system.residual(t, y, yd)[behind]
             change, aim = np.stack([y - start, integral], axis=1).ravel(), aim.ravel()
             np.add.at(aim, i, -mean * change[j])
             if step <= CONVERGED:
@@ -320,7 +308,7 @@ class Instant:
             step = float((np.abs(move[::2]) / np.maximum(magnitude, np.abs(y))).max(initial=0.0))
         wanted = (np.zeros((self.system.rows, 2)) + aims).ravel()
         size = np.fmax(scale, np.stack([np.maximum(np.abs(y), np.abs(start)), 0.0 * y], axis=1).ravel())
-        off = np.where(meant.met, missed((i, j, mean), size, (aim, wanted))[1::2], 0.0)
+        off = np.where(met, missed((i, j, mean), size, (aim, wanted))[1::2], 0.0)
         if off.any():
             raise UnbalancedError(int(np.argmax(off)))
         return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._integrated, integral, 0.0)

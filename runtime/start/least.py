@@ -60,9 +60,8 @@ def weights(starter: Starter, t: float, x: Floats, scale: Floats, inert: Floats)
     """
     known, content = starter.equations, scale.copy()
     np.multiply(content[: inert.size], np.abs(inert), out=content[: inert.size], where=inert != 0.0)
-    content /= largest_of_group(starter.measures, content)
-    if x.size > LARGE:
-        starter.__dict__.pop("measures", None)
+    settled = starter.settled
+    content /= largest_of_group(settled.once_if_small("measures", lambda: known.measures(settled)), content)
     np.multiply(content, WEIGHT["unwritten"], out=content, where=~starter.written)
     own = largest_of_group(known.alike, scale)
     np.multiply(WEIGHT["following"], np.divide(scale, own, out=own), out=own)

@@ -36,7 +36,6 @@ from sysdyn.runtime.start.strategies import (
     around,
     first,
     hopeful,
-    unmoved,
 )
 from sysdyn.values import dataclass
 
@@ -187,8 +186,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | 
     best = Solution(x, np.inf)
     for name, strategy in hopeful(starter, t, x, free, itertools.islice(applicable(starter, t, x), most)):
         found, holds = first(strategy(starter, t, x, guess, free), x)
-        where = unmoved(starter, t, found, guess, free) if holds else None
-        again, sure = (where, True) if where is not None else anew(starter, t, found, x, guess, free)
+        again, sure = anew(starter, t, found, x, guess, free)
         exact = sharp(starter, t, again, free) if holds or sure else None
         if exact is not None:
             return exact, name
@@ -224,7 +222,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         scale = np.maximum(starter.scale(t, freed.x), starter.scale(t, guess))
         change = np.where(starter.free, 0.0, np.abs(freed.x - guess) / scale)
         places = [int(k) for k in np.argsort(-change)[:5] if change[k] > MOVED]
-        candidates = tuple(dict.fromkeys(starter.given.label(k) for k in places))
+        candidates = tuple(dict.fromkeys(starter.label(k) for k in places))
     kind = "fixed"
     if not candidates:
         kind = "gamma" if rows and rows[0].kind.startswith("gamma") else "stuck"
@@ -322,7 +320,7 @@ def _integrated(starter: Starter) -> tuple[Places, Places]:
 def _close_to(starter: Starter, t: float, y: Floats) -> Floats:
     """A state as the guess, but for its multipliers, which redundant rows make as large as they like."""
     system = starter.system
-    near = np.where(system.are(*STATE, "e"), y, starter.given.guess[: system.unknowns])
+    near = np.where(system.are(*STATE, "e"), y, starter.guess[: system.unknowns])
     return starter.unknowns(t, near, np.zeros(near.size))
 
 

@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import ctypes as c
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from hashlib import sha256
 from typing import Any
 
@@ -33,7 +32,6 @@ from sysdyn.runtime.numerics.work import Work
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.runtime.start.residue import Residue
 from sysdyn.runtime.start.sums import Sums, Weights, of_few, of_many, weights
-from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
 STATE = ("q", "f", "p", "s", *START)
@@ -43,36 +41,6 @@ DRIFT = 0.55
 WRITTEN = 4.0 * float(np.finfo(float).eps)
 """Of the largest of its like: a fixed value that is no round-off of the text's own."""
 EQUATIONS = "equations of the start"
-
-
-@dataclass(frozen=True, slots=True)
-class _Given:
-    """Initial values on y: guess [unknowns], fixed and written masks; said: statements and where, fixed ones last."""
-
-    guess: Floats
-    fixed: Mask
-    written: Mask
-    said: Sequence[tuple[Initial, Ints]]
-
-    def label(self, place: int) -> RowLabel:
-        """Of the statement that counts."""
-        return next(item.label for item, own in reversed(self.said) if place in own)
-
-
-def _given(system: System) -> _Given:
-    """The initial values of a text.  InconsistentStart where two fixed ones differ."""
-    at, initial = system.form.at, system.description.initial
-    guess, fixed, written = stated(at, system.unknowns, initial)
-    said = [(item, at[item.family] + item.positions) for item in sorted(initial, key=lambda item: item.fixed)]
-    found = _Given(guess, fixed, written | system.are("slack"), said)
-    for item, own in ((item, own) for item, own in said if item.fixed):
-        apart = np.abs(found.guess[own] - item.values)
-        wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(found.guess[own]), np.abs(item.values)))
-        if wrong.size:
-            place = int(own[wrong[0]])
-            labels = item.label, found.label(place)
-            raise InconsistentStart("fixed", float(apart[wrong[0]]), (), labels, (system.name(place),))
-    return found
 
 
 def remembered(
@@ -112,7 +80,8 @@ class Starter:
         self.settled = settled = system.another("start")
         if system.unknowns > LARGE:  # found again where it is asked
             system.put_away(whole=True)
-        self.given = _given(settled)
+        values, fixed, written = stated(settled.form.at, settled.unknowns, settled.description.initial)
+        self._agreeing(values)
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
         if known.unknowns > LARGE:
@@ -120,6 +89,9 @@ class Starter:
             settled.forget_once("structural")
         self.n, self.rates, self.measured = known.n, known.rates, known.measured
         self._momentum, self._flow = known.momentum, known.flow
+        self.guess = np.append(values, np.zeros(self.rates.size))
+        self.free = np.append(~fixed, np.ones(self.rates.size, dtype=bool))
+        self.written = np.append(written | settled.are("slack"), np.zeros(self.rates.size, dtype=bool))
         self.every = ~known.unsettled  # rows that must hold
         self.rows, self.columns = known.rows, known.columns
         unsettled = np.flatnonzero(known.unsettled)
@@ -127,10 +99,25 @@ class Starter:
         self.every[self._sums.places] = True
         if self.summed:
             self.rows, self.columns = np.append(self.rows, self._sums.rows), np.append(self.columns, self._sums.columns)
-        self.guess = np.append(self.given.guess, np.zeros(self.rates.size))
-        self.free = np.append(~self.given.fixed, np.ones(self.rates.size, dtype=bool))
-        self.written = np.append(self.given.written, np.zeros(self.rates.size, dtype=bool))
-        self.given = replace(self.given, guess=self.guess[: self.n], written=self.written[: self.n])
+
+    def _said(self) -> list[tuple[Initial, Ints]]:
+        """Initial values on y and where they stand, fixed ones last."""
+        at, initial = self.settled.form.at, self.settled.description.initial
+        return [(item, at[item.family] + item.positions) for item in sorted(initial, key=lambda item: item.fixed)]
+
+    def label(self, place: int) -> RowLabel:
+        """Of the initial value that counts."""
+        return next(item.label for item, own in reversed(self._said()) if place in own)
+
+    def _agreeing(self, values: Floats) -> None:
+        """InconsistentStart where two fixed ones differ; values [unknowns of y]: those that count."""
+        for item, own in (pair for pair in self._said() if pair[0].fixed):
+            apart = np.abs(values[own] - item.values)
+            wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(values[own]), np.abs(item.values)))
+            if wrong.size:
+                place = int(own[wrong[0]])
+                labels = item.label, self.label(place)
+                raise InconsistentStart("fixed", float(apart[wrong[0]]), (), labels, (self.settled.name(place),))
 
     @contextmanager
     def granted(self, share: float = 1.0) -> Iterator[None]:
@@ -165,7 +152,7 @@ class Starter:
         """Displacements in constraints alone, of which nothing is said: no store holds them [unknowns]."""
         form, known = self.system.form, self.equations
         found = np.zeros(known.unknowns, dtype=bool)
-        found[form.k_q] = ~self.given.written[form.k_q]
+        found[form.k_q] = ~self.written[form.k_q]
         found[known.columns[~self.groups("phi")[known.rows]]] = False
         return found
 
@@ -181,7 +168,7 @@ class Starter:
         """X of y, yd, the inverse of `expand`: positions are those of the contents, guessed expressions miss what they
         do there.
         """
-        x = np.concatenate([y, self.given.guess[y.size :], yd[self.rates]])
+        x = np.concatenate([y, self.guess[y.size : self.n], yd[self.rates]])
         at = np.flatnonzero((self.moves("start") & self.free)[self.columns])
         if at.size:
             aim = np.where(np.isin(np.arange(self.settled.rows), self.rows[at]), -self.residual(t, x), 0.0)
@@ -295,7 +282,8 @@ class Starter:
 
     def _inertia(self, shift: float) -> Inertia:
         """Inertia beside the state that the text says."""
-        y = self.given.guess + shift * (1.0 + np.abs(self.given.guess)) * np.cos(np.arange(self.n))
+        guess = self.guess[: self.n]
+        y = guess + shift * (1.0 + np.abs(guess)) * np.cos(np.arange(self.n))
         return Inertia(self.settled, *self.settled.jacobian(0.0, y, np.zeros(self.n)))
 
     @remembered
@@ -310,19 +298,14 @@ class Starter:
         state = self.settled.are(*STATE)
         carries = state & ~self.measured
         carries[: self.system.unknowns] &= self.system.differential(jyd)
-        carries |= self.given.written & state
+        carries |= self.written[: self.n] & state
         carries &= ~self.equations.told
-        flow, momentum, written = self._flow, self._momentum, self.given.written
+        flow, momentum, written = self._flow, self._momentum, self.written
         carries[flow[~written[flow]]] = False
         carries[momentum[written[flow] & ~self.equations.joined[flow]]] = False
         found = np.ones(x.size, dtype=bool)
         found[: self.n] = ~carries
         return found
-
-    @functools.cached_property
-    def measures(self) -> Ints:
-        """As `Equations.measures` tells."""
-        return self.equations.measures(self.settled)
 
     @functools.cached_property
     def momenta(self) -> Mask:

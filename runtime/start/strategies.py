@@ -18,7 +18,7 @@ from sysdyn.runtime.numerics.gauss_newton import CORRECTED, Solution, solve, ste
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.start.corrections import EXACT, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
-from sysdyn.runtime.start.flat import OWN, flat_at, off_the_flat, unasked, without_rates
+from sysdyn.runtime.start.flat import OWN, off_the_flat, unasked, without_rates
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import contradicting, no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
@@ -122,8 +122,8 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     follows, nearly = free & starter.following(t, x), False
     begun: Floats | None = x
     if _beyond(starter, t, x, follows):
-        at_rest = x.size <= DENSE and flat_at(starter, t, x, follows).any()
-        begun = _on_its_rows(starter, t, x, guess, free & ~follows, follows) if at_rest else None
+        small = x.size <= DENSE  # a long chain is pulled straight at once
+        begun = _on_its_rows(starter, t, x, guess, free & ~follows, follows) if small else None
     if begun is not None:
         flat, whole = off_the_flat(starter, t, begun, follows), [(begun, follows)]
         for beside, may in itertools.chain(flat, whole) if x.size <= DENSE else itertools.chain(whole, flat):
@@ -169,30 +169,6 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     if not holds:
         starter.every[:], starter.resting[:] = before
     return found, holds
-
-
-def unmoved(starter: Starter, t: float, found: Solution, guess: Floats, free: Mask) -> Solution | None:
-    """In place of a solution whose state moved that with the state where it has to be: at its guess but for what rows
-    of the state alone say; None where the rest does not follow from there.  Newton's steps along laws without a slope
-    move what need not move.
-    """
-    x = found.x
-    follows = free & starter.following(t, x)
-    state = free & ~follows
-    if x.size > DENSE or (x == guess)[state].all() or not _bent(starter, t, x).any():
-        return None
-    with starter.granted():
-        begun = np.where(state, guess, x)
-        if _beyond(starter, t, begun, follows):
-            on = _on_its_rows(starter, t, x, guess, state, follows)  # on the root that was found
-            begun = x if on is None else on
-        if (np.abs(begun - x) <= EXACT * starter.largest_alike(x))[state].all():
-            return None
-        for beside, may in itertools.chain([(begun, follows)], off_the_flat(starter, t, begun, follows)):
-            again, holds = rescaled(starter, t, beside, guess, may, least=False)
-            if holds:
-                return again
-    return None
 
 
 def _as_written(starter: Starter, t: float, x: Floats) -> Mask:

@@ -32,29 +32,21 @@ def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
     return np.isin(np.arange(system.unknowns), column) if free is None else ~free
 
 
-def _nudges(number: int) -> list[tuple[Floats, Floats]]:
-    """Parts by which values are moved, and times by which rates are, at the start and beside it."""
-    drawn = [(uniform(number, 0, k * number), uniform(number, 1, k * number)) for k in range(2)]
-    return [(0.5 + 0.5 * part, 1.0 + times) for part, times in drawn]
-
-
 def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:
     """[observed]: elements of block observe whose derivative follows from the equations."""
     y, yd = start.for_form(system)
     jyd = system.slopes(start.t, y, yd, rate=True)
     free = ~unique(system, jyd)
     free[with_flows(system)[1]] = False  # functions of the tested momenta
+    found = np.ones(system.observed_rows("observe_rate")[1], dtype=bool)
     if not free.any():
-        return np.ones(system.observed_rows("observe_rate")[1], dtype=bool)
-    nudges = system.once_if_small("nudges", lambda: _nudges(y.size))
-    found: NDArray[np.bool_] | None = None
-    for size, (part, times) in zip((0.0, MOVED), nudges, strict=True):
-        there = y + size * (np.abs(y) + MOVED) * part
-        other = yd + free * times * np.where(yd != 0.0, np.abs(yd), 1.0)
+        return found
+    for k, size in enumerate((0.0, MOVED)):
+        part, times = (uniform(y.size, place, k * y.size) for place in (0, 1))
+        there = y + size * (np.abs(y) + MOVED) * (0.5 + 0.5 * part)
+        other = yd + free * (1.0 + times) * np.where(yd != 0.0, np.abs(yd), 1.0)
         with np.errstate(all="ignore"):
             one = system.observe_rate(start.t, there, yd)
             two = system.observe_rate(start.t, there, other)
-        same = (one == two) | np.isnan(one) | np.isnan(two)
-        found = same if found is None else found & same
-    assert found is not None
+        found &= (one == two) | np.isnan(one) | np.isnan(two)
     return found

@@ -46,11 +46,11 @@ def test_contents_are_differences_of_positions():
     assert told == [("a.start", True, 1.0)]
 
 
-def test_where_all_positions_are_told_contents_are_numbers():
-    """a = 1 and b ~ 3: s is fixed with a, t and u are guessed; so a run beside others needs no search."""
-    names, _, told = rows(("a", "nq", 1.0, True), ("b", "nq", 3.0, False))
-    assert names == []
-    assert told == [("s", True, 1.0), ("t", False, 2.0), ("u", False, 3.0)]
+def test_where_all_positions_are_told_contents_are_differences_of_these():
+    names, missed, told = rows(("a", "nq", 1.0, True), ("b", "nq", 3.0, False))
+    assert names == ["a.start", "b.start"]
+    assert missed(a=1.0, b=3.0, s=1.0, t=2.0, u=3.0) == [0.0, 0.0, 0.0]
+    assert told == [("a.start", True, 1.0), ("b.start", False, 3.0)]
 
 
 def test_what_is_said_of_contents_stays():

@@ -66,11 +66,11 @@ def test_rows_hold_the_constraint_and_its_derivatives():
 
 def test_what_carries_inertia_is_state_and_the_tension_follows():
     found = starter()
-    x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
+    x = found.unknowns(0.0, found.guess[: found.n], np.zeros(found.n))
     follows = by_name(found, found.following(0.0, x))
     assert {name for name, yes in follows.items() if not yes} == {"q_1", "q_2", "f_1", "f_2"}
     assert not found.hollow.any()  # all positions are said
-    assert by_name(found, found.given.fixed)["q_1"]
+    assert not by_name(found, found.free[: found.n])["q_1"]
 
 
 def test_momenta_are_paired_with_their_flows_and_flows_weigh_by_them():
@@ -78,19 +78,20 @@ def test_momenta_are_paired_with_their_flows_and_flows_weigh_by_them():
     momenta, flows = with_flows(found.system)
     names = found.system.unknown_names
     assert [(names[p], names[f]) for p, f in zip(momenta, flows, strict=True)] == [("p_1", "f_1"), ("p_2", "f_2")]
-    x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
+    x = found.unknowns(0.0, found.guess[: found.n], np.zeros(found.n))
     scale = np.ones(x.size)
     weight = by_name(found, weights_of(found, 0.0, x, scale, inertias(found, 0.0, x)))
     # of 2 kg a flow of 1 m/s holds 2 N s, twice what a momentum of 1 N s does
     assert weight["f_1"] == pytest.approx(weight["f_2"])
-    assert found.measures[momenta[0]] == found.measures[flows[0]]
+    measures = found.equations.measures(found.settled)
+    assert measures[momenta[0]] == measures[flows[0]]
     assert inertial_rows(found.settled).any()
 
 
 def test_magnitudes_of_what_is_zero_balance_their_rows():
     """No tension is guessed: in magnitudes of its own the weight of 19.62 N is what q_2 times it has to balance."""
     found = starter()
-    x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
+    x = found.unknowns(0.0, found.guess[: found.n], np.zeros(found.n))
     scale = by_name(found, found.scale(0.0, x))
     assert scale["q_1"] == 3.0
     assert scale["q_2"] == 4.0
@@ -102,8 +103,8 @@ def test_the_written_state_moves_before_what_is_unsaid():
     does not say, what holds nothing; fixed unknowns are in none.
     """
     found = starter()
-    x = found.unknowns(0.0, found.given.guess, np.zeros(found.n))
-    free = np.append(~found.given.fixed, np.ones(x.size - found.n, dtype=bool))
+    x = found.unknowns(0.0, found.guess[: found.n], np.zeros(found.n))
+    free = found.free
     problem = problem_of(found, 0.0, x, x, rows=found.every, free=free, least=True)
     momenta, displacements, *others = ({k for k, yes in by_name(found, of).items() if yes} for of in problem.levels)
     assert momenta == {"f_1", "f_2"}

@@ -28,7 +28,7 @@ def driven(law):
 def at_rest(system, **guess):
     """The equations of its start, unknowns with these values, and which of them are free."""
     starter = Starter(system)
-    y = starter.given.guess.copy()
+    y = starter.guess[: starter.n].copy()
     for name, value in guess.items():
         y[starter.settled.unknown_names.index(name)] = value
     return starter, np.append(y, np.zeros(starter.rates.size)), starter.free.copy()

@@ -63,7 +63,7 @@ def culprit(prepared: Prepared, system: System, error: SolverFailure) -> Culprit
 
 def undefined_at_start(prepared: Prepared, system: System, t: float) -> tuple[str, Place] | None:
     """The operation that is no number at the guesses of the start, and its statement; None where all are."""
-    y = Starter(system).given.guess[: system.unknowns]
+    y = Starter(system).guess[: system.unknowns]
     oracle = Oracle(prepared.compiled.form, prepared.binding)
     for block in prepared.compiled.form.blocks:
         if block.name in (*WITHOUT_ENTRIES, "initial"):
