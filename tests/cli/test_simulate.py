@@ -224,6 +224,13 @@ def test_a_draft_left_alone_tells_its_balance_only_where_it_is_asked_for(expect,
     assert "nan" not in said.out + said.err
 
 
+def test_a_claim_on_the_error_of_a_run_asks_for_accuracy(tmp_path, capsys):
+    path = write(tmp_path, PENDULUM.replace("<= 1 J", "<= 1 uJ"))
+    assert run(["simulate", path, "--method", "bdf", "-o", "out.h5"]) == 1
+    assert "help: audit.energy measures the error of the run: a smaller --accuracy" in capsys.readouterr().err
+    assert run(["simulate", path, "--method", "bdf", "--accuracy", "1e-9", "-o", "out.h5"]) == 0
+
+
 def test_limits_leave_a_readable_trace(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
     assert run(["simulate", path, "--max-steps", "5", "-o", "out.h5"]) == 3

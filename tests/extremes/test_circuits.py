@@ -123,7 +123,7 @@ def test_random_rectifiers_start_where_their_diodes_leave_them(tmp_path, seed):
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("seed", "formulation"),
-    itertools.product(range(20, 40), FORMULATIONS[2:])
+    list(itertools.product(range(20, 40), FORMULATIONS[2:]))
     if LONG
     else [(24, "co_lagrangian"), (25, "co_lagrangian"), (26, "co_hamiltonian"), (33, "co_lagrangian")],
 )

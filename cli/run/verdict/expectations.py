@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.start.starting import holds, where_holds
+from sysdyn.dsl.model.expression import variables
 from sysdyn.dsl.model.network import Expectation, Golden
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy.options import Watch
@@ -21,6 +22,8 @@ from sysdyn.values import dataclass
 OPEN = 1e-12
 """Of the largest terms of the sides of a claim, in the run: what no run resolves (round-off; rows that hold)."""
 LOOSE = ("<=", ">=")
+METERS = ("energy", "constraints", "drift")
+"""Members of audit that are zero of an exact solution."""
 WORSE = 1.1
 """Times the worst sample so far: the next one that breaks a claim and is kept, for sizes are known at the end."""
 
@@ -168,6 +171,13 @@ def _columns(
     return left, right, within
 
 
+def _meters(e: Expectation) -> str:
+    """The meters of numerical error that a claim reads, where it reads nothing else; "" of others."""
+    read = [n for n in variables(e.left) | variables(e.right) if n.op == "var"]
+    own = all(n.data[1] == "audit" and n.data[0] in METERS for n in read)
+    return " and ".join(sorted(f"audit.{n.data[0]}" for n in read)) if own else ""
+
+
 def _report(outcome: Outcome, e: Expectation, worst: tuple[float, float, float, float], report: Report) -> None:
     t, a, b, w = worst
     unit = "" if e.unit.text == "1" else f" {e.unit.text}"
@@ -185,4 +195,6 @@ def _report(outcome: Outcome, e: Expectation, worst: tuple[float, float, float, 
         wanted = max((off - w) / size / 10.0, 1e-13)
         less = f"this is less than the estimated error of the run ({estimate:.1g})"
         help_ = f"{less}: --accuracy {wanted:.0e} would decide it"
+    elif read := _meters(e):
+        help_ = f"{read} measures the error of the run: a smaller --accuracy, or the claim"
     report.error("E909", message, e.place, help=help_)
