@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import switched_motions
 from steep_corners import FAMILIES, drawn
 from told import told
 
@@ -59,6 +60,17 @@ def test_every_family_is_met_as_told(number, tmp_path):
         assert not found.refused
         assert found.met
         assert not found.defect, str(found)
+
+
+@pytest.mark.parametrize(
+    "number", range(len(switched_motions.FAMILIES)), ids=[family.__name__ for family in switched_motions.FAMILIES]
+)
+@pytest.mark.one_in(6)
+def test_what_events_carry_is_met_as_told(number, tmp_path):
+    found = told(tmp_path, switched_motions.drawn(number), "lagrangian", 1e-3, "auto", [])
+    assert not found.refused
+    assert found.met
+    assert not found.defect, str(found)
 
 
 def test_truths_at_two_tolerances_agree_and_are_the_same_for_ever():
