@@ -17,6 +17,8 @@ from scipy.integrate import solve_ivp
 
 PER_RUN = 400
 """Rows of a trace with an interval."""
+MOST = 3000
+"""Pieces of a reference: of a motion that knocks without end there is none."""
 STEPS = {"LSODA": 400, "DOP853": 2000}
 """Of a reference at least: what a gap closes for within a step is not seen."""
 
@@ -80,6 +82,7 @@ class Motion:
                     dense_output=True, rtol=rtol, atol=1e-5 * rtol, max_step=self.end / STEPS[self.method],
                 )  # fmt: skip
                 assert here.success, here.message
+                assert len(begins) < MOST, "knocks without end"
                 begins.append(t)
                 pieces.append(here.sol)
                 y, t = here.y[:, -1].copy(), float(here.t[-1]) if here.status == 1 else end

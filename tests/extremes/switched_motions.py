@@ -188,7 +188,7 @@ def rooms(dice):
         given = f"(if on{i} then {heat[i]} W else 0 W)"
         body += [f"dynamic T{i}' = ({wall[i]} W/K*({cold} K - T{i}){beside} + {given})/({c[i]} J/K)"]
         body += [f"when T{i} >= {high[i]} K {{ on{i} := false }}", f"when T{i} <= {low[i]} K {{ on{i} := true }}"]
-    end = float(f"{dice.uniform(0.5, 2.0) * 7200:.4g}")
+    end = float(f"{dice.uniform(0.1, 0.5) * 7200:.4g}")
     full = np.array([[side if abs(i - j) == 1 else 0.0 for j in range(n)] for i in range(n)])
 
     def rates(t, y, mode):

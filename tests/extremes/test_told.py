@@ -42,6 +42,10 @@ def test_rows_within_a_step_taken_for_its_state_are_of_that_step(tmp_path):
         (78, "lagrangian", 1e-3, "radau"),
         # on fronts of order 4, not 5: 1.7 times off
         (117, "hamiltonian", 1e-5, "auto"),
+        # a front within one step of the draft, which no row compared lies in: 2.5 times off
+        (343, "hamiltonian", 1e-3, "auto"),
+        # runs that had not come closer, 0.96 of what was asked apart: 1.1 times off
+        (94, "lagrangian", 1e-2, "auto"),
     ],
 )
 @pytest.mark.one_in(2)
