@@ -81,9 +81,9 @@ def quickest(binding: Binding, t0: float, t1: float, read: Sequence[Node], form:
     from one extreme to the next, TURNS of the span at least; infinite where none turns twice.
     """
     found = np.inf
-    for root, nest in _signals(form, read):
-        if nest and form is not None:
-            continue
+    for root, _ in _signals(form, read):
+        if any(node.op == "index" for node in topological_unbound([root])):
+            continue  # of elements of an array each has its own
         slope = differential(root, {leaf: const(1.0) for leaf in variables(root)})
         times = np.concatenate([[t0], turns(binding, t0, t1, slope), [t1]])
         apart = np.diff(times)[1:-1]  # the ends are no extremes

@@ -92,3 +92,13 @@ def test_a_block_that_sticks_under_a_sine_slips_at_the_first_peak_that_is_enough
     found = ran(tmp_path, SHAKEN, formulation="lagrangian", accuracy=accuracy)
     assert found.met
     assert found.trace["x"].values[-1] == pytest.approx(slipped(), rel=accuracy)
+
+
+def test_what_algebra_alone_determines_is_watched(tmp_path):
+    """A clamp bears 2 N at three peaks of thirty: none was seen, for no step tests what it bears."""
+    text = SHAKEN.replace("content D = 2 N*abs(x')", "phi clamp: x = 0 m").replace("init x' = 0 m/s", "discrete n = 0")
+    text = text.replace("on x\n", "on x\n  when abs(clamp.multiplier) >= 2 N { n := n + 1 }\n")
+    text = text.replace("trace x as x", "trace n as n").replace("20.6 s", "21.6 s")
+    found = ran(tmp_path, text, formulation="lagrangian", accuracy=1e-4)
+    assert found.met
+    assert found.trace["n"].values[-1] == 3.0

@@ -139,7 +139,7 @@ def main() -> int:
                 Path(folder), motion, wanted, given.methods.split(","), tuple(given.formulations.split(","))
             ):
                 found.append(one)
-                if given.all or one.defect or (one.refused and "E602" not in one.refused):
+                if given.all or one.defect or (one.refused and not one.refused.startswith("E60")):
                     print("DEFECT" if one.defect else "      ", one, flush=True)
     runs = [one for one in found if not one.refused]
     met = [one for one in runs if one.met]

@@ -247,8 +247,9 @@ def turning(events: Plan, prepared: Prepared, options: Options) -> Plan:
         return events
     read = [o.expression for o in prepared.network.observations if not o.stored]
     asked = prepared.binding, options.t_start, options.t_end
-    holding = quickest(*asked, (), prepared.compiled.form) if events.contacts else math.inf
-    return replace(events, turns=quickest(*asked, read), holding=holding)
+    watched = events.whens or events.contacts or events.kinks
+    anywhere = quickest(*asked, (), prepared.compiled.form) if watched else math.inf
+    return replace(events, turns=quickest(*asked, read), anywhere=anywhere)
 
 
 def timeless(prepared: Prepared) -> bool:
