@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 
 PER_RUN = 400
 """Rows of a trace with an interval."""
-MOST = 3000
+MOST = 1000
 """Pieces of a reference: of a motion that knocks without end there is none."""
 STEPS = {"LSODA": 400, "DOP853": 2000}
 """Of a reference at least: what a gap closes for within a step is not seen."""
