@@ -175,7 +175,7 @@ def arrived(found: Found, request: Request, report: Report) -> tuple[Found | Non
         return None, None
     options = replace(options, stops=stops(found.prepared, options, report))
     events = plan(found.prepared, found.system, rest=rest(options))
-    options = replace(options, events=replace(events, turns=turning(found.prepared, options)))
+    options = replace(options, events=turning(events, found.prepared, options))
     assert found.started is not None
     try:
         system, state = arrival(found.system, found.state, found.started.facts, options)

@@ -150,7 +150,7 @@ def run_from(target: Target, prepared: Prepared, started: Started, options: Opti
     """From a start to the trace; None where the report says why not.  One without events may serve several runs."""
     events, times = plan(prepared, started.system, rest=rest(options)), stops(prepared, options, report)
     if events or times.size:
-        events = replace(events, turns=turning(prepared, options)) if events else events
+        events = turning(events, prepared, options) if events else events
         options = replace(options, stops=times, events=events)
     return _ran(target, prepared, started, options, report)
 

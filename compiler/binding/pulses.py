@@ -76,12 +76,14 @@ def pulses(
     return times if times.size <= 5 * PULSES else times[:0]
 
 
-def quickest(binding: Binding, t0: float, t1: float, read: Sequence[Node]) -> float:
-    """The least time [s] in which a signal of time alone in any of these expressions goes from one extreme to the next,
-    TURNS of the span at least; infinite where none turns twice.
+def quickest(binding: Binding, t0: float, t1: float, read: Sequence[Node], form: DescriptorForm | None = None) -> float:
+    """The least time [s] in which a signal of time alone in any of these expressions, and in the rows of the form, goes
+    from one extreme to the next, TURNS of the span at least; infinite where none turns twice.
     """
     found = np.inf
-    for root, _ in _signals(None, read):
+    for root, _ in _signals(form, read):
+        if any(node.op == "index" for node in topological_unbound([root])):
+            continue  # of elements of an array each has its own
         slope = differential(root, {leaf: const(1.0) for leaf in variables(root)})
         times = np.concatenate([[t0], turns(binding, t0, t1, slope), [t1]])
         apart = np.diff(times)[1:-1]  # the ends are no extremes

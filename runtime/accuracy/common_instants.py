@@ -47,7 +47,7 @@ class Thinned:
     def __init__(self, most: int = MOST) -> None:
         self._most = most
         self._kept: list[Floats] = []
-        self._stride, self._seen, self._number = 1, 0, 0
+        self._stride, self.seen, self._number = 1, 0, 0
         self._last: Floats | None = None
 
     def take(self, rows: Floats) -> None:
@@ -56,13 +56,13 @@ class Thinned:
         rows = rows[np.diff(rows[:, 0], prepend=before) > 0.0]
         if not len(rows):
             return
-        first = -self._seen % self._stride
-        self._seen += len(rows)
+        first = -self.seen % self._stride
+        self.seen += len(rows)
         if first < len(rows):
             self._kept.append(rows[first :: self._stride].copy())
             self._number += len(self._kept[-1])
         self._last = rows[-1:].copy()
-        while self._number > 2 * min(max(self._most, self._seen // PART), MANY):
+        while self._number > 2 * min(max(self._most, self.seen // PART), MANY):
             self._kept = [np.concatenate(self._kept)[::2]]
             self._stride, self._number = 2 * self._stride, len(self._kept[0])
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from sysdyn.runtime.accuracy import pairs
+from sysdyn.runtime.accuracy import fronts, pairs
 from sysdyn.runtime.accuracy.common_instants import MANY, MOST, VALUES, Instants, Thinned, common, late_by
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.accuracy.pairs import Sampled
@@ -20,6 +20,8 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 
+SHORT = 1000
+"""Steps of a run whose rows are all kept for the next: of longer ones those in common see what happens."""
 BEYOND = 100.0
 """Times its magnitude at steps: an unknown that is more within a step shows that the step passed over something."""
 
@@ -33,11 +35,13 @@ class Compared:
         self.jumps: Floats | None = None
         self._at: Floats | None = None
         self._opened: tuple[Finished, LeftOpen] | None = None
+        self._own: list[Floats] = []
         self.begin()
 
     def begin(self) -> None:
         """A run begins."""
         self._rows: list[Floats] = []
+        self._steps: list[Floats] = []
         self._traced: list[Floats] = []
         self._jump, self._last = np.zeros(self._observed), np.zeros((0, lib.ROW_HEAD + 2 * self._observed))
         self._thinned = Thinned()
@@ -47,8 +51,11 @@ class Compared:
         """Keeps what runs are compared by: rows at the instants of the run before, and its own, thinned."""
         self._take_jumps(rows)
         if self.options.every is None:
+            traced = rows[(kind & TRACE) > 0]
             for thinned in (self._thinned, self._with_events):
-                thinned.take(rows[(kind & TRACE) > 0])
+                thinned.take(traced)
+            if self._thinned.seen <= SHORT:
+                self._steps.append(traced.copy())
         elif (known := self.instants.known) is not None and self.instants.common is not known:
             traced = rows[(kind & TRACE) > 0]  # beside rows at instants of a draft, which this run's steps may pass by
             at = np.minimum(np.searchsorted(known, traced[:, 0]), known.size - 1)
@@ -88,10 +95,22 @@ class Compared:
         jump = np.append(self._jump[quantities.places], np.full(len(quantities.meters), np.inf))
         passed = np.where(rows[:, 1:2].astype(np.int32) & RELAXING, rows[:, 2:4], 0.0)
         found = Sampled(
-            tolerance, values, sizes, steps, noise, open_, between, late, there, jump, len(finished.events), passed
-        )
+            tolerance, values, sizes, steps, noise, open_, between, late, there, jump, len(finished.events), passed,
+            self._passed_over(finished, quantities),
+        )  # fmt: skip
         self.samplings = (*self.samplings[-1:], found)
         return found
+
+    def _passed_over(self, finished: Finished, quantities: Quantities) -> Floats | None:
+        """How far the compared quantities [compared] are from the run before in what one step of that passes over; None
+        where events happen: runs with these are compared at more rows.
+        """
+        last, self._own = self._own, self._steps
+        if finished.events or not last or not self._own or self._thinned.seen > SHORT:
+            return None
+        places = lib.ROW_HEAD + quantities.places
+        found = fronts.passed_over(np.concatenate(last), np.concatenate(self._own), places, places + self._observed)
+        return np.append(found, np.zeros(len(quantities.meters)))
 
     def _of_its_own(self, finished: Finished) -> Floats | None:
         """Rows of the run at which the next one is compared with it; None: those of the run before serve.  So do those

@@ -185,7 +185,7 @@ def control(
         if now.steps == last.steps and apart < ROUND_OFF:
             return _shifted(run, now, target, number)
         away = parted(last, now, target)
-        if estimate.over <= 1.0 and not ((doubted or estimate.stalled) and estimate.alone) and not away:
+        if estimate.met and not ((doubted or estimate.stalled) and estimate.alone) and not away:
             return _achieved(estimate.apart, True, number, now.tolerance)
         dear = estimate.lost or estimate.next_tolerance(now.tolerance) <= DEAR
         if law.brief and dear and now.steps < LENGTHY:
@@ -198,7 +198,7 @@ def control(
         shorter = estimate.shorter() if held and (finest or not estimate.root) else None
         last, longest = now, longest * (shorter or 1.0 / STRETCH)
         tolerance = min(estimate.next_tolerance(now.tolerance), TAME if away else 1.0)
-    if estimate.over <= 1.0 and not away:  # doubted, and no finer run can tell: one with other steps can
+    if estimate.met and not away:  # doubted, and no finer run can tell: one with other steps can
         return _shifted(run, last, target, number)
     return _achieved(estimate.apart, False, number, last.tolerance)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.runtime.accuracy.laws import Law
-from sysdyn.runtime.accuracy.pairs import Sampled, difference, left_at_rest, passed_over
+from sysdyn.runtime.accuracy.pairs import Sampled, before_fronts, difference, left_at_rest, passed_over
 from sysdyn.runtime.model.description import Floats
 
 ROOT = 0.5
@@ -40,6 +40,10 @@ LENGTHY, DEAR = 1000, 1e-8
 """Steps of a run in which so much happens that every method's loose runs have nothing in common, and a finer one costs
 less than another method's draft (the ring modulator at 1e-2, 1e-3, 1e-6: 0.10, 0.16, 0.6 s for 0.27, 0.63, 1.1);
 tolerance below which methods of more stages or steps cost less."""
+APART, HELD = 1.8, 7.0
+"""Decades between two tolerances from which on, where events happen, methods that change their order are doubted whose
+steps are shorter by less than makes of errors, with that power, what is credited (play by radau: a hundredth of the
+tolerance took 1.35 times the steps, and left half of the error, told as an eighth)."""
 UNSEEN = 0.5
 """Of an error, what is credited at most to a finer run whose steps are hardly shorter."""
 ALIKE = 1.1
@@ -86,6 +90,15 @@ def _shrink(law: Law, power: float, step: float, coarse: Sampled, fine: Sampled)
     return float(law.safety * ratio / (1.0 - ratio))
 
 
+def _doubt(law: Law, shrink: float, step: float, coarse: Sampled, fine: Sampled) -> float:
+    """Times the estimate: what must be within what was asked, where events happen, which may hold the steps."""
+    if not fine.jumps:
+        return 1.0
+    ratio = min(max(fine.steps / max(coarse.steps, 1), 1.0) ** -HELD, UNSEEN)
+    held = not law.order and step > APART and law.safety * ratio / (1.0 - ratio) > shrink
+    return SURE if held else max(SURE / law.safety, 1.0)
+
+
 def _unlike(law: Law, coarse: Sampled, fine: Sampled) -> bool:
     """Whether the finer run has met what the other has not seen."""
     if abs(fine.jumps - coarse.jumps) > OTHERS * max(fine.jumps, coarse.jumps):
@@ -107,13 +120,14 @@ class Estimate:
 
     over: beside what was asked, as it mostly is; apart: what is told, relative, hardly ever less than it is, but no
     more than what was asked where that is met; alone: no pair before says how errors fall; stalled: the pair before
-    did not show that they do; root: a quantity ends as a root of the state: what tolerances do for it comes before
-    shorter steps.
+    did not show that they do; met: what was asked is, beyond doubt; root: a quantity ends as a root of the state: what
+    tolerances do for it comes before shorter steps.
     """
 
     def __init__(self, law: Law, target: Floats) -> None:
         self.law, self.target = law, target
         self.over = self.apart = np.inf
+        self.met = False
         self._deep, self.lost, self._unknown, self.alone = 1.0, False, False, True
         self.stalled = self._stalls = False
         self._before: tuple[float, float] | None = None
@@ -136,7 +150,7 @@ class Estimate:
         self._unknown = lost and (step >= DEEP or self.lost)
         self._deep = _affordable(coarse, fine) if lost and not self._unknown else 1.0
         self.lost = lost
-        shrink, luck, slow, self._stalls = None, 1.0, False, False
+        shrink, luck, slow, unseen, self._stalls = None, 1.0, False, False, False
         credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
         credit *= ROOT if self.root else 1.0
         if shorter is not None:
@@ -147,7 +161,8 @@ class Estimate:
             self._stalls = fine.jumps > 0 and over > STALLS * over_before
             slow = fine.jumps > 0 and over > 0.0 and over > over_before * 10.0 ** (-SLOW * step_before)
             if over > over_before or slow:
-                shrink, slow = 1.0, True  # no convergence seen: no credit for the smaller tolerance
+                # no convergence seen: no credit for the smaller tolerance; either may be the better one
+                shrink, slow, unseen = 1.0, True, True
             elif over > 0.0 and np.isfinite(over_before):
                 power = np.log10(over_before / over) / step_before
                 self._power = float(np.clip(power, 0.3, 1.0))
@@ -167,6 +182,12 @@ class Estimate:
         self.apart, self.over = max(self.apart, left), max(self.over, left_over)
         off, off_over = passed_over(coarse, fine, self.target, self.law.safety * UNSEEN / (1.0 - UNSEEN))
         self.apart, self.over = max(self.apart, off), max(self.over, off_over)
+        off, off_over = before_fronts(coarse, fine, self.target)
+        self.apart, self.over = max(self.apart, shrink * off), max(self.over, shrink * off_over)
+        doubt = SURE if unseen else _doubt(self.law, shrink, step, coarse, fine)
+        self.met = doubt * self.over <= 1.0
+        if not self.met:
+            self.apart *= doubt
         return apart
 
     def _told(self, step: float, coarse: Sampled, fine: Sampled) -> float:

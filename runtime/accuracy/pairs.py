@@ -50,8 +50,10 @@ class Sampled:
     event, between an event of this run and the same one of the run before it (None: no instant is); late [instants,
     quantities]: what the dense output of each value moves by within the time tolerance (TIMING): on a steep front no
     more is asked; there: values and late at instants of its own, for the run behind it (None: those are the same);
-    jumps: how many events happened; passed [instants, 2]: where a first step behind a restart passes over
-    what relaxes at once, how many times as long it is, and the most that this may be, of its largest; zeros elsewhere.
+    jumps: how many events happened; passed [instants, 2]: where a first step behind a restart passes over what relaxes
+    at once, how many times as long it is, and the most that this may be, of its largest; zeros elsewhere; front
+    [quantities]: how far off the run before is where it passes over in one step what this one takes many for (None:
+    nowhere).
     """
 
     tolerance: float
@@ -66,6 +68,7 @@ class Sampled:
     jump: Floats | float = np.inf
     jumps: int = 0
     passed: Floats | None = None
+    front: Floats | None = None
 
     @property
     def own(self) -> tuple[Floats, Floats | float]:
@@ -150,6 +153,18 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
         relative = apart(coarse, fine)[:, use].max(axis=0, initial=0.0) / size[use]
     relative = np.where(np.isfinite(relative) & ~unlike, relative, np.inf)
     return float(relative.max()), float((relative / target[use]).max())
+
+
+def before_fronts(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
+    """How far two runs are apart, relative, and that over the accuracy wanted, where the coarser one passes over a
+    front in one step.
+    """
+    use = (fine.largest != 0.0) & np.isfinite(target)
+    if fine.front is None or not fine.front.any() or not use.any():
+        return 0.0, 0.0
+    use &= ~zero(coarse, fine, target)
+    relative = fine.front[use] / fine.largest[use]
+    return float(relative.max(initial=0.0)), float((relative / target[use]).max(initial=0.0))
 
 
 def passed_over(coarse: Sampled, fine: Sampled, target: Floats, credit: float) -> tuple[float, float]:

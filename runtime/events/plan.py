@@ -113,7 +113,8 @@ class Kink:
 class Plan:
     """limit: of events; rest: an impact left slower than this part of the fastest is the last; plain: row families that
     are sums of unknowns, with factors that are numbers, and of nothing else; turns (s): the least time in which a
-    signal that an event reads goes from one extreme to the next.
+    signal that an event reads goes from one extreme to the next; anywhere (s): the same of any signal of the rows,
+    where something is watched (algebra alone may determine that, which no error test follows).
     """
 
     relations: tuple[Relation, ...] = ()
@@ -125,6 +126,7 @@ class Plan:
     rest: float = 1e-6
     plain: frozenset[int] = frozenset()
     turns: float = math.inf
+    anywhere: float = math.inf
 
     def __bool__(self) -> bool:
         return bool(self.whens or self.sampled or self.contacts or self.kinks)

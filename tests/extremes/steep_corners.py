@@ -2,7 +2,8 @@
 
 Nine families: chains that stick and slip (tanh, and Stribeck's curve), clutches of a tanh, a clutch that is engaged,
 slips and locks, play, stops of steep springs, bridges of ideal and of exponential diodes, a converter that is pulsed, a
-mass between relays with hysteresis.  Truth: pieces between which rates jump, each by LSODA near round-off.
+mass between relays with hysteresis.  Truth: pieces between which rates jump, each by LSODA (steep springs: DOP853)
+near round-off.
 """
 
 from __future__ import annotations
@@ -15,31 +16,38 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 PER_RUN = 400
-"""Rows of a trace with an interval; steps of a reference at least."""
+"""Rows of a trace with an interval."""
+MOST = 1000
+"""Pieces of a reference: of a motion that knocks without end there is none."""
+STEPS = {"LSODA": 400, "DOP853": 2000}
+"""Of a reference at least: what a gap closes for within a step is not seen."""
 
 
 @dataclass(frozen=True)
 class Turn:
     """Where `at` (t, y) rises through zero in mode `of`, the motion goes on in mode `to`; rests: the state that is zero
-    then.
+    then; then (y): changes the state, and may say another mode.
     """
 
     of: int
     at: Callable
     to: int
     rests: int | None = None
+    then: Callable | None = None
 
     def after(self, y):
         """The mode behind it, of a state that is changed in place."""
         if self.rests is not None:
             y[self.rests] = 0.0
-        return self.to
+        mode = self.then(y) if self.then is not None else None
+        return self.to if mode is None else mode
 
 
 @dataclass(frozen=True)
 class Motion:
     """text, with a scene s; rates (t, y, mode) -> y' [states]; y and mode at 0 s; instants (s) at which rates jump:
-    time -> mode or None (as it is); read (y [states, k]) -> traced [names, k].
+    time -> mode, a change of the state (y) or None (as it is); read (y [states, k]) -> traced [names, k]; jumps: what
+    is traced jumps at turns and instants; method: of SciPy.
     """
 
     number: int
@@ -53,22 +61,28 @@ class Motion:
     mode: int = 0
     turns: tuple[Turn, ...] = ()
     instants: dict = field(default_factory=dict)
+    jumps: bool = False
+    method: str = "LSODA"
 
     def truth(self, rtol):
         """times (s, ascending) -> traced quantities [names, k] there."""
         y, t, mode, pieces, begins = np.array(self.y, float), 0.0, self.mode, [], []
         for end in [*sorted(x for x in self.instants if 0.0 < x < self.end), self.end]:
-            if self.instants.get(t) is not None:
-                mode = self.instants[t]
+            now = self.instants.get(t)
+            if callable(now):
+                now(y)
+            elif now is not None:
+                mode = now
             while t < end:
                 for turn in [turn for turn in self.turns if turn.of == mode and turn.at(t, y) > 0.0]:
                     mode = turn.after(y)
                 turns = [turn for turn in self.turns if turn.of == mode]
                 here = solve_ivp(
-                    self.rates, (t, end), y, "LSODA", args=(mode,), events=[_event(turn) for turn in turns],
-                    dense_output=True, rtol=rtol, atol=1e-5 * rtol, max_step=self.end / PER_RUN,
+                    self.rates, (t, end), y, self.method, args=(mode,), events=[_event(turn) for turn in turns],
+                    dense_output=True, rtol=rtol, atol=1e-5 * rtol, max_step=self.end / STEPS[self.method],
                 )  # fmt: skip
                 assert here.success, here.message
+                assert len(begins) < MOST, "knocks without end"
                 begins.append(t)
                 pieces.append(here.sol)
                 y, t = here.y[:, -1].copy(), float(here.t[-1]) if here.status == 1 else end
@@ -82,6 +96,7 @@ class Motion:
             found = [pieces[k](times[place == k]) for k in range(len(pieces)) if (place == k).any()]
             return np.atleast_2d(self.read(np.concatenate(found, axis=1)))
 
+        at.begins = np.array(begins)
         return at
 
 
@@ -95,10 +110,15 @@ def _event(turn):
 
 def drawn(number):
     """The motion of that number; every second one is traced at an interval, the others at each step."""
+    return drawn_of(FAMILIES, number)
+
+
+def drawn_of(families, number):
+    """The same of these families."""
     dice = random.Random(20261129 + number)
-    family = FAMILIES[number % len(FAMILIES)]
+    family = families[number % len(families)]
     head, body, traced, end, rest = family(dice)
-    every = f" every {end / PER_RUN:.9g} s" if (number // len(FAMILIES)) % 2 else ""
+    every = f" every {end / PER_RUN:.9g} s" if (number // len(families)) % 2 else ""
     names = tuple(traced)
     lines = [*head, "model m {", *(f"  {line}" for line in body), "}", "scene s of m {", f"  time 0 s to {end:.9g} s"]
     lines += ["  trace " + ", ".join(f"{value} as {name}" for name, value in traced.items()) + every, "}"]
@@ -203,6 +223,14 @@ def engaged(dice):
     return ("from std.mechanical import inertia, rotary_damper",), body, {"a": "a.f", "b": "b.f"}, end, rest
 
 
+def _sides(q, gap):
+    """Of a gap: free, and beyond it on either side, by a hair more and less."""
+    more, less = (1.0 + 1e-12) * gap, (1.0 - 1e-12) * gap
+    for side in (1, -1):
+        yield Turn(0, lambda t, y, s=side: s * q(y) - more, side)
+        yield Turn(side, lambda t, y, s=side: less - s * q(y), 0)
+
+
 def play(dice):
     """Two wheels whose teeth have play and are steep springs with a little damping."""
     one, two, gap = _log(dice, 5e-3, 5e-2), _log(dice, 5e-3, 5e-2), _log(dice, 2e-3, 2e-2)
@@ -216,11 +244,11 @@ def play(dice):
     body += [f"M: effort(e = {torque} N.m*sin({w} rad/s*t)) ground -> a", "init a.f = 0 rad/s", "init b.f = 0 rad/s"]
 
     def rates(t, y, mode):
-        q = y[0] - y[1]
-        teeth = k * (max(q - gap, 0.0) + min(q + gap, 0.0)) + c * (y[2] - y[3])
+        teeth = k * mode * (mode * (y[0] - y[1]) - gap) + c * (y[2] - y[3])
         return [y[2], y[3], (torque * np.sin(w * t) - teeth) / one, (teeth - b * y[3]) / two]
 
-    rest = {"rates": rates, "y": [0.0] * 4, "read": lambda y: y}
+    rest = {"rates": rates, "y": [0.0] * 4, "read": lambda y: y, "method": "DOP853"}
+    rest["turns"] = tuple(_sides(lambda y: y[0] - y[1], gap))
     traced = {"qa": "a.q", "qb": "b.q", "a": "a.f", "b": "b.f"}
     return ("from std.mechanical import inertia, rotary_damper",), body, traced, end, rest
 
@@ -237,10 +265,11 @@ def stops(dice):
     body += [f"F: force(F = {force} N*sin({w} rad/s*t)) ground -> x", "init x.f = 0 m/s"]
 
     def rates(t, y, mode):
-        stop = hard * (max(y[0] - gap, 0.0) + min(y[0] + gap, 0.0))
+        stop = hard * mode * (mode * y[0] - gap)
         return [y[1], (force * np.sin(w * t) - k * y[0] - c * y[1] - stop) / m]
 
-    rest = {"rates": rates, "y": [0.0, 0.0], "read": lambda y: y}
+    rest = {"rates": rates, "y": [0.0, 0.0], "read": lambda y: y, "method": "DOP853"}
+    rest["turns"] = tuple(_sides(lambda y: y[0], gap))
     return ("from std.mechanical import mass, spring, damper, force",), body, {"q": "x.q", "v": "x.f"}, end, rest
 
 

@@ -5,7 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from running import ran
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
 
 PUMP = """
 from std.fluid import relief_valve, accumulator, orifice
@@ -58,3 +59,46 @@ def test_a_relief_valve_that_opens_with_each_stroke(formulation, tmp_path):
     off = np.abs(found.at("relieved", rows) - relieved).max() / relieved.max()
     assert off < 1e-3
     assert off < 3.0 * found.trace.statistics["error_estimate"]
+
+
+SHAKEN = """
+model m {
+  coord x: translation = 0 m
+  init x' = 0 m/s
+  energy T* = 1/2*1 kg*x'^2
+  content D = 2 N*abs(x')
+  work 0.05 N/s*t + 1 N*sin(10 rad/s*t) on x
+}
+scene s of m {
+  time 0 s to 20.6 s
+  trace x as x every 0.1 s
+}
+"""
+
+
+def slipped():
+    """How far it does (m), from where the force is 2 N, a little before its peak at 20.26 s, to where it rests."""
+    begin = brentq(lambda t: 0.05 * t + np.sin(10.0 * t) - 2.0, 20.1, 20.26)
+
+    def speed(t):
+        return 0.025 * (t * t - begin**2) - (np.cos(10.0 * t) - np.cos(10.0 * begin)) / 10.0 - 2.0 * (t - begin)
+
+    return quad(speed, begin, brentq(speed, 20.27, 20.5), epsabs=1e-15)[0]
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-6])
+def test_a_block_that_sticks_under_a_sine_slips_at_the_first_peak_that_is_enough(accuracy, tmp_path):
+    """It was not seen at all: what holds the block was a polynomial over half a period, and no error test asks it."""
+    found = ran(tmp_path, SHAKEN, formulation="lagrangian", accuracy=accuracy)
+    assert found.met
+    assert found.trace["x"].values[-1] == pytest.approx(slipped(), rel=accuracy)
+
+
+def test_what_algebra_alone_determines_is_watched(tmp_path):
+    """A clamp bears 2 N at three peaks of thirty: none was seen, for no step tests what it bears."""
+    text = SHAKEN.replace("content D = 2 N*abs(x')", "phi clamp: x = 0 m").replace("init x' = 0 m/s", "discrete n = 0")
+    text = text.replace("on x\n", "on x\n  when abs(clamp.multiplier) >= 2 N { n := n + 1 }\n")
+    text = text.replace("trace x as x", "trace n as n").replace("20.6 s", "21.6 s")
+    found = ran(tmp_path, text, formulation="lagrangian", accuracy=1e-4)
+    assert found.met
+    assert found.trace["n"].values[-1] == 3.0

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sysdyn.runtime.accuracy import fronts
 from sysdyn.runtime.accuracy.common_instants import MANY, MOST, Thinned, common, joined, known, late_by
 from sysdyn.runtime.accuracy.options import Options, WrongOption, instants
 from sysdyn.runtime.accuracy.pairs import Sampled, apart, difference
@@ -181,6 +182,24 @@ def test_what_an_event_is_late_by_counts_where_values_move():
     assert difference(coarse, fine, np.full(2, 1e-3)) == pytest.approx((9e-4, 0.9))
     turned = replace(fine, values=fine.values + np.array([[0.0], [0.05], [0.0]]), jump=np.array([0.0, 1.0]))
     assert apart(coarse, turned)[1] == pytest.approx([0.0509, 0.05])  # of what does not jump all counts, else the rest
+
+
+def test_a_front_within_one_step_of_the_coarser_run_is_seen():
+    """x = t^3, and behind 0.4 s in the finer run a bump of 0.3 that takes it twelve steps."""
+
+    def run(times, bump):
+        return np.stack([times, times**3 + bump(times), 3.0 * times**2], axis=1)
+
+    def bump(times):
+        return 0.3 * np.exp(-(((times - 0.45) / 0.01) ** 2))
+
+    def off(fine, shape):
+        return fronts.passed_over(run(np.linspace(0.0, 1.0, 6), np.zeros_like), run(fine, shape), *np.array([[1], [2]]))
+
+    even, crowded = np.linspace(0.0, 1.0, 21), np.linspace(0.42, 0.48, 13)
+    assert off(np.union1d(even, crowded), bump) == pytest.approx(0.3)
+    assert off(np.union1d(even, crowded), np.zeros_like) < 1e-15
+    assert off(even, bump) == 0.0  # a step like the others: rows in common see it
 
 
 def test_an_instant_that_rounds_beyond_the_end_is_the_end():

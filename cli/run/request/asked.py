@@ -28,6 +28,7 @@ from sysdyn.dsl.model.network import Network, Scene
 from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy.options import Options, Progress
+from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.trace.trace import Parameter
 from sysdyn.values import dataclass
 
@@ -240,12 +241,15 @@ def _step(request: Request, target: Target, method: str, said: float | None, rep
     return step
 
 
-def turning(prepared: Prepared, options: Options) -> float:
-    """The least time (s) in which a signal that an event reads goes from one extreme to the next."""
+def turning(events: Plan, prepared: Prepared, options: Options) -> Plan:
+    """With the least times (s) in which signals go from one extreme to the next."""
     if _timeless(prepared):
-        return math.inf
+        return events
     read = [o.expression for o in prepared.network.observations if not o.stored]
-    return quickest(prepared.binding, options.t_start, options.t_end, read)
+    asked = prepared.binding, options.t_start, options.t_end
+    watched = events.whens or events.contacts or events.kinks
+    anywhere = quickest(*asked, (), prepared.compiled.form) if watched else math.inf
+    return replace(events, turns=quickest(*asked, read), anywhere=anywhere)
 
 
 def timeless(prepared: Prepared) -> bool:

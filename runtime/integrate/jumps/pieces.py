@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 
 FOLLOWED = 16.0
 """Times a signal that events read may turn within a step: each way has SD_FINEST / FOLLOWED parts (core/run/run.h)."""
+WATCHED = 0.5
+"""Times any signal may turn within a step where something is watched: what algebra alone determines (what a block that
+sticks bears, a node between resistors) is interpolated there, and nothing tests that."""
 WIDER = 3.0
 """Times the stretch in which a change was seen, and was none once settled: the next one behind it that is searched."""
 HALT = 1e-5
@@ -59,6 +62,7 @@ class Pieces:
         method = run.method.contents
         if np.isfinite(plan.turns):
             run.driver.run.turns, method.h_max = plan.turns, min(method.h_max, FOLLOWED * plan.turns)
+        method.h_max = min(method.h_max, WATCHED * plan.anywhere)
         self._longest, self._landing = method.h_max, np.inf
         self._passing = lib.Modes(passed=-np.inf)
         self.at = 0
