@@ -17,8 +17,11 @@ LEARNT = 100
 """Unknowns up to which a run learns anything (SD_REPLAYED)."""
 
 
-class _Made:
-    """One factorisation of the core, None once it is freed; it keeps pattern and order, which the core reads."""
+class Made:
+    """One factorisation of the core, None once it is freed; it keeps pattern and order, which the core reads.
+
+    beside: what its holder learnt of its own, for the next.
+    """
 
     def __init__(self, pattern: Pattern, order: Order, *, complex_: bool) -> None:
         self.pattern, self.order, self.complex = pattern, order, complex_
@@ -38,38 +41,29 @@ class _Made:
 class Factorisation:
     """The core's factorisation of matrices of one pattern, until nobody holds it.
 
-    linear: its structure, of complex ones its address; beside: what its last holder learnt of its own, for the next.
+    linear: its structure, of complex ones its address.
     """
 
-    def __init__(self, made: _Made, factors: Factors) -> None:
-        self._made, self._factors = made, factors
+    def __init__(self, made: Made, factors: Factors) -> None:
+        self.made, self._factors = made, factors
         self.linear: Any = made.linear
-
-    @property
-    def beside(self) -> Any:
-        """None where nobody left anything."""
-        return self._made.beside
-
-    @beside.setter
-    def beside(self, learnt: Any) -> None:
-        self._made.beside = learnt
 
     def __del__(self) -> None:
         # where both are garbage at once the other may have gone first
-        if self._made.pattern.unknowns <= LEARNT and self._made.linear:
-            self._made.again()
-            self._factors.at_hand.append(self._made)
+        if self.made.pattern.unknowns <= LEARNT and self.made.linear:
+            self.made.again()
+            self._factors.at_hand.append(self.made)
 
 
 class Factors:
     """The factorisations of the runs from one start that no run holds."""
 
     def __init__(self) -> None:
-        self.at_hand: list[_Made] = []
+        self.at_hand: list[Made] = []
 
     def take(self, pattern: Pattern, order: Order, *, complex_: bool = False) -> Factorisation:
         """One of these, or a new one."""
         for k, made in enumerate(self.at_hand):
             if made.pattern is pattern and made.complex == complex_ and made.linear:
                 return Factorisation(self.at_hand.pop(k), self)
-        return Factorisation(_Made(pattern, order, complex_=complex_), self)
+        return Factorisation(Made(pattern, order, complex_=complex_), self)

@@ -246,9 +246,10 @@ class Underlying(Accelerations):
         self._order = system.once("order of accelerations", lambda: Order(column_order(self.pattern)))
         self._taken = (factors or Factors()).take(self.pattern, self._order)
         self.linear = self._taken.linear
-        if self._taken.beside is None or not self._taken.beside.serves(system):
-            self._taken.beside = _Core(system, self.linear)
-        self.core: Any = self._taken.beside.at
+        made = self._taken.made
+        if made.beside is None or not made.beside.serves(system):
+            made.beside = _Core(system, self.linear)
+        self.core: Any = made.beside.at
         self._systems(self.core.contents)
         core = self.core.contents
         core.unknown, core.rate, core.column = map(lib.pointer, (self._unknown, self._rate, self._column))

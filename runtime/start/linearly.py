@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import least_squares
+from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
 from sysdyn.runtime.start.settled import Settler, columns_of_rates
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.values import dataclass
@@ -80,8 +80,6 @@ class Rows:
         np.add.at(matrix, (self.rows[free], self.columns[free]), here[free])
         matrix[~asked] = 0.0
         residual = np.where(asked, self.residual(x), 0.0)
-        if not (np.isfinite(matrix).all() and np.isfinite(residual).all()):
-            return False
         by_row, by_column = factors(matrix)
         even, change = by_row[:, None] * matrix * by_column, np.zeros(x.size)
         for _ in range(REFINED):
@@ -112,7 +110,10 @@ def unmet(settler: Settler, t: float, y: Floats, yd: Floats, state: Mask) -> boo
     at = np.concatenate([settled.pattern.row, settled.pattern.row[rated]]), np.concatenate([columns, moved[rated]])
     size = lib.reader(settler.core.contents.scale, n + rates.size)
     rows = Rows(lambda x: settled.residual(*point(x)), slopes, *at, settler.holding, free, size)
-    return rows.contradict(np.concatenate([y, yd[rates]]))
+    try:
+        return rows.contradict(np.concatenate([y, yd[rates]]))
+    except NotFiniteError:
+        return False
 
 
 def no_start(starter: Starter, t: float, x: Floats, free: Mask) -> bool:
