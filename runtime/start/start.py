@@ -45,6 +45,8 @@ HELD = "#held "
 """Before the name of a coordinate: what its flow and others hold together (compiler/forms/lowering.py)."""
 MOVED = 1e-6
 """Of its magnitude: what a fixed value that is in the way has to move by, at least."""
+BESIDE = 1e-3
+"""Of the move of the fixed value most in the way: what moves by less is not."""
 EXPLAINED = 0.1
 """Share of the work of a search that explaining what was not found may take."""
 
@@ -221,7 +223,8 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     if found and contradict:
         scale = np.maximum(starter.scale(t, freed.x), starter.scale(t, guess))
         change = np.where(starter.free, 0.0, np.abs(freed.x - guess) / scale)
-        places = [int(k) for k in np.argsort(-change)[:5] if change[k] > MOVED]
+        least = max(MOVED, BESIDE * float(change.max(initial=0.0)))
+        places = [int(k) for k in np.argsort(-change)[:5] if change[k] > least]
         candidates = tuple(dict.fromkeys(starter.label(k) for k in places))
     kind = "fixed"
     if not candidates:

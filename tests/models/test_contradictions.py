@@ -56,3 +56,25 @@ scene s of m { time 0 s to 1 s; trace p_.e }
 """
     (found,) = [d for d in api.check(text) if d.severity == "error"]
     assert found.message.startswith("fixed initial values of 'p_.e' contradict ")
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+def test_what_moves_a_little_with_the_value_in_the_way_is_not_named(tmp_path, formulation):
+    """The least change spread over the current of a coil, 1.5e-6 of its size: it was named beside the capacitor."""
+    text = """
+from std.electrical import voltage, resistor, capacitor, inductor
+model m {
+  node a, b: electrical
+  V: voltage(v = 24 V) a -> ground
+  C: capacitor(C = 1 uF) a -> ground
+  R: resistor(R = 10 ohm) a -> b
+  L: inductor(L = 1 mH) b -> ground
+  init C.e = 0 V
+  init L.f = 0 A
+}
+scene s of m { time 0 s to 1 ms; trace L.f }
+"""
+    path = tmp_path / "m.sd"
+    path.write_text(text)
+    with pytest.raises(api.ModelError, match=r"E903: fixed initial values of 'C.e' contradict"):
+        api.simulate(path, formulation=formulation, output=tmp_path / "t.h5")
