@@ -21,7 +21,8 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 
 SHORT = 1000
-"""Steps of a run whose rows are all kept for the next: of longer ones those in common see what happens."""
+"""Steps of a run whose rows are all kept for the next, where they are few numbers: of longer ones those in common see what
+happens."""
 BEYOND = 100.0
 """Times its magnitude at steps: an unknown that is more within a step shows that the step passed over something."""
 
@@ -45,7 +46,8 @@ class Compared:
         self._traced: list[Floats] = []
         self._jump, self._last = np.zeros(self._observed), np.zeros((0, lib.ROW_HEAD + 2 * self._observed))
         self._thinned = Thinned()
-        self._with_events = Thinned(min(max(VALUES // max(self._observed, 1), MOST), MANY))
+        room = VALUES // max(self._observed, 1)
+        self._with_events, self._short = Thinned(min(max(room, MOST), MANY)), min(room, SHORT)
 
     def take(self, rows: Floats, kind: Ints) -> None:
         """Keeps what runs are compared by: rows at the instants of the run before, and its own, thinned."""
@@ -54,7 +56,7 @@ class Compared:
             traced = rows[(kind & TRACE) > 0]
             for thinned in (self._thinned, self._with_events):
                 thinned.take(traced)
-            if self._thinned.seen <= SHORT:
+            if self._thinned.seen <= self._short:
                 self._steps.append(traced.copy())
         elif (known := self.instants.known) is not None and self.instants.common is not known:
             traced = rows[(kind & TRACE) > 0]  # beside rows at instants of a draft, which this run's steps may pass by
@@ -106,7 +108,7 @@ class Compared:
         where events happen: runs with these are compared at more rows.
         """
         last, self._own = self._own, self._steps
-        if finished.events or not last or not self._own or self._thinned.seen > SHORT:
+        if finished.events or not last or not self._own or self._thinned.seen > self._short:
             return None
         places = lib.ROW_HEAD + quantities.places
         found = fronts.passed_over(np.concatenate(last), np.concatenate(self._own), places, places + self._observed)
