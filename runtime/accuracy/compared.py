@@ -21,8 +21,8 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 
 SHORT = 1000
-"""Steps of a run whose rows are all kept for the next, where they are few numbers: of longer ones those in common see what
-happens."""
+"""Steps of a run whose rows are all kept for the next, VALUES at most: of longer ones those in common see what happens.
+"""
 BEYOND = 100.0
 """Times its magnitude at steps: an unknown that is more within a step shows that the step passed over something."""
 
