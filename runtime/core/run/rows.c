@@ -35,12 +35,15 @@ void sd_run_settle(sd_run *run, double t)
     lend(run, 0);
 }
 
-/* How far the unknowns of a row within a step lie beyond those of the steps. */
+/* How far the unknowns of a row within a step, as written, lie beyond those of the steps, its own end among them. */
 static void note_beyond(sd_run *run)
 {
-    for (int32_t j = 0; j < run->stepper->n; j++)
-        if (fabs(run->point[j]) > run->beyond * run->magnitude[j] && run->magnitude[j] > 0.0)
-            run->beyond = fabs(run->point[j]) / run->magnitude[j];
+    const double *end = run->stepper->y;
+    for (int32_t j = 0; j < run->stepper->n && j < run->written; j++) {
+        double most = run->beyond * fmax(run->magnitude[j], fabs(end[j]));
+        if (fabs(run->point[j]) > most && run->magnitude[j] > 0.0)
+            run->beyond = fabs(run->point[j]) / fmax(run->magnitude[j], fabs(end[j]));
+    }
 }
 
 /* Whether something observed relaxes at t within a small part of the last step, which began with it: by the equations,
