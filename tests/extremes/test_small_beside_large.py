@@ -76,7 +76,7 @@ def test_a_small_effort_is_no_difference_of_large_ones(formulation, tmp_path):
 
 def test_a_diode_that_turns_on_passes_over_nothing(tmp_path):
     """Its current grows a hundredfold within one step, a multiplier of the stabilised form is round-off: both were
-    taken for steps that pass over something. Runs were finer than any Newton's iteration bears (6664 steps, at 1 s E930).
+    taken for steps that pass over something. Runs were finer than any iteration of Newton bears (6664 steps; E930).
     """
     gallery = Path(models.__file__).parent / "gallery/rectifier_motor_slider.sd"
     asked = {"accuracy": 1e-6, "method": "bdf", "index": "2", "until": 0.05}
