@@ -10,6 +10,7 @@ Results are not compared: told.py and the circuits beside it do.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import tempfile
 import time
@@ -53,11 +54,12 @@ def ended(file: Path, settings: dict[str, float], folder: Path, formulation: str
 
 
 def parameters(file: Path, folder: Path, formulation: str | None) -> tuple[str, ...]:
-    """Of a model that runs; () if it does not in this formulation."""
+    """Of a model that runs, one element of each array; () if it does not in this formulation."""
     try:
-        return tuple(api.simulate(file, scene=scene(file), output=folder / "n.h5", formulation=formulation).parameters)
+        trace = api.simulate(file, scene=scene(file), output=folder / "n.h5", formulation=formulation)
     except FINDINGS:
         return ()
+    return tuple({re.sub(r"\[.*?\]", "[]", name): name for name in trace.parameters}.values())
 
 
 def settings(names: tuple[str, ...], two: bool) -> Iterator[dict[str, float]]:
