@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from ends import ended
-from sysdyn import models
+from sysdyn import api, models
 
 ROOT = Path(models.__file__).parent / "seed"
 
@@ -21,3 +21,9 @@ ROOT = Path(models.__file__).parent / "seed"
 def test_numbers_that_overflow_are_no_fault(model, settings, tmp_path):
     """The compiled module and the text multiply in other orders: one had a number where the other had none (exit 4)."""
     assert not ended(ROOT / f"{model}.sd", settings, tmp_path).startswith("FAULT")
+
+
+def test_a_quantity_that_is_no_number_anywhere_is_not_met(tmp_path):
+    """Its size was nothing, so nothing was asked of it: 0 times infinity was told as met."""
+    with pytest.raises(api.NotMet, match="T is no number from t = 0 s on"):
+        api.simulate(ROOT / "relativistic_mass.sd", set={"c": 1e300, "F": 1e-300}, until=0.02, output=tmp_path / "n.h5")
