@@ -26,4 +26,6 @@ def test_numbers_that_overflow_are_no_fault(model, settings, tmp_path):
 def test_a_quantity_that_is_no_number_anywhere_is_not_met(tmp_path):
     """Its size was nothing, so nothing was asked of it: 0 times infinity was told as met."""
     with pytest.raises(api.NotMet, match="T is no number"):
-        api.simulate(ROOT / "relativistic_mass.sd", set={"c": 1e300, "F": 1e-300}, method="rosenbrock", output=tmp_path / "n.h5")
+        api.simulate(
+            ROOT / "relativistic_mass.sd", set={"c": 1e300, "F": 1e-300}, method="rosenbrock", output=tmp_path / "n.h5"
+        )
