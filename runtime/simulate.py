@@ -18,7 +18,7 @@ from sysdyn.runtime.accuracy.runs import Runs, Samples
 from sysdyn.runtime.accuracy.second_opinion import confirmed
 from sysdyn.runtime.accuracy.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge
+from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge, undefined
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
 from sysdyn.runtime.model.failures import SolverFailure, WrongOption
@@ -356,7 +356,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
         close(runs, None, None)
         raise
     assert runs.done is not None
-    missed = _missed(runs, options, achieved)
+    missed = _missed(runs, options, achieved) or undefined(runs.done[2].undefined())
     judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, missed, runs.open_balances)
     close(runs, achieved, judgement)
     finished, _, writer = runs.done

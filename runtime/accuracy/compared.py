@@ -90,8 +90,7 @@ class Compared:
         noise = np.append(noise, np.zeros(len(quantities.meters)))
         late = self._late(rows, quantities) if instants is not None else 0.0
         open_ = partial(self._open_quantities, finished, quantities)
-        steps = finished.statistics.steps
-        sizes = np.where(np.isfinite(values).all(axis=0), quantities.of_run(finished), np.nan)
+        sizes, steps = quantities.of_run(finished), finished.statistics.steps
         between = self._between(rows, finished, quantities)
         jump = np.append(self._jump[quantities.places], np.full(len(quantities.meters), np.inf))
         passed = np.where(rows[:, 1:2].astype(np.int32) & RELAXING, rows[:, 2:4], 0.0)

@@ -24,7 +24,6 @@ import numpy as np
 from sysdyn import api, models
 from sysdyn.cli.run.request import targets
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.runtime.trace.trace import Quantity
 
 VALUES = (1e300, 1e20, 1e-20, 1e-300, 0.0, -1.0)
 FAR = (1e300, 1e-300)
@@ -50,13 +49,8 @@ def ended(file: Path, settings: dict[str, float], folder: Path, formulation: str
             return type(finding).__name__
         except Exception as fault:  # that there is none is what is asked
             return f"FAULT {type(fault).__name__}: {str(fault)[:120]}"
-    missing = [name for name in trace.names if not numbers(trace[name])]
+    missing = [name for name in trace.names if not np.isfinite(trace[name].values).all()]
     return f"FAULT told as met without numbers: {', '.join(missing)[:120]}" if missing else "met"
-
-
-def numbers(column: Quantity) -> bool:
-    """Whether all values of a column are, and all rates."""
-    return all(np.isfinite(values).all() for values in (column.values, column.derivative) if values is not None)
 
 
 def parameters(file: Path, folder: Path, formulation: str | None) -> tuple[str, ...]:
