@@ -78,7 +78,7 @@ def _started(
             facts = structure(system, state)
             implicit = undetermined(system, state, facts)
     except InconsistentStart as error:
-        _refused(prepared, t0, error, report)
+        _refused(prepared, t0, error, report, until)
         return None
     except NotFiniteError:
         _steep(prepared, system, t0, report)
@@ -106,17 +106,18 @@ def _late(prepared: Prepared, when: str, remedy: str, report: Report) -> None:
     report.error("E934", text, prepared.network.place, help=remedy)
 
 
-def _refused(prepared: Prepared, t0: float, error: InconsistentStart, report: Report) -> None:
+def _refused(prepared: Prepared, t0: float, error: InconsistentStart, report: Report, until: float | None) -> None:
     """Report why there is no start; of gathered elements at the lines of the author, as `compile_network` does."""
     if prepared.compiled.written is not None:
         found = Report()
         one_by_one = prepare(
             prepared.network, Report(), formulation=prepared.formulation, backend="numpy", gather=False
         )
-        if one_by_one is not None and start(one_by_one, t0, found) is None:
+        tried = one_by_one is not None and start(one_by_one, t0, found, until=until) is None
+        if tried and all(finding.code != "E934" for finding in found.diagnostics):
             report.extend(found)
             return
-    inconsistent(prepared, t0, error, report)
+    inconsistent(prepared, t0, error, report, until)
 
 
 def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None:
