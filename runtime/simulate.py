@@ -197,7 +197,7 @@ def _short(runs: Runs, options: Options, achieved: Achieved) -> str | None:
 def _bounded(failure: SolverFailure, runs: Runs) -> bool:
     """The caller's own bound ended it, or the text itself ends there: another method would meet the same."""
     limited = failure.cause == "max_steps" and runs.most_steps == runs.options.max_steps
-    return limited or failure.cause in ("max_wall", "memory", "zeno")
+    return limited or failure.late or failure.cause in ("max_wall", "memory", "zeno")
 
 
 def _told(before: SolverFailure | None, last: SolverFailure) -> SolverFailure:
