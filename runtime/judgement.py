@@ -134,6 +134,11 @@ def allowed(options: Options) -> float:
     return max(TIMES * max(asked, default=0.0), LEAST)
 
 
+def undefined(found: tuple[str, float] | None) -> tuple[Estimate, ...]:
+    """A quantity of the trace that is no number from an instant [s] on: missed whatever was asked of it."""
+    return () if found is None else (Estimate(found[0], None, 0.0, found[1], undefined=True),)
+
+
 def judge(
     options: Options,
     method: str,
@@ -147,12 +152,10 @@ def judge(
     """
     balances = tuple(balances)
     conserved = tuple(b for b in balances if b.conserved)
+    found = [NotMet("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined) for e in missed]
     if method == "euler":
-        return Judgement((), (), conserved)
+        return Judgement((), tuple(found), conserved)
     judged = ["accuracy"] if accurate else []
-    found = [
-        NotMet("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined) for e in missed if accurate
-    ]
     part = allowed(options)
     for kind, what in (("energy", "energy"), ("invariant", "invariants")):
         own = [(k, b) for k, b in enumerate(balances) if b.kind == kind]

@@ -18,7 +18,7 @@ from sysdyn.runtime.accuracy.runs import Runs, Samples
 from sysdyn.runtime.accuracy.second_opinion import confirmed
 from sysdyn.runtime.accuracy.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge
+from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Estimate, Judgement, cancelled, judge, undefined
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, Floats, describe
 from sysdyn.runtime.model.failures import SolverFailure, WrongOption
@@ -197,7 +197,7 @@ def _short(runs: Runs, options: Options, achieved: Achieved) -> str | None:
 def _bounded(failure: SolverFailure, runs: Runs) -> bool:
     """The caller's own bound ended it, or the text itself ends there: another method would meet the same."""
     limited = failure.cause == "max_steps" and runs.most_steps == runs.options.max_steps
-    return limited or failure.cause in ("max_wall", "memory", "zeno")
+    return limited or failure.late or failure.cause in ("max_wall", "memory", "zeno")
 
 
 def _told(before: SolverFailure | None, last: SolverFailure) -> SolverFailure:
@@ -356,7 +356,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
         close(runs, None, None)
         raise
     assert runs.done is not None
-    missed = _missed(runs, options, achieved)
+    missed = _missed(runs, options, achieved) or undefined(runs.done[2].undefined())
     judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, missed, runs.open_balances)
     close(runs, achieved, judgement)
     finished, _, writer = runs.done

@@ -31,6 +31,8 @@ UNKNOWN = 768
 each node and branch of a line of a million sections)."""
 STEPPED = 2 << 10
 """Bytes that an unknown takes in a run, with its share of the factors (measured: 2500 in that line)."""
+TERM = 1 << 10
+"""Bytes charged for each term of a sum that is added up while the text is read: it takes a microsecond or two."""
 NUMBER = 16
 """Bytes of an element of a parameter."""
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model.expression import Node, index, order_of, topological_unbound, variables
 from sysdyn.dsl.model.functions import FUNCTIONS, real_power
 
@@ -82,7 +83,8 @@ def _value(node: Node, values: Mapping[Node, Any], lookup: Callable[[Node], floa
         case "not":
             return not args[0]
         case "reduce":
-            return _reduce(node, round(args[0]), round(args[1]), lookup)
+            finite = math.isfinite(args[0]) and math.isfinite(args[1])
+            return _reduce(node, round(args[0]), round(args[1]), lookup) if finite else math.nan
         case _:
             return lookup(node)
 
@@ -94,6 +96,7 @@ def _reduce(node: Node, first: int, last: int, lookup: Callable[[Node], float]) 
     def at(i: int) -> float:
         return evaluate([node.args[2]], lambda n: float(i) if n is me else lookup(n))[0]
 
+    budget.charge(budget.TERM * max(last - first, 0), f"the terms of a {operator} one by one")
     items = [at(i) for i in range(first, last + 1)]
     match operator:
         case "sum":

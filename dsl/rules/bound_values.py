@@ -41,6 +41,8 @@ LOOKED_AT = 1000
 
 def run(model: Elaborator, known: Values, report: Report, observations: Iterable[Observation] = ()) -> None:
     """E119, E313 of dry friction, E322, E324, E805 with the values bound; observations: what is traced."""
+    if not _sizes(model, known, report) or not _elements(model, known, report):
+        return  # the others go through every element
     _allowances(model, known, report)
     for r in model.parts.requirements:
         read = min(map(str, ex.variables(r.condition)), default=None)
@@ -63,10 +65,8 @@ def run(model: Elaborator, known: Values, report: Report, observations: Iterable
         if not _undefined(node, place, report):
             _divisions(model, node, tuple(loops), place, known, report)
     _frictions(model, known, report)
-    _sizes(model, known, report)
     _dynamics(model, known, report)
     _branches(model, known, report)
-    _elements(model, known, report)
     _indices(model, known, report)
 
 
@@ -182,16 +182,22 @@ def _is_constant(node: Node) -> bool:
     return all(n.op not in ("var", "time", "table") for n in ex.topological([node]))
 
 
-def _sizes(model: Elaborator, known: Values, report: Report) -> None:
+def _sizes(model: Elaborator, known: Values, report: Report) -> bool:
+    """Whether each size is a whole number, else E805."""
+    whole = True
     for name in sorted(model.resolver.whole):
         parameter = model.parts.parameters.get(name)
         if parameter is None or parameter.shape or not parameter.values:
             continue
         value = known.number(ex.param(name))
-        if value != math.floor(value) or abs(value) > 2**31 - 2:
+        if math.isnan(value):
+            continue  # of a parameter without a value
+        if abs(value) > 2**31 - 2 or value != math.floor(value):
             message = f"'{name}' is a size or an index, so it must be a whole number: {value:g}"
-            help_ = f"{math.floor(value):g} or {math.ceil(value):g}" if abs(value) < 2**31 else "a smaller number"
+            help_ = "a smaller number" if abs(value) >= 2**31 else f"{math.floor(value):g} or {math.ceil(value):g}"
             report.error("E805", message, parameter.place, help=help_, subject="sizes")
+            whole = False
+    return whole
 
 
 def _dynamics(model: Elaborator, known: Values, report: Report) -> None:
@@ -260,8 +266,8 @@ def _known(first: Node, last: Node, known: Values) -> bool:
     return math.isfinite(known.number(first) + known.number(last))
 
 
-def _elements(model: Elaborator, known: Values, report: Report) -> None:
-    """E119: arrays and loops of more elements than there is memory for."""
+def _elements(model: Elaborator, known: Values, report: Report) -> bool:
+    """Whether there is memory for the elements of arrays and loops, else E119."""
     parts = model.parts
     unknowns: list[Coordinate | Unknown | State | NodeFamily] = [*parts.coordinates, *parts.unknowns]
     unknowns += [*parts.states, *parts.nodes]
@@ -269,6 +275,8 @@ def _elements(model: Elaborator, known: Values, report: Report) -> None:
     counted += [(u.name, _volume(u.shape, known), u.place, budget.UNKNOWN) for u in unknowns]
     rows: list[Branch | Constraint] = [*parts.branches, *parts.constraints]
     counted += [(r.name, _count(r.loops, known), r.place, budget.UNKNOWN) for r in rows]
+    counted += [(d.state.data[0], _count(d.loops, known), d.place, budget.UNKNOWN) for d in parts.dynamics if d.loops]
+    counted += [("require", _count(r.loops, known), r.place, budget.TERM) for r in parts.requirements if r.loops]
     left = float(budget.granted())
     for name, count, place, price in counted:
         left -= count * price
@@ -276,7 +284,8 @@ def _elements(model: Elaborator, known: Values, report: Report) -> None:
             message = f"the {count:.10g} elements of '{name}' need {budget.shown(count * price)}"
             granted = budget.shown(budget.granted())
             report.error("E119", f"{message}; one model may take {granted} in all", place, help="fewer elements")
-            return
+            return False
+    return True
 
 
 def _volume(shape: Shape, known: Values) -> float:

@@ -100,8 +100,8 @@ def _shifted(run: Run, last: Sampled, target: Floats, number: int) -> Achieved:
 
 
 def _limited(failure: SolverFailure) -> bool:
-    """It ended because the caller wanted it to."""
-    return failure.cause in ("max_steps", "max_wall")
+    """It ended because the caller wanted it to, or no time is left."""
+    return failure.late or failure.cause in ("max_steps", "max_wall")
 
 
 def _draft(run: Run, tolerance: float, law: Law) -> Sampled:

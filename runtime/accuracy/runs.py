@@ -221,6 +221,15 @@ class Runs:
         self.accounts.begin()
         try:
             return integration.run(self._write, self._progress)
+        except SolverFailure as failure:
+            left = self.accounts.wall_left()
+            failure.late = left is not None and left <= 0.0
+            own = failure.cause == "max_steps" and self.most_steps != self.options.max_steps
+            if failure.late and (own or failure.cause in ("strained", "stiff")):  # it asks for another run
+                over = SolverFailure("max_wall", failure.time, failure.step)
+                over.state = failure.state
+                raise over from failure
+            raise
         finally:
             self.accounts.add(integration)
 

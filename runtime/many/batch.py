@@ -21,7 +21,7 @@ from sysdyn.runtime.accuracy.runs import APART, Runs
 from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
-from sysdyn.runtime.judgement import allowed, judge
+from sysdyn.runtime.judgement import allowed, judge, undefined
 from sysdyn.runtime.many.anchors import anchors
 from sysdyn.runtime.many.asked import DONE, END, ROWS, TRACES, WHY, Claim, NotApplicableError, Results, obstacle
 from sysdyn.runtime.many.mass_matrix import mass_matrix
@@ -383,7 +383,7 @@ class Batch:
         writer.append(rows[(rows[:, 1].astype(np.int32) & TRACE) > 0])
         runs.done = finished, [], writer
         estimate = float(found.estimate[0])
-        judgement = judge(self.options, runs.method, finished.balances, True, ())
+        judgement = judge(self.options, runs.method, finished.balances, True, undefined(writer.undefined()))
         close(runs, Achieved(estimate, True, 0, 0.0), judgement)
         return runs.held
 

@@ -60,7 +60,7 @@ class SolverFailure(Exception):  # noqa: N818 (a name of the house)
     cause: newton, error_test, singular, inertia, nonfinite, step_too_small, crawl, stiff, strained, max_steps,
     max_wall, memory.
     unknown: name of the unknown in the way, row: its row; None where the cause has no place; smooth: the bdf took
-    nearly all steps at its highest order.
+    nearly all steps at its highest order; late: no wall time is left for another run.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class SolverFailure(Exception):  # noqa: N818 (a name of the house)
         *,
         smooth: bool = False,
     ) -> None:
-        self.smooth = smooth
+        self.smooth, self.late = smooth, False
         self.cause, self.time, self.step, self.unknown, self.row = cause, time, step, unknown, row
         self.partial: object = None
         self.state: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None

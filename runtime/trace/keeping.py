@@ -38,6 +38,9 @@ class Writer(Protocol):
     def seen(self) -> dict[str, float]:
         """Largest magnitude of each stored quantity."""
 
+    def undefined(self) -> tuple[str, float] | None:
+        """The first quantity that is no number, or infinite, and when [s]."""
+
     def finish(
         self, nominal: Mapping[str, float], attributes: Attributes, final: bool, events: Sequence[Happened] = ()
     ) -> None:
@@ -53,6 +56,7 @@ class Held:
     def __init__(self, layout: Layout) -> None:
         self._layout, self._met = layout, Met(layout.columns)
         self._rows: list[Floats] = []
+        self._asked = 0
         self.closed = False
         self.trace: Trace | None = None
 
@@ -65,8 +69,19 @@ class Held:
         """There is nothing behind."""
 
     def seen(self) -> dict[str, float]:
-        """Largest magnitude of each stored quantity of a finished trace."""
-        return self._met.largest()
+        """Largest magnitude of each stored quantity."""
+        return self._taken().largest()
+
+    def undefined(self) -> tuple[str, float] | None:
+        """The first quantity that is no number, or infinite, and when [s]."""
+        return self._taken().undefined
+
+    def _taken(self) -> Met:
+        """Of all rows so far: of runs that are not kept nobody asks."""
+        while self._asked < len(self._rows):
+            self._met.take(self._rows[self._asked])
+            self._asked += 1
+        return self._met
 
     def finish(
         self, nominal: Mapping[str, float], attributes: Attributes, final: bool, events: Sequence[Happened] = ()
@@ -74,8 +89,6 @@ class Held:
         """The trace as `Trace.open` would read it from a file."""
         if self.closed:
             return
-        for some in self._rows:  # of runs that are not kept nobody asks
-            self._met.take(some)
         layout = self._layout
         width = BEFORE + 2 * layout.observed
         rows = np.concatenate(self._rows) if self._rows else np.zeros((0, width))
@@ -89,7 +102,7 @@ class Held:
             )
             for c in layout.columns
         }
-        energy = Quantity("audit.energy", rows[:, 6].copy(), "J", self._met.turned_over, None)
+        energy = Quantity("audit.energy", rows[:, 6].copy(), "J", self._taken().turned_over, None)
         constraints = Quantity("audit.constraints", rows[:, 7].copy(), "1", None, None)
         data |= {"audit.energy": energy, "audit.constraints": constraints}
         known = {**layout.attributes, **attributes, "final": int(final)}

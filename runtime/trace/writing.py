@@ -49,19 +49,27 @@ def uninterrupted() -> Iterator[None]:
 
 
 class Met:
-    """The largest of each stored quantity, and of the energies that went round, over the rows so far."""
+    """The largest of each stored quantity, and of the energies that went round, over the rows so far; undefined: the
+    first quantity that was no number, or infinite, and when [s].
+    """
 
     def __init__(self, columns: Sequence[Column]) -> None:
         self.columns = tuple(columns)
         self.turned_over = 0.0
         self._energies: Floats | None = None
+        self.undefined: tuple[str, float] | None = None
         self._largest = np.zeros(len(self.columns))
         self._places = np.array([BEFORE + column.place for column in self.columns], dtype=np.intp)
 
     def take(self, rows: Floats) -> None:
         """Rows [k, 8 + 2 observed]."""
         self._energy(rows[:, 2:6])
-        self._largest = np.fmax(self._largest, np.abs(rows[:, self._places]).max(axis=0))
+        size = np.abs(rows[:, self._places])
+        most = size.max(axis=0)
+        self._largest = np.fmax(self._largest, most)
+        if self.undefined is None and not np.isfinite(most).all():
+            k, place = np.argwhere(~np.isfinite(size))[0]
+            self.undefined = self.columns[place].name, float(rows[k, 0])
 
     def _energy(self, rows: Floats) -> None:
         """Largest of kinetic energy, change of potential energy, energy dissipated and supplied (J).
@@ -128,6 +136,10 @@ class TraceWriter:
     def seen(self) -> dict[str, float]:
         """Largest magnitude of each stored quantity."""
         return self._met.largest()
+
+    def undefined(self) -> tuple[str, float] | None:
+        """The first quantity that is no number, or infinite, and when [s]."""
+        return self._met.undefined
 
     def flush(self) -> None:
         """All rows so far stand in the trace."""

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from sysdyn import api
+from sysdyn.runtime.accuracy.accounts import Accounts
+from sysdyn.runtime.accuracy.runs import Runs
 from texts import ARRAY, BROKEN, FAILING, PENDULUM, STUCK, TWO_SCENES, write
 
 
@@ -58,6 +60,18 @@ def test_errors_are_raised(tmp_path):
         api.simulate("missing.sd")
     with pytest.raises(api.ModelError):
         api.compile_model(write(tmp_path, BROKEN))
+
+
+def test_no_run_begins_when_the_wall_time_is_over(tmp_path, monkeypatch):
+    """Runs that failed at once were followed by eleven others: 51 s of 100 000 sections where 3 s were given."""
+    text = "model m { coord x: translation = 1 m; energy T* = 1/2*(1 kg)*x'^2; init x' = 0 m/s\n"
+    text += "work -(1 N)*sqrt(1 - t/(1 us)) on x }\nscene s of m { time 0 s to 1 s }\n"
+    begun, own = [], Runs.run
+    monkeypatch.setattr(Runs, "run", lambda self, *given: (begun.append(self.method), own(self, *given))[1])
+    monkeypatch.setattr(Accounts, "wall_left", lambda self: -1.0)
+    with pytest.raises(api.SolverFailure, match="max_wall"):
+        api.simulate(write(tmp_path, text))
+    assert len(begun) == 1
 
 
 @pytest.mark.parametrize("backend", ["c", "numpy"])

@@ -316,6 +316,20 @@ def test_a_start_that_no_point_gives_numbers_for_says_what_helps(tmp_path):
     assert "below a division" in found.help
 
 
+def test_what_explains_that_there_is_no_start_heeds_the_limit_of_wall_time(tmp_path):
+    """A start was sought for each parameter that is zero, whatever the limit: 18 s where 3 s were given."""
+    path = tmp_path / "m.sd"
+    text = "model m { param k = 0; coord x, y: translation ~ 1 m; energy T* = 1/2*(1 kg)*(x'^2 + y'^2)"
+    text += "; work k*(1 N) on x; phi rod: x^2 + y^2 = 4 m^2 }\n"
+    path.write_text(f"{text}scene s of m {{ time 0 s to 1 s }}\n")
+    prepared = load(path)._loaded.first.prepared
+    for until, said in ((None, "with k = 0 there is no start"), (0.0, "no start was found")):
+        report = Report()
+        inconsistent(prepared, 0.0, InconsistentStart("stuck", 0.0), report, until)
+        (found,) = report
+        assert said in found.message
+
+
 def test_where_constraints_are_redundant_check_says_how_many(tmp_path, capsys):
     """It said 'index None': the form as written has none."""
     path = tmp_path / "m.sd"

@@ -177,3 +177,24 @@ def test_a_file_of_many_mistakes(tmp_path, capsys):
     assert run(["check", "--json", str(path)]) == 1
     found = json.loads(capsys.readouterr().out)["diagnostics"]
     assert len(found) == MOST + 1
+
+
+ELEMENTS = "state a[1..n]: 1 = 0\n  dynamic a[1]' = 1 s^-1\n  for i in 2..n {\n    dynamic a[i]' = 1 s^-1\n  }"
+
+
+@pytest.mark.parametrize(
+    ("body", "code"),
+    [
+        (f"param n = 1e300\n  {ELEMENTS}", "E805"),
+        (f"param n = 1e9\n  {ELEMENTS}", "E119"),
+        ("param n = 1e9\n  for i in 1..n {\n    require i*m > 0 kg\n  }", "E119"),
+        ("param n = 1e9\n  param s = sum(i in 1..n: 1/i)", "E119"),
+        ("param n = inf\n  param s = sum(i in 1..n: 1/i)", "E805"),
+        ("param n = 1e200\n  param s = sum(i in 1..n*n: 1/i)", "E805"),
+    ],
+)
+def test_a_size_beyond_all_memory_is_told_before_its_elements_are_gone_through(body, code):
+    """By the command line, `--set n=1e20` of a beam took all memory and never came back."""
+    network, report = judged(body)
+    assert network is None
+    assert {found.code for found in report.diagnostics} == {code}

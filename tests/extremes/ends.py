@@ -1,26 +1,33 @@
-"""Parameters at the ends of what numbers are: python tests/extremes/ends.py [ROOM ...] [--from K] [--count N]
+"""Parameters at the ends of what numbers are: python tests/extremes/ends.py [ROOM ...] [--from K] [--count N] [...]
 
 The first scene of each model of these rooms of models/ (seed, gallery) runs with each of its parameters at 1e300, 1e20,
-1e-20, 1e-300, 0 and -1, the others as they are.  A run ends with a result, or with findings: a fault of the house, or a
-run that takes more than SLOW seconds, is printed. Results are not compared: told.py and the circuits beside it do.
+1e-20, 1e-300, 0 and -1, the others as they are; --two: each with the next one, at all pairs of 1e300 and 1e-300.
+--formulation F: in that one, where the model has it.  A run ends with a result, or with findings: a fault of the house,
+a trace told as met that holds something else than numbers, or a run that takes more than SLOW seconds, is printed.
+Results are not compared: told.py and the circuits beside it do.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import tempfile
 import time
 import warnings
 from collections import Counter
 from collections.abc import Iterator
+from itertools import pairwise, product
 from pathlib import Path
 
+import numpy as np
 from sysdyn import api, models
 from sysdyn.cli.run.request import targets
 from sysdyn.dsl.text.diagnostics import Report
 
 VALUES = (1e300, 1e20, 1e-20, 1e-300, 0.0, -1.0)
+FAR = (1e300, 1e-300)
+"""What pairs take."""
 WALL, SLOW = 3.0, 10.0
 """Seconds given to a run, and those that it may take with all that stands around it."""
 FINDINGS = (api.ModelError, api.SolverFailure, api.NotMet)
@@ -31,30 +38,37 @@ def scene(file: Path) -> str:
     return next(iter(targets.read(str(file), Report()).scenes))
 
 
-def ended(file: Path, settings: dict[str, float], folder: Path) -> str:
+def ended(file: Path, settings: dict[str, float], folder: Path, formulation: str | None = None) -> str:
     """How a run with these parameters ended: met, or the name of the exception."""
+    given = {"scene": scene(file), "output": folder / "n.h5", "max_wall": WALL, "set": settings}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            api.simulate(file, scene=scene(file), output=folder / "n.h5", max_wall=WALL, set=settings)
+            trace = api.simulate(file, formulation=formulation, **given)
         except FINDINGS as finding:
             return type(finding).__name__
         except Exception as fault:  # that there is none is what is asked
             return f"FAULT {type(fault).__name__}: {str(fault)[:120]}"
-    return "met"
+    missing = [name for name in trace.names if not np.isfinite(trace[name].values).all()]
+    return f"FAULT told as met without numbers: {', '.join(missing)[:120]}" if missing else "met"
 
 
-def parameters(file: Path, folder: Path) -> tuple[str, ...]:
-    """Of a model that runs."""
-    return tuple(api.simulate(file, scene=scene(file), output=folder / "n.h5").parameters)
+def parameters(file: Path, folder: Path, formulation: str | None) -> tuple[str, ...]:
+    """Of a model that runs, one element of each array; () if it does not in this formulation."""
+    try:
+        trace = api.simulate(file, scene=scene(file), output=folder / "n.h5", formulation=formulation)
+    except FINDINGS:
+        return ()
+    return tuple({re.sub(r"\[.*?\]", "[]", name): name for name in trace.parameters}.values())
 
 
-def runs(file: Path, folder: Path) -> Iterator[tuple[str, float, str, float]]:
-    """Parameter, its value, how the run ended, and how long it took (s)."""
-    for name in parameters(file, folder):
-        for value in VALUES:
-            began = time.monotonic()
-            yield name, value, ended(file, {name: value}, folder), time.monotonic() - began
+def settings(names: tuple[str, ...], two: bool) -> Iterator[dict[str, float]]:
+    """What the runs of one model change."""
+    if not two:
+        yield from ({name: value} for name in names for value in VALUES)
+        return
+    for pair in pairwise((*names, names[0]) if len(names) > 2 else names):
+        yield from (dict(zip(pair, values, strict=True)) for values in product(FAR, repeat=2))
 
 
 def main() -> None:
@@ -62,18 +76,24 @@ def main() -> None:
     parser.add_argument("room", nargs="*", default=["seed", "gallery"])
     parser.add_argument("--from", type=int, default=0, dest="first")
     parser.add_argument("--count", type=int)
+    parser.add_argument("--formulation")
+    parser.add_argument("--two", action="store_true")
     given = parser.parse_args()
     root = Path(models.__file__).parent
-    files = [file for room in given.room for file in sorted((root / room).glob("*.sd"))][given.first :][: given.count]
+    files = [file for room in given.room for file in sorted((root / room).glob("**/*.sd"))][given.first :]
     ends: Counter[str] = Counter()
     wrong = 0
     with tempfile.TemporaryDirectory() as folder:
-        for file in files:
-            for name, value, end, took in runs(file, Path(folder)):
+        for file in files[: given.count]:
+            for changed in settings(parameters(file, Path(folder), given.formulation), given.two):
+                began = time.monotonic()
+                end = ended(file, changed, Path(folder), given.formulation)
+                took = time.monotonic() - began
                 ends[end.split()[0]] += 1
                 if end.startswith("FAULT") or took > SLOW:
                     wrong += 1
-                    print(f"{file.stem} {name} = {value:g}: {end}, {took:.1f} s", flush=True)
+                    told = ", ".join(f"{name} = {value:g}" for name, value in changed.items())
+                    print(f"{file.stem} {told}: {end}, {took:.1f} s", flush=True)
     print(f"{sum(ends.values())} runs: {', '.join(f'{n} {end}' for end, n in ends.most_common())}; wrong: {wrong}")
     sys.exit(1 if wrong else 0)
 

@@ -21,7 +21,7 @@ from sysdyn.dsl.model.network import Parameter
 from sysdyn.dsl.model.units import multiply, quantity, si
 from sysdyn.dsl.text.diagnostics import ModelError, Place, Related, Report
 from sysdyn.runtime.events.start import eventful_start
-from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
+from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.slopes import WITH_A_SLOPE, no_slope
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import NotFiniteError
@@ -38,8 +38,10 @@ def place_of(prepared: Prepared, label: RowLabel) -> Place:
     return place_at(prepared.network, label.file, label.line)
 
 
-def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report: Report) -> None:
-    """Report why there is no start."""
+def inconsistent(
+    prepared: Prepared, t0: float, error: InconsistentStart, report: Report, until: float | None = None
+) -> None:
+    """Report why there is no start; until: `time.monotonic()` at which no more is tried."""
     where = place_of(prepared, error.rows[0]) if error.rows else prepared.network.place
     names = ", ".join(dict.fromkeys(_shown(r) for r in error.rows)) or ", ".join(error.names)
     fixed_at = dict.fromkeys(place_of(prepared, c) for c in error.candidates)  # a line may fix several
@@ -63,7 +65,7 @@ def inconsistent(prepared: Prepared, t0: float, error: InconsistentStart, report
         case "nonfinite":
             message = f"{names} is not a number at the initial values: a root or logarithm out of its range?"
             report.error("E519", message, where)
-        case _ if zero := _zero(prepared, t0):
+        case _ if zero := _zero(prepared, t0, until):
             said = f"with {zero.name} = {quantity(0.0, zero.unit)} there is no start"
             left = f"{_residual(error)} is left over in {names}"
             free = f", or '~' for '=' of {_listed(prepared, error)}" if error.candidates else ""
@@ -159,7 +161,7 @@ def _residual(error: InconsistentStart) -> str:
     return f"{error.residual:.3g}{f' {unit}' if unit != '1' else ''}"
 
 
-def _zero(prepared: Prepared, t0: float) -> Parameter | None:
+def _zero(prepared: Prepared, t0: float, until: float | None) -> Parameter | None:
     """The parameter that is zero and without which there is no start: with 1 in its place there is one."""
     values = prepared.binding.values
     zeros = [
@@ -172,7 +174,9 @@ def _zero(prepared: Prepared, t0: float) -> Parameter | None:
             binding = prepared.compiled.bind({p.name: 1.0})
             system = System(prepared.structure, prepared.arrays_of(binding), prepared.carrier)
             with np.errstate(all="ignore"):
-                eventful_start(system, t0, plan(replace(prepared, binding=binding), system))
+                eventful_start(system, t0, plan(replace(prepared, binding=binding), system), until)
+        except SolverFailure:  # no time is left
+            return None
         except (InconsistentStart, NotFiniteError, ModelError):
             continue
         return p

@@ -78,7 +78,8 @@ def _started(
             facts = structure(system, state)
             implicit = undetermined(system, state, facts)
     except InconsistentStart as error:
-        _refused(prepared, t0, error, report)
+        if error.kind != "nonfinite" or not _undefined(prepared, system, t0, report):
+            _refused(prepared, t0, error, report, until)
         return None
     except NotFiniteError:
         _steep(prepared, system, t0, report)
@@ -106,17 +107,18 @@ def _late(prepared: Prepared, when: str, remedy: str, report: Report) -> None:
     report.error("E934", text, prepared.network.place, help=remedy)
 
 
-def _refused(prepared: Prepared, t0: float, error: InconsistentStart, report: Report) -> None:
+def _refused(prepared: Prepared, t0: float, error: InconsistentStart, report: Report, until: float | None) -> None:
     """Report why there is no start; of gathered elements at the lines of the author, as `compile_network` does."""
     if prepared.compiled.written is not None:
         found = Report()
         one_by_one = prepare(
             prepared.network, Report(), formulation=prepared.formulation, backend="numpy", gather=False
         )
-        if one_by_one is not None and start(one_by_one, t0, found) is None:
+        tried = one_by_one is not None and start(one_by_one, t0, found, until=until) is None
+        if tried and all(finding.code != "E934" for finding in found.diagnostics):
             report.extend(found)
             return
-    inconsistent(prepared, t0, error, report)
+    inconsistent(prepared, t0, error, report, until)
 
 
 def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None:
@@ -157,14 +159,20 @@ def shortened(lines: list[str]) -> list[str]:
     return lines if len(lines) <= 6 else [*lines[:5], f"... {len(lines) - 5} more of these"]
 
 
-def _steep(prepared: Prepared, system: System, t0: float, report: Report) -> None:
-    """E519: the rows at the start, or their slopes, are no numbers."""
+def _undefined(prepared: Prepared, system: System, t0: float, report: Report) -> bool:
+    """Whether a function is no number at the start, which is told (E519)."""
     from sysdyn.cli.run.verdict.culprit import undefined_at_start  # of mistakes alone
 
     found = undefined_at_start(prepared, system, t0)
     if found is not None:
         help_ = "initial values at which it is defined, or a law that is defined there"
         report.error("E519", f"at the start {found[0]}", found[1], help=help_)
+    return found is not None
+
+
+def _steep(prepared: Prepared, system: System, t0: float, report: Report) -> None:
+    """E519: the rows at the start, or their slopes, are no numbers."""
+    if _undefined(prepared, system, t0, report):
         return
     message = "the slopes of the equations are no numbers at the start: values beyond 1e308, or a root at zero?"
     report.error("E519", message, prepared.network.place, help="look at the sizes of parameters and initial values")

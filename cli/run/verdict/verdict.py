@@ -244,7 +244,7 @@ def _inaccurate(prepared: Prepared, missed: NotMet, place: Place, flat: tuple[Ro
         return
     if missed.undefined:
         text = f"{missed.element} is no number from t = {missed.time:.9g} s on: a function is outside its domain"
-        report.error("E920", f"the accuracy asked was not reached: {text}", where, help=_REMEDIES["E933"])
+        report.error("E920", text, where, help=_REMEDIES["E933"])
         return
     estimate = "nothing estimates its error" if missed.value is None else f"estimated error {missed.value:.1e}"
     since = "" if missed.time is None else f", beyond it from t = {missed.time:.9g} s on"
