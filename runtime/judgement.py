@@ -152,7 +152,9 @@ def judge(
     """
     balances = tuple(balances)
     conserved = tuple(b for b in balances if b.conserved)
-    found = [NotMet("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined) for e in missed]
+    asked = accurate and method != "euler"  # what is no number is missed whatever was asked
+    misses = [e for e in missed if asked or e.undefined]
+    found = [NotMet("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined) for e in misses]
     if method == "euler":
         return Judgement((), tuple(found), conserved)
     judged = ["accuracy"] if accurate else []
