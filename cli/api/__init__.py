@@ -133,7 +133,7 @@ class Model:
         if not options.keys() <= _RUN:
             raise UsageError(f"run() has no option {', '.join(sorted(options.keys() - _RUN))}: give it to load()")
         given = {name: value for name, value in {"until": until, "at": at, **options}.items() if value is not None}
-        report, values = Report(), dict(_pairs({} if set is None else set))
+        report, values = Report(), _settings({} if set is None else set)
         if given:
             return _handed(self._loaded.run(values, report, alone=True, **_changes(given)), report, unmet)
         found = self._loaded.trace(values, report)
@@ -230,14 +230,14 @@ def check(text: str, name: str = "<text>") -> list[Diagnostic]:
 def _request(path: str, options: dict[str, Any]) -> Request:
     given = dict(options)
     settings = given.pop("set", None) or given.pop("settings", ())
-    given["settings"] = tuple((name, text_of(value)) for name, value in _pairs(settings))
+    given["settings"] = tuple((name, text_of(value)) for name, value in _settings(settings).items())
     return _made(Request, path, **_changes(given))
 
 
-def _pairs(settings: Any) -> Iterable[tuple[str, Any]]:
-    """Names and values of a mapping, or of pairs."""
+def _settings(settings: Any) -> dict[str, Any]:
+    """Values by name, of a mapping or of pairs."""
     try:
-        return tuple(dict(settings).items())
+        return dict(settings)
     except (TypeError, ValueError):
         raise UsageError(f"set {settings!r}: names with their values, such as {{'R.R': '10 ohm'}}") from None
 

@@ -91,7 +91,7 @@ def _beyond(points: Points, p: Array) -> NDArray[np.bool_]:
 
 def _extreme(numbers: Array) -> bool:
     sizes = np.abs(numbers[numbers != 0.0])
-    return bool(~np.all((sizes > FARTHEST**-1) & (sizes < FARTHEST)))
+    return not ((sizes > 1.0 / FARTHEST) & (sizes < FARTHEST)).all()
 
 
 def _points(system: System, whole: System, started: Started, oracle: SampledRows, until: float) -> Points:

@@ -135,6 +135,11 @@ def zero(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
     return np.asarray(found)
 
 
+def _used(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
+    """Quantities [quantities] that are asked for, and more than round-off."""
+    return np.asarray((fine.largest != 0.0) & np.isfinite(target) & ~zero(coarse, fine, target))
+
+
 def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
     """(largest relative difference, the same over the accuracy wanted) of two runs, in the finer one's sizes."""
     size = fine.largest
@@ -159,10 +164,9 @@ def before_fronts(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float
     """How far two runs are apart, relative, and that over the accuracy wanted, where the coarser one passes over a
     front in one step.
     """
-    use = (fine.largest != 0.0) & np.isfinite(target)
-    if fine.front is None or not fine.front.any() or not use.any():
+    if fine.front is None or not fine.front.any():
         return 0.0, 0.0
-    use &= ~zero(coarse, fine, target)
+    use = _used(coarse, fine, target)
     relative = fine.front[use] / fine.largest[use]
     return float(relative.max(initial=0.0)), float((relative / target[use]).max(initial=0.0))
 
@@ -176,7 +180,7 @@ def passed_over(coarse: Sampled, fine: Sampled, target: Floats, credit: float) -
     if fine.passed is None or not fine.passed.any() or coarse.own[0].shape != fine.values.shape:
         return 0.0, 0.0
     at = fine.passed[:, 0] > 0.0
-    use = (fine.largest != 0.0) & np.isfinite(target) & ~zero(coarse, fine, target)
+    use = _used(coarse, fine, target)
     if not use.any():
         return 0.0, 0.0
     longer, most = fine.passed[at].T
@@ -198,10 +202,9 @@ def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats, *, known: bool 
     zero, and what they hardly share a digit of is left.
     """
     before, size = coarse.own[0], fine.largest
-    use = (size != 0.0) & np.isfinite(target)
-    if before.shape != fine.values.shape or len(before) < 2 or not use.any() or fine.jumps:
+    if before.shape != fine.values.shape or len(before) < 2 or fine.jumps:
         return 0.0, 0.0  # what jumps may be nothing between its jumps
-    use &= ~zero(coarse, fine, target)  # round-off has not come to rest
+    use = _used(coarse, fine, target)  # round-off has not come to rest
     if not use.any():
         return 0.0, 0.0
     with np.errstate(all="ignore"):

@@ -103,8 +103,7 @@ class Handler(Watching):
         has it; p has the values then.  None where they assign what p does not hold.
         """
         values = self.observer(t, y, yd)
-        for k, relation in enumerate(self.plan.relations):
-            self.side[k] = self._side(t, k, values[relation.row], 1.0)
+        self._take_sides(t, values, np.ones_like(self.side))
         self.truth, self.rounds = self._true(), []
         self._cascade(t, y, yd, range(len(self.plan.sampled)), [])
         assigned = [a for r in self.rounds for group in r.groups for a in group]
@@ -115,8 +114,7 @@ class Handler(Watching):
         it.
         """
         values = self.observer(t, y, yd)
-        for k, relation in enumerate(self.plan.relations):
-            self.side[k] = self._side(t, k, values[relation.row], 1.0)
+        self._take_sides(t, values, np.ones_like(self.side))
         self._bounded(t, values)
         drives = self.succession.pushed(t, y, yd, values) if self.restart is not None else None
         if drives is not None:
@@ -129,12 +127,18 @@ class Handler(Watching):
             return self.fire(t, y, yd, due)
         return self.settled(t, y, yd, self._words()) if anew else None
 
-    def _side(self, t: float, k: int, value: float, before: float) -> float:
+    def _take_sides(self, t: float, values: Floats, before: Floats) -> None:
+        """The side of each relation, which was `before` [relations].  SolverFailure where one is no number."""
+        for k, relation in enumerate(self.plan.relations):
+            value = values[relation.row]
+            if np.isnan(value):
+                raise SolverFailure("nonfinite", t, 0.0)
+            self.side[k] = self._side(k, value, before[k])
+
+    def _side(self, k: int, value: float, before: float) -> float:
         """The side of relation k, which was `before`: a value that a jump made zero is on neither, one that was found
-        as the root of a crossing is past it, and one that jumps there.  SolverFailure where it is no number.
+        as the root of a crossing is past it, and one that jumps there.
         """
-        if np.isnan(value):
-            raise SolverFailure("nonfinite", t, 0.0)
         relation = self.plan.relations[k]
         small = self.observer.zero(relation.row) if relation.moves else 0.0
         near = abs(value) <= small and (value != 0.0 or k in self._exact)
@@ -381,8 +385,7 @@ class Handler(Watching):
         """Sides after a jump."""
         values = self.observer(t, y, yd)
         self._bounded(t, values)
-        for k, relation in enumerate(self.plan.relations):
-            self.side[k] = self._side(t, k, values[relation.row], self.side[k])
+        self._take_sides(t, values, self.side)
 
     # -- what never ends -----------------------------------------------------------------------------------------
 

@@ -18,6 +18,7 @@ Displacements come first: where they go does not depend on how flows jump.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -47,6 +48,12 @@ Entries = tuple[NDArray[Any], NDArray[Any], Floats, Floats]
 """Row, column, value, its mean over the way so far.  Row 2 k is row k behind the instant, 2 k + 1 its integral; column
 2 k is unknown k, 2 k + 1 its integral over the instant, of flows and momenta their rate behind it.
 """
+
+
+@functools.cache
+def _gauss() -> tuple[Floats, Floats]:
+    """Points in -1..1 and weights of the rule: found where something first jumps."""
+    return np.polynomial.legendre.leggauss(POINTS)
 
 
 class UnbalancedError(Exception):
@@ -239,7 +246,7 @@ class Instant:
         begin, end = way
         if np.array_equal(jyd, self.system.jacobian(t, 0.5 * (begin + end), yd)[1], equal_nan=True):
             return jyd
-        parts, weights = np.polynomial.legendre.leggauss(POINTS)
+        parts, weights = _gauss()
         at = (begin + 0.5 * (1.0 + part) * (end - begin) for part in parts.tolist())
         found = 0.5 * np.asarray(weights) @ [self.system.jacobian(t, y, yd)[1] for y in at]
         return np.where(np.isfinite(found), found, 0.0)

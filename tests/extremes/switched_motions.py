@@ -195,14 +195,8 @@ def rooms(dice):
         on = np.array([mode >> i & 1 for i in range(n)])
         return (np.array(wall) * (cold - y) + full @ y - full.sum(axis=1) * y + on * heat) / c
 
-    turns = []
-    for mode in range(2**n):
-        for i in range(n):
-            if mode >> i & 1:
-                turns += [Turn(mode, lambda t, y, i=i: y[i] - high[i], mode ^ 1 << i)]
-            else:
-                turns += [Turn(mode, lambda t, y, i=i: low[i] - y[i], mode ^ 1 << i)]
-    rest = {"rates": rates, "y": [15.0] * n, "read": lambda y: y, "turns": tuple(turns), "mode": 2**n - 1}
+    turns = _relays(n, lambda i, y: y[i] - high[i], lambda i, y: low[i] - y[i])
+    rest = {"rates": rates, "y": [15.0] * n, "read": lambda y: y, "turns": turns, "mode": 2**n - 1}
     return (), body, {f"T{i}": f"T{i}" for i in range(n)}, end, rest
 
 
@@ -230,6 +224,15 @@ def samplers(dice):
     return (), body, {"q": "x", "v": "x'", "u": "u"}, end, rest
 
 
+def _relays(n, off, on):
+    """The turns of n switches, a bit of the mode each: off(i, y), on(i, y) rise through zero where switch i is."""
+    return tuple(
+        Turn(mode, lambda t, y, i=i, value=off if mode >> i & 1 else on: value(i, y), mode ^ 1 << i)
+        for mode in range(2**n)
+        for i in range(n)
+    )
+
+
 def rings(dice):
     """Three to five stores in a ring, each charged while the one before it is switched on, and switched at a level."""
     n = dice.choice((3, 5))
@@ -244,14 +247,8 @@ def rings(dice):
     def rates(t, y, mode):
         return [((0.0 if mode >> (i - 1) % n & 1 else 1.0) - y[i]) / slow[i] for i in range(n)]
 
-    turns = []
-    for mode in range(2**n):
-        for i in range(n):
-            if mode >> i & 1:
-                turns += [Turn(mode, lambda t, y, i=i: low[i] - y[i], mode ^ 1 << i)]
-            else:
-                turns += [Turn(mode, lambda t, y, i=i: y[i] - high[i], mode ^ 1 << i)]
-    rest = {"rates": rates, "y": [0.1 * i for i in range(n)], "read": lambda y: y, "turns": tuple(turns)}
+    turns = _relays(n, lambda i, y: low[i] - y[i], lambda i, y: y[i] - high[i])
+    rest = {"rates": rates, "y": [0.1 * i for i in range(n)], "read": lambda y: y, "turns": turns}
     return (), body, {f"y{i}": f"y{i}" for i in range(n)}, end, rest
 
 

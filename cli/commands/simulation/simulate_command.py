@@ -95,15 +95,15 @@ def _summary(ran: Ran) -> str:
     form = {"None": "not known"} | ({"2": "2 (stabilised)"} if ran.started.facts.index == 3 else {})
     method = f"{o.method} ({o.reason})" if o.reason else o.method
     how = (ran.prepared.formulation, method, f"index {form.get(str(o.index), o.index)}", ran.prepared.backend)
-    read = {"energy balance {:.2e} J": o.samples.energy, "constraints {:.1e}": o.samples.constraints}
-    last = {text: _last(values) for text, values in read.items()}
-    meters = [text.format(value) for text, value in last.items() if math.isfinite(value)]  # of a draft left behind none
+    balance, missed = _last(o.samples.energy), _last(o.samples.constraints)
+    meters = [f"energy balance {balance:.2e} J"] if math.isfinite(balance) else []  # a draft left behind has none
+    meters += [f"constraints {missed:.1e}"] if math.isfinite(missed) else []
     began = ran.started.state.t
     span = f"{o.reached:g} s" if began == 0.0 else f"{began:.12g} s to {o.reached:.12g} s"
     lines = [
         f"{ran.target.name}: {', '.join(how)}",
         f"  {span} in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
-        *(f"  {', '.join(meters)}" for _ in meters[:1]),
+        *([f"  {', '.join(meters)}"] if meters else []),
         *(f"  {text}" for text in _conserved(ran)),
         f"  {o.trace}{'' if o.final else ' (not final)'}{'' if o.met or not o.final else ' (not met)'}",
     ]

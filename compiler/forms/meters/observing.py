@@ -43,16 +43,16 @@ def begun(model: EnergyModel, seen: frozenset[str]) -> frozenset[str]:
     """Coordinates whose displacement is an unknown: those seen, and those that an initial value ties to them or to what
     is no displacement.
     """
-    tied = []
+    found, tied = set(seen), []
     for read in map(_unknowns, model.initials):
         names = {n.data[0] for n in read if n.data[1] == model.mirror.coordinate}
         tied.append((names, any(n.data[1] != model.mirror.coordinate for n in read)))
-    before: frozenset[str] | None = None
-    while seen != before:
-        before = seen
-        for names, more in tied:
-            seen = seen | names if more or names & seen else seen
-    return seen
+    while tied := [(names, more) for names, more in tied if not names <= found]:
+        reached = [names for names, more in tied if more or names & found]
+        if not reached:
+            break
+        found.update(*reached)
+    return frozenset(found)
 
 
 def _unknowns(target: Target) -> list[Node]:

@@ -40,9 +40,9 @@ static void note_beyond(sd_run *run)
 {
     const double *end = run->stepper->y;
     for (int32_t j = 0; j < run->stepper->n && j < run->written; j++) {
-        double most = run->beyond * fmax(run->magnitude[j], fabs(end[j]));
-        if (fabs(run->point[j]) > most && run->magnitude[j] > 0.0)
-            run->beyond = fabs(run->point[j]) / fmax(run->magnitude[j], fabs(end[j]));
+        const double size = fmax(run->magnitude[j], fabs(end[j]));
+        if (fabs(run->point[j]) > run->beyond * size && run->magnitude[j] > 0.0)
+            run->beyond = fabs(run->point[j]) / size;
     }
 }
 
