@@ -57,11 +57,13 @@ def names(*rooms: str) -> list[str]:
 class Bench:
     """A model under its scene `reference` and one formulation."""
 
-    def __init__(self, name: str, folder: Path, formulation: str | None = None) -> None:
+    def __init__(
+        self, name: str, folder: Path, formulation: str | None = None, settings: tuple[tuple[str, str], ...] = ()
+    ) -> None:
         path = MODELS / f"{name}.sd"
         report = Report()
         self.trace = folder / "trace.h5"
-        settings = sizes(str(path))[1]
+        settings = (*sizes(str(path))[1], *settings)
         request = Request(str(path), "reference", formulation=formulation, output=str(self.trace), settings=settings)
         target = targets.one(targets.read(str(path), report), str(path), None, "reference", report)
         assert target is not None, [d.message for d in report.diagnostics]

@@ -1,6 +1,6 @@
-"""Ours against SUNDIALS in one run: python tests/bench/race.py [--targets A,...] [--plot FILE] [FAMILY...]
+"""Ours against SUNDIALS in one run: python tests/bench/race.py [--targets A,...] [--plot FILE] [FAMILY[:n]...]
 
-The models of models/benchmark, each at its end: the cheapest run whose achieved error meets a target.  Ours: over
+The models of models/benchmark (n: of a line or ladder, its sections), each at its end: the cheapest run whose achieved error meets a target.  Ours: over
 `--accuracy` 10^(-1, -1.5, ..., -12), everything else automatic, `cpu_integrate_s` with all runs of the control; beside
 it the cheapest single run with --rtol by any method.  Peers: IDA and CVODE on the residual and the Jacobian that
 `sysdyn compile` writes of the same model (peers/peer.c), over index forms, tolerances by half decades, algebraic
@@ -49,6 +49,14 @@ POLICIES = (("1", "0.33", "0.25"), ("1", "0.33", "0.01"), ("1", "0.01", "0.25"),
 
 
 RECORDED: dict[str, dict[float, tuple[float, float]]] = {
+    "oregonator": {1e-3: (1.2, 0.22), 1e-6: (4.7, 0.36)},
+    "akzo": {1e-3: (0.14, 0.042), 1e-6: (0.41, 0.066)},
+    "caraxis": {1e-3: (2.7, 0.19), 1e-6: (10.9, 0.35)},
+    "rc_ladder:100": {1e-3: (math.nan, 0.25), 1e-6: (math.nan, 0.42)},
+    "rc_ladder:1000": {1e-3: (math.nan, 2.1), 1e-6: (math.nan, 5.4)},
+    "rc_ladder:10000": {1e-3: (math.nan, 25.0), 1e-6: (math.nan, 32.0)},
+    "nltl:1000": {1e-3: (math.nan, 2.8), 1e-6: (math.nan, 6.2)},
+    "lc_line:100": {1e-3: (math.nan, 1.34), 1e-6: (math.nan, 2.7)},
     "pendulum": {1e-3: (0.99, 0.024), 1e-6: (2.21, 0.065)},
     "andrews": {1e-3: (1.92, 0.29), 1e-6: (5.32, 0.69)},
     "crank": {1e-3: (16.8, 5.8), 1e-6: (math.nan, 10.8)},
@@ -61,8 +69,14 @@ RECORDED: dict[str, dict[float, tuple[float, float]]] = {
     "beam": {1e-3: (84.5, 8.8), 1e-6: (929.0, 84.0)},
 }
 """Of the best of RADAU5, RADAU, RODAS, MEBDFI and DOP853, driven by experts on equations reduced by hand: CPU ms of the
-best SUNDIALS run beside it (nan: none got there), its own.
+best SUNDIALS run beside it (nan: none got there, or on a line's own text of one unknown a node), its own.
 """
+
+
+def sized(family: str) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """NAME[:n]: the model and its settings."""
+    name, _, n = family.partition(":")
+    return name, (("n", n),) if n else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,9 +110,11 @@ class Peers:
         """The program of one index form, its number of unknowns, its outputs; None where the model has no such form."""
         here = self.folder / f"{family}-{index}"
         sysdyn = Path(sys.executable).parent / "sysdyn"
-        model = MODELS / "benchmark" / f"{family}.sd"
+        name, settings = sized(family)
+        model = MODELS / "benchmark" / f"{name}.sd"
+        given = [word for key, value in settings for word in ("--set", f"{key}={value}")]
         written = subprocess.run(
-            [str(sysdyn), "compile", str(model), "--scene", "reference", "--index", index, "-o", str(here)],
+            [str(sysdyn), "compile", str(model), "--scene", "reference", "--index", index, *given, "-o", str(here)],
             capture_output=True, text=True, check=False,
         )  # fmt: skip
         if written.returncode:
@@ -172,7 +188,8 @@ def finest(bench: Bench, method: str) -> Measured | None:
 def race(family: str, peers: Peers, seconds: float) -> Family | None:
     """Everybody on one family; None where nothing is exact enough to judge by."""
     with tempfile.TemporaryDirectory() as folder:
-        bench = Bench(f"benchmark/{family}", Path(folder))
+        name, settings = sized(family)
+        bench = Bench(f"benchmark/{name}", Path(folder), settings=settings)
         span = bench.options.t_end - bench.options.t_start
         bench.options = replace(bench.options, every=span)
         exact, other = finest(bench, "radau") or finest(bench, "dopri"), finest(bench, "bdf")

@@ -43,7 +43,7 @@ def published():
 def ended(folder, published, family, accuracy):
     """(refusal or "", largest error over the accuracy asked)."""
     if family == "oregonator":
-        path, wanted, more = Path(__file__).with_name("oregonator.sd"), OREGONATOR, {}
+        path, wanted, more = ROOT / "models/benchmark/oregonator.sd", OREGONATOR, {}
     elif family == "vdpol_million":
         path, wanted = ROOT / "models/benchmark/vdpol.sd", VDPOL
         more = {"settings": (("mu", "1e6"),), "until": "2e6 s"}
