@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.events.plan import Assignment, Condition, Relation
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -40,6 +41,39 @@ def holds(condition: Condition, sides: Floats, relations: Sequence[Relation], cr
         return bool((side == 0.0) == (operator == "=="))
     strict = {">": side > 0.0, "<": side < 0.0, ">=": side >= 0.0, "<=": side <= 0.0}
     return bool(strict[operator])
+
+
+class Conditions:
+    """The conditions of a plan's events; those are asked again of whose relations one has changed its side."""
+
+    def __init__(self, conditions: Sequence[Condition], relations: Sequence[Relation]) -> None:
+        self._conditions, self._relations = conditions, relations
+        self._of: list[list[int]] = [[] for _ in relations]
+        for k, condition in enumerate(conditions):
+            for relation in _relations_of(condition):
+                self._of[relation].append(k)
+        self._sides = np.full(len(relations), np.nan)
+        self._held = np.array([holds(c, np.zeros(len(relations)), relations, ()) for c in conditions], dtype=bool)
+
+    def hold(self, sides: Floats, crossed: Sequence[int] = ()) -> NDArray[np.bool_]:
+        """Which hold [conditions] where relations stand on these sides; crossed: as of `holds`."""
+        self._ask(np.flatnonzero(sides != self._sides), sides, (), self._held)
+        self._sides[:] = sides
+        found = self._held.copy()
+        if len(crossed):
+            self._ask(crossed, sides, crossed, found)
+        return found
+
+    def _ask(self, changed: Iterable[int], sides: Floats, crossed: Sequence[int], held: NDArray[np.bool_]) -> None:
+        for k in {k for relation in changed for k in self._of[relation]}:
+            held[k] = holds(self._conditions[k], sides, self._relations, crossed)
+
+
+def _relations_of(condition: Condition) -> set[int]:
+    """Numbers of the relations that a condition asks."""
+    if condition[0] == "relation":
+        return {condition[1]}
+    return {k for part in condition[1:] for k in _relations_of(part)}
 
 
 def with_momenta(settled: System, t: float, y: Floats, yd: Floats) -> Floats:

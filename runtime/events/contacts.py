@@ -8,11 +8,12 @@ Sets that fit are found by pivoting.py; gaps that close are struck before (impac
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime.events.inequalities import BEYOND, BODIES, Inequalities
 from sysdyn.runtime.events.mates import mates
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Contact, Plan
@@ -22,8 +23,6 @@ from sysdyn.runtime.model.system import System
 
 FAINT = 1e-3
 """Of the magnitude of an unknown."""
-BODIES = 4.0
-"""Inertias that a contact may stop at once, of the one that its largest multiplier and rate tell."""
 UNTOLD = 1e-9
 """Change of a bound by reactions of one that is round-off."""
 
@@ -33,8 +32,10 @@ SHORTEST = 1e-150
 """Seconds; the square of less is no double."""
 EDGE = 2.0
 """Times what is zero of a flow: within it is what an event is located by, and what a step ends beyond."""
-BEYOND = 1e-6
-"""Of the largest value of a gap: one that is less than nothing by more has jumped, and does not stay where it is."""
+
+
+Standing = tuple[NDArray[np.bool_], NDArray[np.bool_]]
+"""Which hold, and whose sense is upwards [contacts]."""
 
 
 class Contacts:
@@ -66,6 +67,11 @@ class Contacts:
         own = [places[k.number] if k.hold < 0 else None for k in contacts]
         self.multiplier = [-1 if at is None else int(system.form.at[at[0]]) + at[1] for at in own]
         self.frozen = mates(plan, system, self.multiplier)
+        self._sensed, self._sense = _places((k, c.sense) for k, c in enumerate(contacts))
+        self._kept, self._hold = _places((k, c.hold) for k, c in enumerate(contacts))
+        self._switched, self._number = _places((k, c.number if c.hold < 0 else -1) for k, c in enumerate(contacts))
+        self._follow = np.array([k for k, c in enumerate(contacts) if c.kind == "follows"], dtype=np.int64)
+        self._inequalities = Inequalities(contacts, self.multiplier, self.frozen)
 
     def size(self, magnitude: Floats, time: float) -> None:
         """Least sizes of values, rates and multipliers: FAINT of those of the unknowns (magnitude [unknowns]) and of a
@@ -127,10 +133,7 @@ class Contacts:
 
     def begin(self) -> None:
         """Nothing holds and nothing slips: where a start is sought from."""
-        self.active[:] = False
-        for contact in self.contacts:
-            if contact.sense >= 0:
-                self.p[contact.sense] = 0.0
+        self.active[:], self.p[self._sense] = False, 0.0
         self.apply()
 
     def obey(self, values: Floats) -> None:
@@ -144,8 +147,7 @@ class Contacts:
 
     def take(self, switches: NDArray[np.bool_]) -> None:
         """The active set of the switches as it is given."""
-        held = [switches[c.number] if c.hold < 0 else self.p[c.hold] for c in self.contacts]
-        self.active = np.array(held, dtype=bool)
+        self.active[self._switched], self.active[self._kept] = switches[self._number], self.p[self._hold] != 0.0
         self.switches.set(switches)
 
     def apply(self) -> None:
@@ -153,38 +155,39 @@ class Contacts:
         now = np.zeros(len(self.switches.places), dtype=bool)
         for k, holds in self.frozen.items():
             self.active[k] = holds
-        for k, contact in enumerate(self.contacts):
-            if contact.kind == "follows":
-                self.active[k] = self.active[k - 1]
-            if contact.hold < 0:
-                now[contact.number] = self.active[k]
-            else:
-                self.p[contact.hold] = self.active[k]
+        self.active[self._follow] = self.active[self._follow - 1]
+        now[self._number], self.p[self._hold] = self.active[self._switched], self.active[self._kept]
         self.switches.set(now)
 
     def state(self) -> tuple[float, ...]:
-        """The active set and the senses."""
-        senses = (float(self.p[c.sense]) if c.sense >= 0 else 0.0 for c in self.contacts)
-        return (*map(float, self.active), *senses)
+        """The active set and the senses [contacts each]."""
+        senses = np.zeros(len(self.contacts))
+        senses[self._sensed] = self.p[self._sense]
+        return tuple(np.concatenate([self.active, senses]).tolist())
 
     def become(self, state: tuple[float, ...]) -> None:
         """The active set and the senses as `state` gave them."""
-        self.active[:] = np.array(state[: len(self.contacts)]) != 0.0
-        for contact, sense in zip(self.contacts, state[len(self.contacts) :], strict=True):
-            if contact.sense >= 0:
-                self.p[contact.sense] = sense
+        holds, senses = np.reshape(np.array(state), (2, len(self.contacts)))
+        self.active[:], self.p[self._sense] = holds != 0.0, senses[self._sensed]
         self.apply()
+
+    def standing(self) -> Standing:
+        """What words are about: which hold, and whose sense is upwards [contacts]."""
+        up = np.zeros(len(self.contacts), dtype=bool)
+        up[self._sensed] = self.p[self._sense] > 0.0
+        return self.active.copy(), up
+
+    def changed(self, before: Standing) -> dict[int, tuple[str, str]]:
+        """How contacts stood and stand that do otherwise, by their numbers."""
+        now = self.standing()
+        differ = np.flatnonzero((before[0] != now[0]) | (before[1] != now[1])).tolist()
+        was, is_ = ([self.contacts[k].word(holds=bool(h[k]), up=bool(u[k])) for k in differ] for h, u in (before, now))
+        return {k: (w, i) for k, w, i in zip(differ, was, is_, strict=True) if w != i}
 
     def word(self, k: int) -> str:
         """How a contact stands."""
         contact = self.contacts[k]
-        if contact.hold >= 0:
-            return "at zero" if self.active[k] else "above" if self.p[contact.sense] > 0.0 else "below"
-        if contact.kind == "friction":
-            return "sticks" if self.active[k] else f"slips {'+' if self.p[contact.sense] > 0.0 else '-'}"
-        if contact.kind == "planar":
-            return "sticks" if self.active[k] else "slips"
-        return "holds" if bool(self.active[k]) is not contact.dual else "free"
+        return contact.word(holds=bool(self.active[k]), up=contact.sense >= 0 and bool(self.p[contact.sense] > 0.0))
 
     # -- what does not fit ---------------------------------------------------------------------------------------
 
@@ -231,10 +234,14 @@ class Contacts:
 
     def wrongs(self, values: Floats, impulses: Floats) -> Iterator[int]:
         """Contacts whose condition does not hold."""
-        for k, contact in enumerate(self.contacts):
+        plain = self._inequalities
+        asked = np.ones(len(self.contacts), dtype=bool)
+        asked[plain.number] = plain.wrong(values, impulses, self)
+        asked[self._follow] = False
+        asked[list(self.frozen)] = False
+        for k in np.flatnonzero(asked).tolist():
+            contact = self.contacts[k]
             test = _TESTS.get(contact.kind, Contacts._unilateral)
-            if contact.kind == "follows" or k in self.frozen:
-                continue
             if self.against(k, values):
                 if not (k in self.spared and self.idle(k, values)):
                     yield k
@@ -384,3 +391,10 @@ class Contacts:
 
 
 _TESTS = {"friction": Contacts._friction, "planar": Contacts._planar}
+
+
+def _places(pairs: Iterable[tuple[int, int]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The numbers of contacts that have a place, and the places."""
+    found = [pair for pair in pairs if pair[1] >= 0]
+    numbers, places = np.array(found, dtype=np.int64).reshape(len(found), 2).T
+    return numbers, places

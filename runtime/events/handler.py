@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.bounces import thrown
 from sysdyn.runtime.events.choices import Choices
-from sysdyn.runtime.events.conditions import Round, holds, with_momenta
+from sysdyn.runtime.events.conditions import Conditions, Round, with_momenta
+from sysdyn.runtime.events.contacts import Standing as Stood
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.kinks import NoBranchError
 from sysdyn.runtime.events.pivoting import NoActiveSetError
@@ -22,7 +23,8 @@ from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.events.returns import LEAST, flights
 from sysdyn.runtime.events.succession import Point, Succession
 from sysdyn.runtime.events.turns import Turns
-from sysdyn.runtime.events.watching import BOUNDED, Watched, Watching
+from sysdyn.runtime.events.watches import BOUNDED, Watched
+from sysdyn.runtime.events.watching import Watching
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
@@ -52,17 +54,22 @@ class Handler(Watching):
         self.succession = Succession(plan, self.contacts, self.determined)
         self.choices = Choices(self.contacts, self.determined)
         self.turns = Turns(plan, self.observer, self.succession)
-        self.passes = np.inf
-        """How long (s) a peak takes that began at the last event; inf: none did."""
-        self.truth = [False] * len(plan.whens)
+        self.passes = np.inf  # how long (s) a peak takes that began at the last event; inf: none did
+        self.truth = np.zeros(len(plan.whens), dtype=bool)
+        self._conditions = Conditions(tuple(w.condition for w in plan.whens), plan.relations)
+        self._row = np.array([r.row for r in plan.relations], dtype=np.int64)
+        self._gap = np.array([k for k, c in enumerate(plan.contacts) if c.kind == "phi"], dtype=np.int64)
+        self._gaps = np.array([plan.contacts[k].value for k in self._gap], dtype=np.int64)
+        self._bounds = [c for c in plan.contacts if c.kind in BOUNDED]
+        self._bound = np.array([c.bound for c in self._bounds], dtype=np.int64)
+        self._moves = np.array([r.moves for r in plan.relations], dtype=bool)
         self.happened: list[Happened] = []
         self.stalled, self.last = 0, -np.inf
         self.simple, self.struck, self.rounds, self.soon = False, -1, list[Round](), 0.0
         self._plain = all(c.kind in ("phi", "friction") and c.guard < 0 for c in plan.contacts)
-        self._exact: list[int] = []
+        self._exact, self._sinking = list[int](), set[int]()
         self._jumps: dict[int, float] = {}
         """Relations that jump where they were found to cross, on whose other side the point is, by round-off: that."""
-        self._sinking: set[int] = set()
         self.back(begin)
         self.before = self.now()
 
@@ -104,7 +111,7 @@ class Handler(Watching):
         """
         values = self.observer(t, y, yd)
         self._take_sides(t, values, np.ones_like(self.side))
-        self.truth, self.rounds = self._true(), []
+        self.truth, self.rounds = self._conditions.hold(self.side), []
         self._cascade(t, y, yd, range(len(self.plan.sampled)), [])
         assigned = [a for r in self.rounds for group in r.groups for a in group]
         return [a.place for a in assigned] if all(a.kind == "discrete" for a in assigned) else None
@@ -121,29 +128,27 @@ class Handler(Watching):
             raise SolverFailure("drives", t, 0.0, drives)
         self.turns.seen(t, (y, yd))
         self.choices.begin(t, y, yd)
-        self.truth = self._true()
+        self.truth = self._conditions.hold(self.side)
         due, anew = self.due(t), self.kinks.begin(values)
         if due and not sampled:
             return self.fire(t, y, yd, due)
-        return self.settled(t, y, yd, self._words()) if anew else None
+        return self.settled(t, y, yd, self.contacts.standing()) if anew else None
 
     def _take_sides(self, t: float, values: Floats, before: Floats) -> None:
-        """The side of each relation, which was `before` [relations].  SolverFailure where one is no number."""
-        for k, relation in enumerate(self.plan.relations):
-            value = values[relation.row]
-            if np.isnan(value):
-                raise SolverFailure("nonfinite", t, 0.0)
-            self.side[k] = self._side(k, value, before[k])
-
-    def _side(self, k: int, value: float, before: float) -> float:
-        """The side of relation k, which was `before`: a value that a jump made zero is on neither, one that was found
-        as the root of a crossing is past it, and one that jumps there.
+        """The side of each relation, which was `before` [relations]: a value that a jump made zero is on neither, one
+        that was found as the root of a crossing is past it, and one that jumps there.  SolverFailure where one is no
+        number.
         """
-        relation = self.plan.relations[k]
-        small = self.observer.zero(relation.row) if relation.moves else 0.0
-        near = abs(value) <= small and (value != 0.0 or k in self._exact)
-        side = float(np.sign(value))
-        return before if near or self._jumps.get(k) == side else side
+        values = values[self._row]
+        if np.isnan(values).any():
+            raise SolverFailure("nonfinite", t, 0.0)
+        exact = values != 0.0
+        exact[self._exact] = True
+        near = exact & (np.abs(values) <= np.where(self._moves, self.observer.zeros(self._row), 0.0))
+        side = np.sign(values)
+        for k, past in self._jumps.items():
+            near[k] |= past == side[k]
+        self.side[:] = np.where(near, before, side)
 
     # -- what happens --------------------------------------------------------------------------------------------
 
@@ -196,7 +201,7 @@ class Handler(Watching):
         self.choices.end(t, y, yd)
         free = self._free()
         self.simple, self.struck, self.rounds, self.soon = True, -1, [], 0.0
-        said, stood = self._words(), self.kinks.state()
+        said, stood = self.contacts.standing(), self.kinks.state()
         self.kinks.anew()
         which, crossed = self._crossed(t, y, yd, which)
         begun, y, yd = y, y.copy(), yd.copy()
@@ -224,10 +229,11 @@ class Handler(Watching):
 
     def _hold(self, values: Floats, crossed: Sequence[int]) -> None:
         """What a constraint holds at zero since an event before (a speed that sticks) is on neither side."""
-        for k, relation in enumerate(self.plan.relations):
-            still = relation.moves and k not in crossed and self.stalled == 0
-            if still and abs(values[relation.row]) <= HELD * self.observer.zero(relation.row):
-                self.side[k] = 0.0
+        if self.stalled:
+            return
+        still = self._moves & (np.abs(values[self._row]) <= HELD * self.observer.zeros(self._row))
+        still[crossed] = False
+        self.side[still] = 0.0
 
     def _return(self, t: float, begun: Floats, point: Point, which: Sequence[Watched]) -> None:
         """SolverFailure where what was assigned sends a relation back for so little that it is not seen to return;
@@ -260,19 +266,19 @@ class Handler(Watching):
             fired = self._risen(())
             if not fired:
                 return point
-            self.simple, self.struck, said = False, -1, self._words()
+            self.simple, self.struck, said = False, -1, self.contacts.standing()
             y = self._assign(t, *point, [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired])
             self._renew(t, y, point[1])
             point = self.settled(t, y, point[1], said)
         raise SolverFailure("chatter", t, 0.0, self._names())
 
-    def settled(self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()) -> Point:
+    def settled(self, t: float, y: Floats, yd: Floats, said: Stood, touched: Sequence[int] = ()) -> Point:
         """The consistent point with the constraints and the branches that hold from now on."""
         self.kinks.leave(self.observer(t, y, yd))
         point = self._constrained(t, y, yd, said, touched)
         try:
             while self.kinks.turn(self.observer(t, *point)):
-                point = self._constrained(t, *point, self._words())
+                point = self._constrained(t, *point, self.contacts.standing())
         except NoBranchError as error:
             raise SolverFailure("slides" if error.pushed else "chatter", t, 0.0, ", ".join(error.names)) from error
         return point
@@ -281,16 +287,12 @@ class Handler(Watching):
         """The point behind an instant at which the text jumps, and behind the conditions that become true by it."""
         self.simple, self.struck, self.rounds, self.soon, stood = True, -1, [], 0.0, self.kinks.state()
         self.kinks.anew()
-        point = self._followed(t, self.settled(t, y, yd, self._words()))
+        point = self._followed(t, self.settled(t, y, yd, self.contacts.standing()))
         self.simple &= not self.bounces
         self.happened += self.kinks.happened(t, stood)
         return point
 
-    def _words(self) -> list[str]:
-        """How the contacts stand."""
-        return [self.contacts.word(k) for k in range(len(self.plan.contacts))]
-
-    def _constrained(self, t: float, y: Floats, yd: Floats, said: list[str], touched: Sequence[int] = ()) -> Point:
+    def _constrained(self, t: float, y: Floats, yd: Floats, said: Stood, touched: Sequence[int] = ()) -> Point:
         """The consistent point with the constraints that hold from now on; SolverFailure where there is none."""
         assert self.restart is not None
         if not self.plan.contacts:
@@ -316,33 +318,31 @@ class Handler(Watching):
     def _bounce(self, t: float, y: Floats, yd: Floats) -> None:
         """The gaps that an impact opened."""
         values = self.observer(t, y, yd)
+        closed = np.abs(values[self._gaps]) <= self.observer.zeros(self._gaps)
+        opened = self._gap[closed & ~self.contacts.active[self._gap]]
         self.bounces = {
             c.value: thrown(float(values[c.value]), float(values[c.rate]), -float(values[c.acceleration]))
-            for k, c in enumerate(self.plan.contacts)
-            if c.kind == "phi" and not self.contacts.active[k] and abs(values[c.value]) <= self.observer.zero(c.value)
+            for c in (self.plan.contacts[k] for k in opened)
         }
 
-    def _note(self, t: float, said: list[str], struck: Set[int]) -> None:
-        for k, contact in enumerate(self.plan.contacts):
-            now = self.contacts.word(k)
-            if contact.kind == "follows":
-                continue
-            if now != said[k]:
-                self.happened.append(Happened(t, contact.name, contact.name, said[k], now))
-            elif k in struck and contact.kind == "phi":
-                self.happened.append(Happened(t, f"impact {contact.name}", contact.name, said[k], now))
+    def _note(self, t: float, said: Stood, struck: Set[int]) -> None:
+        """What contacts that stand otherwise than `said`, and impacts, are called."""
+        words = self.contacts.changed(said)
+        for k in sorted({*words, *struck}):
+            contact = self.plan.contacts[k]
+            if k in words and contact.kind != "follows":
+                self.happened.append(Happened(t, contact.name, contact.name, *words[k]))
+            elif contact.kind == "phi":
+                word = self.contacts.word(k)
+                self.happened.append(Happened(t, f"impact {contact.name}", contact.name, word, word))
 
     # -- conditions and assignments ------------------------------------------------------------------------------
 
-    def _true(self, crossed: Sequence[int] = ()) -> list[bool]:
-        """Which conditions hold."""
-        return [holds(w.condition, self.side, self.plan.relations, crossed) for w in self.plan.whens]
-
     def _risen(self, crossed: Sequence[int]) -> list[int]:
-        now = self._true(crossed)
-        fired = [k for k, (was, is_) in enumerate(zip(self.truth, now, strict=True)) if is_ and not was]
-        self.truth = self._true()
-        return fired
+        """Which conditions have become true; crossed: relations that are zero at this instant alone."""
+        fired = np.flatnonzero(self._conditions.hold(self.side, crossed) & ~self.truth)
+        self.truth = self._conditions.hold(self.side)
+        return [int(k) for k in fired]
 
     def _assign(self, t: float, y: Floats, yd: Floats, events: list[tuple[str, tuple[Assignment, ...]]]) -> Floats:
         """All values are read, then all assigned; a law driven back to where it came from is no longer so for that."""
@@ -377,9 +377,8 @@ class Handler(Watching):
 
     def _bounded(self, t: float, values: Floats) -> None:
         """SolverFailure where the bound of dry friction is negative."""
-        for c in self.plan.contacts:
-            if c.kind in BOUNDED and values[c.bound] < -self.observer.zero(c.bound):
-                raise SolverFailure("drives", t, 0.0, c.name)
+        for k in np.flatnonzero(values[self._bound] < -self.observer.zeros(self._bound)):
+            raise SolverFailure("drives", t, 0.0, self._bounds[k].name)
 
     def _renew(self, t: float, y: Floats, yd: Floats) -> None:
         """Sides after a jump."""

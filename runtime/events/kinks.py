@@ -17,7 +17,7 @@ from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Happened, Kink
 
 if TYPE_CHECKING:
-    from sysdyn.runtime.events.watching import Watched
+    from sysdyn.runtime.events.watches import Watched
 from sysdyn.runtime.model.description import Floats
 
 LIVE, ABOVE, BELOW, SLIDES, RESTS = 0.0, 1.0, -1.0, 2.0, 3.0

@@ -6,10 +6,12 @@ Ridders' method on the settled dense output: it needs no derivative and never le
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
+from sysdyn.values import dataclass
 
 PARTS = 4
 """Of a step, as core/run/run.h looks at it."""
@@ -17,16 +19,27 @@ ITERATIONS = 60
 AT_ONCE = 1e-6
 """Of what is searched: a moment."""
 
+Numbers = NDArray[np.int64]
 Dense = Callable[[float], Floats]
 """t (s) -> values [observed] there."""
-Watch = tuple[int, int, float, int, float, float]
-"""(row, side, tolerance, row of its rate or -1, level <= 0, tolerance of its rate): it changes where side*value - level
-falls below -tolerance. A bounce begins at the value that the impact before it left, which is zero but for round-off:
-that is its level, else the round-off of many bounces adds up to a fall.
-"""
 
 
-def crossing(dense: Dense, watches: Sequence[Watch], begin: float, end: float) -> tuple[float, list[int]] | None:
+@dataclass(frozen=True, slots=True)
+class Edges:
+    """Columns [watches]: row, side, row of its rate or -1, tolerance, level <= 0, tolerance of its rate: each changes
+    where side*value - level falls below -tolerance.  A bounce begins at the value that the impact before it left, which
+    is zero but for round-off: that is its level, else the round-off of many bounces adds up to a fall.
+    """
+
+    row: Numbers
+    side: Numbers
+    rate: Numbers
+    small: Floats
+    level: Floats
+    still: Floats
+
+
+def crossing(dense: Dense, edges: Edges, begin: float, end: float) -> tuple[float, list[int]] | None:
     """The first instant, and the numbers of the watches that change there; None where none does.  Where what is found
     turns others may have changed before, and be back at the end.
     """
@@ -34,46 +47,50 @@ def crossing(dense: Dense, watches: Sequence[Watch], begin: float, end: float) -
     low, before = begin, dense(begin)
     for high in grid:
         values = dense(high)
-        hit = [k for k, watch in enumerate(watches) if _falls(watch, before, values)]
+        hit = _falling(edges, before, values)
         while hit:
-            t, which = _first(dense, watches, hit, (low, before), (high, values))
+            t, which = _first(dense, edges, hit, (low, before), (high, values))
             known, high, values = set(hit), t, dense(t)
-            hit = [k for k, watch in enumerate(watches) if _falls(watch, before, values)]
+            hit = _falling(edges, before, values)
             if not low < t or known.issuperset(hit):
                 return t, which
         low, before = high, values
     return None
 
 
-def _falls(watch: Watch, low: Floats, high: Floats) -> bool:
-    """Whether a watch changes between two points; what leaves zero upwards, or at rest (a contact that lets go begins
-    to part by its jerk alone), and does not fall at the end, has not: a first step of order 1 may pull it below.
+def _falling(edges: Edges, low: Floats, high: Floats) -> list[int]:
+    """Which watches change between two points; what leaves zero upwards, or at rest (a contact that lets go begins to
+    part by its jerk alone), and does not fall at the end, has not: a first step of order 1 may pull it below.
     """
-    row, side, small, rate, level, still = watch
-    rises = rate >= 0 and side * low[row] <= level + small and min(side * low[rate], side * high[rate]) >= -still
-    return bool(side * high[row] - level < -small and not rises)
+    side, rate = edges.side, edges.rate
+    fell = np.flatnonzero(side * high[edges.row] - edges.level < -edges.small)
+    side, row, rate, level = side[fell], edges.row[fell], rate[fell], edges.level[fell]
+    begins = (rate >= 0) & (side * low[row] <= level + edges.small[fell])
+    rises = begins & (np.minimum(side * low[rate], side * high[rate]) >= -edges.still[fell])
+    return [int(k) for k in fell[~rises]]
 
 
 def _first(
     dense: Dense,
-    watches: Sequence[Watch],
+    edges: Edges,
     hit: list[int],
     low: tuple[float, Floats],
     high: tuple[float, Floats],
 ) -> tuple[float, list[int]]:
     found = {}
     for k in hit:
-        found[k] = _instant(dense, watches[k], low, high)
+        found[k] = _instant(dense, edges, k, low, high)
     first = min(found.values())
     same = 8.0 * float(np.spacing(max(abs(low[0]), abs(high[0]))))
     return first, [k for k in hit if found[k] <= first + same]
 
 
-def _instant(dense: Dense, watch: Watch, low: tuple[float, Floats], high: tuple[float, Floats]) -> float:
-    """Where a watch falls through zero; what begins at zero and rises (a bounce lower than the tolerance) falls from
+def _instant(dense: Dense, edges: Edges, k: int, low: tuple[float, Floats], high: tuple[float, Floats]) -> float:
+    """Where watch k falls through zero; what begins at zero and rises (a bounce lower than the tolerance) falls from
     its crest, or, where that is round-off too, through its tolerance.
     """
-    row, side, small, rate, level, _ = watch
+    row, side, rate = (int(column[k]) for column in (edges.row, edges.side, edges.rate))
+    small, level = float(edges.small[k]), float(edges.level[k])
     begin, value = low[0], side * float(low[1][row]) - level
     if value <= 0.0 and rate >= 0 and side * float(low[1][rate]) > 0.0 > side * float(high[1][rate]):
         lower, upper = ((at, side * float(values[rate])) for at, values in (low, high))

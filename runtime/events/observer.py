@@ -66,6 +66,10 @@ class Observer:
         """The unit of a row."""
         return self._units[row]
 
+    def zeros(self, rows: NDArray[np.int64]) -> Floats:
+        """Below them values of the rows are zero."""
+        return SMALL * self.largest[rows]
+
     def zero(self, row: int) -> float:
         """Below it a value of the row is zero."""
         return SMALL * float(self.largest[row])

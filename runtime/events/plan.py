@@ -86,6 +86,16 @@ class Contact:
     dual: bool = False
     turn: int = -1
 
+    def word(self, *, holds: bool, up: bool) -> str:
+        """How it stands where it holds or does not, with its sense upwards or not."""
+        if self.hold >= 0:
+            return "at zero" if holds else "above" if up else "below"
+        if self.kind == "friction":
+            return "sticks" if holds else f"slips {'+' if up else '-'}"
+        if self.kind == "planar":
+            return "sticks" if holds else "slips"
+        return "holds" if holds is not self.dual else "free"
+
 
 @dataclass(frozen=True, slots=True)
 class Kink:

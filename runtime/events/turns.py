@@ -15,7 +15,7 @@ from sysdyn.runtime.events.succession import Point, Succession
 from sysdyn.runtime.model.failures import SolverFailure
 
 if TYPE_CHECKING:
-    from sysdyn.runtime.events.watching import Watched
+    from sysdyn.runtime.events.watches import Watched
 
 
 class Turns:

@@ -5,34 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.events.bounces import Bounce
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.kinks import Kinks
-from sysdyn.runtime.events.locate import Dense, crossing
+from sysdyn.runtime.events.locate import Dense, Edges, crossing
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Plan
+from sysdyn.runtime.events.watches import Candidates, Watched, Watches
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
-from sysdyn.values import dataclass
 
-BOUNDED = ("friction", "planar")
-"""Kinds of contacts with a bound, below which no effort is within it."""
 NOTHING = 1e-12
 """Of the span: no time."""
 FALLEN = 1e-4
 """Of what else counts as zero, and of the height of its flight: a gap that an impact opened closes again below it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Watched:
-    """A row of block observe on the side 1 or -1 of zero; relation, contact or kink: whose it is, the others -1."""
-
-    relation: int
-    contact: int
-    row: int
-    side: int
-    kink: int = -1
 
 
 class Watching:
@@ -47,76 +35,58 @@ class Watching:
         self.side = np.ones(len(plan.relations))
         self.bounces: dict[int, Bounce] = {}
         self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
+        self._candidates = Candidates(plan)
+        self._frozen = np.isin(np.arange(len(plan.contacts)), list(self.contacts.frozen))
 
-    def watched(self) -> list[Watched]:
+    def watched(self) -> Watches:
         """Everything whose change ends a piece: a relation on neither side yet is watched on both."""
-        found: list[Watched] = []
-        for k, (r, side) in enumerate(zip(self.plan.relations, self.side, strict=True)):
-            if r.moves:
-                found += [Watched(k, -1, r.row, s) for s in ((int(side),) if side else (1, -1))]
-        for k, c in enumerate(self.plan.contacts):
-            sticks = bool(self.contacts.active[k])
-            if self.contacts.barred[k] or k in self.contacts.frozen:
-                continue
-            if c.kind == "friction":
-                rows = ((c.upper, 1), (c.lower, 1)) if sticks else ((c.value, int(self.p[c.sense]) or 1),)
-                found += [Watched(-1, k, row, side) for row, side in rows]
-            elif c.kind == "planar":
-                found.append(Watched(-1, k, c.upper if sticks else c.value, 1))
-            elif c.kind in ("phi", "psi"):
-                found.append(Watched(-1, k, c.multiplier if sticks else c.value, 1))
-            if c.moves and c.kind in BOUNDED:
-                found.append(Watched(-1, k, c.bound, 1))
-        for k in range(len(self.plan.kinks)):
-            found += [Watched(-1, -1, row, side, k) for row, side in self.kinks.rows(k)]
-        return found
+        contacts = self.contacts
+        return self._candidates.now(self.side, contacts.active, contacts.barred | self._frozen, self.p)
 
-    def core(self) -> Any:
-        """The same as the core's array."""
-        found = self.watched()
-        array = (lib.Watch * max(len(found), 1))()
-        for k, w in enumerate(found):
-            array[k] = lib.Watch(w.row, w.side, self._least(w) - self._level(w))
-        return array
+    def core(self) -> tuple[Any, int]:
+        """The same as the core's array, and how many they are."""
+        watched = self.watched()
+        array: Any = (lib.Watch * max(len(watched), 1))()
+        columns = np.frombuffer(array, dtype=np.dtype(lib.Watch))[: len(watched)]
+        small, level = self._edges(watched.row)
+        columns["row"], columns["side"], columns["tolerance"] = watched.row, watched.side, small - level
+        return array, len(watched)
 
     def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
         """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
         watched = self.watched()
-        still = [self.observer.zero(self.rate(w)) * (w.row in self.bounces) for w in watched]  # let go, at rest
-        rows = [(w.row, w.side, self._least(w), self.rate(w), self._level(w), still[k]) for k, w in enumerate(watched)]
-        found = crossing(dense, rows, begin, end)
+        small, level = self._edges(watched.row)
+        flies = np.isin(watched.row, list(self.bounces))  # let go, at rest
+        still = np.where(flies & (watched.rate >= 0), self.observer.zeros(watched.rate), 0.0)
+        found = crossing(dense, Edges(watched.row, watched.side, watched.rate, small, level, still), begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 
     def turned(self, t: float, y: Floats, yd: Floats) -> list[Watched]:
         """The relations that an instant at which the text jumps leaves on another side."""
-        values = self.observer(t, y, yd)
-        found = [w for w in self.watched() if w.relation >= 0]
-        return [w for w in found if w.side * values[w.row] < -self.observer.zero(w.row)]
+        values, watched = self.observer(t, y, yd), self.watched()
+        other = watched.side * values[watched.row] < -self.observer.zeros(watched.row)
+        return watched.each(other & (watched.relation >= 0))
 
-    def _least(self, watched: Watched) -> float:
-        """What a watched value may fall by unseen: behind an impact nearly nothing, for bounces become small."""
-        zero, bounce = self.observer.zero(watched.row), self.bounces.get(watched.row)
-        return zero if bounce is None else FALLEN * min(zero, bounce.height)
-
-    def _level(self, watched: Watched) -> float:
-        """The value at which what is watched begins: that of a bounce, else zero."""
-        bounce = self.bounces.get(watched.row)
-        return 0.0 if bounce is None else bounce.level
+    def _edges(self, rows: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """What each watched value may fall by unseen (behind an impact nearly nothing, for bounces become small), and
+        the value at which it begins: that of a bounce, else zero.
+        """
+        small, level = self.observer.zeros(rows), np.zeros(rows.size)
+        if self.bounces:
+            height = np.full(self.observer.largest.size, np.inf)
+            begins = np.zeros(self.observer.largest.size)
+            thrown = list(self.bounces)
+            height[thrown] = [b.height for b in self.bounces.values()]
+            begins[thrown] = [b.level for b in self.bounces.values()]
+            flies = np.isin(rows, thrown)
+            small[flies] = FALLEN * np.minimum(small, height[rows])[flies]
+            level = begins[rows]
+        return small, level
 
     def flight(self, unseen: float) -> float:
         """Time (s) until the first bounce ends that rises less than `unseen` times the largest value of its gap."""
         low = (b.flight for row, b in self.bounces.items() if b.height < unseen * self.observer.largest[row])
         return min(low, default=np.inf)
-
-    def rate(self, watched: Watched) -> int:
-        """The row of the rate of what is watched, where there is one."""
-        if watched.kink >= 0:
-            kink = self.plan.kinks[watched.kink]
-            return kink.rate if watched.row == kink.value else -1
-        if watched.contact < 0:
-            return -1
-        contact = self.plan.contacts[watched.contact]
-        return contact.rate if watched.row == contact.value else -1
 
     # -- samples -------------------------------------------------------------------------------------------------
 

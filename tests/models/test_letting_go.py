@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from sysdyn import api
-from sysdyn.runtime.events.locate import crossing
+from sysdyn.runtime.events.locate import Edges, crossing
 
 G = 9.80665
 
@@ -100,7 +100,7 @@ def test_a_ladder_leaves_the_wall(tmp_path, accuracy):
 def test_a_gap_below_its_level_that_does_not_close_has_not_fallen():
     """From rest: by an error of the step it lies lower, at a rate that is none; at a rate that is one it falls."""
     drawn = lambda rate: lambda t: np.array([-1e-8 * t, rate * t])  # noqa: E731
-    watch = [(0, 1, 1e-12, 1, 0.0, 1e-9)]
+    watch = Edges(*(np.array([one]) for one in (0, 1, 1, 1e-12, 0.0, 1e-9)))
     assert crossing(drawn(1e-6), watch, 0.0, 1.0) is None
     assert crossing(drawn(-1e-10), watch, 0.0, 1.0) is None
     assert crossing(drawn(-1e-6), watch, 0.0, 1.0) is not None

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import small_models as models
-from sysdyn.runtime.events.locate import crossing
+from sysdyn.runtime.events.locate import Edges, crossing
 from sysdyn.runtime.linear.pencil import motions, parted, surely_parted, widely_parted
 from sysdyn.runtime.linear.stability import Energy, energy_at, verdict
 from sysdyn.runtime.linear.states import pivots, rank_of, unseen
@@ -31,6 +31,12 @@ def system_of(made, form="3"):
 # -- the first instant at which something watched falls ----------------------------------------------------------------
 
 
+def edges(*watches):
+    """Of (row, side, tolerance, row of its rate, level, tolerance of its rate)."""
+    row, side, small, rate, level, still = (np.array(column) for column in zip(*watches, strict=True))
+    return Edges(row, side, rate, small, level, still)
+
+
 def thrown(height, speed):
     """Height above the floor, and its rate."""
     return lambda t: np.array([height + speed * t - G * t * t / 2.0, speed - G * t])
@@ -38,7 +44,7 @@ def thrown(height, speed):
 
 def test_a_stone_falls_on_the_floor():
     """From 2 m at 3 m/s upwards."""
-    found, which = crossing(thrown(2.0, 3.0), [(0, 1, 1e-9, 1, 0.0, 0.0)], 0.0, 2.0)
+    found, which = crossing(thrown(2.0, 3.0), edges((0, 1, 1e-9, 1, 0.0, 0.0)), 0.0, 2.0)
     assert found == pytest.approx((3.0 + math.sqrt(9.0 + 4.0 * G)) / G, rel=1e-15)
     assert which == [0]
 
@@ -46,28 +52,29 @@ def test_a_stone_falls_on_the_floor():
 def test_what_begins_at_zero_and_rises_falls_from_its_crest():
     """A bounce: at the floor when it begins, there again after 2 v/g, not at once."""
     for speed in (1.0, 1e-4):
-        found, _ = crossing(thrown(0.0, speed), [(0, 1, 1e-12, 1, 0.0, 0.0)], 0.0, 3.0 * speed / G)
+        found, _ = crossing(thrown(0.0, speed), edges((0, 1, 1e-12, 1, 0.0, 0.0)), 0.0, 3.0 * speed / G)
         assert found == pytest.approx(2.0 * speed / G, rel=1e-9)
 
 
 def test_of_two_sides_each_falls_its_own_way():
     """sin t leaves -0.5 upwards at once it is above 0.5: a watch of side -1 and level -0.5."""
-    found, which = crossing(lambda t: np.array([math.sin(t)]), [(0, -1, 1e-12, -1, -0.5, 0.0)], 0.0, 1.5)
+    found, which = crossing(lambda t: np.array([math.sin(t)]), edges((0, -1, 1e-12, -1, -0.5, 0.0)), 0.0, 1.5)
     assert found == pytest.approx(math.pi / 6.0, rel=1e-14)
     assert which == [0]
 
 
 def test_the_first_comes_first_and_what_falls_together_is_told_together():
     dense = lambda t: np.array([0.7 - t, 0.3 - t, 0.6 - 2.0 * t])  # noqa: E731
-    found, which = crossing(dense, [(k, 1, 1e-12, -1, 0.0, 0.0) for k in range(3)], 0.0, 1.0)
+    found, which = crossing(dense, edges(*((k, 1, 1e-12, -1, 0.0, 0.0) for k in range(3))), 0.0, 1.0)
     assert found == pytest.approx(0.3, rel=1e-15)
     assert which == [1, 2]
 
 
 def test_what_dips_by_less_than_its_tolerance_does_not_fall():
     dense = lambda t: np.array([(t - 0.5) ** 2 - 1e-7])  # noqa: E731
-    assert crossing(dense, [(0, 1, 1e-6, -1, 0.0, 0.0)], 0.0, 1.0) is None
-    assert crossing(dense, [(0, 1, 1e-8, -1, 0.0, 0.0)], 0.0, 1.0)[0] == pytest.approx(0.5 - math.sqrt(1e-7), rel=1e-12)
+    assert crossing(dense, edges((0, 1, 1e-6, -1, 0.0, 0.0)), 0.0, 1.0) is None
+    found, _ = crossing(dense, edges((0, 1, 1e-8, -1, 0.0, 0.0)), 0.0, 1.0)
+    assert found == pytest.approx(0.5 - math.sqrt(1e-7), rel=1e-12)
 
 
 # -- the motions of a pencil -------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.events.bounces import thrown
 from sysdyn.runtime.events.returns import SEEN, flights
-from sysdyn.runtime.events.watching import FALLEN, Watched, Watching
+from sysdyn.runtime.events.watching import FALLEN, Watching
 from sysdyn.runtime.integrate.jumps.first_step import PARTS, WIDER, FirstStep
 from sysdyn.runtime.integrate.jumps.modes import EARLY
 from sysdyn.runtime.model.facts import Facts
@@ -51,7 +51,7 @@ class Watch(Watching):
         samples = [SimpleNamespace(period=0.01), SimpleNamespace(period=0.025)]
         self.plan = SimpleNamespace(contacts=[contact], sampled=samples, relations=[], kinks=[])
         self.span, self.nothing, self.next = (0.5, 1.5), 1e-12, np.zeros(2, dtype=np.int64)
-        self.observer = SimpleNamespace(zero=lambda row: 1e-6, largest=np.ones(5))
+        self.observer = SimpleNamespace(zeros=lambda rows: np.full(rows.size, 1e-6), largest=np.ones(5))
         self.bounces = {}
 
 
@@ -68,12 +68,12 @@ def test_samples_are_due_once_each_whatever_their_instants_are_rounded_to():
 
 @pytest.mark.parametrize("speed", [1e-4, 0.1])
 def test_behind_an_impact_a_gap_closes_below_a_part_of_what_it_rises_to(speed):
-    watch, gap = Watch(), Watched(-1, 0, 3, 1)
-    assert (watch._least(gap), watch._level(gap), watch.rate(gap)) == (1e-6, 0.0, 4)
+    watch, gap = Watch(), np.array([3])
+    assert watch._edges(gap) == (1e-6, 0.0)
     watch.bounces[3] = thrown(-1e-9, speed, G)
     rises = 0.5 * speed**2 / G
-    assert watch._least(gap) == pytest.approx(FALLEN * min(1e-6, rises), rel=1e-12)
-    assert watch._level(gap) == -1e-9
+    assert watch._edges(gap)[0] == pytest.approx(FALLEN * min(1e-6, rises), rel=1e-12)
+    assert watch._edges(gap)[1] == -1e-9
     assert watch.flight(2.0 * rises) == pytest.approx(2.0 * speed / G, rel=1e-12)
     assert watch.flight(0.5 * rises) == np.inf
 

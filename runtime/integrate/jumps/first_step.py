@@ -15,7 +15,7 @@ from sysdyn.runtime.model.description import Floats
 
 if TYPE_CHECKING:
     from sysdyn.runtime.events.handler import Handler
-    from sysdyn.runtime.events.watching import Watched
+    from sysdyn.runtime.events.watches import Watched
     from sysdyn.runtime.integrate.integrate import Integration
 
 PARTS = 8

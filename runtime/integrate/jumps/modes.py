@@ -17,7 +17,7 @@ from sysdyn.runtime.events.handler import STALLED, Handler
 from sysdyn.runtime.events.kinks import WORDS
 from sysdyn.runtime.events.observer import SMALL
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
-from sysdyn.runtime.events.watching import Watched
+from sysdyn.runtime.events.watches import Watched
 from sysdyn.runtime.integrate.jumps.crossing import JUMP
 from sysdyn.runtime.integrate.jumps.segments import core_pieces
 from sysdyn.runtime.integrate.jumps.strikes import Balance, of_momenta, struck
@@ -214,7 +214,7 @@ class Modes:
         number = core.base if core.now == lib.OWN else core.now
         if number >= 0:
             side, truth, contacts = self._states[number]
-            handler.side[:], handler.truth = side, list(truth)
+            handler.side[:], handler.truth = side, truth.copy()
             handler.contacts.become(contacts)
             handler.caught_up(core.last, core.stalled)
             handler.bounces = self._bounces()
@@ -253,7 +253,7 @@ class Modes:
     def stands(self) -> int:
         """The number of the handler's present mode, which the core is in from now on; -1: one too many."""
         core, handler = self.core, self.handler
-        key = handler.side.tobytes(), tuple(handler.truth), handler.contacts.state(), tuple(handler.kinks.state())
+        key = handler.side.tobytes(), handler.truth.tobytes(), handler.contacts.state(), tuple(handler.kinks.state())
         core.last, core.stalled = handler.last, handler.stalled
         limit = handler.plan.limit
         core.left = UNLIMITED if limit is None else limit - len(handler.happened)
@@ -271,7 +271,7 @@ class Modes:
         self._modes = _grown(self._modes, number)
         self._modes[number] = self._described()
         self.core.mode = c.addressof(self._modes)
-        self._states.append((self.handler.side.copy(), key[1], key[2]))
+        self._states.append((self.handler.side.copy(), self.handler.truth.copy(), key[2]))
         self._number[key] = number
         return number
 
@@ -290,9 +290,9 @@ class Modes:
         return lib.Mode(
             watches=len(watched),
             first=-1,
-            row=self._array([w.row for w in watched], np.int32),
-            side=self._array([w.side for w in watched], np.int32),
-            rate=self._array([handler.rate(w) for w in watched], np.int32),
+            row=self._array(watched.row, np.int32),
+            side=self._array(watched.side, np.int32),
+            rate=self._array(watched.rate, np.int32),
             value=self._array(handler.p[self._fixed]),
             relation=self._array(handler.side),
             holds=self._array(handler.contacts.active, np.int32),
@@ -380,7 +380,7 @@ class Modes:
     def places(self, which: Sequence[Watched]) -> list[int]:
         """Numbers of these among what is watched."""
         watched = self.handler.watched()
-        return [watched.index(w) for w in which]
+        return [watched.place(w) for w in which]
 
 
 def _grown(array: Any, number: int) -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 from sysdyn.runtime.events.handler import Handler, Point
 from sysdyn.runtime.events.observer import SMALL
 from sysdyn.runtime.events.plan import Happened, Plan
-from sysdyn.runtime.events.watching import Watched
+from sysdyn.runtime.events.watches import Watched
 from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.jumps.crossing import go_on
 from sysdyn.runtime.integrate.jumps.first_step import PARTS, FirstStep
@@ -92,9 +92,9 @@ class Pieces:
 
     def _watch(self) -> None:
         self.handler.observer.know(self.run.driver.largest())
-        self._array = self.handler.core()
+        self._array, number = self.handler.core()
         core = self.run.driver.run
-        core.watch, core.watches = c.addressof(self._array), len(self.handler.watched())
+        core.watch, core.watches = c.addressof(self._array), number
         if self.modes is not None:
             self._mode = self.modes.stands()
 
@@ -205,7 +205,7 @@ class Pieces:
         stepper = method.stepper
         self._told()
         self.handler.before = self.handler.now()
-        sides, truth = self.handler.side.copy(), list(self.handler.truth)
+        sides, truth = self.handler.side.copy(), self.handler.truth.copy()
         if stepper.refine:
             _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
         end, begun = method.t, core.t_from == (self._begun if self.modes is None else self.modes.core.begun)
@@ -263,17 +263,21 @@ class Pieces:
 
     def _met(self, t: float, point: Point, known: Sequence[Watched] = ()) -> list[Watched]:
         """The relations beside the known ones that cross zero at t (s) too, but for round-off: one instant for all."""
-        handler, relations = self.handler, {w.relation for w in known}
-        sided = [k for k, side in enumerate(handler.side.tolist()) if side and k not in relations]
-        values = handler.observer(t, *point) if sided else np.zeros(0)
-        near = [w for w in handler.watched() if w.relation in sided]
-        near = [w for w in near if abs(values[w.row]) <= handler.observer.zero(w.row)]
+        handler = self.handler
+        asked = handler.side != 0.0
+        asked[[w.relation for w in known if w.relation >= 0]] = False
         step = (t - self._from) / PARTS
-        if not near or step <= handler.nothing:
+        if not asked.any() or step <= handler.nothing:
             return []
-        low, here = self._values(t - step), self._values(t)
-        falls = [(w, w.side * float(low[w.row] - here[w.row]) / step) for w in near]
-        return [w for w, rate in falls if rate > 0.0 and w.side * float(here[w.row]) <= rate * handler.nothing]
+        watched, values = handler.watched(), handler.observer(t, *point)
+        near = np.abs(values[watched.row]) <= handler.observer.zeros(watched.row)
+        near &= (watched.relation >= 0) & np.append(asked, False)[watched.relation]
+        if not near.any():
+            return []
+        watched, low, here = watched.of(near), self._values(t - step), self._values(t)
+        rate = watched.side * (low[watched.row] - here[watched.row]) / step
+        falls = (rate > 0.0) & (watched.side * here[watched.row] <= rate * handler.nothing)
+        return watched.each(falls)
 
     def _by_round_off(self, which: list[Watched]) -> bool:
         """Whether a relation has crossed zero within what round-off leaves of it, which is then its zero."""
