@@ -10,38 +10,59 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.gauss_newton import Correction, corrected
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import STATE, Mask, Starter
+from sysdyn.values import dataclass
 
 EXACT = 1e-9
 """Scaled residual of rows that hold, and a step that is none."""
 SHARPER = 60
 """Corrections in which what follows from the state is found, or left as it was."""
+BACK = 0.5
+"""Of the step before: what is longer, and the other way, is round-off where it may be."""
 
 
-def by_corrections(
-    starter: Starter, t: float, x: Floats, rows: Mask, free: Mask, *, partly: bool = False
-) -> tuple[Floats, bool]:
-    """X after corrections that vanish, and whether the rows hold to their round-off then and leave no state or effort
-    open by more than the largest of its like; as it was where corrections do not vanish, or rows determine too little.
-    partly: what has no row of its own stays, and what is less than its round-off is nothing.
+@dataclass(frozen=True, slots=True)
+class Corrected:
+    """x; holds: whether the rows do, to their round-off, and leave no state or effort open by more than the largest of
+    its like; known [unknowns]: what they determine.  x as it was, and nothing known, where corrections do not vanish.
     """
-    begun, agrees, last = x, True, np.inf
-    for _ in range(SHARPER):
+
+    x: Floats
+    holds: bool
+    known: Mask
+
+
+def by_corrections(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask, *, partly: bool = False) -> Corrected:
+    """What `rows` make of x in what is `free`, by corrections until nothing moves but round-off.  What has no row of
+    its own stays; partly: what is less than its round-off is nothing.
+    """
+    begun, nothing = x, np.zeros_like(free)
+    last, rested = np.zeros(x.size), False
+    for k in range(SHARPER):
         problem = problem_of(starter, t, x, x, rows=rows, free=free)
+        starter.work.iteration((int(rows.sum()), int(free.sum())), starter.rows.size)
         near = corrected(problem, x)
-        if near is None or not (partly or near.whole):
-            return begun, agrees
-        agrees = near.agrees
-        step, size = np.abs(near.x - x), np.maximum(problem.scale, np.abs(x))
-        step[step <= near.open_] = 0.0
-        most = float(np.max(step / size, initial=0.0))
-        if most <= EXACT and (agrees or most >= 0.5 * last):  # a steep law tells 1e-13 of a volt from its round-off
+        if near is None or not (partly or near.whole):  # too large, of too few rows, leading nowhere
+            return Corrected(begun, k == 0, nothing)
+        step, size = near.x - x, np.maximum(problem.scale, np.abs(x))
+        rests = not _moving(step, last, near.open_, size).any()
+        if rests and (near.agrees or rested):
             if partly:
                 x = np.where(np.isfinite(near.open_) & (np.abs(x) <= near.open_), 0.0, x)
-            return x, agrees and not leaves_open(starter, t, near, size)
+            holds = near.agrees and not leaves_open(starter, t, near, size)
+            return Corrected(x, holds, free & np.isfinite(near.open_))
         if starter.work.done:
-            return begun, False
-        x, last = near.x, most
-    return begun, True
+            break
+        x, last, rested = near.x, step, rests
+    return Corrected(begun, False, nothing)
+
+
+def _moving(step: Floats, last: Floats, open_: Floats, size: Floats) -> Mask:
+    """What a correction moves: beyond its round-off; within this bound, mostly a wide one, as long as steps go on the
+    same way (down an exponential, each as long as the last) or become less.
+    """
+    length, before = np.abs(step), np.abs(last)
+    onward = (length < BACK * before) | ((step * last > 0.0) & (length <= before))
+    return np.asarray((length > EXACT * size) & ((length > open_) | onward))
 
 
 def leaves_open(starter: Starter, t: float, near: Correction, size: Floats) -> bool:

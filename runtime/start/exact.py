@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.gauss_newton import Solution, corrected, solve, stepped
+from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
-from sysdyn.runtime.start.corrections import EXACT, by_corrections, leaves_open
+from sysdyn.runtime.start.corrections import EXACT, Corrected, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.flat import at_rest
 from sysdyn.runtime.start.least import problem_of
@@ -47,33 +47,51 @@ def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, f
 
 
 def sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | None:
-    """The solution with what follows from its state by corrections that vanish, where rows determine them, first those
-    as written: what only leakage ties moves by volts under rows that hold to round-off of the largest current.  None
-    where rows with steep laws do not come to hold to their own round-off: it is no solution.
+    """The solution with what follows from its state by corrections that vanish, where rows determine them: values
+    before rates, whose rows mix large slopes with small ones; what only leakage ties moves by volts under rows that
+    hold to round-off of the largest current.  None where rows with steep laws do not come to hold to their own
+    round-off: it is no solution.
     """
     if best.x.size > SINGULAR_VALUES:
         return best
     follows, steep = free & starter.following(t, best.x), bool(starter.system.form.scales)
     follows &= ~at_rest(starter, t, best.x, follows)
-    written = starter.every & ~starter.groups(*HIDDEN) & starter.reading(follows)
-    x, held = by_corrections(starter, t, best.x, written, follows & (np.arange(follows.size) < starter.n))
-    if not held and steep:
+    values = _values(starter, t, best.x, follows)
+    if not values.holds and steep:
         return None
-    x = x if held else best.x
-    near, held = by_corrections(starter, t, x, starter.every, follows)
-    if held and near is not x:
-        best = Solution(near, own_residual(starter, t, near, near))
-    elif x is not best.x and np.isfinite(starter.jacobian(t, x)).all():
-        best = solve(problem_of(starter, t, x, x, rows=starter.every, free=follows), x, 1)
-    return None if steep and not _tells(starter, t, best.x, written, follows) else best
+    found = values.holds and bool(values.known.any())
+    x, rest = (values.x, follows & ~(values.known & _of_y(starter))) if found else (best.x, follows)
+    rates = by_corrections(starter, t, x, starter.every & starter.reading(rest), rest)
+    if rates.holds and rates.x is not x:
+        return Solution(rates.x, own_residual(starter, t, rates.x, rates.x))
+    if found and np.isfinite(starter.jacobian(t, x)).all():
+        return solve(problem_of(starter, t, x, x, rows=starter.every, free=rest), x, 1)
+    return best
 
 
-def _tells(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask) -> bool:
-    """Whether these rows, rates answering, hold and leave no state or effort of the point open by more than the largest
-    of its like: a sum of currents may stand between charges of 1e8 A that cancel in it, and hold to their round-off.
+def _of_y(starter: Starter) -> Mask:
+    """Unknowns that are no rates."""
+    return np.arange(starter.free.size) < starter.n
+
+
+def _values(starter: Starter, t: float, x: Floats, follows: Mask) -> Corrected:
+    """X with what rows as written determine, together with the rates that these read, from zero: of capacitors that
+    float with 1e13 V/s rows hold differences of rates alone, microvolts a second.  Where they do not determine all of
+    that (coils whose currents other rates tie), beside rates as they are.
     """
-    problem = problem_of(starter, t, x, x, rows=rows, free=free)
-    near = corrected(problem, x)
-    if near is None or not near.whole:
-        return True
-    return near.agrees and not leaves_open(starter, t, near, np.maximum(problem.scale, np.abs(x)))
+    of_y = _of_y(starter)
+    written = rows = starter.every & ~starter.groups(*HIDDEN) & starter.reading(follows & of_y)
+    for _ in range(2):  # rates of momenta read those of flows
+        rates = follows & ~of_y & _read(starter, rows)
+        rows = rows | (starter.every & starter.groups("momentum_rate") & starter.reading(rates))
+    found = by_corrections(starter, t, np.where(rates, 0.0, x), rows, follows & (of_y | _read(starter, rows)))
+    if found.known.any() or not found.holds:
+        return found
+    return by_corrections(starter, t, x, written, follows & of_y)
+
+
+def _read(starter: Starter, rows: Mask) -> Mask:
+    """Unknowns that some of these rows read."""
+    found = np.zeros_like(starter.free)
+    found[starter.columns[rows[starter.rows]]] = True
+    return found

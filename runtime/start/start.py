@@ -189,7 +189,8 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | 
     for name, strategy in hopeful(starter, t, x, free, itertools.islice(applicable(starter, t, x), most)):
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = anew(starter, t, found, x, guess, free)
-        exact = sharp(starter, t, again, free) if holds or sure else None
+        with starter.granted():  # what led there has taken its own
+            exact = sharp(starter, t, again, free) if holds or sure else None
         if exact is not None:
             return exact, name
         best = found if found.residual < best.residual else best

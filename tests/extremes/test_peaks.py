@@ -163,3 +163,36 @@ def test_more_hills_than_are_watched_are_told(tmp_path):
     """A note, with what to write."""
     found = ran(tmp_path, SWARM, settings=(("n", "2100"),), accuracy=1e-2, until="1e-5")
     assert "N608" in found.notes
+
+
+HARDLY = """
+from std.electrical import voltage, resistor
+model m {
+  node a, b: electrical
+  coord x: translation = 0 m
+  discrete n = 0
+  param phase = 0
+  param limit = 150 V
+  energy T* = 1/2*(1 kg)*x'^2
+  V: voltage(v = 200 V*sin(12 rad/s*t + phase)) a -> ground
+  R1: resistor(R = 1 ohm) a -> b
+  R2: resistor(R = 3 ohm) b -> ground
+  when b.e > limit { n := n + 1 }
+  init x' = 1 m/s
+}
+scene s of m {
+  time 0 s to 3 s
+  trace n, x
+}
+"""
+
+
+@pytest.mark.parametrize(("accuracy", "part"), [(1e-3, 1e-3), (1e-3, 1e-5), (1e-6, 1e-5)])
+def test_what_algebra_alone_decides_is_met_where_it_hardly_is(part, accuracy, tmp_path):
+    """A node between resistors, a thousandth past its limit: interpolated within steps it stayed below, told as met."""
+    for phase in (0.3, 1.3):
+        said = ("phase", repr(phase)), ("limit", f"{150.0 * (1.0 - part)!r} V")
+        found = ran(tmp_path, HARDLY, accuracy=accuracy, settings=said)
+        rises = (np.pi / 2.0 - np.arccos(1.0 - part) - phase + 2.0 * np.pi * np.arange(6)) / 12.0
+        assert found.met
+        assert [event.time for event in found.trace.events] == pytest.approx(rises, abs=1e-9)

@@ -112,9 +112,10 @@ def test_a_divider_of_megohms_is_found_from_anywhere_by_corrections():
     _, system, _, starter, x = start_of(DIVIDER, "co_lagrangian")
     follows = starter.free & starter.following(0.0, x)
     away = np.where(follows, 0.3 * x, x)
-    found, holds = by_corrections(starter, 0.0, away, starter.every, follows)
-    assert holds
-    assert at(system, found[: system.form.written], "b'") == pytest.approx(4.0, rel=1e-14)
+    found = by_corrections(starter, 0.0, away, starter.every, follows)
+    assert found.holds
+    assert (found.known == follows).all()
+    assert at(system, found.x[: system.form.written], "b'") == pytest.approx(4.0, rel=1e-14)
     best = Solution(x, 0.0)
     assert sharp(starter, 0.0, best, starter.free).x == pytest.approx(x, rel=1e-14, abs=1e-20)
     assert anew(starter, 0.0, best, x, x, starter.free) == (best, False), "no state has moved: it is left as it is"

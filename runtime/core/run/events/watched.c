@@ -16,7 +16,11 @@
 #define DEEP 70        /* of these: to the spacing of t */
 #define STEEPER 2.0    /* times the slopes met: as steep it may fall between two looks */
 #define AT_ONCE 1e-6   /* of the first part: what begins at zero and falls there may come back within it */
+#define OFF 0.1        /* of what is met within a step: what is interpolated between its ends may be off by */
+#define SETTLED 2
 #define FAINT 1e-9    /* of the largest value of what is watched: what it is off by unseen */
+
+typedef void look(sd_run *run, double t, double *values);
 
 /* The parabola through three points: its rise from the first to the second, and half of its second derivative. */
 static double parabola(const double *x, const double *value, double *bend)
@@ -72,19 +76,20 @@ static int unfollowed(const sd_run *run, const sd_watch *watch, int first)
 }
 
 /* What watch has at t. */
-static double value_of(sd_run *run, const sd_watch *watch, double t)
+static double value_of(sd_run *run, const sd_watch *watch, double t, look *at)
 {
     double *values = run->looked + (size_t)(SD_PARTS + 1) * (size_t)run->observed;
-    sd_run_look(run, t, values);
+    at(run, t, values);
     return watch->side * values[watch->row];
 }
 
 /* The bottom of a watch within a..b, where it has fa, fb, by golden section; whether it has fallen there (*seen)
  * and not before (*clear).  It is given up where slopes like those met so far lead to no fall. */
-static int bottomed(sd_run *run, const sd_watch *watch, double a, double fa, double b, double fb, double *clear, double *seen)
+static int bottomed(sd_run *run, const sd_watch *watch, double a, double fa, double b, double fb, look *at, double *clear,
+                    double *seen)
 {
     double x = b - GOLDEN * (b - a), y = a + GOLDEN * (b - a);
-    double fx = value_of(run, watch, x), fy = value_of(run, watch, y);
+    double fx = value_of(run, watch, x, at), fy = value_of(run, watch, y, at);
     for (int k = 0; k < DEEP; k++) {
         double least = fmin(fx, fy), slope = fmax(fabs(fx - fa) / (x - a), fabs(fb - fy) / (b - y));
         int fell = least < -watch->tolerance, apart = a < x && x < y && y < b;
@@ -96,11 +101,11 @@ static int bottomed(sd_run *run, const sd_watch *watch, double a, double fa, dou
             return 0;
         if (fx < fy) {
             b = y, fb = fy, y = x, fy = fx;
-            x = b - GOLDEN * (b - a), fx = value_of(run, watch, x);
+            x = b - GOLDEN * (b - a), fx = value_of(run, watch, x, at);
         } else {
             a = x, fa = fx, x = y, fx = fy;
             *clear = fa < -watch->tolerance ? *clear : a;
-            y = a + GOLDEN * (b - a), fy = value_of(run, watch, y);
+            y = a + GOLDEN * (b - a), fy = value_of(run, watch, y, at);
         }
     }
     return 0;
@@ -116,13 +121,78 @@ static int dips(sd_run *run, const sd_watch *watch, const double *t, int first)
     for (int k = first && f[0] <= watch->tolerance; k < SD_PARTS; k++) {
         double clear = t[k], seen = t[k + 1];
         int falls = k == 0 || f[k] < f[k - 1], rises = k + 2 > SD_PARTS || f[k + 2] > f[k + 1];
-        if (falls && rises && bottomed(run, watch, t[k], f[k], t[k + 1], f[k + 1], &clear, &seen)) {
+        if (falls && rises && bottomed(run, watch, t[k], f[k], t[k + 1], f[k + 1], sd_run_look, &clear, &seen)) {
             if (seen < run->t_seen)
                 run->t_clear = clear, run->t_seen = seen;
             return 1;
         }
     }
     return 0;
+}
+
+/* A fall of a watch between a and b where it is settled, into t_clear..t_seen if it is before t_seen; begin: where it has not
+ * fallen.  Of what algebra alone determines no error test follows what is interpolated within a step. */
+static int falls_settled(sd_run *run, const sd_watch *watch, double begin, double a, double b)
+{
+    double clear = begin, seen = a, fa = value_of(run, watch, a, sd_run_observe);
+    if (!(fa < -watch->tolerance)) {
+        clear = a;
+        if (!bottomed(run, watch, a, fa, b, value_of(run, watch, b, sd_run_observe), sd_run_observe, &clear, &seen))
+            return 0;
+    }
+    if (seen < run->t_seen)
+        run->t_clear = clear, run->t_seen = seen;
+    return 1;
+}
+
+/* Whether a watch that is lowest within t[0..SD_PARTS], where it misses zero by less than it may be off by, falls as it is
+ * settled.  first: as unfollowed. */
+static int touches(sd_run *run, const sd_watch *watch, const double *t, int first)
+{
+    double f[SD_PARTS + 1], most = -INFINITY;
+    for (int k = 0; k <= SD_PARTS; k++) {
+        f[k] = watch->side * run->looked[(size_t)k * (size_t)run->observed + (size_t)watch->row];
+        most = fmax(most, f[k]);
+    }
+    first = first && f[0] <= watch->tolerance;
+    int low = first;
+    for (int k = first + 1; k <= SD_PARTS; k++)
+        low = f[k] < f[low] ? k : low;
+    const int a = low > first ? low - 1 : low, b = low < SD_PARTS ? low + 1 : low;
+    const double least = b > a + 1 ? fmin(f[low], bottom(t + a, f + a)) : f[low];
+    return f[a] > watch->tolerance && least <= OFF * (most - f[low]) && falls_settled(run, watch, t[0], t[a], t[b]);
+}
+
+static int fallen(const sd_run *run, const double *values)
+{
+    for (int32_t i = 0; i < run->watches; i++)
+        if (run->watch[i].side * values[run->watch[i].row] < -run->watch[i].tolerance)
+            return 1;
+    return 0;
+}
+
+/* What has been seen to change within from..to as it is interpolated: where it does as it is settled, if it does. */
+static void confirm(sd_run *run, double from, double to)
+{
+    const double seen = run->t_seen;
+    double *values = run->looked + (size_t)(SD_PARTS + 1) * (size_t)run->observed;
+    sd_run_observe(run, seen, values);
+    if (fallen(run, values)) {
+        if (run->t_clear > from) {
+            sd_run_observe(run, run->t_clear, values);
+            run->t_clear = fallen(run, values) ? from : run->t_clear;
+        }
+        return;
+    }
+    sd_run_look(run, seen, run->looked);
+    run->t_seen = INFINITY;
+    for (int32_t i = 0; i < run->watches; i++) {
+        const sd_watch *watch = &run->watch[i];
+        if (watch->side * run->looked[watch->row] < -watch->tolerance)
+            falls_settled(run, watch, from, from, to);
+    }
+    if (run->t_seen == INFINITY)
+        run->t_seen = seen;
 }
 
 /* Whether a watch that begins at zero falls and comes back between the points t[0..SD_PARTS] (a ball that is thrown). */
@@ -135,25 +205,18 @@ static int returns(sd_run *run, const sd_watch *watch, const double *t)
         return 0;
     while (back <= f && k < SD_PARTS)
         back = watch->side * values[(size_t)++k * (size_t)run->observed];
-    if (back <= f || (k == 1 && value_of(run, watch, t[0] + AT_ONCE * (t[1] - t[0])) >= f))
+    if (back <= f || (k == 1 && value_of(run, watch, t[0] + AT_ONCE * (t[1] - t[0]), sd_run_look) >= f))
         return 0;
-    if (!bottomed(run, watch, t[0], f, t[k], back, &clear, &seen))
+    if (!bottomed(run, watch, t[0], f, t[k], back, sd_run_look, &clear, &seen))
         return 0;
     if (seen < run->t_seen)
         run->t_clear = clear, run->t_seen = seen;
     return 1;
 }
 
-static int fallen(const sd_run *run, const double *values)
-{
-    for (int32_t i = 0; i < run->watches; i++)
-        if (run->watch[i].side * values[run->watch[i].row] < -run->watch[i].tolerance)
-            return 1;
-    return 0;
-}
-
 /* Looks at `parts` parts of begin..end, up to the first at whose end something watched has changed, which is then
- * t_clear..t_seen; whether what is watched is not followed by so many.  seek: nor falls and comes back between two. */
+ * t_clear..t_seen; whether what is watched is not followed by so many.  seek: nor falls and comes back between two.  *fell:
+ * whether something has; SETTLED: where it is settled. */
 static int scan(sd_run *run, double begin, double end, int parts, int seek, int *fell)
 {
     size_t row = (size_t)run->observed;
@@ -176,7 +239,9 @@ static int scan(sd_run *run, double begin, double end, int parts, int seek, int 
         for (int32_t i = 0; i < run->watches && (seek || !more) && !*fell; i++) {
             const int turns = unfollowed(run, &run->watch[i], part == SD_PARTS);
             more |= turns;
-            dip |= turns && seek && dips(run, &run->watch[i], at, part == SD_PARTS);
+            const int falls = turns && seek && dips(run, &run->watch[i], at, part == SD_PARTS);
+            const int nearly = !falls && seek && run->settle && touches(run, &run->watch[i], at, part == SD_PARTS);
+            dip |= nearly ? SETTLED : falls;
             dip |= seek && part == SD_PARTS && returns(run, &run->watch[i], at);
         }
         *fell |= dip;
@@ -200,7 +265,8 @@ int sd_run_changes(sd_run *run, double from)
         parts *= SD_PARTS; /* of what turns several times between two looks they may say nothing */
     const int known = parts > SD_PARTS;
     int more = scan(run, from, to, parts, 1, &fell);
-    const int parted = more || known;
+    const double clear = run->t_clear, seen = run->t_seen;
+    const int settled = fell & SETTLED, parted = more || known;
     for (; more && parts < SD_FINEST; more = scan(run, from, end, parts, 0, &fell)) {
         end = fell ? run->t_seen : end;
         parts *= SD_PARTS;
@@ -214,5 +280,9 @@ int sd_run_changes(sd_run *run, double from)
             break;
     }
     run->t_clear = parted ? fmax(from, 2.0 * run->t_clear - run->t_seen) : from;
-    return fell;
+    if (fell && run->settle)
+        confirm(run, from, to);
+    if (settled && !(fell && run->t_seen < seen))
+        run->t_clear = clear, run->t_seen = seen;
+    return fell || settled;
 }
