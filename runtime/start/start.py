@@ -23,6 +23,7 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.gauss_newton import Solution, least_residual, solve
 from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
+from sysdyn.runtime.numerics.tall import free_unknowns
 from sysdyn.runtime.numerics.work import OutOfTimeError, Work
 from sysdyn.runtime.start.corrections import EXACT
 from sysdyn.runtime.start.exact import anew, sharp
@@ -152,18 +153,32 @@ def _aimed(starter: Starter, t: float) -> Floats:
 def _with_momenta(starter: Starter, t: float) -> Floats:
     """The guess with the momenta of flows that share inertia, and with what guesses of these miss."""
     known, guess = starter.equations, starter.guess
-    joined = known.joined
-    if not (joined.any() and guess[: starter.n][joined].any()):
+    joined, flows, placed = known.joined, starter.moves("f"), starter.moves("q")
+    tied = starter.groups("psi", "phi_rate")
+    if not (joined.any() and (guess[flows].any() or starter.residual(t, guess)[tied].any())):
         return guess  # of a large model the room counts
-    x = guess.copy()
+    x = _followed(starter, t, tied, flows & starter.free & ~starter.written, placed & starter.free)
     rows, missed = known.guessed
     x[missed] = starter.residual(t, x)[rows]
     momentum, own = known.momentum[joined[known.flow]], own_unknown(starter.settled, "momentum", "f")
-    if not momentum.size or starter.written[momentum].any():
-        return x
-    free = np.zeros(x.size, dtype=bool)
-    free[momentum] = True
-    return _onto(starter, t, x, x, rows=(own >= 0) & joined[own], free=free)
+    if momentum.size and not starter.written[momentum].any():
+        free = np.zeros(x.size, dtype=bool)
+        free[momentum] = True
+        x = _onto(starter, t, x, x, rows=(own >= 0) & joined[own], free=free)
+    x[placed] = guess[placed]
+    return x
+
+
+def _followed(starter: Starter, t: float, tied: Mask, flows: Mask, placed: Mask) -> Floats:
+    """The guess put on the constraints, with those flows that tied rows make of what is said, the others at rest."""
+    guess = starter.guess
+    x = _onto(starter, t, guess, guess, rows=tied | starter.groups("phi"), free=flows | placed).copy()
+    values, take = starter.jacobian(t, x), tied[starter.rows] & flows[starter.columns]
+    entries = starter.rows[take], starter.columns[take], values[take]
+    choice = free_unknowns((starter.settled.rows, x.size), entries)
+    at_rest = flows if choice is None else flows & choice
+    x[at_rest] = guess[at_rest]
+    return x
 
 
 def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
