@@ -157,7 +157,9 @@ def _with_momenta(starter: Starter, t: float) -> Floats:
     tied = starter.groups("psi", "phi_rate")
     if not (joined.any() and (guess[flows].any() or starter.residual(t, guess)[tied].any())):
         return guess  # of a large model the room counts
-    x = _followed(starter, t, tied, flows & starter.free & ~starter.written, placed & starter.free)
+    unsaid = flows & starter.free & ~starter.written
+    x = _onto(starter, t, guess, guess, rows=tied | starter.groups("phi"), free=unsaid | placed & starter.free).copy()
+    _rest(starter, t, x, rows=tied, of=unsaid)
     rows, missed = known.guessed
     x[missed] = starter.residual(t, x)[rows]
     momentum, own = known.momentum[joined[known.flow]], own_unknown(starter.settled, "momentum", "f")
@@ -169,30 +171,39 @@ def _with_momenta(starter: Starter, t: float) -> Floats:
     return x
 
 
-def _followed(starter: Starter, t: float, tied: Mask, flows: Mask, placed: Mask) -> Floats:
-    """The guess put on the constraints, with those flows that tied rows make of what is said, the others at rest."""
-    guess = starter.guess
-    x = _onto(starter, t, guess, guess, rows=tied | starter.groups("phi"), free=flows | placed).copy()
-    values, take = starter.jacobian(t, x), tied[starter.rows] & flows[starter.columns]
-    entries = starter.rows[take], starter.columns[take], values[take]
+def _rest(starter: Starter, t: float, x: Floats, *, rows: Mask, of: Mask) -> None:
+    """Those unknowns of X that these rows alone do not tell are as guessed again, in place."""
+    take = rows[starter.rows] & of[starter.columns]
+    entries = starter.rows[take], starter.columns[take], starter.jacobian(t, x)[take]
     choice = free_unknowns((starter.settled.rows, x.size), entries)
-    at_rest = flows if choice is None else flows & choice
-    x[at_rest] = guess[at_rest]
-    return x
+    at_rest = of if choice is None else of & choice
+    x[at_rest] = starter.guess[at_rest]
 
 
 def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
-    """X with the displacements that implicit efforts which are said tell with others (coupled coils, mirrored)."""
-    said = np.flatnonzero(starter.written)
-    said = said[starter.moves("e")[said] & (x[said] != 0.0)]
-    if not said.size:
+    """X with the displacements that implicit efforts which are said tell with others (coupled coils, mirrored), and
+    those efforts that balances alone make of what is said.
+    """
+    efforts, gammas = starter.moves("e"), starter.groups("gamma")
+    if (_number(starter, gammas, efforts) > 1).any():  # of coupled stores
+        balances = starter.groups("dynamics") & ~starter.reading(np.arange(x.size) >= starter.n)  # no rate in them
+        unsaid = starter.moves("e", "f") & starter.free & ~starter.written
+        found = _onto(starter, t, x, x, rows=balances, free=unsaid).copy()
+        _rest(starter, t, found, rows=balances, of=unsaid)
+        x = np.where(efforts, found, x)
+    told = efforts & (x != 0.0)
+    if not told.any():
         return x
-    told = np.zeros(x.size, dtype=bool)
-    told[said] = True
-    rows = starter.groups("gamma") & starter.reading(told)
+    rows = gammas & starter.reading(told)
     free = np.zeros(x.size, dtype=bool)
     free[starter.columns[rows[starter.rows]]] = True
     return _onto(starter, t, x, x, rows=rows, free=free & starter.moves("q") & ~starter.written)
+
+
+def _number(starter: Starter, rows: Mask, unknowns: Mask) -> Ints:
+    """How many of these unknowns each of these rows reads [rows]."""
+    take = rows[starter.rows] & unknowns[starter.columns]
+    return np.bincount(starter.rows[take], minlength=starter.settled.rows)
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | None = None) -> tuple[Solution, str]:

@@ -207,3 +207,21 @@ def test_what_constraints_move_moves_nothing_else(tmp_path, formulation, tie, sa
     trace = trace_of(tmp_path, HANGING.replace("TIE", tie).replace("SAID", said), formulation=formulation)
     found = [trace[name].values[0] for name in ("x'", "turn'", "a'")]
     assert found == pytest.approx([speed, turns, 0.0], abs=1e-9)
+
+
+TRANSFORMER = """from std.electrical import coupled_inductors, current, resistor
+model transformer {
+  node a, b: electrical
+  I: current(i = 2 A) ground -> a
+  K: coupled_inductors(L1 = 1 H, L2 = 2 H, k = 0.6) one = a -> ground, two = b -> ground
+  R: resistor(R = 1 ohm) b -> ground
+}
+scene go of transformer { time 0 s to 0.01 s; trace K.one.f, K.two.f }
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
+def test_a_source_through_one_coil_leaves_the_other_as_guessed(tmp_path, formulation):
+    trace = trace_of(tmp_path, TRANSFORMER, formulation=formulation)
+    assert [trace[name].values[0] for name in ("K.one.f", "K.two.f")] == pytest.approx([2.0, 0.0], abs=1e-9)
