@@ -200,7 +200,7 @@ def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
     return _onto(starter, t, x, x, rows=rows, free=free & starter.moves("q") & ~starter.written)
 
 
-def _number(starter: Starter, rows: Mask, unknowns: Mask) -> Ints:
+def _number(starter: Starter, rows: Mask, unknowns: Mask) -> Places:
     """How many of these unknowns each of these rows reads [rows]."""
     take = rows[starter.rows] & unknowns[starter.columns]
     return np.bincount(starter.rows[take], minlength=starter.settled.rows)
