@@ -277,6 +277,9 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
         colon = ":" in accepted and text in _DOMAINS
         joined = f"{' '.join(line.split())}{':' if colon else ','} {text}"
         shape = joined if word != "trace" else f"{joined}; a name of one's own: as {text}"
+    member = re.search(r"(\w+)(?:\.\w+|\[[^\]]*\])+\s*$", line)
+    if text == "=" and "->" in accepted and member is not None:
+        return "E113", said, f"a port is given whole, a bundle as one of nodes, an array as an array: {member[1]} = ..."
     if word == "trace" and text == "in":
         shape = "the unit stands before the name: trace x in mm as pos"
     return "E113", said, _hint(kind, text, line, accepted) or shape

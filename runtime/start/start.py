@@ -23,6 +23,7 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.gauss_newton import Solution, least_residual, solve
 from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
+from sysdyn.runtime.numerics.tall import free_unknowns
 from sysdyn.runtime.numerics.work import OutOfTimeError, Work
 from sysdyn.runtime.start.corrections import EXACT
 from sysdyn.runtime.start.exact import anew, sharp
@@ -152,32 +153,57 @@ def _aimed(starter: Starter, t: float) -> Floats:
 def _with_momenta(starter: Starter, t: float) -> Floats:
     """The guess with the momenta of flows that share inertia, and with what guesses of these miss."""
     known, guess = starter.equations, starter.guess
-    joined = known.joined
-    if not (joined.any() and guess[: starter.n][joined].any()):
+    joined, flows, placed = known.joined, starter.moves("f"), starter.moves("q")
+    tied = starter.groups("psi", "phi_rate")
+    if not (joined.any() and (guess[flows].any() or starter.residual(t, guess)[tied].any())):
         return guess  # of a large model the room counts
-    x = guess.copy()
+    unsaid = flows & starter.free & ~starter.written
+    x = _onto(starter, t, guess, guess, rows=tied | starter.groups("phi"), free=unsaid | placed & starter.free).copy()
+    _rest(starter, t, x, rows=tied, of=unsaid)
     rows, missed = known.guessed
     x[missed] = starter.residual(t, x)[rows]
     momentum, own = known.momentum[joined[known.flow]], own_unknown(starter.settled, "momentum", "f")
-    if not momentum.size or starter.written[momentum].any():
-        return x
-    free = np.zeros(x.size, dtype=bool)
-    free[momentum] = True
-    return _onto(starter, t, x, x, rows=(own >= 0) & joined[own], free=free)
+    if momentum.size and not starter.written[momentum].any():
+        free = np.zeros(x.size, dtype=bool)
+        free[momentum] = True
+        x = _onto(starter, t, x, x, rows=(own >= 0) & joined[own], free=free)
+    x[placed] = guess[placed]
+    return x
+
+
+def _rest(starter: Starter, t: float, x: Floats, *, rows: Mask, of: Mask) -> None:
+    """Those unknowns of X that these rows alone do not tell are as guessed again, in place."""
+    take = rows[starter.rows] & of[starter.columns]
+    entries = starter.rows[take], starter.columns[take], starter.jacobian(t, x)[take]
+    choice = free_unknowns((starter.settled.rows, x.size), entries)
+    at_rest = of if choice is None else of & choice
+    x[at_rest] = starter.guess[at_rest]
 
 
 def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
-    """X with the displacements that implicit efforts which are said tell with others (coupled coils, mirrored)."""
-    said = np.flatnonzero(starter.written)
-    said = said[starter.moves("e")[said] & (x[said] != 0.0)]
-    if not said.size:
+    """X with the displacements that implicit efforts which are said tell with others (coupled coils, mirrored), and
+    those efforts that balances alone make of what is said.
+    """
+    efforts, gammas = starter.moves("e"), starter.groups("gamma")
+    if (_number(starter, gammas, efforts) > 1).any():  # of coupled stores
+        balances = starter.groups("dynamics") & ~starter.reading(np.arange(x.size) >= starter.n)  # no rate in them
+        unsaid = starter.moves("e", "f") & starter.free & ~starter.written
+        found = _onto(starter, t, x, x, rows=balances, free=unsaid).copy()
+        _rest(starter, t, found, rows=balances, of=unsaid)
+        x = np.where(efforts, found, x)
+    told = efforts & (x != 0.0)
+    if not told.any():
         return x
-    told = np.zeros(x.size, dtype=bool)
-    told[said] = True
-    rows = starter.groups("gamma") & starter.reading(told)
+    rows = gammas & starter.reading(told)
     free = np.zeros(x.size, dtype=bool)
     free[starter.columns[rows[starter.rows]]] = True
     return _onto(starter, t, x, x, rows=rows, free=free & starter.moves("q") & ~starter.written)
+
+
+def _number(starter: Starter, rows: Mask, unknowns: Mask) -> Places:
+    """How many of these unknowns each of these rows reads [rows]."""
+    take = rows[starter.rows] & unknowns[starter.columns]
+    return np.bincount(starter.rows[take], minlength=starter.settled.rows)
 
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | None = None) -> tuple[Solution, str]:

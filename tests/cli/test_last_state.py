@@ -94,3 +94,12 @@ def test_the_stiffest_of_several_statements():
     """x is pulled by 6 N/m x + 1/x: one energy, in line 4."""
     of, _ = last(ROD, x=1.0)
     assert of.statement("x").start[0] == 4
+
+
+def test_a_divisor_that_a_loop_counts_tells_nothing():
+    """`i` is no unknown: a run that stopped ended with E807 where its finding should stand."""
+    of, point = last(
+        "model m {\n  for i in 1..2 {\n    state s[i] = 1\n    dynamic s[i]' = -1/(s[i]*i*(2 s))\n  }\n}\n",
+        **{"s[1]": 1e-9},
+    )
+    assert of.vanishing(point({"s[1]": 1.0})) is None

@@ -46,6 +46,7 @@ CASES = [
     ("pendulum", "phi rod: x^2", "phi: x^2", "E113", "phi name: ... = ...", None),
     ("pendulum", "phi rod: x^2", "let x^2", "E113", "phi name: ... = ...", None),
     ("pendulum", "phi rod: x^2", "gamma rod: x^2", "E102", "phi rod: ...", None),
+    ("drive", PORTS, "p[1] = a, n = ground, shaft = shaft", "E113", "a port is given whole", None),
     ("drive", PORTS, "p -> a, n -> ground, shaft -> shaft", "E402", PORTS, None),
     ("drive", PORTS, "p = a, n = ground, shaft", "E402", "shaft = shaft", None),
     ("drive", "shaft.f in rpm", "shaft.w in rpm", "E102", "shaft.f", None),

@@ -17,7 +17,7 @@ from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Constraint
-from sysdyn.dsl.text.diagnostics import Place
+from sysdyn.dsl.text.diagnostics import ModelError, Place
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import decomposed
 
@@ -83,7 +83,7 @@ class LastState:
         return k if k is not None and k < self.y.size else None
 
     def value(self, node: Node, y: NDArray[np.float64] | None = None) -> float:
-        """The value of an expression of unknowns without indices; not a number where it has others."""
+        """The value of an expression of unknowns without indices; no number where it has others, or loop variables."""
         where = self.y if y is None else y
 
         def lookup(n: Node, arguments: list[Any]) -> Any:
@@ -97,7 +97,7 @@ class LastState:
         try:
             with np.errstate(all="ignore"):
                 return float(evaluate([node], lookup)[0])
-        except (ArithmeticError, KeyError, ValueError, TypeError):
+        except (ArithmeticError, KeyError, ValueError, TypeError, ModelError):
             return math.nan
 
     def grown(self, start: NDArray[np.float64]) -> str | None:
