@@ -17,6 +17,7 @@ from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear import responses
 from sysdyn.runtime.linear.modes import Transfer
@@ -43,7 +44,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Locus:
-    """Eigenvalues [values, n] over a parameter (SI); failed: values at which there is no linearisation, and why."""
+    """Eigenvalues [values, n] over a parameter; unit: of the values, SI; failed: values without any, and why."""
 
     parameter: str
     unit: str
@@ -128,7 +129,7 @@ def locus(request: Request, name: str, along: Sequence[float], *, rest: bool, fo
             continue
         sets.append(values)
         kept.append(value)
-    units = {p.name: p.unit.text for p in found.prepared.network.parameters}
+    units = {p.name: si_text(p.unit.dimension) for p in found.prepared.network.parameters}
     return Locus(name, units[name.partition("[")[0]], np.array(kept), responses.branches(sets), tuple(failed))
 
 
@@ -166,7 +167,7 @@ def locus_to_text(found: Locus) -> str:
     for value, curve in zip(found.values, found.curves, strict=True):
         here = curve[np.isfinite(curve)]
         moving = here[np.abs(here) > 0.0]
-        damping = min((-v.real / abs(v) for v in moving), default=np.nan)
+        damping = min((-v.real / abs(v) + 0.0 for v in moving), default=np.nan)
         shown = ", ".join(_complex(v) for v in sorted(here, key=lambda v: (-v.real, v.imag))[:4])
         most = f"{here.real.max():.6g}" if here.size else ""
         rows.append([f"{value:.6g}", most, f"{damping:.4g}", shown + (", ..." if here.size > 4 else "")])

@@ -19,6 +19,7 @@ LINES = 10
 """Of a legend; more stand in columns."""
 STYLES = ("-", "--", ":", "-.")
 STYLE: dict[str, Any] = {
+    "axes.axisbelow": True,
     "axes.edgecolor": "#9aa0a6",
     "axes.grid": True,
     "axes.labelcolor": "#30343b",

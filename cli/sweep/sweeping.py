@@ -60,6 +60,11 @@ class Swept:
         """Of each run, one by one."""
         return tuple(self.done[k] for k in range(len(self.cases)))
 
+    def unit(self, name: str) -> str:
+        """Of a parameter or a traced quantity; "" where it has none."""
+        unit = self.units.get(name, "")
+        return "" if unit == "1" else unit
+
     @property
     def exits(self) -> set[int]:
         """Of the runs; those of a block are met."""

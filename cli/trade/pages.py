@@ -66,7 +66,7 @@ def picture(found: Traded, kind: str) -> bytes:
         axis.set_yscale("log")
         _ticks(axis)
         axis.set_xlabel("largest relative error of the traced quantities")
-        axis.set_ylabel("work, matrix entries touched")
+        axis.set_ylabel("work, ns of one machine")
         axis.set_title(found.name, fontweight="bold", fontsize=11, pad=10)
         axis.set_title(_resolved(found), loc="right", fontsize=8.5, color="#7b828c", pad=10)
         _legend(axis, found, colour)
@@ -85,7 +85,7 @@ def _ticks(axis: Any) -> None:
     axis.xaxis.set_major_locator(LogLocator(10.0, numticks=9))
     axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0e}"))
     axis.yaxis.set_major_locator(LogLocator(10.0, (1.0, 2.0, 5.0), numticks=9))
-    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0e}"))
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
     for side in (axis.xaxis, axis.yaxis):
         side.set_minor_formatter(NullFormatter())
 

@@ -136,14 +136,20 @@ def _table(found: Swept) -> str:
     """Every run where they are few; else the spread of the end values."""
     if len(found.cases) <= SHOWN:
         names = list(next((k.end for k in found.kept if k.end), {}) or {})[:COLUMNS]
-        head = ["run", *found.cases[0], *(f"{n} at the end" for n in names), ""]
+        varied = [_headed(found, n) for n in found.cases[0]]
+        head = ["run", *varied, *(_headed(found, n, " at the end") for n in names), ""]
         rows = []
         for k in found.kept:
             ends = [_text((k.end or {}).get(n, "-")) for n in names]
             rows.append([str(k.run), *map(_text, found.cases[k.run].values()), *ends, _mark(k)])
         return aligned([head, *rows], right=range(len(head) - 1))
-    rows = [[name, *(_text(v) for v in spread.values())] for name, spread in summary(found).items()]
+    rows = [[_headed(found, name), *(_text(v) for v in spread.values())] for name, spread in summary(found).items()]
     return aligned([["at the end", "least", "median", "largest"], *rows], right=(1, 2, 3))
+
+
+def _headed(found: Swept, name: str, when: str = "") -> str:
+    """`x at the end [m]`."""
+    return f"{name}{when}{f' [{unit}]' if (unit := found.unit(name)) else ''}"
 
 
 def _mark(kept: Kept) -> str:
