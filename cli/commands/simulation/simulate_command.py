@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import scene_command
 from sysdyn.cli.progress import ProgressLine
-from sysdyn.cli.whole_files import named
 
 if TYPE_CHECKING:
     from sysdyn.cli.run.request.asked import Request
@@ -75,16 +74,7 @@ def _streamed(request: Request, console: Console, line: ProgressLine) -> Ran | N
             return ran and replace(ran, outcome=replace(ran.outcome, trace=Path(request.output)))
         finally:  # what was computed before an interruption, too
             if path.is_file():
-                _put(request.output, path.read_bytes())
-
-
-def _put(output: str, data: bytes) -> None:
-    if output == "-":
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
-    else:
-        with named(output):
-            Path(output).write_bytes(data)
+                whole_files.write(request.output, path.read_bytes())
 
 
 def _summary(ran: Ran) -> str:

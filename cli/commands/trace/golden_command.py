@@ -157,7 +157,6 @@ def check(
 
 
 def _report(console: Console, cases: Sequence[Case], junit_file: str | None, html_file: str | None, pages: bool) -> int:
-    from sysdyn.cli.commands.trace.diff_command import write
     from sysdyn.cli.golden.changes import page
     from sysdyn.cli.golden.checking import checkable
     from sysdyn.cli.page.junit import junit
@@ -168,9 +167,9 @@ def _report(console: Console, cases: Sequence[Case], junit_file: str | None, htm
         "failed": len(wrong),
     }
     if junit_file:
-        write(junit_file, junit([(c.label, c.seconds, c.cases) for c in cases]))
+        whole_files.write(junit_file, junit([(c.label, c.seconds, c.cases) for c in cases]))
     if html_file:
-        write(html_file, page(cases))
+        whole_files.write(html_file, page(cases))
     if not console.quiet and "-" not in (junit_file, html_file):
         if wrong:
             console.data(f"{len(wrong)} of {len(cases)} checks failed; worst: {wrong[0].label}: {wrong[0].message}")

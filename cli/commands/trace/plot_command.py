@@ -34,20 +34,18 @@ def command(console: Console, trace: str, names: tuple[str, ...], output: str | 
     files = [trace, *(name for name in names if _is_trace(name))]
     wanted = list(dict.fromkeys(name for name in names if not _is_trace(name)))
     traces = [(label(file), opened(file)) for file in files]
-    target = destination(trace, output, console, KINDS, "a picture")
+    target, kind = destination(trace, output, console, KINDS, "a picture")
     drawn = quantities([t for _, t in traces], wanted)
-    data = _drawn(traces, drawn, target.suffix.lower())
+    data = _drawn(traces, drawn, kind)
     if output is None and not console.quiet:
         from sysdyn.cli.page.sparkline import summary
 
         width = shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
         console.data(summary(traces, drawn, width))
-    if output == "-":
-        sys.stdout.buffer.write(data)
-    else:
-        whole_files.write(target, data)
+    whole_files.write(target, data)
+    if target != "-":
         console.say(f"{target}: {', '.join(drawn)}")
-    console.result = {"picture": output if output == "-" else str(target), "traces": files, "quantities": drawn}
+    console.result = {"picture": target, "traces": files, "quantities": drawn}
     return console.finish()
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import scene_command
@@ -22,7 +23,6 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         raise UsageError("-o - and --json both want standard output")
     if output not in (None, "-") and Path(str(output)).suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"'{output}': a report is an .html")
-    from sysdyn.cli.commands.trace.diff_command import write
     from sysdyn.cli.report.collect import collect
     from sysdyn.cli.report.page import page
     from sysdyn.cli.run.request.asked import Request
@@ -36,7 +36,7 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
             return console.unable()
         text = page(study)
     target = output or _default(request.file, study.network.scene.name if study.network.scene else "")
-    write(target, text)
+    whole_files.write(target, text)
     console.say(f"{target}: {study.target.name}, {len(text) / 1e3:.0f} kB")
     console.result = {
         "report": target,
