@@ -191,9 +191,7 @@ def compile_model(
         prepared = prepare(network, report, formulation=wanted, backend=backend, prune=not no_prune)
         if prepared is None:
             raise ModelError(report.diagnostics)
-        said = prepared.network.scene
-        t0 = prepared.binding.evaluate(said.start) if said and said.start else 0.0
-        started = start(prepared, t0, report)
+        started = start(prepared, prepared.begin, report)
         if started is None or report.failed:
             raise ModelError(report.diagnostics)
         try:

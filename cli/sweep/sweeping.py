@@ -124,7 +124,7 @@ def sweep(
     cases = tuple(study.cases())
     _judged(runner, cases[0])
     target = runner.loaded().target
-    texts = lock.hashes(target.document.file.source, target.document.file.items)
+    texts = lock.hashes(target)
     digest = study.digest(request=replace(request, output=None), texts=texts, version=__version__, keep=keep)
     units, attributes = _units(runner), _attributes(target, study)
     place = destination(output)

@@ -108,14 +108,12 @@ def _account(prepared: Prepared) -> str:
 
 def _write(console: Console, prepared: Prepared, index: str | None, folder: Path) -> None:
     """The files of one index form; nothing where the model has no start or no such form."""
-    scene = prepared.network.scene
-    t0 = prepared.binding.evaluate(scene.start) if scene and scene.start else 0.0
     happens: list[Event | Switch] = [*prepared.network.events, *prepared.network.switches]
     if happens:
         text = f"'{happens[0].name}' is not part of an exported residual yet: it is one smooth piece"
         console.report.error("E608", text, happens[0].place, help="sysdyn simulate, or --dump")
         return
-    started = start(prepared, t0, console.report)
+    started = start(prepared, prepared.begin, console.report)
     if started is None or console.report.failed:
         return
     try:

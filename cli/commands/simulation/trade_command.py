@@ -101,9 +101,7 @@ def budget_of(text: str | None) -> float | None:
 
 def _lock(request: Request, found: Traded, best: Measured) -> Path:
     """Writes the choice for its scene."""
-    report = Report()
-    document = targets.read(request.file, report)
-    scene = targets.one(document, request.file, request.model, request.scene, report)
+    scene = targets.asked(request, Report())
     assert scene is not None
     c = best.combination
     held = lock.Lock(c.formulation, c.index, c.method, c.levels, best.tolerance, found.accuracy)

@@ -131,7 +131,7 @@ def options_of(
     scene = prepared.network.scene or Scene("", prepared.network.place)
     value = prepared.binding.evaluate
 
-    t0 = value(scene.start) if scene.start is not None else 0.0
+    t0 = prepared.begin
     t1 = value(scene.end) if scene.end is not None else None
     if request.until is None and t1 is None and not report.failed:
         raise UsageError(f"{target.name} has no 'time' statement: --until is needed")

@@ -62,10 +62,11 @@ def path_of(file: str) -> Path:
     return Path(file + SUFFIX)
 
 
-def hashes(source: SourceText, items: tuple[syntax.TopLevel, ...]) -> dict[str, str]:
-    """sha256 of a text, of what it imports from its own folder, and of its tables' files, by name beside it."""
+def hashes(target: Target) -> dict[str, str]:
+    """sha256 of the text, of what it imports from its own folder, and of its tables' files, by name beside it."""
     found: dict[str, str] = {}
-    top = real(source.name).parent
+    file = target.document.file
+    top = real(file.source.name).parent
 
     def name(path: Path) -> str:
         return path.relative_to(top).as_posix() if path.is_relative_to(top) else str(path)
@@ -80,7 +81,7 @@ def hashes(source: SourceText, items: tuple[syntax.TopLevel, ...]) -> dict[str, 
             elif other.is_file():
                 found[name(other)] = hashlib.sha256(other.read_bytes()).hexdigest()
 
-    take(real(source.name), items)
+    take(real(file.source.name), file.items)
     return dict(sorted(found.items()))
 
 
@@ -123,7 +124,7 @@ def _stale(held: Mapping[str, Any], target: Target, version: str) -> str:
     """Why a lock no longer holds; "" where it does."""
     if held["version"] != FORMAT or held["sysdyn"] != version:
         return f"sysdyn {held['sysdyn']} wrote it, this is {version}"
-    now = hashes(target.document.file.source, target.document.file.items)
+    now = hashes(target)
     changed = sorted(name for name in now.keys() | held["files"].keys() if now.get(name) != held["files"].get(name))
     return f"{', '.join(changed)} changed since it was measured" if changed else ""
 
@@ -212,8 +213,7 @@ def write(file: str, target: Target, lock: Lock, version: str) -> Path:
         "accuracy": lock.accuracy,
         "level": dict(lock.levels),
     }
-    files = hashes(target.document.file.source, target.document.file.items)
-    whole_files.replace(path, _text(files, version, scenes))
+    whole_files.replace(path, _text(hashes(target), version, scenes))
     return path
 
 

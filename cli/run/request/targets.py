@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import glob
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.dsl import load
@@ -16,6 +17,9 @@ from sysdyn.dsl.text.decoding import decode
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
+
+if TYPE_CHECKING:
+    from sysdyn.cli.run.request.asked import Request
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +107,17 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
     if scenes:
         raise UsageError(f"{path} has several scenes: --scene {' | '.join(s.name.name for s in scenes)}")
     return whole(document, path, model, None, report)
+
+
+def asked(request: Request, report: Report, choose: Callable[..., Target | None] = one) -> Target | None:
+    """What a request means of its file, by `one`, `still` or `whole`."""
+    document = read(request.file, report, request.text)
+    return choose(document, request.file, request.model, request.scene, report)
+
+
+def held(request: Request, target: Target) -> Request:
+    """The request for other processes: what stood on standard input is read once."""
+    return replace(request, text=target.document.file.source.text if request.file == "-" else None)
 
 
 def still(document: Document, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
