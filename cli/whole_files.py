@@ -1,8 +1,9 @@
-"""Files that commands write: the one at the path is always whole."""
+"""Files that commands write: the one at the path is always whole; texts in them."""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -52,3 +53,9 @@ def replace(target: Path, data: str | bytes) -> None:
         except BaseException:
             part.unlink(missing_ok=True)
             raise
+
+
+def toml_text(value: str) -> str:
+    """A basic string of TOML; JSON's escapes are TOML's but for DEL and lone surrogates."""
+    safe = value.encode("utf-8", "replace").decode("utf-8")
+    return json.dumps(safe, ensure_ascii=False).replace("\x7f", "\\u007F")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sysdyn.cli.analysis.asked import Found
 from sysdyn.cli.analysis.linear import Linear, linearised
 from sysdyn.cli.analysis.states import state_of
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import aligned, complex_text
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
@@ -168,13 +168,9 @@ def locus_to_text(found: Locus) -> str:
         here = curve[np.isfinite(curve)]
         moving = here[np.abs(here) > 0.0]
         damping = min((-v.real / abs(v) + 0.0 for v in moving), default=np.nan)
-        shown = ", ".join(_complex(v) for v in sorted(here, key=lambda v: (-v.real, v.imag))[:4])
+        shown = ", ".join(complex_text(v, 5) for v in sorted(here, key=lambda v: (-v.real, v.imag))[:4])
         most = f"{here.real.max():.6g}" if here.size else ""
         rows.append([f"{value:.6g}", most, f"{damping:.4g}", shown + (", ..." if here.size > 4 else "")])
     lines = [aligned(rows)]
     lines += [f"{found.parameter} = {value:.6g}: {why}" for value, why in found.failed]
     return "\n".join(lines)
-
-
-def _complex(value: complex) -> str:
-    return f"{value.real:.5g}" if abs(value.imag) <= 1e-12 * abs(value) else f"{value.real:.5g}{value.imag:+.5g}i"

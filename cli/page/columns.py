@@ -1,8 +1,8 @@
-"""Tables that line up."""
+"""Tables that line up, and what stands in them."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 
 def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
@@ -13,3 +13,17 @@ def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
         cells = [t.rjust(w) if k in right else t.ljust(w) for k, (t, w) in enumerate(zip(row, widths, strict=True))]
         lines.append("  ".join(cells).rstrip())
     return "\n".join(lines)
+
+
+def complex_text(value: complex, digits: int = 9) -> str:
+    """A complex number; a part that is round-off beside the other is 0."""
+    real, imaginary = (part if abs(part) > 1e-12 * abs(value) else 0.0 for part in (value.real, value.imag))
+    return f"{real:.{digits}g}" if imaginary == 0.0 else f"{real:.{digits}g}{imaginary:+.{digits}g}i"
+
+
+def refusals(pairs: Iterable[tuple[str, str]]) -> list[str]:
+    """A line a reason: `not in kane, co_kane: why`; pairs: what cannot be had, and why."""
+    reasons: dict[str, dict[str, None]] = {}
+    for name, reason in pairs:
+        reasons.setdefault(reason, {})[name] = None
+    return [f"not in {', '.join(names)}: {reason}" for reason, names in reasons.items()]

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysdyn.cli.failures import UsageError
+from sysdyn.cli.failures import UsageError, instead
 from sysdyn.names import stored
 
 if TYPE_CHECKING:
@@ -52,11 +52,7 @@ def opened(file: str) -> Trace:
 
 def no_quantity(trace: Trace, name: str, known: Iterable[str], listed: Sequence[str]) -> str:
     """That a trace has none of that name; known: those that may be meant."""
-    from sysdyn.dsl.names.symbols import nearest
-
-    near = nearest(name, known)
-    hint = f"nearest: '{near}'" if near else f"there are: {', '.join(listed)}"
-    return f"{trace.path} has no quantity '{name}'; {hint}"
+    return f"{trace.path} has no quantity '{name}'; {instead(name, known, listed)}"
 
 
 def quantities(traces: list[Trace], wanted: list[str]) -> list[str]:

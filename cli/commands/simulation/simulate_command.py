@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -131,7 +131,7 @@ def _result(ran: Ran) -> dict[str, Any]:
         "judged": list(o.judgement.judged) if o.judgement else [],
         "not_met": [missed.to_json() for missed in o.judgement.not_met] if o.judgement else [],
         "conserved": o.judgement.kept() if o.judgement else [],
-        "expects": [{"text": c.text, "ok": c.ok, "value": c.value, "time": c.time} for c in ran.claims],
+        "expects": [asdict(c) for c in ran.claims],
         "moved": described(ran.prepared, ran.started.state),
         "warnings": list(o.warnings),
         "failure": ran.failure,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import scene_command, side_by_side
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import aligned, refusals
 from sysdyn.cli.run.request import lock, targets
 from sysdyn.cli.run.request.asked import Request, instants_of
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
@@ -168,15 +169,15 @@ def _shown(found: Traded) -> list[Measured]:
     return [*best.values(), *found.pareto]
 
 
-def _refused(refusals: tuple[Refusal, ...]) -> list[str]:
+def _refused(refusals_: Iterable[Refusal]) -> list[str]:
     """What cannot be run, those with one reason together."""
-    reasons: dict[str, list[str]] = {}
-    for r in refusals:
-        name = r.formulation if r.index is None else f"{r.formulation} index {r.index}"
-        names = reasons.setdefault(r.reason.removeprefix(f"not expressible in {r.formulation}: "), [])
-        if name not in names:
-            names.append(name)
-    return [f"not in {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+    return refusals(
+        (
+            r.formulation if r.index is None else f"{r.formulation} index {r.index}",
+            r.reason.removeprefix(f"not expressible in {r.formulation}: "),
+        )
+        for r in refusals_
+    )
 
 
 def _result(found: Traded, use: str, *, timings: bool) -> dict[str, Any]:

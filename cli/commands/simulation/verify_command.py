@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +10,11 @@ import click
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import INTERRUPTED, SOLVER, worst
 from sysdyn.cli.options import scene_command, side_by_side
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import aligned, refusals
 
 if TYPE_CHECKING:
     from sysdyn.cli.verify.agreement import Gap
-    from sysdyn.cli.verify.verified import Run, Verified
+    from sysdyn.cli.verify.verified import Refusal, Run, Verified
 
 
 @scene_command("verify", "runs", "are compared")
@@ -168,12 +168,12 @@ def _table(found: Verified, *, timings: bool) -> str:
 
 def _refused(found: Verified) -> list[str]:
     """Formulations left out, those with one reason together."""
-    reasons: dict[str, list[str]] = {}
-    for r in found.refusals:
-        reason = r.reason.removeprefix(f"not expressible in {r.formulation}: ").removeprefix(f"{r.formulation} of ")
-        text = "not supported yet" if r.code == "E608" else f"{r.code} {reason}"
-        reasons.setdefault(text, []).append(r.formulation)
-    return [f"not in {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+
+    def reason(r: Refusal) -> str:
+        text = r.reason.removeprefix(f"not expressible in {r.formulation}: ").removeprefix(f"{r.formulation} of ")
+        return "not supported yet" if r.code == "E608" else f"{r.code} {text}"
+
+    return refusals((r.formulation, reason(r)) for r in found.refusals)
 
 
 def _cells(run: Run) -> list[str]:
@@ -225,14 +225,14 @@ def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
         "disagreements": [
             {
                 "runs": [{"formulation": r.formulation, "method": r.method} for r in (d.one, d.other)],
-                **_gap_object(d.gap),
+                **asdict(d.gap),
             }
             for d in found.disagreements
         ],
         "horizon": found.horizon,
         "compared": list(found.compared),
         "not_compared": [{"variable": name, "reason": reason} for name, reason in found.left_out],
-        "not_expressible": [{"formulation": r.formulation, "code": r.code, "reason": r.reason} for r in found.refusals],
+        "not_expressible": [asdict(r) for r in found.refusals],
         "backends": [
             {"formulation": t.formulation, "difference": t.difference, "row": t.row, "ok": t.agree} for t in found.twins
         ],
@@ -255,20 +255,10 @@ def _run_object(run: Run, gap: Gap | None, *, keep: bool, timings: bool) -> dict
         "met": not run.unbalanced and o.final,
         "not_met": [m.to_json() for m in run.unbalanced],
         "constraints": run.constraints,
-        "worst": None if gap is None else _gap_object(gap),
+        "worst": None if gap is None else asdict(gap),
         "expects": [{"text": text, "ok": ok} for text, ok in run.expects],
         "warnings": list(o.warnings),
         "failure": run.failure,
         "diagnostic": run.finding,
         "trace": str(o.trace) if keep else None,
-    }
-
-
-def _gap_object(gap: Gap) -> dict[str, Any]:
-    return {
-        "variable": gap.variable,
-        "time": gap.time,
-        "first": gap.first,
-        "ratio": gap.ratio,
-        "values": list(gap.values),
     }

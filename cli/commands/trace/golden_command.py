@@ -7,13 +7,13 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, USAGE, UsageError, worst
-from sysdyn.cli.options import FORMULATIONS, Setting, side_by_side
+from sysdyn.cli.options import FORMULATIONS, Setting, of_file, side_by_side
 from sysdyn.cli.page.columns import aligned
 from sysdyn.dsl.text.source import real
 
@@ -49,15 +49,12 @@ def _add(name: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
     return decorate
 
 
-def _folder(function: Callable[..., Any]) -> Callable[..., Any]:
-    option = click.option("--folder", default="golden", show_default=True, metavar="DIR", help="The golden folder.")
-    return option(function)
+_folder = click.option("--folder", default="golden", show_default=True, metavar="DIR", help="The golden folder.")
 
 
 @_add("record")
 @click.argument("file")
-@click.option("--scene", metavar="NAME", help="The scene; needed where the file has several.")
-@click.option("--model", metavar="NAME", help="The model; needed where the file has several and no scene.")
+@of_file
 @click.option("--name", metavar="NAME", help="Folder of the model below the golden folder. Default: the file's name.")
 @click.option("--rtol", type=float, default=RTOL, show_default=True, metavar="R", help="Times the nominal magnitude.")
 @click.option("--atol", type=float, default=0.0, show_default=True, metavar="A", help="In each quantity's own unit.")

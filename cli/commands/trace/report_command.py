@@ -25,7 +25,7 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         raise UsageError(f"'{output}': a report is an .html")
     from sysdyn.cli.report.collect import collect
     from sysdyn.cli.report.page import page
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.asked import Request, default_output
     from sysdyn.dsl.model import expression as ex
 
     request = Request(**options)
@@ -35,7 +35,7 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         if study is None:
             return console.unable()
         text = page(study)
-    target = output or _default(request.file, study.network.scene.name if study.network.scene else "")
+    target = output or default_output(request.file, study.network.scene.name if study.network.scene else "", ".html")
     whole_files.write(target, text)
     console.say(f"{target}: {study.target.name}, {len(text) / 1e3:.0f} kB")
     console.result = {
@@ -48,8 +48,3 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         "failure": None if study.ran is None else study.ran.failure,
     }
     return console.finish(0 if study.ran is None else study.ran.exit)
-
-
-def _default(file: str, scene: str) -> str:
-    stem = "model" if file == "-" else Path(file).stem
-    return f"{stem}-{scene}.html" if scene else f"{stem}.html"

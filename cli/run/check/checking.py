@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from sysdyn.cli.failures import classify
@@ -111,7 +112,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
         "passivity": {
             "verdict": judged.verdict,
             "proven": judged.proven,
-            "elements": [{"name": f.name, "role": f.role, "how": f.how, "said": f.said} for f in judged.findings],
+            "elements": [asdict(f) for f in judged.findings],
             "lines": judged.lines(),
         },
     }

@@ -290,10 +290,10 @@ def separate(text: str) -> list[str]:
     return parts
 
 
-def default_output(file: str, scene: str) -> str:
-    """The trace's file where none is named."""
+def default_output(file: str, scene: str, end: str = ".h5") -> str:
+    """The file where none is named: a trace's, or with another end."""
     stem = "model" if file == "-" else Path(file).stem
-    return f"{stem}-{scene}.h5" if scene else f"{stem}.h5"
+    return f"{stem}-{scene}{end}" if scene else f"{stem}{end}"
 
 
 def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:

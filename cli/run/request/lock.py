@@ -9,7 +9,6 @@ are taken together, in the formulation in which they were.  A lock that is out o
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from typing import Any
 from sysdyn.cli import whole_files
 from sysdyn.cli.options import FORMULATIONS, INDICES
 from sysdyn.cli.run.request.targets import Target
+from sysdyn.cli.whole_files import toml_text
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.text.source import real
@@ -219,19 +219,16 @@ def write(file: str, target: Target, lock: Lock, version: str) -> Path:
 
 def _text(files: Mapping[str, str], version: str, scenes: Mapping[str, Mapping[str, Any]]) -> str:
     lines = ["# Written by sysdyn trade --lock, read by sysdyn simulate; out of date once a file below changes."]
-    lines += [f"version = {FORMAT}", f"sysdyn = {_quoted(version)}", "", "[files]"]
-    lines += [f"{_quoted(name)} = {_quoted(value)}" for name, value in files.items()]
+    lines += [f"version = {FORMAT}", f"sysdyn = {toml_text(version)}", "", "[files]"]
+    lines += [f"{toml_text(name)} = {toml_text(value)}" for name, value in files.items()]
     for name, said in sorted(scenes.items()):
-        lines += ["", f"[scene.{_quoted(name)}]"]
+        lines += ["", f"[scene.{toml_text(name)}]"]
         for key in ("formulation", "index", "method"):
-            lines.append(f"{key} = {_quoted(str(said[key]))}")
+            lines.append(f"{key} = {toml_text(str(said[key]))}")
         for key in ("tolerance", "accuracy"):
             lines.append(f"{key} = {float(said[key])!r}")
-        levels = ", ".join(f"{_quoted(path)} = {_quoted(str(level))}" for path, level in said.get("level", {}).items())
+        levels = ", ".join(
+            f"{toml_text(path)} = {toml_text(str(level))}" for path, level in said.get("level", {}).items()
+        )
         lines.append(f"level = {{ {levels} }}" if levels else "level = {}")
     return "\n".join(lines) + "\n"
-
-
-def _quoted(text: str) -> str:
-    """A basic string of TOML: JSON's, which escapes the same."""
-    return json.dumps(text, ensure_ascii=False)

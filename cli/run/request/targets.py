@@ -9,10 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysdyn.cli.failures import UsageError
+from sysdyn.cli.failures import UsageError, instead
 from sysdyn.dsl import load
 from sysdyn.dsl.load import Document
-from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.text.decoding import decode
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report, SourceText
 from sysdyn.dsl.tree import syntax
@@ -156,7 +155,5 @@ def _nothing(document: Document, path: str, what: str, name: str, names: list[st
         from sysdyn.dsl.text.diagnostics import ModelError
 
         return ModelError(report.diagnostics)
-    near = nearest(name, names)
-    listed = f"nearest: '{near}'" if near else f"there are: {', '.join(names) or 'none'}"
     code = "E901" if what == "scene" else "E902"
-    return UsageError(f"{code}: {path} has no {what} '{name}'; {listed}")
+    return UsageError(f"{code}: {path} has no {what} '{name}'; {instead(name, names)}")
