@@ -32,10 +32,11 @@ ROWS = 13
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """One output by one input: names, over frequency, margins, step response (t [s], y)."""
+    """One output by one input: names, both with units, over frequency, margins, step response (t [s], y)."""
 
     output: str
     input: str
+    label: str
     frequencies: Frequencies
     margins: Margins
     time: Array
@@ -67,6 +68,7 @@ def _answer(linear: Linear, transfer: Transfer, low: float, high: float, end: fl
     return Answer(
         linear.outputs[transfer.output],
         linear.inputs[transfer.input],
+        linear.label(transfer),
         responses.frequencies(transfer, low, high),
         responses.margins(transfer, low, high),
         time,
@@ -95,7 +97,7 @@ def _finite(values: Array) -> list[float | None]:
 
 def answer_to_text(answer: Answer, kinds: Sequence[str]) -> str:
     """Tables of a few rows each."""
-    f, parts = answer.frequencies, [f"{answer.output} by {answer.input}"]
+    f, parts = answer.frequencies, [answer.label]
     places = np.unique(np.linspace(0, f.w.size - 1, ROWS).round().astype(int))
     if "bode" in kinds:
         rows = [[f"{f.w[k]:.5g}", f"{f.magnitude[k]:.5g}", f"{f.phase[k]:.5g}"] for k in places]

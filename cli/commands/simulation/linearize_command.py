@@ -175,7 +175,8 @@ def _write(file: str, linear: Any, curves: Any, over: Any, kinds: tuple[str, ...
         whole_files.write(file, written(linear, kind, console.result))
         console.say(f"{file}: {len(linear.modes)} states, {len(linear.transfers)} transfer functions")
         return
-    drawn = (*kinds, "locus") if kinds else ((*KINDS, "poles") if over is None else ("poles",))
+    asked = kinds or ((*KINDS, "poles") if over is None else ("poles",))
+    drawn = [k for k in asked if k == "poles" or curves] + ([] if over is None else ["locus"])
     title = f"{name}, t = {linear.t:g} s" + ("" if linear.moving else _still(linear))
     data = picture(title, linear, curves, over, drawn, "svg" if kind == ".html" else kind.removeprefix("."))
     if kind == ".html":
@@ -193,9 +194,8 @@ def _tables(linear: Any, over: Any) -> list[tuple[str, list[list[str]]]]:
         rows = [["transfer function", "gain", "at rest", "zeros [1/s]", "poles [1/s]"]]
         for t in linear.transfers:
             static = "" if t.static is None else f"{t.static:.6g}"
-            label = f"{linear.outputs[t.output]} by {linear.inputs[t.input]}"
             ends = [", ".join(map(complex_text, part)) or "none" for part in (t.zeros, t.poles)]
-            rows.append([label, f"{t.gain:.6g}", static, *ends])
+            rows.append([linear.label(t), f"{t.gain:.6g}", static, *ends])
         found.append(("Transfer functions", rows))
     if over is not None:
         rows = [[f"{over.parameter} [{over.unit}]", "eigenvalues [1/s]"]]
@@ -293,7 +293,7 @@ def _table(linear: Any) -> str:
     """Modes and transfer functions as text."""
     lines = [aligned(_modes(linear))] if linear.modes else ["no states"]
     for t in linear.transfers:
-        lines += ["", f"{linear.outputs[t.output]} by {linear.inputs[t.input]}"]
+        lines += ["", linear.label(t)]
         lines.append(f"  gain   {t.gain:.9g}" + ("" if t.static is None else f", at rest {t.static:.9g}"))
         lines.append(f"  zeros  {', '.join(map(complex_text, t.zeros)) or 'none'}")
         lines.append(f"  poles  {', '.join(map(complex_text, t.poles)) or 'none'}")
