@@ -21,6 +21,11 @@ def complex_text(value: complex, digits: int = 9) -> str:
     return f"{real:.{digits}g}" if imaginary == 0.0 else f"{real:.{digits}g}{imaginary:+.{digits}g}i"
 
 
+def spent(seconds: float) -> str:
+    """A time of work: `0.483 ms`, `12.8 s`."""
+    return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
+
+
 def refusals(pairs: Iterable[tuple[str, str]]) -> list[str]:
     """A line a reason: `not in kane, co_kane: why`; pairs: what cannot be had, and why."""
     reasons: dict[str, dict[str, None]] = {}

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from sysdyn.cli.page.columns import spent
 from sysdyn.cli.page.document import document, escape, table
 from sysdyn.cli.page.panels import COLOURS
 from sysdyn.cli.page.picture import drawing
@@ -178,7 +179,7 @@ def verdict(found: Traded) -> str:
         return f"no setting that was tried meets the accuracy {found.accuracy:.0e}"
     return (
         f"the cheapest of {len(found.measured)} runs that meets {found.accuracy:.0e}: {m.combination.name} at "
-        f"{m.tolerance:.1e}, error {m.error:.1e}, {1e3 * m.cpu_s:.3g} ms of CPU"
+        f"{m.tolerance:.1e}, error {m.error:.1e}, {spent(m.cpu_s)} of CPU"
     )
 
 

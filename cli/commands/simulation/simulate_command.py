@@ -12,6 +12,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import scene_command
+from sysdyn.cli.page.columns import spent
 from sysdyn.cli.progress import ProgressLine
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def _summary(ran: Ran) -> str:
     span = f"{o.reached:g} s" if began == 0.0 else f"{began:.12g} s to {o.reached:.12g} s"
     lines = [
         f"{ran.target.name}: {', '.join(how)}",
-        f"  {span} in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
+        f"  {span} in {s['steps']} steps, {spent(t['cpu_integrate_s'])} of CPU{estimate}",
         *([f"  {', '.join(meters)}"] if meters else []),
         *(f"  {text}" for text in _conserved(ran)),
         f"  {o.trace}{'' if o.final else ' (not final)'}{'' if o.met or not o.final else ' (not met)'}",
