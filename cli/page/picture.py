@@ -113,7 +113,7 @@ def _head(axes: Any, traces: Sequence[tuple[str, Trace]]) -> None:
 def _draw(axis: Any, panel: Panel, traces: Sequence[tuple[str, Trace]], scale: float) -> None:
     curves = []
     for name, trace, label, colour, k in styled(panel, traces):
-        time, values = curve(trace, name)
+        time, values = curve(trace, name, panel.unit)
         (line,) = axis.plot(time * scale, values, STYLES[k % len(STYLES)], color=colour)
         curves.append((line, _legible(shortened(label, 2 * MOST))))
     unit = unit_text(panel.unit)
