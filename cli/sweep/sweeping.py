@@ -126,7 +126,7 @@ def sweep(
     target = runner.loaded().target
     texts = lock.hashes(target)
     digest = study.digest(request=replace(request, output=None), texts=texts, version=__version__, keep=keep)
-    units, attributes = _units(runner), _attributes(target, study)
+    units, attributes = _units(runner, cases[0]), _attributes(target, study)
     place = destination(output)
     with claimed(place), Journal(place, digest) as journal:
         resumed = len(journal.done)
@@ -192,11 +192,12 @@ def _attributes(target: Target, study: Study) -> dict[str, Any]:
     }
 
 
-def _units(runner: Runner) -> dict[str, str]:
-    """Of parameters and traced quantities by name."""
+def _units(runner: Runner, case: Case) -> dict[str, str]:
+    """Of parameters, what varies of them and traced quantities by name."""
     prepared = runner.loaded().first.prepared
     known = {p.name: si_text(p.unit.dimension) for p in prepared.network.parameters}
     rows = [row for row in prepared.structure["rows"] if row.get("stored")]
+    known |= {name: known[whole] for name in case if (whole := name.partition("[")[0]) in known}
     return known | {str(row["name"]): str(row["unit"]) for row in rows}
 
 

@@ -185,7 +185,7 @@ def test_traces_in_other_units_share_an_axis():
     (panel,) = panels_of([small, large], ["x"])
     assert (panel.unit, panel.high) == ("mm", pytest.approx(2e3 * large.time[-1]))
     np.testing.assert_allclose(curve(large, "x", panel.unit)[1], 2e3 * curve(large, "x")[0])
-    with pytest.raises(UsageError, match="'x' is in s in .*, in mm in another trace"):
+    with pytest.raises(UsageError, match=r"'x' is in s in .*, in mm in another trace"):
         panels_of([small, made([("x", "s", np.sin)])], ["x"])
 
 
