@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from sysdyn.cli.page.panels import COLOURS
 from sysdyn.cli.page.picture import drawing
+from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.sweeping import Swept
 
 MOST = 4
@@ -17,9 +19,10 @@ FEW = 8
 
 def picture(found: Swept, kind: str) -> bytes:
     """PNG or SVG: a row a traced quantity; runs that are not met in red crosses."""
-    names = list(next((k.end for k in found.kept if k.end), {}) or {})[:MOST]
+    kept = found.kept
+    names = list(next((k.end for k in kept if k.end), {}) or {})[:MOST]
     over = list(found.cases[0])[:MOST]
-    bands = any(k.traces for k in found.kept)
+    bands = any(k.traces for k in kept)
     columns = len(over) + bands
     size = (2.4 + 3.1 * columns, 1.0 + 2.2 * max(len(names), 1))
 
@@ -27,9 +30,9 @@ def picture(found: Swept, kind: str) -> bytes:
         axes = figure.subplots(max(len(names), 1), columns, squeeze=False, sharex="col")
         for row, name in enumerate(names):
             if bands:
-                _bands(axes[row, 0], found, name)
+                _bands(axes[row, 0], found, kept, name)
             for k, varied in enumerate(over):
-                _scatter(axes[row, k + bands], found, name, varied)
+                _scatter(axes[row, k + bands], found, kept, name, varied)
             axes[row, 0].set_ylabel(_labelled(found, name))
         for k, varied in enumerate(over):
             axes[-1, k + bands].set_xlabel(_labelled(found, varied))
@@ -47,8 +50,8 @@ def _labelled(found: Swept, name: str) -> str:
     return ", ".join(filter(None, (name, found.unit(name))))
 
 
-def _bands(axis: Any, found: Swept, name: str) -> None:
-    some = [k for k in found.kept if k.met and k.time and k.traces]
+def _bands(axis: Any, found: Swept, kept: Sequence[Kept], name: str) -> None:
+    some = [k for k in kept if k.met and k.time and k.traces]
     if not some:
         return
     time = max((k.time or [] for k in some), key=len)
@@ -64,10 +67,10 @@ def _bands(axis: Any, found: Swept, name: str) -> None:
     axis.plot(time, middle, color=COLOURS[0])
 
 
-def _scatter(axis: Any, found: Swept, name: str, varied: str) -> None:
+def _scatter(axis: Any, found: Swept, kept: Sequence[Kept], name: str, varied: str) -> None:
     """End values; bands stand beside them, so that these share the scale of their quantity alone."""
     drawn: dict[tuple[str, str], list[tuple[Any, Any]]] = {}
-    for k in found.kept:
+    for k in kept:
         if k.end:
             how = ("o", _colour(found, k.run)) if k.met else ("x", "#c2334d")
             drawn.setdefault(how, []).append((found.cases[k.run][varied], k.end[name]))
