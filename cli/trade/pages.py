@@ -153,8 +153,8 @@ def page(found: Traded, command: str) -> str:
 
 
 HEADS = (
-    "", "formulation", "index", "method", "tolerance", "error", "work", "of the least", "CPU, ms", "steps", "energy, J",
-    "constraints", "",
+    "", "formulation", "index", "method", "tolerance", "error", "work, ns", "of the least", "CPU, ms", "steps",
+    "energy, J", "constraints", "",
 )  # fmt: skip
 """The last column: the level where there are several, and why a run may not be chosen."""
 

@@ -14,7 +14,7 @@ from sysdyn.cli.page.columns import aligned, refusals
 
 if TYPE_CHECKING:
     from sysdyn.cli.verify.agreement import Gap
-    from sysdyn.cli.verify.verified import Refusal, Run, Verified
+    from sysdyn.cli.verify.verified import Disagreement, Refusal, Run, Verified
 
 
 @scene_command("verify", "runs", "are compared")
@@ -99,7 +99,7 @@ def _complaints(found: Verified) -> list[str]:
     for d in found.disagreements:
         if d.doubted:
             continue
-        pairs.append(f"{d.one.name} and {d.other.name} disagree: {_apart(d.gap)}")
+        pairs.append(f"{d.one.name} and {d.other.name} disagree: {_apart(d)}")
     carriers = [
         f"{' and '.join(t.backends)} disagree in {t.formulation}: row {t.row} by {t.difference:.1e} of itself"
         for t in found.twins
@@ -112,7 +112,7 @@ def _doubts(found: Verified) -> list[str]:
     """Differences from runs that are not met by their own estimate: nothing is known from them."""
     return [
         f"{' and '.join(run.name for run in d.doubted)}: not met by its own estimate, and apart from "
-        f"{(d.one if d.other in d.doubted else d.other).name}: {_apart(d.gap)}"
+        f"{(d.one if d.other in d.doubted else d.other).name}: {_apart(d)}"
         for d in found.disagreements
         if d.doubted
     ]
@@ -128,9 +128,10 @@ def _unbalanced(found: Verified) -> list[str]:
     ]
 
 
-def _apart(gap: Gap) -> str:
-    a, b = gap.values
-    worst = f"{gap.variable} is {a:.6g} and {b:.6g} at {gap.time:.6g} s, {gap.ratio:.3g} times what is allowed"
+def _apart(d: Disagreement) -> str:
+    gap, unit = d.gap, d.one.trace[d.gap.variable].units
+    a, b = (f"{value:.6g}{'' if unit == '1' else f' {unit}'}" for value in gap.values)
+    worst = f"{gap.variable} is {a} and {b} at {gap.time:.6g} s, {gap.ratio:.3g} times what is allowed"
     return worst if gap.first in (None, gap.time) else f"{worst} (first at {gap.first:.6g} s)"
 
 
