@@ -235,4 +235,5 @@ def to_json(found: Swept) -> dict[str, Any]:
             for k in found.failed
         ],
         "end": summary(found),
+        "units": {name: found.units[name] for name in (*found.cases[0], *found.done.names()) if name in found.units},
     }
