@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 from sysdyn.cli.failures import classify
@@ -112,7 +111,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
         "passivity": {
             "verdict": judged.verdict,
             "proven": judged.proven,
-            "elements": [asdict(f) for f in judged.findings],
+            "elements": [{"name": f.name, "role": f.role, "how": f.how, "said": f.said} for f in judged.findings],
             "lines": judged.lines(),
         },
     }
