@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
-from sysdyn.cli.console import with_console
+from sysdyn.cli.console import WHEN, with_console
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -19,6 +19,9 @@ EVERY = tuple(name for name in FORMULATIONS if name != "auto")
 TRIED = tuple(name for name in EVERY if name != "co_kane")
 """What `trade` measures by itself: co_kane has co_lagrangian's rows but those of effort constraints."""
 INDICES = ["auto", "3", "2", "2v", "1", "0"]
+BACKENDS = ("c", "numpy")
+FORMATS = ("full", "concise", "json", "github", "junit", "sarif")
+"""Of what `check` finds."""
 METHODS = ["auto", "bdf", "radau", "rosenbrock", "dopri", "energy", "euler"]
 
 
@@ -70,7 +73,7 @@ chosen = _together(
     of_file,
     click.option("--formulation", type=click.Choice(FORMULATIONS), help="Default: the scene's, else auto."),
     click.option("--index", type=click.Choice(INDICES), help="Index form. Default: the scene's, else auto."),
-    click.option("--backend", type=click.Choice(["c", "numpy"]), default="c", show_default=True),
+    click.option("--backend", type=click.Choice(BACKENDS), default="c", show_default=True),
     _set("--set", "settings", help="Parameter or input; repeatable."),
     _set("--level", "levels", help="PATH=NAME; repeatable."),
     click.option("--no-prune", is_flag=True, help="Keep what the scene does not need."),
@@ -86,7 +89,7 @@ solved = _together(
     click.option("--no-lock", is_flag=True, help="Leave the setting of FILE.lock aside."),
     click.option("--max-steps", type=click.IntRange(min=1), metavar="N"),
     click.option("--max-wall", metavar="T", help="Limit of wall time; a bare number in s."),
-    click.option("--progress", type=click.Choice(["auto", "always", "never"]), default="auto"),
+    click.option("--progress", type=click.Choice(WHEN), default="auto"),
 )
 """How a scene is solved, and for how long."""
 

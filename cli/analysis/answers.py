@@ -83,16 +83,12 @@ def answer_to_json(answer: Answer, kinds: Sequence[str]) -> dict[str, Any]:
     if "bode" in kinds or "nyquist" in kinds:
         found["margins"] = {"gain": m.gain, "w_phase": m.w_phase, "phase": m.phase, "w_gain": m.w_gain}
     if "bode" in kinds:
-        found["bode"] = {"w": f.w.tolist(), "magnitude": _finite(f.magnitude), "phase": f.phase.tolist()}
+        found["bode"] = {"w": f.w.tolist(), "magnitude": f.magnitude.tolist(), "phase": f.phase.tolist()}
     if "nyquist" in kinds:
         found["nyquist"] = {"w": f.w.tolist(), "re": f.value.real.tolist(), "im": f.value.imag.tolist()}
     if "step" in kinds:
-        found["step"] = {"t": answer.time.tolist(), "y": _finite(answer.step)}
+        found["step"] = {"t": answer.time.tolist(), "y": answer.step.tolist()}
     return found
-
-
-def _finite(values: Array) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]
 
 
 def answer_to_text(answer: Answer, kinds: Sequence[str]) -> str:

@@ -14,7 +14,7 @@ from sysdyn.cli.export.index_parameters import index_parameters
 from sysdyn.cli.export.layout import AUDIT, Formed, state_jacobian, tables
 from sysdyn.cli.export.naming import elements
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.options import FORMULATIONS, INDICES
+from sysdyn.cli.options import BACKENDS, FORMULATIONS, INDICES
 from sysdyn.cli.run.many.loaded import KEPT, place_of
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.request.asked import Request
@@ -23,8 +23,6 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
-
-BACKENDS = ("c", "numpy")
 
 
 class Module:

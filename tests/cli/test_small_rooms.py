@@ -18,8 +18,9 @@ def test_a_picture_is_called_as_its_trace_and_goes_where_it_is_asked():
     console = SimpleNamespace(as_json=False)
     assert label("runs/pendulum-swing.h5") == "pendulum-swing"
     assert label("-") == "stdin"
-    assert str(destination("runs/a.h5", None, console, (".png", ".svg"), "a plot")) == "a.png"
-    assert str(destination("a.h5", "b.SVG", console, (".png", ".svg"), "a plot")) == "b.SVG"
+    assert destination("runs/a.h5", None, console, (".png", ".svg"), "a plot") == ("a.png", ".png")
+    assert destination("a.h5", "b.SVG", console, (".png", ".svg"), "a plot") == ("b.SVG", ".svg")
+    assert destination("a.h5", "-", console, (".png", ".svg"), "a plot") == ("-", ".png")
     with pytest.raises(UsageError, match=r"a plot is one of \.png, \.svg"):
         destination("a.h5", "b.pdf", console, (".png", ".svg"), "a plot")
 

@@ -13,7 +13,7 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, USAGE, UsageError, worst
-from sysdyn.cli.options import FORMULATIONS, Setting, of_file, side_by_side
+from sysdyn.cli.options import BACKENDS, FORMULATIONS, Setting, of_file, side_by_side
 from sysdyn.cli.page.columns import aligned
 from sysdyn.dsl.text.source import real
 
@@ -126,7 +126,7 @@ def record(
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--formulation", "formulations", type=click.Choice(FORMULATIONS[:-1]), multiple=True, help="Repeatable.")
 @click.option("--method", "methods", type=click.Choice(["bdf", "radau", "auto"]), multiple=True, help="Repeatable.")
-@click.option("--backend", "backends", type=click.Choice(["c", "numpy"]), multiple=True, help="Repeatable. Default: c.")
+@click.option("--backend", "backends", type=click.Choice(BACKENDS), multiple=True, help="Repeatable. Default: c.")
 @side_by_side
 @click.option("--junit", "junit_file", metavar="FILE", help="Write the results as JUnit XML.")
 @click.option("--html", "html_file", metavar="FILE", help="Write one page with pictures of what differs.")
