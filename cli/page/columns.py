@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from collections.abc import Collection, Iterable, Sequence
 
 
@@ -13,6 +15,27 @@ def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
         cells = [t.rjust(w) if k in right else t.ljust(w) for k, (t, w) in enumerate(zip(row, widths, strict=True))]
         lines.append("  ".join(cells).rstrip())
     return "\n".join(lines)
+
+
+def terminal() -> int | None:
+    """Columns of the terminal that shows standard output; None where there is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+
+
+def fitted(rows: Sequence[Sequence[str]], spare: Sequence[str], width: int | None) -> tuple[list[list[str]], str]:
+    """Rows without as many of the columns that can be spared, the first first, as make them fit, and the line that says
+    so; width: None: whatever they take.
+    """
+    heads, kept = list(rows[0]), list(range(len(rows[0])))
+    widths = [2 + max(map(len, column)) for column in zip(*rows, strict=True)]
+    gone = []
+    for head in spare:
+        if width is None or sum(widths[k] for k in kept) - 2 <= width:
+            break
+        kept.remove(heads.index(head))
+        gone.append(head)
+    said = f"{width} columns have no room for {'; '.join(gone)}" if gone else ""
+    return [[row[k] for k in kept] for row in rows], said
 
 
 def complex_text(value: complex, digits: int = 9) -> str:

@@ -14,7 +14,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import scene_command, side_by_side
-from sysdyn.cli.page.columns import aligned, refusals
+from sysdyn.cli.page.columns import aligned, fitted, refusals, terminal
 from sysdyn.cli.run.request import lock, targets
 from sysdyn.cli.run.request.asked import Request, instants_of
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
@@ -26,6 +26,8 @@ from sysdyn.dsl import load
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 
 KINDS = (".html", ".png", ".svg")
+SPARE = ("constraints", "energy, J", "work, ns", "steps")
+"""Columns that a narrow terminal has no room for."""
 
 
 @scene_command("trade", "runs")
@@ -150,8 +152,9 @@ def _table(found: Traded, *, timings: bool) -> str:
     rows = [list(HEADS), *(cells(found, m) for m in found.measured if m in shown)]
     if not timings:
         rows = [[cell for k, cell in enumerate(row) if HEADS[k] != "CPU, ms"] for row in rows]
+    rows, said = fitted(rows, SPARE, terminal())
     known = found.reference
-    lines = [aligned(rows, right=range(4, len(rows[0]) - 1)), *_refused(found.refusals)]
+    lines = [aligned(rows, right=range(4, len(rows[0]) - 1)), *([said] if said else []), *_refused(found.refusals)]
     lines.append(f"reference: {known.first}, confirmed to {known.uncertainty:.1e} by {known.second}")
     return "\n".join([*lines, verdict(found)])
 

@@ -10,11 +10,14 @@ import click
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import INTERRUPTED, SOLVER, worst
 from sysdyn.cli.options import scene_command, side_by_side
-from sysdyn.cli.page.columns import aligned, refusals
+from sysdyn.cli.page.columns import aligned, fitted, refusals, terminal
 
 if TYPE_CHECKING:
     from sysdyn.cli.verify.agreement import Gap
     from sysdyn.cli.verify.verified import Disagreement, Refusal, Run, Verified
+
+SPARE = ("constraints", "energy J", "estimate", "index")
+"""Columns that a narrow terminal has no room for."""
 
 
 @scene_command("verify", "runs", "are compared")
@@ -157,8 +160,9 @@ def _table(found: Verified, *, timings: bool) -> str:
         rows = [[cell for k, cell in enumerate(row) if k != 5] for row in rows]
     accuracy, (t0, t1) = found.runs[0].accuracy, found.span
     lines = [f"{found.name}: {t0:g} s to {t1:g} s, apart in units of {TIMES:g} x {accuracy:g} x nominal"]
+    rows, said = fitted(rows, SPARE, terminal())
     columns = len(rows[0])
-    lines.append(aligned(rows, right={*range(2, columns)} - {columns - 2}))
+    lines += [aligned(rows, right={*range(2, columns)} - {columns - 2}), *([said] if said else [])]
     lines += _refused(found)
     lines += [f"not compared: {name}: {reason}" for name, reason in found.left_out]
     if found.twins:

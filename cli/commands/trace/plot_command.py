@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.page.columns import terminal
 from sysdyn.cli.page.named import destination, label, opened, quantities
 
 if TYPE_CHECKING:
@@ -40,8 +39,7 @@ def command(console: Console, trace: str, names: tuple[str, ...], output: str | 
     if output is None and not console.quiet:
         from sysdyn.cli.page.sparkline import summary
 
-        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
-        console.data(summary(traces, drawn, width))
+        console.data(summary(traces, drawn, terminal() or WIDTH))
     whole_files.write(target, data)
     if target != "-":
         console.say(f"{target}: {', '.join(drawn)}")
