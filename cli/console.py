@@ -15,6 +15,7 @@ from sysdyn.cli.progress import RUN, ProgressLine
 from sysdyn.cli.streams import put
 from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, ModelError, Report, shortened
 
+WHEN = ("auto", "always", "never")
 ROUTINE = ("N501", "N601", "N602", "N603", "N604")
 ALWAYS = ("W921",)
 """Shown under --quiet too: a file that somebody relies on is not read."""
@@ -141,9 +142,7 @@ def with_console(name: str) -> Callable[[F], Callable[..., Any]]:
     def decorate(function: F) -> Callable[..., Any]:
         @click.option("--json", "as_json", is_flag=True, help="Print one JSON object (version 1).")
         @click.option("-q", "--quiet", is_flag=True, help="Errors only.")
-        @click.option(
-            "--color", type=click.Choice(["auto", "always", "never"]), default="auto", help="Coloured messages."
-        )
+        @click.option("--color", type=click.Choice(WHEN), default="auto", help="Coloured messages.")
         def command(as_json: bool, quiet: bool, color: str, **options: Any) -> int:
             console = Console(name, as_json=as_json, quiet=quiet, color=color)
             try:

@@ -31,6 +31,15 @@ class UsageError(click.UsageError):
     """Wrong usage that is found after the options are read."""
 
 
+def instead(name: str, known: Iterable[str], listed: Sequence[str] | None = None) -> str:
+    """What may be meant by a name that there is not: the nearest of those known, else all (or those listed)."""
+    from sysdyn.dsl.names.symbols import nearest
+
+    names = list(known)
+    near = nearest(name, names)
+    return f"nearest: '{near}'" if near else f"there are: {', '.join(names if listed is None else listed) or 'none'}"
+
+
 def report_failure(error: BaseException, arguments: Sequence[str]) -> int:
     """Print what went wrong (as JSON where asked for) and return the exit code; where that cannot be printed either,
     the code of input and output.

@@ -88,7 +88,8 @@ class Group(click.Group):
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             import difflib
 
-            near = difflib.get_close_matches(args[0], COMMANDS, 1)
+            begun = [name for name in COMMANDS if name.startswith(args[0])]
+            near = begun if len(begun) == 1 else difflib.get_close_matches(args[0], COMMANDS, 1)
             hint = f" Did you mean '{near[0]}'?" if near else f" There are {', '.join(sorted(COMMANDS))}."
             raise click.UsageError(f"There is no command '{args[0]}'.{hint}", ctx)
         return super().resolve_command(ctx, args)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
-from sysdyn.cli.console import with_console
+from sysdyn.cli.console import WHEN, with_console
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -18,7 +19,13 @@ EVERY = tuple(name for name in FORMULATIONS if name != "auto")
 TRIED = tuple(name for name in EVERY if name != "co_kane")
 """What `trade` measures by itself: co_kane has co_lagrangian's rows but those of effort constraints."""
 INDICES = ["auto", "3", "2", "2v", "1", "0"]
+BACKENDS = ("c", "numpy")
+FORMATS = ("full", "concise", "json", "github", "junit", "sarif")
+"""Of what `check` finds."""
 METHODS = ["auto", "bdf", "radau", "rosenbrock", "dopri", "energy", "euler"]
+
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 class Setting(click.ParamType):  # type: ignore[type-arg]  # generic since click 8.3
@@ -42,76 +49,52 @@ def offered(context: click.Context, parameter: click.Parameter, begun: str) -> l
     return complete(context, parameter, begun)
 
 
-def side_by_side(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The option that says how many processes do what can be done side by side."""
-    said = "Processes side by side. Default: one a core, where the work pays for them."
-    return click.option("--jobs", "-j", type=click.IntRange(min=1), metavar="N", help=said)(function)
+def _together(*options: Decorator) -> Decorator:
+    """Several options as one."""
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
 
 
-def chosen(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Options that choose the model, the scene and how it is compiled."""
-    for option in reversed(
-        [
-            click.option(
-                "--scene", metavar="NAME", shell_complete=offered, help="The scene; needed where the file has several."
-            ),
-            click.option(
-                "--model",
-                metavar="NAME",
-                shell_complete=offered,
-                help="The model; needed where the file has several and no scene.",
-            ),
-            click.option("--formulation", type=click.Choice(FORMULATIONS), help="Default: the scene's, else auto."),
-            click.option("--index", type=click.Choice(INDICES), help="Index form. Default: the scene's, else auto."),
-            click.option("--backend", type=click.Choice(["c", "numpy"]), default="c", show_default=True),
-            click.option(
-                "--set",
-                "settings",
-                type=Setting(),
-                multiple=True,
-                shell_complete=offered,
-                help="Parameter or input; repeatable.",
-            ),
-            click.option(
-                "--level",
-                "levels",
-                type=Setting(),
-                multiple=True,
-                shell_complete=offered,
-                help="PATH=NAME; repeatable.",
-            ),
-            click.option("--no-prune", is_flag=True, help="Keep what the scene does not need."),
-        ]
-    ):
-        function = option(function)
-    return function
+_named = partial(click.option, metavar="NAME", shell_complete=offered)
+_set = partial(click.option, type=Setting(), multiple=True, shell_complete=offered)
+_number = partial(click.option, type=float)
+_SIDE_BY_SIDE = "Processes side by side. Default: one a core, where the work pays for them."
+side_by_side = click.option("--jobs", "-j", type=click.IntRange(min=1), metavar="N", help=_SIDE_BY_SIDE)
+of_file = _together(
+    _named("--scene", help="The scene; needed where the file has several."),
+    _named("--model", help="The model; needed where the file has several and no scene."),
+)
+chosen = _together(
+    of_file,
+    click.option("--formulation", type=click.Choice(FORMULATIONS), help="Default: the scene's, else auto."),
+    click.option("--index", type=click.Choice(INDICES), help="Index form. Default: the scene's, else auto."),
+    click.option("--backend", type=click.Choice(BACKENDS), default="c", show_default=True),
+    _set("--set", "settings", help="Parameter or input; repeatable."),
+    _set("--level", "levels", help="PATH=NAME; repeatable."),
+    click.option("--no-prune", is_flag=True, help="Keep what the scene does not need."),
+)
+"""Which model and scene, and how it is compiled."""
+solved = _together(
+    click.option("--method", type=click.Choice(METHODS)),
+    click.option("--step", metavar="T", help="Length of the steps of --method euler; a bare number in s."),
+    click.option("--redundancy", type=click.Choice(["error", "drop", "minimum_norm"])),
+    _number("--accuracy", metavar="R", help="Relative accuracy of the traced quantities. Default 1e-4."),
+    _number("--rtol", metavar="R", help="The solver's own relative tolerance (no accuracy control)."),
+    _number("--atol", metavar="A", help="The solver's own absolute tolerance."),
+    click.option("--no-lock", is_flag=True, help="Leave the setting of FILE.lock aside."),
+    click.option("--max-steps", type=click.IntRange(min=1), metavar="N"),
+    click.option("--max-wall", metavar="T", help="Limit of wall time; a bare number in s."),
+    click.option("--progress", type=click.Choice(WHEN), default="auto"),
+)
+"""How a scene is solved, and for how long."""
 
 
-def solved(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Options that say how a scene is solved, and for how long."""
-    for option in reversed(
-        [
-            click.option("--method", type=click.Choice(METHODS)),
-            click.option("--step", metavar="T", help="Length of the steps of --method euler; a bare number in s."),
-            click.option("--redundancy", type=click.Choice(["error", "drop", "minimum_norm"])),
-            click.option(
-                "--accuracy", type=float, metavar="R", help="Relative accuracy of the traced quantities. Default 1e-4."
-            ),
-            click.option(
-                "--rtol", type=float, metavar="R", help="The solver's own relative tolerance (no accuracy control)."
-            ),
-            click.option("--atol", type=float, metavar="A", help="The solver's own absolute tolerance."),
-            click.option("--no-lock", is_flag=True, help="Leave the setting of FILE.lock aside."),
-            click.option("--max-steps", type=click.IntRange(min=1), metavar="N"),
-            click.option("--max-wall", metavar="T", help="Limit of wall time; a bare number in s."),
-            click.option("--progress", type=click.Choice(["auto", "always", "never"]), default="auto"),
-        ]
-    ):
-        function = option(function)
-    return function
-
-
-def scene_command(name: str, runs: str = "run", at: str | None = None) -> Callable[..., Callable[..., Any]]:
+def scene_command(name: str, runs: str = "run", at: str | None = None) -> Decorator:
     """How a command that runs a scene of FILE begins: `chosen`, `solved`, --until and, where `at` says what becomes of
     them, --at; runs: how many it makes.
     """

@@ -56,10 +56,11 @@ def silence(name: str = "stdout") -> None:
     setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, PTH123
 
 
-def put(text: str, name: str = "stdout") -> None:
+def put(data: str | bytes, name: str = "stdout") -> None:
     """Write to a standard stream; where its reader went away the rest is left out, and the exit is what it would be."""
+    stream = getattr(sys, name)
     try:
-        getattr(sys, name).write(text)
+        (stream if isinstance(data, str) else stream.buffer).write(data)
     except BrokenPipeError:
         silence(name)
 

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from sysdyn.cli.analysis.asked import Found
 from sysdyn.cli.analysis.linear import Linear, linearised
 from sysdyn.cli.analysis.states import state_of
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import aligned, complex_text
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear import responses
 from sysdyn.runtime.linear.modes import Transfer
@@ -31,10 +32,11 @@ ROWS = 13
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """One output by one input: names, over frequency, margins, step response (t [s], y)."""
+    """One output by one input: names, both with units, over frequency, margins, step response (t [s], y)."""
 
     output: str
     input: str
+    label: str
     frequencies: Frequencies
     margins: Margins
     time: Array
@@ -43,7 +45,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Locus:
-    """Eigenvalues [values, n] over a parameter (SI); failed: values at which there is no linearisation, and why."""
+    """Eigenvalues [values, n] over a parameter; unit: of the values, SI; failed: values without any, and why."""
 
     parameter: str
     unit: str
@@ -66,6 +68,7 @@ def _answer(linear: Linear, transfer: Transfer, low: float, high: float, end: fl
     return Answer(
         linear.outputs[transfer.output],
         linear.inputs[transfer.input],
+        linear.label(transfer),
         responses.frequencies(transfer, low, high),
         responses.margins(transfer, low, high),
         time,
@@ -80,21 +83,17 @@ def answer_to_json(answer: Answer, kinds: Sequence[str]) -> dict[str, Any]:
     if "bode" in kinds or "nyquist" in kinds:
         found["margins"] = {"gain": m.gain, "w_phase": m.w_phase, "phase": m.phase, "w_gain": m.w_gain}
     if "bode" in kinds:
-        found["bode"] = {"w": f.w.tolist(), "magnitude": _finite(f.magnitude), "phase": f.phase.tolist()}
+        found["bode"] = {"w": f.w.tolist(), "magnitude": f.magnitude.tolist(), "phase": f.phase.tolist()}
     if "nyquist" in kinds:
         found["nyquist"] = {"w": f.w.tolist(), "re": f.value.real.tolist(), "im": f.value.imag.tolist()}
     if "step" in kinds:
-        found["step"] = {"t": answer.time.tolist(), "y": _finite(answer.step)}
+        found["step"] = {"t": answer.time.tolist(), "y": answer.step.tolist()}
     return found
-
-
-def _finite(values: Array) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]
 
 
 def answer_to_text(answer: Answer, kinds: Sequence[str]) -> str:
     """Tables of a few rows each."""
-    f, parts = answer.frequencies, [f"{answer.output} by {answer.input}"]
+    f, parts = answer.frequencies, [answer.label]
     places = np.unique(np.linspace(0, f.w.size - 1, ROWS).round().astype(int))
     if "bode" in kinds:
         rows = [[f"{f.w[k]:.5g}", f"{f.magnitude[k]:.5g}", f"{f.phase[k]:.5g}"] for k in places]
@@ -128,7 +127,7 @@ def locus(request: Request, name: str, along: Sequence[float], *, rest: bool, fo
             continue
         sets.append(values)
         kept.append(value)
-    units = {p.name: p.unit.text for p in found.prepared.network.parameters}
+    units = {p.name: si_text(p.unit.dimension) for p in found.prepared.network.parameters}
     return Locus(name, units[name.partition("[")[0]], np.array(kept), responses.branches(sets), tuple(failed))
 
 
@@ -166,14 +165,10 @@ def locus_to_text(found: Locus) -> str:
     for value, curve in zip(found.values, found.curves, strict=True):
         here = curve[np.isfinite(curve)]
         moving = here[np.abs(here) > 0.0]
-        damping = min((-v.real / abs(v) for v in moving), default=np.nan)
-        shown = ", ".join(_complex(v) for v in sorted(here, key=lambda v: (-v.real, v.imag))[:4])
+        damping = min((-v.real / abs(v) + 0.0 for v in moving), default=np.nan)
+        shown = ", ".join(complex_text(v, 5) for v in sorted(here, key=lambda v: (-v.real, v.imag))[:4])
         most = f"{here.real.max():.6g}" if here.size else ""
         rows.append([f"{value:.6g}", most, f"{damping:.4g}", shown + (", ..." if here.size > 4 else "")])
     lines = [aligned(rows)]
     lines += [f"{found.parameter} = {value:.6g}: {why}" for value, why in found.failed]
     return "\n".join(lines)
-
-
-def _complex(value: complex) -> str:
-    return f"{value.real:.5g}" if abs(value.imag) <= 1e-12 * abs(value) else f"{value.real:.5g}{value.imag:+.5g}i"

@@ -64,15 +64,14 @@ def compiled(
     beside.  inputs: those that move in time, about what a formula gives them too.  choose: the target
     among those of the file.  None where the report says why not.
     """
-    document = targets.read(request.file, report)
-    target = choose(document, request.file, request.model, request.scene, report)
+    target = targets.asked(request, report, choose)
     if target is None:
         return None
     inner, unasked = Report(), frozenset[str]()
     named = _named(target, inputs)
     read = partial(
         load.network,
-        document,
+        target.document,
         target.model,
         target.scene,
         settings=request.settings,
@@ -153,9 +152,7 @@ def of_nodes(network: Network) -> tuple[str, ...]:
 
 def begun(target: Target, prepared: Prepared, request: Request, report: Report) -> Found | None:
     """The model at its start; None where the report says what is in the way."""
-    scene = prepared.network.scene
-    t0 = prepared.binding.evaluate(scene.start) if scene is not None and scene.start is not None else 0.0
-    started = start(prepared, t0, report, request.redundancy)
+    started = start(prepared, prepared.begin, report, request.redundancy)
     if started is None or report.failed:
         return None
     return Found(target, prepared, started.system, started.state, prepared.binding, started)

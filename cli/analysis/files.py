@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from sysdyn.cli.analysis.linear import Linear
+from sysdyn.cli.console import finite
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,7 +46,7 @@ def written(linear: Linear, kind: str, result: dict[str, Any]) -> bytes:
             return _hdf5(linear)
         case ".mat":
             return _mat(linear)
-    return (json.dumps(result, indent=1, allow_nan=False) + "\n").encode()
+    return (json.dumps(finite(result), indent=1, allow_nan=False) + "\n").encode()
 
 
 def _hdf5(linear: Linear) -> bytes:

@@ -22,6 +22,8 @@ from sysdyn.cli.run.request.targets import Target
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.binding.sensitivity import FIRST, LAST, Sensitivity
 from sysdyn.dsl.model.expression import variables
+from sysdyn.dsl.model.network import Network
+from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.linear.modes import Mode, Transfer, modes, stored, transfer, wide_transfer
@@ -43,7 +45,7 @@ MOVING = 1e-9
 @dataclass(frozen=True, slots=True)
 class Linear:
     """A linearisation at t [s]; moving: a state whose motion changes the matrices; steady: one that moves and does
-    not; energies [modes, stores]: shares of each.
+    not; energies [modes, stores]: shares of each; units: of inputs (SI) and outputs (as traced) by name.
     """
 
     t: float
@@ -58,6 +60,13 @@ class Linear:
     steady: bool
     stores: tuple[str, ...]
     energies: Array
+    units: dict[str, str]
+
+    def label(self, found: Transfer) -> str:
+        """`x [mm] by F [N]`."""
+        ends = self.outputs[found.output], self.inputs[found.input]
+        units = (self.units.get(name, self.units.get(name.partition("[")[0], "1")) for name in ends)
+        return " by ".join(name if u == "1" else f"{name} [{u}]" for name, u in zip(ends, units, strict=True))
 
 
 def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -> tuple[Input, ...]:
@@ -131,7 +140,13 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3", watched:
     pairs = ((i, j) for i in range(len(names)) for j in range(len(labels)))
     transfers = tuple(_transfer(small, i, j) for i, j in pairs)
     moves, steady = _felt_moves(system, small, found)
-    return Linear(state.t, state.y, descriptor, small, own, transfers, labels, names, moves, steady, stores, energies)
+    named = transfers, labels, names, moves, steady, stores, energies, _units(found.prepared.network)
+    return Linear(state.t, state.y, descriptor, small, own, *named)
+
+
+def _units(network: Network) -> dict[str, str]:
+    inputs = {p.name: si_text(p.unit.dimension) for p in network.parameters}
+    return inputs | {o.name: o.unit.text for o in network.observations}
 
 
 def _with(

@@ -59,16 +59,17 @@ def page(title: str, svg: bytes, tables: Sequence[tuple[str, Sequence[Sequence[s
     return document(title, "\n".join(parts)).encode()
 
 
-def _label(answer: Answer) -> str:
-    return f"{answer.output} by {answer.input}"
-
-
 def _curves(axis: Any, found: Sequence[Answer], draw: Callable[[Answer], tuple[Any, Any]]) -> None:
     for k, answer in enumerate(found):
         x, y = draw(answer)
-        axis.plot(x, y, color=COLOURS[k % len(COLOURS)], label=_label(answer))
+        axis.plot(x, y, color=COLOURS[k % len(COLOURS)], label=answer.label)
     if len(found) > 1:
-        axis.legend(fontsize=8)
+        _legend(axis)
+
+
+def _legend(axis: Any) -> None:
+    """On a ground through which curves shine."""
+    axis.legend(fontsize=8, frameon=True, framealpha=0.8, edgecolor="none")
 
 
 def _magnitude(axis: Any, found: Sequence[Answer]) -> None:
@@ -109,12 +110,12 @@ def _nyquist(axis: Any, found: Sequence[Answer]) -> None:
         size = TALL * float(np.median(np.abs(value))) if value.size else 1.0
         kept = np.where(np.abs(value) <= size, value, np.nan)
         colour = COLOURS[k % len(COLOURS)]
-        axis.plot(kept.real, kept.imag, color=colour, label=_label(answer))
+        axis.plot(kept.real, kept.imag, color=colour, label=answer.label)
         axis.plot(kept.real, -kept.imag, color=colour, linestyle="--", linewidth=0.9)
         limit = max(limit, float(np.nanmax(np.abs(kept), initial=0.0)))
     if limit < 50.0:
         axis.plot([-1.0], [0.0], "+", color="#b00020", markersize=9, label="-1")
-        axis.legend(fontsize=8)
+        _legend(axis)
     axis.set(xlabel="Re G", ylabel="Im G", title="Nyquist (dashed: w < 0)")
     axis.set_aspect("equal", adjustable="datalim")
 
@@ -126,7 +127,7 @@ def _step(axis: Any, found: Sequence[Answer]) -> None:
 
 
 def _title(found: Sequence[Answer]) -> str:
-    return _label(found[0]) if len(found) == 1 else ""
+    return found[0].label if len(found) == 1 else ""
 
 
 def _poles(axis: Any, linear: Linear) -> None:
@@ -136,11 +137,11 @@ def _poles(axis: Any, linear: Linear) -> None:
     axis.plot(values.real, values.imag, "x", color="#30343b", markersize=7, label="eigenvalues")
     for t in linear.transfers[:MOST]:
         if t.zeros.size:
-            name = f"zeros, {linear.outputs[t.output]} by {linear.inputs[t.input]}"
+            name = f"zeros, {linear.label(t)}"
             colour = COLOURS[linear.transfers.index(t) % len(COLOURS)]
             axis.plot(t.zeros.real, t.zeros.imag, "o", fillstyle="none", color=colour, label=name)
     _plane(axis)
-    axis.legend(fontsize=8)
+    _legend(axis)
 
 
 def _plane(axis: Any) -> None:
@@ -162,4 +163,4 @@ def _locus(axis: Any, locus: Locus) -> None:
     _plane(axis)
     unit = "" if locus.unit == "1" else f", {locus.unit}"
     axis.set_title(f"eigenvalues over {locus.parameter}{unit}")
-    axis.legend(fontsize=8)
+    _legend(axis)

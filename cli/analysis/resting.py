@@ -10,6 +10,7 @@ import numpy as np
 from sysdyn.cli.analysis.asked import Found, compiled, of_nodes
 from sysdyn.cli.analysis.linear import linearised, loose_of
 from sysdyn.cli.analysis.states import at, resting
+from sysdyn.cli.page.columns import complex_text
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.request.targets import still
 from sysdyn.dsl.model.units import Unit, quantity
@@ -80,7 +81,7 @@ class Equilibrium:
         if self.judged is not None and self.judged.modes:
             modes = sorted(self.judged.modes, key=lambda m: -m.eigenvalue.real)[:6]
             rest = [f"... {len(self.judged.modes) - 6} more"] if len(self.judged.modes) > 6 else []
-            lines.append(f"   eigenvalues {', '.join([*(_complex(m.eigenvalue) for m in modes), *rest])} 1/s")
+            lines.append(f"   eigenvalues {', '.join([*(complex_text(m.eigenvalue, 6) for m in modes), *rest])} 1/s")
         return "\n".join(lines)
 
     def _judgement(self) -> str:
@@ -161,8 +162,3 @@ def _judged(found: Found, rest: Rest) -> Equilibrium:
     with np.errstate(all="ignore"):
         energy = energy_at(system, rest.state) if primal else None
     return Equilibrium(rest, names, kinds, units, verdict(small, loose_of(here), energy, rest.together), "")
-
-
-def _complex(value: complex) -> str:
-    value = complex(*(part if abs(part) > 1e-12 * abs(value) else 0.0 for part in (value.real, value.imag)))
-    return f"{value.real:.6g}" if value.imag == 0.0 else f"{value.real:.6g}{value.imag:+.6g}i"

@@ -55,8 +55,7 @@ def resting(
     """The model at its first state of rest, and all of them; the guess where there is none, and what is to be said of
     it.  advance: see rests.
     """
-    scene = prepared.network.scene
-    t0 = prepared.binding.evaluate(scene.start) if scene is not None and scene.start is not None else 0.0
+    t0 = prepared.begin
     system = System(prepared.structure, prepared.arrays, prepared.carrier)
     events = plan(prepared, system)
     guess = _guess(system, t0, events)

@@ -8,26 +8,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.cli.export.asked import formed_of, network_of, refused
 from sysdyn.cli.export.files import manifest_of
 from sysdyn.cli.export.index_parameters import index_parameters
-from sysdyn.cli.export.layout import AUDIT, Formed, choose, state_jacobian, tables
+from sysdyn.cli.export.layout import AUDIT, Formed, state_jacobian, tables
 from sysdyn.cli.export.naming import elements
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.options import FORMULATIONS, INDICES
+from sysdyn.cli.options import BACKENDS, FORMULATIONS, INDICES
 from sysdyn.cli.run.many.loaded import KEPT, place_of
 from sysdyn.cli.run.prepare import prepare
-from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.start.flat_laws import impossible
-from sysdyn.cli.run.start.starting import start
-from sysdyn.dsl import load as load_
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.integrate.underlying import Underlying
-from sysdyn.runtime.model.failures import NoSuchForm
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
-
-BACKENDS = ("c", "numpy")
 
 
 class Module:
@@ -35,7 +30,8 @@ class Module:
 
     manifest: as `compile` writes it; unknowns, traced: names in the order of y and of `outputs`;
     t0, y0, yd0: the start; parameters: values as bound; indptr, indices: pattern of the matrices by columns.
-    In index form 0, y are the differential unknowns and the residual is yd - F(t, y).
+    In index form 0, y are the differential unknowns and the residual is yd - F(t, y).  Of a model with
+    events it is the piece that holds at the start, until the first of them.
     """
 
     def __init__(self, formed: Formed) -> None:
@@ -176,31 +172,19 @@ def compile_model(
     """
     index = str(index)
     known(formulation, backend, index)
-    report = Report()
-    document = targets.read(str(path), report)
-    target = targets.whole(document, str(path), model, scene, report)
-    report.raise_if_failed()
-    assert target is not None
+    report, request = Report(), Request(str(path), scene, model, backend=backend, no_prune=no_prune)
     with ex.fresh():
-        inner = Report()
-        network = load_.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
-        report.extend(inner if network else targets.unsupported(inner))
+        network = network_of(request, report)
+        report.raise_if_failed()
+        assert network is not None
         wanted = None if formulation == "auto" else formulation
-        if network is None:
-            raise ModelError(report.diagnostics)
         prepared = prepare(network, report, formulation=wanted, backend=backend, prune=not no_prune)
-        if prepared is None:
-            raise ModelError(report.diagnostics)
-        said = prepared.network.scene
-        t0 = prepared.binding.evaluate(said.start) if said and said.start else 0.0
-        started = start(prepared, t0, report)
-        if started is None or report.failed:
-            raise ModelError(report.diagnostics)
-        try:
-            return Module(choose(prepared, started, None if index == "auto" else index))
-        except NoSuchForm as error:
-            report.error("E607", impossible(prepared, error)[0], prepared.network.place)
-            raise ModelError(report.diagnostics) from error
+        if prepared is not None:
+            with refused(prepared, report):
+                formed = formed_of(prepared, None if index == "auto" else index, report)
+                if formed is not None:
+                    return Module(formed)
+    raise ModelError(report.diagnostics)
 
 
 def known(formulation: str | None, backend: str, index: str | None) -> None:

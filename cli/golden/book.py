@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import tomllib
 from collections.abc import Sequence
@@ -17,7 +16,8 @@ from typing import Any
 
 import click
 from sysdyn.cli import whole_files
-from sysdyn.cli.failures import UsageError
+from sysdyn.cli.failures import UsageError, instead
+from sysdyn.cli.whole_files import toml_text
 from sysdyn.values import dataclass
 
 BOOK = "golden.toml"
@@ -121,11 +121,7 @@ def find(root: Path, names: Sequence[str] = ()) -> tuple[Golden, ...]:
     for name in names:
         here = [g for g in found if name in (g.label, g.folder.name, g.model.name, str(g.model), str(g.folder))]
         if not here:
-            from sysdyn.dsl.names.symbols import nearest
-
-            near = nearest(name, [g.label for g in found])
-            hint = f"nearest: '{near}'" if near else f"there are: {', '.join(g.label for g in found)}"
-            raise UsageError(f"{root} has no golden '{name}'; {hint}")
+            raise UsageError(f"{root} has no golden '{name}'; {instead(name, [g.label for g in found])}")
         chosen += here
     return tuple(dict.fromkeys(chosen)) if names else tuple(found)
 
@@ -137,7 +133,7 @@ def write(golden: Golden) -> None:
     lines = [
         "# Golden traces: `sysdyn golden check` compares, `sysdyn golden accept --reason ...` renews.",
         f"version = {VERSION}",
-        f"model = {_text(Path(os.path.relpath(golden.model, golden.folder)).as_posix())}",
+        f"model = {toml_text(Path(os.path.relpath(golden.model, golden.folder)).as_posix())}",
     ]
     for g in sorted([*others, golden], key=lambda g: g.name):
         lines += ["", *_lines(g)]
@@ -146,8 +142,8 @@ def write(golden: Golden) -> None:
 
 def _lines(g: Golden) -> list[str]:
     lines = [
-        f"[scenes.{_text(g.name)}]",
-        f"scene = {_text(g.scene)}",
+        f"[scenes.{toml_text(g.name)}]",
+        f"scene = {toml_text(g.scene)}",
         f"rtol = {g.rtol!r}  # of each quantity's nominal magnitude",
         f"atol = {g.atol!r}",
         f"tau = {g.tau!r}  # s",
@@ -155,19 +151,13 @@ def _lines(g: Golden) -> list[str]:
         f"error = {float(f'{g.error:.2e}')!r}  # of the trace itself, measured",
         f"energy = {float(f'{g.energy:.2e}')!r}  # J, bound of audit.energy",
         f"constraints = {float(f'{g.constraints:.2e}')!r}  # bound of audit.constraints",
-        f"formulations = [{', '.join(map(_text, g.formulations))}]",
+        f"formulations = [{', '.join(map(toml_text, g.formulations))}]",
     ]
     if g.until is not None:
-        lines.append(f"until = {_text(g.until)}")
+        lines.append(f"until = {toml_text(g.until)}")
     if g.settings:
-        lines.append("settings = { " + ", ".join(f"{_text(k)} = {_text(v)}" for k, v in g.settings) + " }")
+        lines.append("settings = { " + ", ".join(f"{toml_text(k)} = {toml_text(v)}" for k, v in g.settings) + " }")
     for a in g.accepted:
-        lines += ["", f"[[scenes.{_text(g.name)}.accepted]]", f"reason = {_text(a.reason)}"]
-        lines.append(f"change = {_text(a.change)}")
+        lines += ["", f"[[scenes.{toml_text(g.name)}.accepted]]", f"reason = {toml_text(a.reason)}"]
+        lines.append(f"change = {toml_text(a.change)}")
     return lines
-
-
-def _text(value: str) -> str:
-    """A basic string of TOML; JSON's escapes are TOML's but for DEL and lone surrogates."""
-    safe = value.encode("utf-8", "replace").decode("utf-8")
-    return json.dumps(safe, ensure_ascii=False).replace("\x7f", "\\u007F")

@@ -91,8 +91,7 @@ def _largest(values: Floats) -> float:
 
 def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
     """As `cli.running.run`, but the trace holds the steps and the instants that are wanted here."""
-    document = targets.read(request.file, report)
-    target = targets.one(document, request.file, request.model, request.scene, report)
+    target = targets.asked(request, report)
     if target is None:
         return None
     prepared = ready(request, target, report)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysdyn.cli.failures import UsageError
+from sysdyn.cli.failures import UsageError, instead
 from sysdyn.names import stored
 
 if TYPE_CHECKING:
@@ -21,19 +21,19 @@ def label(file: str) -> str:
     return "stdin" if file == "-" else Path(file).stem
 
 
-def destination(trace: str, output: str | None, console: Console, kinds: tuple[str, ...], what: str) -> Path:
-    """Where it goes, by default to the trace's name with the first kind, here; UsageError of any other kind.
+def destination(trace: str, output: str | None, console: Console, kinds: tuple[str, ...], what: str) -> tuple[str, str]:
+    """Where it goes and its kind, by default the trace's name with the first one, here; UsageError of any other kind.
 
     kinds: ends of names, with the dot; what: this command makes, as a message says.
     """
     if output == "-":
         if console.as_json:
             raise UsageError("-o - and --json both want standard output")
-        return Path(f"-{kinds[0]}")
+        return output, kinds[0]
     target = Path(output) if output is not None else Path(f"{label(trace)}{kinds[0]}")
     if target.suffix.lower() not in kinds:
         raise UsageError(f"'{target}': {what} is one of {', '.join(kinds)}")
-    return target
+    return str(target), target.suffix.lower()
 
 
 def opened(file: str) -> Trace:
@@ -52,11 +52,7 @@ def opened(file: str) -> Trace:
 
 def no_quantity(trace: Trace, name: str, known: Iterable[str], listed: Sequence[str]) -> str:
     """That a trace has none of that name; known: those that may be meant."""
-    from sysdyn.dsl.names.symbols import nearest
-
-    near = nearest(name, known)
-    hint = f"nearest: '{near}'" if near else f"there are: {', '.join(listed)}"
-    return f"{trace.path} has no quantity '{name}'; {hint}"
+    return f"{trace.path} has no quantity '{name}'; {instead(name, known, listed)}"
 
 
 def quantities(traces: list[Trace], wanted: list[str]) -> list[str]:

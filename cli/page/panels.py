@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.cli.failures import UsageError
+from sysdyn.cli.page.unit_text import conversion
 from sysdyn.runtime.comparison.curve import hermite
 from sysdyn.runtime.trace.trace import Trace
 
@@ -53,10 +55,11 @@ def panels_of(traces: Sequence[Trace], names: Sequence[str]) -> list[Panel]:
     """The layout: each quantity joins the first panel that takes it."""
     panels: list[Panel] = []
     for name in names:
-        found = [trace[name] for trace in traces if name in trace]
-        values = np.concatenate([q.values[np.isfinite(q.values)] for q in found])
+        found = [trace for trace in traces if name in trace]
+        unit = found[0][name].units
+        values = np.concatenate([_measured(trace, name, unit)[0] for trace in found])
+        values = values[np.isfinite(values)]
         low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
-        unit = found[0].units
         panel = next((p for p in panels if p.takes(unit, low, high)), None)
         if panel is None:
             panel = Panel(unit)
@@ -65,12 +68,22 @@ def panels_of(traces: Sequence[Trace], names: Sequence[str]) -> list[Panel]:
     return panels
 
 
-def curve(trace: Trace, name: str) -> tuple[Floats, Floats]:
-    """Instants and values of a curve: those of the trace and, where it holds derivatives, of its Hermite interpolant
-    between instants that lie far apart; between the two rows of a jump it is upright.
-    """
+def _measured(trace: Trace, name: str, unit: str) -> tuple[Floats, Floats | None]:
+    """Values of a quantity and their derivative in a unit; UsageError where it is of another dimension."""
     quantity = trace[name]
-    time, values, rate = trace.time, quantity.values, quantity.derivative
+    to = conversion(quantity.units, unit)
+    if to is None:
+        text = f"in {quantity.units} in {trace.path}, in {unit} in another trace"
+        raise UsageError(f"'{name}' is {text}: a picture each")
+    scale, offset = to
+    return quantity.values * scale + offset, None if quantity.derivative is None else quantity.derivative * scale
+
+
+def curve(trace: Trace, name: str, unit: str | None = None) -> tuple[Floats, Floats]:
+    """Instants and values of a curve: those of the trace and, where it holds derivatives, of its Hermite interpolant
+    between instants that lie far apart; between the two rows of a jump it is upright.  unit: None: its own.
+    """
+    time, (values, rate) = trace.time, _measured(trace, name, unit or trace[name].units)
     if rate is None or time.size < 2 or not np.all(np.diff(time) >= 0.0) or not time[-1] > time[0]:
         return time, values
     h = np.diff(time)

@@ -19,6 +19,7 @@ LINES = 10
 """Of a legend; more stand in columns."""
 STYLES = ("-", "--", ":", "-.")
 STYLE: dict[str, Any] = {
+    "axes.axisbelow": True,
     "axes.edgecolor": "#9aa0a6",
     "axes.grid": True,
     "axes.labelcolor": "#30343b",
@@ -112,7 +113,7 @@ def _head(axes: Any, traces: Sequence[tuple[str, Trace]]) -> None:
 def _draw(axis: Any, panel: Panel, traces: Sequence[tuple[str, Trace]], scale: float) -> None:
     curves = []
     for name, trace, label, colour, k in styled(panel, traces):
-        time, values = curve(trace, name)
+        time, values = curve(trace, name, panel.unit)
         (line,) = axis.plot(time * scale, values, STYLES[k % len(STYLES)], color=colour)
         curves.append((line, _legible(shortened(label, 2 * MOST))))
     unit = unit_text(panel.unit)

@@ -63,7 +63,7 @@ def figures(traces: Sequence[tuple[str, Trace]], names: Sequence[str]) -> str:
 def _panel(panel: Panel, traces: Sequence[tuple[str, Trace]], scale: float, arrays: _Arrays) -> dict[str, Any]:
     curves = []
     for name, trace, shown, colour, k in styled(panel, traces):
-        time, values = thinned(*curve(trace, name), arrays.most)
+        time, values = thinned(*curve(trace, name, panel.unit), arrays.most)
         places = {"time": arrays.add(time * scale), "values": arrays.add(values)}
         curves.append({"label": shown, "colour": colour, "dash": k % 2 == 1, **places})
     name, unit = panel.names[0] if len(panel.names) == 1 else "", unit_text(panel.unit)

@@ -10,19 +10,21 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from sysdyn.cli.console import WHEN
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.options import BACKENDS, FORMATS
 from sysdyn.dsl.text.source import real
 
 FILES = ("sysdyn.toml", "pyproject.toml")
 _RUNS = ("simulate", "report", "sweep", "trade", "verify", "reduce")
 _JOBS = ("check", "sweep", "trade", "verify")
 _ALL: dict[str, tuple[str, Any]] = {
-    "color": ("color", ("auto", "always", "never")),
+    "color": ("color", WHEN),
     "quiet": ("quiet", bool),
 }
 _RUN: dict[str, tuple[str, Any]] = {
-    "backend": ("backend", ("c", "numpy")),
-    "progress": ("progress", ("auto", "always", "never")),
+    "backend": ("backend", BACKENDS),
+    "progress": ("progress", WHEN),
     "max-steps": ("max_steps", int),
     "max-wall": ("max_wall", str),
 }
@@ -32,7 +34,7 @@ KEYS: dict[str, dict[str, tuple[str, Any]]] = {
         "files": ("files", list),
         "strict": ("strict", bool),
         "allow-unsupported": ("allow_unsupported", bool),
-        "output-format": ("output_format", ("full", "concise", "json", "github", "junit", "sarif")),
+        "output-format": ("output_format", FORMATS),
         "jobs": ("jobs", int),
     },
     "diff": {"rtol": ("rtol", float), "atol": ("atol", float), "tau": ("tau", float)},

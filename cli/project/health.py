@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from sysdyn.cli.options import BACKENDS
 from sysdyn.values import dataclass
 
 NEEDED = ("click", "h5py", "lark", "matplotlib", "numpy", "scipy", "sympy")
@@ -134,7 +135,7 @@ def _hdf5() -> Iterator[Finding]:
 
 def _runs() -> Iterator[Finding]:
     """A swing by both backends against its cosine."""
-    for backend in ("c", "numpy"):
+    for backend in BACKENDS:
         yield _run(backend)
 
 

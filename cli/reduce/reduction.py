@@ -97,14 +97,13 @@ def reduce(
     if request.rtol is not None or request.atol is not None:
         raise UsageError("reduce measures errors: --accuracy says what is wanted")
     began = time.monotonic()
-    document = targets.read(request.file, report)
-    target = targets.one(document, request.file, request.model, request.scene, report)
+    target = targets.asked(request, report)
     if target is None:
         return None
     found = activities(request, target, report, folder, began, None, budget)
     if found is None:
         return None
-    text = document.file.source.text
+    text = target.document.file.source.text
     if only:
         return Reduced(target.name, request.accuracy or ACCURACY, found, (), text, 0.0, None, None, True)
     limit = None if budget is None else began + budget

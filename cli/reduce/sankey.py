@@ -200,16 +200,17 @@ def _stubs_of(axis: Any, stubs: Sequence[Stub], x: float, began: float, most: fl
     at, out = began, began + (GAP if began else 0.0)
     for s in stubs:
         size = s.energy / most
-        out = max(out, at)
-        inner, outer = (x + 0.02 * side, -at), (x + STUB * side, -out)
+        room = max(size, 2.0 * GAP)  # of two lines of text
+        top = max(out + (room - size) / 2, at)
+        inner, outer = (x + 0.02 * side, -at), (x + STUB * side, -top)
         _ribbon(axis, inner, outer, size, COLOURS[s.role])
         word = WORDS[s.role] if (s.role != "held" or side > 0) else "given by stores"
         word = "returned" if s.role == "in" and side > 0 else word
         text = f"{_short(s.label)}\n{s.energy:.3g} J {word}"
-        axis.text(x + (STUB + 0.02) * side, -out - size / 2, text, ha="left" if side > 0 else "right", va="center",
+        axis.text(x + (STUB + 0.02) * side, -top - size / 2, text, ha="left" if side > 0 else "right", va="center",
                   fontsize=8)  # fmt: skip
         at += size
-        out += max(size, 2.0 * GAP) + GAP / 2
+        out = top + (room + size) / 2 + GAP / 2
     return -out
 
 

@@ -34,8 +34,7 @@ def collect(request: Request, report: Report, progress: Progress | None = None) 
     stages: Stages = []
     began = time.monotonic()
     with _timed("read", stages):
-        document = targets.read(request.file, report)
-        target = targets.one(document, request.file, request.model, request.scene, report)
+        target = targets.asked(request, report)
     if target is None:
         return None
     with _timed("check", stages):

@@ -64,6 +64,12 @@ class Prepared:
         found = {**self.arrays_of(b), "stand": stand, "holds": holds}
         return {**found, "layouts": self.layouts.setdefault(sizes, {}), "alone": self.alone}
 
+    @property
+    def begin(self) -> float:
+        """Where the time of the scene begins [s]; 0 where it says nothing."""
+        scene = self.network.scene
+        return 0.0 if scene is None or scene.start is None else self.binding.evaluate(scene.start)
+
     def place(self, node: Node) -> int:
         """The place in p of a parameter, or of an element of one."""
         compiled, binding = self.compiled, self.binding

@@ -63,8 +63,7 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
     check_tolerances(request)
     if request.output and request.file != "-" and _same(request.output, request.file):
         raise UsageError(f"-o {request.output} is the model itself")
-    document = targets.read(request.file, report)
-    target = targets.one(document, request.file, request.model, request.scene, report)
+    target = targets.asked(request, report)
     if target is None:
         return None
     output = request.output or default_output(request.file, target.scene.name.name if target.scene else "")

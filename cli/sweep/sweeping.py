@@ -60,6 +60,11 @@ class Swept:
         """Of each run, one by one."""
         return tuple(self.done[k] for k in range(len(self.cases)))
 
+    def unit(self, name: str) -> str:
+        """Of a parameter or a traced quantity; "" where it has none."""
+        unit = self.units.get(name, "")
+        return "" if unit == "1" else unit
+
     @property
     def exits(self) -> set[int]:
         """Of the runs; those of a block are met."""
@@ -119,9 +124,9 @@ def sweep(
     cases = tuple(study.cases())
     _judged(runner, cases[0])
     target = runner.loaded().target
-    texts = lock.hashes(target.document.file.source, target.document.file.items)
+    texts = lock.hashes(target)
     digest = study.digest(request=replace(request, output=None), texts=texts, version=__version__, keep=keep)
-    units, attributes = _units(runner), _attributes(target, study)
+    units, attributes = _units(runner, cases[0]), _attributes(target, study)
     place = destination(output)
     with claimed(place), Journal(place, digest) as journal:
         resumed = len(journal.done)
@@ -187,11 +192,12 @@ def _attributes(target: Target, study: Study) -> dict[str, Any]:
     }
 
 
-def _units(runner: Runner) -> dict[str, str]:
-    """Of parameters and traced quantities by name."""
+def _units(runner: Runner, case: Case) -> dict[str, str]:
+    """Of parameters, what varies of them and traced quantities by name."""
     prepared = runner.loaded().first.prepared
     known = {p.name: si_text(p.unit.dimension) for p in prepared.network.parameters}
     rows = [row for row in prepared.structure["rows"] if row.get("stored")]
+    known |= {name: known[whole] for name in case if (whole := name.partition("[")[0]) in known}
     return known | {str(row["name"]): str(row["unit"]) for row in rows}
 
 
@@ -229,4 +235,5 @@ def to_json(found: Swept) -> dict[str, Any]:
             for k in found.failed
         ],
         "end": summary(found),
+        "units": {name: found.units[name] for name in (*found.cases[0], *found.done.names()) if name in found.units},
     }

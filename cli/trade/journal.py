@@ -17,10 +17,9 @@ from typing import Any
 from sysdyn import __version__
 from sysdyn.cli.run.request import lock
 from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.trade.traded import Combination, Measured, Reference, Runs
 from sysdyn.compiler.program import cache
-from sysdyn.dsl.text.diagnostics import SourceText
-from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.trace.trace import Trace
 
 
@@ -74,10 +73,10 @@ class Journal:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def journal(request: Request, source: SourceText, items: tuple[syntax.TopLevel, ...]) -> Journal | None:
+def journal(request: Request, target: Target) -> Journal | None:
     """That of a request; None of a text that stands in no file."""
     if request.file == "-":
         return None
     asked = asdict(replace(request, file=Path(request.file).name, output=None, timings=True, no_lock=True))
-    said = {"version": __version__, "asked": asked, "files": lock.hashes(source, items)}
+    said = {"version": __version__, "asked": asked, "files": lock.hashes(target)}
     return Journal(hashlib.sha256(json.dumps(said, sort_keys=True, default=str).encode()).hexdigest()[:32])

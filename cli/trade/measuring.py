@@ -337,8 +337,7 @@ def bench_of(request: Request, folder: Path) -> Bench:
     if key not in _benches:
         report, own = Report(), folder / f"ahead-{os.getpid()}"
         own.mkdir(exist_ok=True)
-        document = targets.read(request.file, report, request.text)
-        target = targets.one(document, request.file, request.model, request.scene, report)
+        target = targets.asked(request, report)
         assert target is not None
         _benches[key] = Bench(request, target, report, own, time.monotonic())
         _benches[key].prepare()

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from sysdyn.cli.page.columns import spent
 from sysdyn.cli.page.document import document, escape, table
 from sysdyn.cli.page.panels import COLOURS
 from sysdyn.cli.page.picture import drawing
@@ -66,7 +67,7 @@ def picture(found: Traded, kind: str) -> bytes:
         axis.set_yscale("log")
         _ticks(axis)
         axis.set_xlabel("largest relative error of the traced quantities")
-        axis.set_ylabel("work, matrix entries touched")
+        axis.set_ylabel("work, ns of one machine")
         axis.set_title(found.name, fontweight="bold", fontsize=11, pad=10)
         axis.set_title(_resolved(found), loc="right", fontsize=8.5, color="#7b828c", pad=10)
         _legend(axis, found, colour)
@@ -85,7 +86,7 @@ def _ticks(axis: Any) -> None:
     axis.xaxis.set_major_locator(LogLocator(10.0, numticks=9))
     axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0e}"))
     axis.yaxis.set_major_locator(LogLocator(10.0, (1.0, 2.0, 5.0), numticks=9))
-    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0e}"))
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
     for side in (axis.xaxis, axis.yaxis):
         side.set_minor_formatter(NullFormatter())
 
@@ -152,8 +153,8 @@ def page(found: Traded, command: str) -> str:
 
 
 HEADS = (
-    "", "formulation", "index", "method", "tolerance", "error", "work", "of the least", "CPU, ms", "steps", "energy, J",
-    "constraints", "",
+    "", "formulation", "index", "method", "tolerance", "error", "work, ns", "of the least", "CPU, ms", "steps",
+    "energy, J", "constraints", "",
 )  # fmt: skip
 """The last column: the level where there are several, and why a run may not be chosen."""
 
@@ -178,7 +179,7 @@ def verdict(found: Traded) -> str:
         return f"no setting that was tried meets the accuracy {found.accuracy:.0e}"
     return (
         f"the cheapest of {len(found.measured)} runs that meets {found.accuracy:.0e}: {m.combination.name} at "
-        f"{m.tolerance:.1e}, error {m.error:.1e}, {1e3 * m.cpu_s:.3g} ms of CPU"
+        f"{m.tolerance:.1e}, error {m.error:.1e}, {spent(m.cpu_s)} of CPU"
     )
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
@@ -58,15 +57,14 @@ def trade(
     """
     _allowed(request)
     began = time.monotonic()
-    document = targets.read(request.file, report)
-    request = replace(request, text=document.file.source.text if request.file == "-" else None)
-    target = targets.one(document, request.file, request.model, request.scene, report)
+    target = targets.asked(request, report)
     if target is None:
         return None
+    request = targets.held(request, target)
     bench = Bench(request, target, report, folder, began)
     if not bench.prepare():
         return None
-    journal = journal_of(request, document.file.source, document.file.items)
+    journal = journal_of(request, target)
     kept, known = (journal.reference if journal else None) or reference(bench, budget, jobs)
     first = time.monotonic() - began
     if journal is not None and journal.reference is None:

@@ -25,15 +25,15 @@ Bounds = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """The worst place of a quantity.  time [s]; first [s]: where it differs first (None: nowhere); values of both
-    traces in its unit; ratio: difference over what is allowed.
+    """The worst place of a quantity.  time [s]; first [s]: where it differs first (None: nowhere); ratio: difference
+    over what is allowed; values of both traces in its unit.
     """
 
     variable: str
     time: float
     first: float | None
-    values: tuple[float, float]
     ratio: float
+    values: tuple[float, float]
 
 
 def gaps(one: Trace, other: Trace, bounds: Bounds, until: float) -> tuple[Gap, ...]:
@@ -47,7 +47,7 @@ def gaps(one: Trace, other: Trace, bounds: Bounds, until: float) -> tuple[Gap, .
         k = int(np.argmax(ratio[inside]))
         values = float(one[name].values[here[k]]), float(other[name].values[there[k]])
         apart = times[inside & (ratio > 1.0)]
-        found.append(Gap(name, float(times[k]), float(apart[0]) if apart.size else None, values, float(ratio[k])))
+        found.append(Gap(name, float(times[k]), float(apart[0]) if apart.size else None, float(ratio[k]), values))
     return tuple(sorted(found, key=lambda gap: -gap.ratio))
 
 

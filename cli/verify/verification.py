@@ -62,10 +62,10 @@ def verify(
     check_tolerances(request)
     if request.method == "euler":
         raise UsageError("--method euler: verify compares bdf and radau, or another and bdf; euler has no accuracy")
-    document = targets.read(request.file, report)
-    request = replace(request, text=document.file.source.text if request.file == "-" else None)
-    target = targets.one(document, request.file, request.model, request.scene, report)
-    return None if target is None else _Verification(request, target, report, folder, progress).all(jobs)
+    target = targets.asked(request, report)
+    if target is None:
+        return None
+    return _Verification(targets.held(request, target), target, report, folder, progress).all(jobs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +87,7 @@ def _part(asked: tuple[Request, Path | None, str | None]) -> _Part:
     """One formulation (None: the reference) in a process of its own."""
     request, folder, name = asked
     report = Report()
-    document = targets.read(request.file, report, request.text)
-    target = targets.one(document, request.file, request.model, request.scene, report)
+    target = targets.asked(request, report)
     assert target is not None
     before = set(report)
     own = _Verification(request, target, report, folder, None)

@@ -77,7 +77,7 @@ def test_the_gain_margin_of_an_integrator_with_two_lags(tmp_path, capsys):
 
 
 def test_a_root_locus_is_that_of_the_polynomial(tmp_path, capsys):
-    path = write(tmp_path, RLC)
+    path = write(tmp_path, RLC.replace("R = 3 ohm", "R = 3e-3 kohm"))  # values are in SI, whatever the text's unit
     found = answered(capsys, path, "--locus", "R=0.1 ohm..30 ohm:9:log", "--outputs", "v")["locus"]
     assert (found["parameter"], found["unit"], found["failed"]) == ("R", "ohm", [])
     assert found["values"] == pytest.approx(np.geomspace(0.1, 30, 9), rel=1e-14)

@@ -37,7 +37,7 @@ def test_the_table_names_modes_and_transfer_functions(tmp_path, capsys):
     assert run(["linearize", str(write(tmp_path, RLC)), "--outputs", "v", "--backend", "numpy"]) == 0
     out, err = capsys.readouterr()
     assert "-3" in out
-    assert "v by u" in out
+    assert "v [V] by u [V]" in out
     assert "gain   100, at rest 1" in out
     assert "at rest" in err
 

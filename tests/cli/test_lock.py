@@ -82,12 +82,12 @@ def test_the_scene_wins(tmp_path, statement, how):
     text = PENDULUM.replace("time 0 s to 1 s", f"time 0 s to 1 s\n  {statement}")
     write(tmp_path, text)
     path = Path(f"{file}.lock")
+    from sysdyn.cli.run.request.asked import Request
     from sysdyn.cli.run.request.lock import hashes
-    from sysdyn.dsl import load
+    from sysdyn.cli.run.request.targets import asked
     from sysdyn.dsl.text.diagnostics import Report
 
-    document = load.read(file, Report())
-    now = hashes(document.file.source, document.file.items)["model.sd"]
+    now = hashes(asked(Request(file), Report()))["model.sd"]
     before = tomllib.loads(path.read_text())["files"]["model.sd"]
     path.write_text(path.read_text().replace(before, now))
     assert ran(file)[:3] == how

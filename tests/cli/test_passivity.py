@@ -70,6 +70,7 @@ scene x of m { time 0 s to 1 s; trace n.e }
 def test_a_law_is_proven_or_sampled(law, cap, verdict, role, how, tmp_path, capsys):
     found = certified(capsys, write(tmp_path, TEXT.replace("LAW", law).replace("CAP", cap)))
     (r,) = [e for e in found["elements"] if e["name"] == "r"]
+    assert r.keys() == {"name", "role", "how", "said"}  # and not the place, which holds the whole text
     assert (found["verdict"], r["role"], r["how"]) == (verdict, role, how)
     assert found["proven"] == (how != "sampled")
     assert {e["name"] for e in found["elements"] if e["role"] == "port"} == {"supply"}

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sysdyn.cli.failures import UsageError
 from sysdyn.cli.main import run
 from sysdyn.cli.page.panels import curve, in_order, panels_of, shortened, styled, unit_text
 from sysdyn.cli.page.sparkline import sparkline, told_apart
@@ -176,6 +177,16 @@ def test_many_curves_of_a_panel_can_be_told_apart():
         assert len(set(drawn)) == len(drawn) == 14 * len(traces)
     assert shortened("a" * 30 + "b" * 30, 12) == "aaaaaaa…bbbb"
     assert shortened("short", 12) == "short"
+
+
+def test_traces_in_other_units_share_an_axis():
+    """What is drawn beside millimetres is in millimetres, and seconds are not drawn there."""
+    small, large = made([("x", "mm", lambda t: 1e3 * t)]), made([("x", "m", lambda t: 2.0 * t)])
+    (panel,) = panels_of([small, large], ["x"])
+    assert (panel.unit, panel.high) == ("mm", pytest.approx(2e3 * large.time[-1]))
+    np.testing.assert_allclose(curve(large, "x", panel.unit)[1], 2e3 * curve(large, "x")[0])
+    with pytest.raises(UsageError, match=r"'x' is in s in .*, in mm in another trace"):
+        panels_of([small, made([("x", "s", np.sin)])], ["x"])
 
 
 def test_curves_are_hermite_interpolants():

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.memory_limit import LEAST, TooLittle
+from sysdyn.cli.page.columns import aligned, fitted
 from sysdyn.cli.page.named import destination, label, quantities
 
 
@@ -18,8 +19,9 @@ def test_a_picture_is_called_as_its_trace_and_goes_where_it_is_asked():
     console = SimpleNamespace(as_json=False)
     assert label("runs/pendulum-swing.h5") == "pendulum-swing"
     assert label("-") == "stdin"
-    assert str(destination("runs/a.h5", None, console, (".png", ".svg"), "a plot")) == "a.png"
-    assert str(destination("a.h5", "b.SVG", console, (".png", ".svg"), "a plot")) == "b.SVG"
+    assert destination("runs/a.h5", None, console, (".png", ".svg"), "a plot") == ("a.png", ".png")
+    assert destination("a.h5", "b.SVG", console, (".png", ".svg"), "a plot") == ("b.SVG", ".svg")
+    assert destination("a.h5", "-", console, (".png", ".svg"), "a plot") == ("-", ".png")
     with pytest.raises(UsageError, match=r"a plot is one of \.png, \.svg"):
         destination("a.h5", "b.pdf", console, (".png", ".svg"), "a plot")
 
@@ -40,3 +42,12 @@ def test_quantities_are_those_asked_for_each_once_and_meters_by_either_spelling(
     assert set(quantities([trace], [])) == {"x", "v"}
     with pytest.raises(UsageError, match=r"t\.h5 has no quantity 'w'; (nearest|there are)"):
         quantities([trace], ["w"])
+
+
+def test_a_table_leaves_out_what_a_terminal_has_no_room_for():
+    rows = [["", "name", "work", "drift", ""], [">", "radau", "1.2e6", "1e-12", "chosen"]]
+    assert fitted(rows, ("drift", "work"), None) == (rows, "")
+    assert fitted(rows, ("drift", "work"), 30) == (rows, "")
+    assert fitted(rows, ("drift", "work"), 29)[0] == [["", "name", "work", ""], [">", "radau", "1.2e6", "chosen"]]
+    assert fitted(rows, ("drift", "work"), 10)[1] == "10 columns have no room for drift; work"
+    assert max(map(len, aligned(rows).split("\n"))) == 30

@@ -88,3 +88,15 @@ def test_monte_carlo_has_the_quantiles_of_the_closed_form(filter_):
         density = np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi) / slope
         error = np.sqrt(p * (1.0 - p) / n) / density
         assert abs(np.quantile(u, p) - expected) < 4.0 * error, p
+
+
+def test_an_element_that_varies_has_the_unit_of_its_array(tmp_path):
+    text = (
+        TEXT.replace("R = 1000 ohm", "R[1..2] = [1 kohm, 1 kohm]")
+        .replace("R*q'", "R[2]*q'")
+        .replace("trace q/C", "trace q")
+    )
+    (path := tmp_path / "filter.sd").write_text(text)
+    found = load(path).sweep({"R[2]": [500.0, 1000.0]}, keep="end")
+    assert found.units == {"set.R[2]": "ohm", "end.u": "C"}
+    assert found["end.u"] == pytest.approx(-1e-6 * np.expm1([-2.0, -1.0]), rel=1e-4)

@@ -1,10 +1,12 @@
 """Files that commands write where the disk takes no more: what was there stays, and the message names the file."""
 
 import errno
+import os
 import resource
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from sysdyn.cli import whole_files
@@ -87,3 +89,13 @@ def test_a_trace_that_another_program_writes_is_said_to_be_held(tmp_path, capsys
         assert (f"{output}: another program holds this file open" in capsys.readouterr().err) == (mode == "r+")
         other.communicate("\n")
     assert (output.stat().st_ino == before.st_ino) == (mode == "r+")
+
+
+@pytest.mark.skipif(not Path("/dev/fd").is_dir(), reason="no names of open files here")
+def test_a_pipe_takes_what_is_written_by_its_name():
+    """`/dev/stdout | less`: the name leads to no path of the file system."""
+    read, written = os.pipe()
+    whole_files.write(f"/dev/fd/{written}", "a page")
+    assert os.read(read, 100) == b"a page"
+    os.close(read)
+    os.close(written)

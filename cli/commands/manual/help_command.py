@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import offered
@@ -18,10 +19,9 @@ def command(console: Console, topic: str | None, html_file: str | None) -> int:
     if html_file is not None:
         if topic is not None:
             raise UsageError("--html writes all topics: leave the topic out")
-        from sysdyn.cli.commands.trace.diff_command import write
         from sysdyn.cli.manual.site import site
 
-        write(html_file, site())
+        whole_files.write(html_file, site())
         if html_file != "-":
             console.say(html_file)
         console.result = {"file": html_file}

@@ -9,13 +9,11 @@ from pathlib import Path
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import INPUT_OUTPUT, UsageError, classify
-from sysdyn.cli.options import side_by_side
+from sysdyn.cli.options import FORMATS, side_by_side
 from sysdyn.cli.run.check.checking import Checked, file_checked
 from sysdyn.cli.run.many.crew import Lost, each
 from sysdyn.cli.run.request import targets
 from sysdyn.dsl.text.diagnostics import ModelError
-
-FORMATS = ["full", "concise", "json", "github", "junit", "sarif"]
 
 
 @with_console("check")

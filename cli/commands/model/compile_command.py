@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.export import files, layout
+from sysdyn.cli.export import files
+from sysdyn.cli.export.asked import formed_of, network_of, refused
 from sysdyn.cli.options import chosen
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.run.prepare import Prepared, prepare
-from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.start.starting import start
+from sysdyn.cli.run.request.asked import Request
 from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.program import program_text
-from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.scenes.stopping import unwatched
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model import network_text
 from sysdyn.dsl.model.network import Event, Switch
-from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.condense.condenser import departures
-from sysdyn.runtime.model.failures import NoSuchForm
 from sysdyn.runtime.model.system import System
 
 STAGES = ("network", "reflected", "coordinates", "energies", "descriptor", "program")
@@ -34,43 +31,22 @@ STAGES = ("network", "reflected", "coordinates", "energies", "descriptor", "prog
 @click.option("-o", "folder", metavar="DIR", help="Where the files go. Default: here.")
 @click.option("--dump", type=click.Choice(STAGES), help="Print a stage.")
 @click.option("--explain", is_flag=True, help="List what was pruned, integrated and inverted, and why.")
-def command(
-    console: Console,
-    file: str,
-    scene: str | None,
-    model: str | None,
-    formulation: str | None,
-    index: str | None,
-    backend: str,
-    settings: tuple[tuple[str, str], ...],
-    levels: tuple[tuple[str, str], ...],
-    no_prune: bool,
-    folder: str | None,
-    dump: str | None,
-    explain: bool,
-) -> int:
+def command(console: Console, folder: str | None, dump: str | None, explain: bool, **options: Any) -> int:
     """Compile the model of FILE, of a scene where one is named, to files that anyone can call.
 
     DIR/residual.c and binding.c (or residual.py), sysdyn_model.h, binding.json, manifest.json.
     """
-    document = targets.read(file, console.report)
-    target = targets.whole(document, file, model, scene, console.report)
-    if target is None:
-        return console.finish(1)
+    request = Request(**options)
     with ex.fresh():
-        required, inner = target.scene is not None, Report()
-        network = load.network(
-            target.document, target.model, target.scene, inner, settings, levels=levels, required=required
-        )
-        console.report.extend(inner if network else targets.unsupported(inner))
+        network = network_of(request, console.report)
         if network is None:
             return console.finish(1)
-        network = unwatched(network)
         if dump == "network":
             console.result = {"stage": dump, "text": network_text.show(network)}
             console.data(console.result["text"])
             return console.finish()
-        prepared = prepare(network, console.report, formulation=formulation, backend=backend, prune=not no_prune)
+        backend, prune = request.backend, not request.no_prune
+        prepared = prepare(network, console.report, formulation=request.formulation, backend=backend, prune=prune)
         if prepared is None:
             return console.finish(1)
         if dump:
@@ -85,7 +61,7 @@ def command(
             console.result = {"stage": dump, "text": stages[dump]()}
             console.data(console.result["text"])
         if dump is None or folder is not None:
-            _write(console, prepared, index, Path(folder or "."))
+            _write(console, prepared, request.index, Path(folder or "."))
     if explain:
         console.say(_account(prepared))
     console.explain = explain
@@ -108,23 +84,17 @@ def _account(prepared: Prepared) -> str:
 
 def _write(console: Console, prepared: Prepared, index: str | None, folder: Path) -> None:
     """The files of one index form; nothing where the model has no start or no such form."""
-    scene = prepared.network.scene
-    t0 = prepared.binding.evaluate(scene.start) if scene and scene.start else 0.0
     happens: list[Event | Switch] = [*prepared.network.events, *prepared.network.switches]
     if happens:
         text = f"'{happens[0].name}' is not part of an exported residual yet: it is one smooth piece"
         console.report.error("E608", text, happens[0].place, help="sysdyn simulate, or --dump")
         return
-    started = start(prepared, t0, console.report)
-    if started is None or console.report.failed:
-        return
-    try:
-        formed = layout.choose(prepared, started, index)
+    with refused(prepared, console.report):
+        formed = formed_of(prepared, index, console.report)
+        if formed is None:
+            return
         console.result = files.write(formed, folder)
-    except NoSuchForm as error:
-        console.report.error("E607", str(error), prepared.network.place)
-        return
-    for text in formed.warnings:
-        console.report.note("N608", text, prepared.network.place)
-    names = "residual.c, binding.c" if prepared.backend == "c" else "residual.py"
-    console.say(f"{folder}: {names}, binding.json, sysdyn_model.h, manifest.json; index {formed.index}")
+        for text in formed.warnings:
+            console.report.note("N608", text, prepared.network.place)
+        names = "residual.c, binding.c" if prepared.backend == "c" else "residual.py"
+        console.say(f"{folder}: {names}, binding.json, sysdyn_model.h, manifest.json; index {formed.index}")

@@ -11,6 +11,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import INDICES, chosen
+from sysdyn.cli.page.columns import aligned, complex_text
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.runtime.trace.opening import replaceable
 
@@ -174,7 +175,8 @@ def _write(file: str, linear: Any, curves: Any, over: Any, kinds: tuple[str, ...
         whole_files.write(file, written(linear, kind, console.result))
         console.say(f"{file}: {len(linear.modes)} states, {len(linear.transfers)} transfer functions")
         return
-    drawn = (*kinds, "locus") if kinds else ((*KINDS, "poles") if over is None else ("poles",))
+    asked = kinds or ((*KINDS, "poles") if over is None else ("poles",))
+    drawn = [k for k in asked if k == "poles" or curves] + ([] if over is None else ["locus"])
     title = f"{name}, t = {linear.t:g} s" + ("" if linear.moving else _still(linear))
     data = picture(title, linear, curves, over, drawn, "svg" if kind == ".html" else kind.removeprefix("."))
     if kind == ".html":
@@ -192,14 +194,13 @@ def _tables(linear: Any, over: Any) -> list[tuple[str, list[list[str]]]]:
         rows = [["transfer function", "gain", "at rest", "zeros [1/s]", "poles [1/s]"]]
         for t in linear.transfers:
             static = "" if t.static is None else f"{t.static:.6g}"
-            label = f"{linear.outputs[t.output]} by {linear.inputs[t.input]}"
-            ends = [", ".join(map(_complex, part)) or "none" for part in (t.zeros, t.poles)]
-            rows.append([label, f"{t.gain:.6g}", static, *ends])
+            ends = [", ".join(map(complex_text, part)) or "none" for part in (t.zeros, t.poles)]
+            rows.append([linear.label(t), f"{t.gain:.6g}", static, *ends])
         found.append(("Transfer functions", rows))
     if over is not None:
         rows = [[f"{over.parameter} [{over.unit}]", "eigenvalues [1/s]"]]
         for value, curve in zip(over.values, over.curves, strict=True):
-            rows.append([f"{value:.6g}", ", ".join(_complex(complex(v)) for v in curve if np.isfinite(v))])
+            rows.append([f"{value:.6g}", ", ".join(complex_text(complex(v)) for v in curve if np.isfinite(v))])
         found.append((f"Eigenvalues over {over.parameter}", rows))
     return found
 
@@ -290,12 +291,12 @@ def _still(linear: Any) -> str:
 
 def _table(linear: Any) -> str:
     """Modes and transfer functions as text."""
-    lines = _columns(_modes(linear)) if linear.modes else ["no states"]
+    lines = [aligned(_modes(linear))] if linear.modes else ["no states"]
     for t in linear.transfers:
-        lines += ["", f"{linear.outputs[t.output]} by {linear.inputs[t.input]}"]
+        lines += ["", linear.label(t)]
         lines.append(f"  gain   {t.gain:.9g}" + ("" if t.static is None else f", at rest {t.static:.9g}"))
-        lines.append(f"  zeros  {', '.join(map(_complex, t.zeros)) or 'none'}")
-        lines.append(f"  poles  {', '.join(map(_complex, t.poles)) or 'none'}")
+        lines.append(f"  zeros  {', '.join(map(complex_text, t.zeros)) or 'none'}")
+        lines.append(f"  poles  {', '.join(map(complex_text, t.poles)) or 'none'}")
         if any(t.improper):
             lines.append(f"  and {t.improper[0]:.9g} s {t.improper[1]:+.9g} s^2: it differentiates its input")
     return "\n".join(lines)
@@ -306,7 +307,7 @@ def _modes(linear: Any) -> list[list[str]]:
     for mode, energies in zip(linear.modes, linear.energies, strict=True):
         damping = "" if mode.damping is None else f"{mode.damping:.4g}"
         shares = _listed(linear.reduced.names, mode.participation), _listed(linear.stores, energies)
-        rows.append([_complex(mode.eigenvalue), damping, f"{mode.frequency:.6g}", *shares])
+        rows.append([complex_text(mode.eigenvalue), damping, f"{mode.frequency:.6g}", *shares])
     return rows if linear.stores else [row[:-1] for row in rows]
 
 
@@ -314,17 +315,3 @@ def _listed(names: Sequence[str], shares: Sequence[float]) -> str:
     """Those that take part most."""
     order = sorted(range(len(names)), key=lambda k: -shares[k])
     return ", ".join(f"{names[k]} {100 * shares[k]:.0f} %" for k in order[:4] if shares[k] >= 0.05)
-
-
-def _complex(value: complex) -> str:
-    value = complex(value.real if abs(value.real) > 1e-12 * abs(value) else 0.0, value.imag)
-    return f"{value.real:.9g}" if value.imag == 0.0 else f"{value.real:.9g}{value.imag:+.9g}i"
-
-
-def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
-    wide = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return [_spaced(row, wide) for row in rows]
-
-
-def _spaced(row: Iterable[str], wide: Sequence[int]) -> str:
-    return "  ".join(text.ljust(n) for text, n in zip(row, wide, strict=True)).rstrip()

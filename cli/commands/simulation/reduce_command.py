@@ -92,7 +92,8 @@ def _summary(found: Reduced, target: Path, *, kept: bool, timings: bool) -> str:
     number = sum(t.kept for t in found.trials)
     if not kept:
         return "\n".join([*lines, f"{found.name}: every element that was tried is needed for {found.accuracy:.0e}"])
-    lines.append(f"{found.name}: {number} elements are not needed for {found.accuracy:.0e}; error {found.error:.1e}")
+    gone = "1 element is" if number == 1 else f"{number} elements are"
+    lines.append(f"{found.name}: {gone} not needed for {found.accuracy:.0e}; error {found.error:.1e}")
     if found.full and found.reduced:
         lines.append(_costs(found.full, found.reduced, timings=timings))
     return "\n".join([*lines, f"{target}"])

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import scene_command
+from sysdyn.cli.page.columns import spent
 from sysdyn.cli.progress import ProgressLine
-from sysdyn.cli.whole_files import named
 
 if TYPE_CHECKING:
     from sysdyn.cli.run.request.asked import Request
@@ -75,16 +75,7 @@ def _streamed(request: Request, console: Console, line: ProgressLine) -> Ran | N
             return ran and replace(ran, outcome=replace(ran.outcome, trace=Path(request.output)))
         finally:  # what was computed before an interruption, too
             if path.is_file():
-                _put(request.output, path.read_bytes())
-
-
-def _put(output: str, data: bytes) -> None:
-    if output == "-":
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
-    else:
-        with named(output):
-            Path(output).write_bytes(data)
+                whole_files.write(request.output, path.read_bytes())
 
 
 def _summary(ran: Ran) -> str:
@@ -102,7 +93,7 @@ def _summary(ran: Ran) -> str:
     span = f"{o.reached:g} s" if began == 0.0 else f"{began:.12g} s to {o.reached:.12g} s"
     lines = [
         f"{ran.target.name}: {', '.join(how)}",
-        f"  {span} in {s['steps']} steps, {1e3 * t['cpu_integrate_s']:.3g} ms of CPU{estimate}",
+        f"  {span} in {s['steps']} steps, {spent(t['cpu_integrate_s'])} of CPU{estimate}",
         *([f"  {', '.join(meters)}"] if meters else []),
         *(f"  {text}" for text in _conserved(ran)),
         f"  {o.trace}{'' if o.final else ' (not final)'}{'' if o.met or not o.final else ' (not met)'}",
@@ -141,7 +132,7 @@ def _result(ran: Ran) -> dict[str, Any]:
         "judged": list(o.judgement.judged) if o.judgement else [],
         "not_met": [missed.to_json() for missed in o.judgement.not_met] if o.judgement else [],
         "conserved": o.judgement.kept() if o.judgement else [],
-        "expects": [{"text": c.text, "ok": c.ok, "value": c.value, "time": c.time} for c in ran.claims],
+        "expects": [asdict(c) for c in ran.claims],
         "moved": described(ran.prepared, ran.started.state),
         "warnings": list(o.warnings),
         "failure": ran.failure,

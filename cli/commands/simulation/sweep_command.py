@@ -12,7 +12,7 @@ from sysdyn.cli.failures import UsageError, worst
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import aligned
 from sysdyn.cli.run.many.crew import cores
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.asked import Request, default_output
 from sysdyn.cli.sweep.in_core import KEEPS
 from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.one_run import Runner
@@ -85,7 +85,9 @@ def command(
         runs if runs is not None else said.get("runs"),
         seed if seed is not None else said.get("seed", 0),
     )
-    target = Path(output or said.get("output") or _default(file, runner))
+    scene = runner.loaded().target.scene
+    named = default_output(file, scene.name.name if scene else "", "-sweep.h5")
+    target = Path(output or said.get("output") or named)
     if target.suffix == ".sd" or (target.exists() and target.samefile(file)):
         raise UsageError(f"-o {target} is the model itself")
     if target.is_file() and not replaceable(target, sweep=True):
@@ -94,11 +96,6 @@ def command(
     with console.progress(progress) as line:
         swept = sweep(request, asked, target, number, line, timings=not no_timings, keep=kept, dask=dask, runner=runner)
     return _shown(console, swept, plot)
-
-
-def _default(file: str, runner: Runner) -> str:
-    scene = runner.loaded().target.scene
-    return f"{Path(file).stem}-{scene.name.name}-sweep.h5" if scene else f"{Path(file).stem}-sweep.h5"
 
 
 def _shown(console: Console, found: Swept, plot: str | None) -> int:
@@ -136,14 +133,20 @@ def _table(found: Swept) -> str:
     """Every run where they are few; else the spread of the end values."""
     if len(found.cases) <= SHOWN:
         names = list(next((k.end for k in found.kept if k.end), {}) or {})[:COLUMNS]
-        head = ["run", *found.cases[0], *(f"{n} at the end" for n in names), ""]
+        varied = [_headed(found, n) for n in found.cases[0]]
+        head = ["run", *varied, *(_headed(found, n, " at the end") for n in names), ""]
         rows = []
         for k in found.kept:
             ends = [_text((k.end or {}).get(n, "-")) for n in names]
             rows.append([str(k.run), *map(_text, found.cases[k.run].values()), *ends, _mark(k)])
         return aligned([head, *rows], right=range(len(head) - 1))
-    rows = [[name, *(_text(v) for v in spread.values())] for name, spread in summary(found).items()]
+    rows = [[_headed(found, name), *(_text(v) for v in spread.values())] for name, spread in summary(found).items()]
     return aligned([["at the end", "least", "median", "largest"], *rows], right=(1, 2, 3))
+
+
+def _headed(found: Swept, name: str, when: str = "") -> str:
+    """`x at the end [m]`."""
+    return f"{name}{when}{f' [{unit}]' if (unit := found.unit(name)) else ''}"
 
 
 def _mark(kept: Kept) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import scene_command, side_by_side
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import aligned, fitted, refusals, terminal
 from sysdyn.cli.run.request import lock, targets
 from sysdyn.cli.run.request.asked import Request, instants_of
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
@@ -25,6 +26,8 @@ from sysdyn.dsl import load
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 
 KINDS = (".html", ".png", ".svg")
+SPARE = ("constraints", "energy, J", "work, ns", "steps")
+"""Columns that a narrow terminal has no room for."""
 
 
 @scene_command("trade", "runs")
@@ -101,9 +104,7 @@ def budget_of(text: str | None) -> float | None:
 
 def _lock(request: Request, found: Traded, best: Measured) -> Path:
     """Writes the choice for its scene."""
-    report = Report()
-    document = targets.read(request.file, report)
-    scene = targets.one(document, request.file, request.model, request.scene, report)
+    scene = targets.asked(request, Report())
     assert scene is not None
     c = best.combination
     held = lock.Lock(c.formulation, c.index, c.method, c.levels, best.tolerance, found.accuracy)
@@ -151,8 +152,9 @@ def _table(found: Traded, *, timings: bool) -> str:
     rows = [list(HEADS), *(cells(found, m) for m in found.measured if m in shown)]
     if not timings:
         rows = [[cell for k, cell in enumerate(row) if HEADS[k] != "CPU, ms"] for row in rows]
+    rows, said = fitted(rows, SPARE, terminal())
     known = found.reference
-    lines = [aligned(rows, right=range(4, len(rows[0]) - 1)), *_refused(found.refusals)]
+    lines = [aligned(rows, right=range(4, len(rows[0]) - 1)), *([said] if said else []), *_refused(found.refusals)]
     lines.append(f"reference: {known.first}, confirmed to {known.uncertainty:.1e} by {known.second}")
     return "\n".join([*lines, verdict(found)])
 
@@ -170,15 +172,15 @@ def _shown(found: Traded) -> list[Measured]:
     return [*best.values(), *found.pareto]
 
 
-def _refused(refusals: tuple[Refusal, ...]) -> list[str]:
+def _refused(refusals_: Iterable[Refusal]) -> list[str]:
     """What cannot be run, those with one reason together."""
-    reasons: dict[str, list[str]] = {}
-    for r in refusals:
-        name = r.formulation if r.index is None else f"{r.formulation} index {r.index}"
-        names = reasons.setdefault(r.reason.removeprefix(f"not expressible in {r.formulation}: "), [])
-        if name not in names:
-            names.append(name)
-    return [f"not in {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+    return refusals(
+        (
+            r.formulation if r.index is None else f"{r.formulation} index {r.index}",
+            r.reason.removeprefix(f"not expressible in {r.formulation}: "),
+        )
+        for r in refusals_
+    )
 
 
 def _result(found: Traded, use: str, *, timings: bool) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +10,14 @@ import click
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import INTERRUPTED, SOLVER, worst
 from sysdyn.cli.options import scene_command, side_by_side
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import aligned, fitted, refusals, terminal
 
 if TYPE_CHECKING:
     from sysdyn.cli.verify.agreement import Gap
-    from sysdyn.cli.verify.verified import Run, Verified
+    from sysdyn.cli.verify.verified import Disagreement, Refusal, Run, Verified
+
+SPARE = ("constraints", "energy J", "estimate", "index")
+"""Columns that a narrow terminal has no room for."""
 
 
 @scene_command("verify", "runs", "are compared")
@@ -99,7 +102,7 @@ def _complaints(found: Verified) -> list[str]:
     for d in found.disagreements:
         if d.doubted:
             continue
-        pairs.append(f"{d.one.name} and {d.other.name} disagree: {_apart(d.gap)}")
+        pairs.append(f"{d.one.name} and {d.other.name} disagree: {_apart(d)}")
     carriers = [
         f"{' and '.join(t.backends)} disagree in {t.formulation}: row {t.row} by {t.difference:.1e} of itself"
         for t in found.twins
@@ -112,7 +115,7 @@ def _doubts(found: Verified) -> list[str]:
     """Differences from runs that are not met by their own estimate: nothing is known from them."""
     return [
         f"{' and '.join(run.name for run in d.doubted)}: not met by its own estimate, and apart from "
-        f"{(d.one if d.other in d.doubted else d.other).name}: {_apart(d.gap)}"
+        f"{(d.one if d.other in d.doubted else d.other).name}: {_apart(d)}"
         for d in found.disagreements
         if d.doubted
     ]
@@ -128,9 +131,10 @@ def _unbalanced(found: Verified) -> list[str]:
     ]
 
 
-def _apart(gap: Gap) -> str:
-    a, b = gap.values
-    worst = f"{gap.variable} is {a:.6g} and {b:.6g} at {gap.time:.6g} s, {gap.ratio:.3g} times what is allowed"
+def _apart(d: Disagreement) -> str:
+    gap, unit = d.gap, d.one.trace[d.gap.variable].units
+    a, b = (f"{value:.6g}{'' if unit == '1' else f' {unit}'}" for value in gap.values)
+    worst = f"{gap.variable} is {a} and {b} at {gap.time:.6g} s, {gap.ratio:.3g} times what is allowed"
     return worst if gap.first in (None, gap.time) else f"{worst} (first at {gap.first:.6g} s)"
 
 
@@ -156,8 +160,9 @@ def _table(found: Verified, *, timings: bool) -> str:
         rows = [[cell for k, cell in enumerate(row) if k != 5] for row in rows]
     accuracy, (t0, t1) = found.runs[0].accuracy, found.span
     lines = [f"{found.name}: {t0:g} s to {t1:g} s, apart in units of {TIMES:g} x {accuracy:g} x nominal"]
+    rows, said = fitted(rows, SPARE, terminal())
     columns = len(rows[0])
-    lines.append(aligned(rows, right={*range(2, columns)} - {columns - 2}))
+    lines += [aligned(rows, right={*range(2, columns)} - {columns - 2}), *([said] if said else [])]
     lines += _refused(found)
     lines += [f"not compared: {name}: {reason}" for name, reason in found.left_out]
     if found.twins:
@@ -168,12 +173,12 @@ def _table(found: Verified, *, timings: bool) -> str:
 
 def _refused(found: Verified) -> list[str]:
     """Formulations left out, those with one reason together."""
-    reasons: dict[str, list[str]] = {}
-    for r in found.refusals:
-        reason = r.reason.removeprefix(f"not expressible in {r.formulation}: ").removeprefix(f"{r.formulation} of ")
-        text = "not supported yet" if r.code == "E608" else f"{r.code} {reason}"
-        reasons.setdefault(text, []).append(r.formulation)
-    return [f"not in {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+
+    def reason(r: Refusal) -> str:
+        text = r.reason.removeprefix(f"not expressible in {r.formulation}: ").removeprefix(f"{r.formulation} of ")
+        return "not supported yet" if r.code == "E608" else f"{r.code} {text}"
+
+    return refusals((r.formulation, reason(r)) for r in found.refusals)
 
 
 def _cells(run: Run) -> list[str]:
@@ -225,14 +230,14 @@ def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
         "disagreements": [
             {
                 "runs": [{"formulation": r.formulation, "method": r.method} for r in (d.one, d.other)],
-                **_gap_object(d.gap),
+                **asdict(d.gap),
             }
             for d in found.disagreements
         ],
         "horizon": found.horizon,
         "compared": list(found.compared),
         "not_compared": [{"variable": name, "reason": reason} for name, reason in found.left_out],
-        "not_expressible": [{"formulation": r.formulation, "code": r.code, "reason": r.reason} for r in found.refusals],
+        "not_expressible": [asdict(r) for r in found.refusals],
         "backends": [
             {"formulation": t.formulation, "difference": t.difference, "row": t.row, "ok": t.agree} for t in found.twins
         ],
@@ -255,20 +260,10 @@ def _run_object(run: Run, gap: Gap | None, *, keep: bool, timings: bool) -> dict
         "met": not run.unbalanced and o.final,
         "not_met": [m.to_json() for m in run.unbalanced],
         "constraints": run.constraints,
-        "worst": None if gap is None else _gap_object(gap),
+        "worst": None if gap is None else asdict(gap),
         "expects": [{"text": text, "ok": ok} for text, ok in run.expects],
         "warnings": list(o.warnings),
         "failure": run.failure,
         "diagnostic": run.finding,
         "trace": str(o.trace) if keep else None,
-    }
-
-
-def _gap_object(gap: Gap) -> dict[str, Any]:
-    return {
-        "variable": gap.variable,
-        "time": gap.time,
-        "first": gap.first,
-        "ratio": gap.ratio,
-        "values": list(gap.values),
     }

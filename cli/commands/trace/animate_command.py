@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
@@ -43,7 +41,7 @@ def command(
 
     if speed is not None and not 0.0 < speed < float("inf"):
         raise UsageError(f"--speed {speed:g}: more than 0")
-    target = destination(trace, output, console, KINDS, "what plays")
+    target, kind = destination(trace, output, console, KINDS, "what plays")
     found = opened(trace)
     film = animation.film(found, speed)
     joined = animation.links_of(found, links)
@@ -51,15 +49,13 @@ def command(
     drawn = quantities([found], list(names)) if names else [n for n in quantities([found], []) if n not in taken]
     picture = animation.drawing(film, joined, drawn)
     title = str(found.attributes.get("title", label(trace)))
-    data = picture if target.suffix.lower() == ".svg" else animation.page(title, picture)
-    if output == "-":
-        sys.stdout.buffer.write(data.encode())
-    else:
-        whole_files.write(target, data.encode())
+    data = picture if kind == ".svg" else animation.page(title, picture)
+    whole_files.write(target, data.encode())
+    if target != "-":
         points = ", ".join(" ".join(",".join(point) for point in link) for link in joined)
         console.say(f"{target}: {film.seconds:g} s; points: {points or 'none'}; curves: {', '.join(drawn) or 'none'}")
     console.result = {
-        "animation": output if output == "-" else str(target),
+        "animation": target,
         "trace": trace,
         "seconds": film.seconds,
         "links": [[list(point) for point in link] for link in joined],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 
 import click
@@ -55,16 +54,16 @@ def command(
             if html_file:
                 from sysdyn.cli.compare.comparison_page import page
 
-                write(html_file, page(f"{test} against {ref}", [(one, two, verdict)]))
+                whole_files.write(html_file, page(f"{test} against {ref}", [(one, two, verdict)]))
             unfinished = [(t.path, "did not end as asked") for t in (one, two) if not t.final]
             unfinished += [(t.path, "is not met") for t in (one, two) if t.final and not t.met]
     except Incomparable as error:
         console.complain(f"the traces cannot be compared: {error}", SOLVER)
         if junit_file:
-            write(junit_file, junit([(f"{test} against {ref}", 0.0, [("comparable", str(error))])]))
+            whole_files.write(junit_file, junit([(f"{test} against {ref}", 0.0, [("comparable", str(error))])]))
         return console.finish(SOLVER)
     if junit_file:
-        write(junit_file, junit([(f"{test} against {ref}", time.monotonic() - began, cases(verdict))]))
+        whole_files.write(junit_file, junit([(f"{test} against {ref}", time.monotonic() - began, cases(verdict))]))
     console.result = as_json(verdict)
     for path, why in unfinished:
         console.complain(f"{path} is of a run that {why}", 1)
@@ -73,14 +72,6 @@ def command(
     if not (console.quiet or pages):
         console.data(headline(verdict) + "\n" + table(verdict))
     return console.finish(0 if verdict.equal and not unfinished else 1)
-
-
-def write(file: str, text: str) -> None:
-    """A text to a file, or to standard output where it is '-'."""
-    if file == "-":
-        sys.stdout.write(text)
-    else:
-        whole_files.write(file, text)
 
 
 def _seconds(text: str) -> float:

@@ -13,12 +13,12 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, USAGE, UsageError, worst
-from sysdyn.cli.options import FORMULATIONS, Setting, side_by_side
+from sysdyn.cli.options import BACKENDS, FORMULATIONS, Setting, of_file, side_by_side
 from sysdyn.cli.page.columns import aligned
 from sysdyn.dsl.text.source import real
 
 if TYPE_CHECKING:
-    from sysdyn.cli.golden.book import Golden
+    from sysdyn.cli.golden.book import Accepted, Golden
     from sysdyn.cli.golden.checking import Case, Mutant
     from sysdyn.cli.golden.recording import Recorded
     from sysdyn.cli.run.request.asked import Request
@@ -49,15 +49,12 @@ def _add(name: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
     return decorate
 
 
-def _folder(function: Callable[..., Any]) -> Callable[..., Any]:
-    option = click.option("--folder", default="golden", show_default=True, metavar="DIR", help="The golden folder.")
-    return option(function)
+_folder = click.option("--folder", default="golden", show_default=True, metavar="DIR", help="The golden folder.")
 
 
 @_add("record")
 @click.argument("file")
-@click.option("--scene", metavar="NAME", help="The scene; needed where the file has several.")
-@click.option("--model", metavar="NAME", help="The model; needed where the file has several and no scene.")
+@of_file
 @click.option("--name", metavar="NAME", help="Folder of the model below the golden folder. Default: the file's name.")
 @click.option("--rtol", type=float, default=RTOL, show_default=True, metavar="R", help="Times the nominal magnitude.")
 @click.option("--atol", type=float, default=0.0, show_default=True, metavar="A", help="In each quantity's own unit.")
@@ -69,18 +66,13 @@ def _folder(function: Callable[..., Any]) -> Callable[..., Any]:
 @_folder
 def record(
     console: Console,
-    file: str,
-    scene: str | None,
-    model: str | None,
     name: str | None,
     rtol: float,
     atol: float,
-    until: str | None,
-    formulation: str | None,
-    settings: tuple[tuple[str, str], ...],
     size: float,
     jobs: int | None,
     folder: str,
+    **asked: Any,
 ) -> int:
     """Record a scene of FILE as golden.
 
@@ -88,38 +80,53 @@ def record(
     ten times that; runs every formulation that can express the scene.
     """
     from sysdyn.cli.golden.book import BOOK, Accepted, Golden, read
+    from sysdyn.cli.run.request import targets
     from sysdyn.cli.run.request.asked import Request
 
+    request = Request(**asked)
     if not (0.0 < rtol < 1.0 and 0.0 <= atol < math.inf):
         raise UsageError(f"--rtol {rtol:g} --atol {atol:g}: between 0 and 1, and not negative")
-    if file == "-":
+    if request.file == "-":
         raise UsageError("a golden trace belongs to a model in a file")
-    chosen = _target(console, file, scene, model)
-    if chosen is None:
+    target = targets.asked(request, console.report)
+    if target is None:
         return console.finish(1)
-    label, scene_name, model_name = chosen
-    place = Path(folder) / (name or Path(file).stem)
+    scene, model = target.scene.name.name if target.scene else None, target.model.name.name
+    request = replace(request, scene=scene, model=None if scene else model)
+    label, file = scene or model, Path(request.file)
+    place = Path(folder) / (name or file.stem)
     known = read(place) if (place / BOOK).is_file() else ()
     if any(real(g.model) != real(file) for g in known):
         raise UsageError(f"{place} is of {known[0].model}: --name gives another folder")
     if any(g.name == label for g in known):
         raise UsageError(f"{place.name}/{label} is recorded already: 'sysdyn golden accept' renews it, with a reason")
-    request = Request(file, scene=scene_name, model=model_name, until=until, formulation=formulation, settings=settings)
     found = _measured(console, request, rtol, atol, jobs)
     if isinstance(found, int):
         return console.finish(found)
-    golden = _golden(
-        Golden(place, Path(file), label, scene_name or "", rtol, atol, 0, 0, 0, 0, 0, (), settings, until), found
-    )
-    golden = replace(golden, accepted=(Accepted("recorded", f"first record, {found.method}"),))
-    return _kept(console, golden, found, size)
+    said = request.settings, request.until
+    golden = Golden(place, file, label, scene or "", rtol, atol, 0, 0, 0, 0, 0, (), *said)
+    golden = _golden(golden, found, Accepted("recorded", f"first record, {found.method}"))
+    code = _keep(console, golden, found, size)
+    console.result = {
+        "golden": golden.label,
+        "trace": str(golden.trace),
+        "error": golden.error,
+        "rtol": golden.rtol,
+        "accuracy": golden.accuracy,
+        "points": int(found.trace.time.size),
+        "formulations": list(golden.formulations),
+    }
+    if code == 0:
+        kept = golden.trace.stat().st_size / 1e3
+        console.say(f"{golden.label}: {found.trace.time.size} instants, {kept:.0f} kB")
+    return console.finish(code)
 
 
 @_add("check")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--formulation", "formulations", type=click.Choice(FORMULATIONS[:-1]), multiple=True, help="Repeatable.")
 @click.option("--method", "methods", type=click.Choice(["bdf", "radau", "auto"]), multiple=True, help="Repeatable.")
-@click.option("--backend", "backends", type=click.Choice(["c", "numpy"]), multiple=True, help="Repeatable. Default: c.")
+@click.option("--backend", "backends", type=click.Choice(BACKENDS), multiple=True, help="Repeatable. Default: c.")
 @side_by_side
 @click.option("--junit", "junit_file", metavar="FILE", help="Write the results as JUnit XML.")
 @click.option("--html", "html_file", metavar="FILE", help="Write one page with pictures of what differs.")
@@ -157,7 +164,6 @@ def check(
 
 
 def _report(console: Console, cases: Sequence[Case], junit_file: str | None, html_file: str | None, pages: bool) -> int:
-    from sysdyn.cli.commands.trace.diff_command import write
     from sysdyn.cli.golden.changes import page
     from sysdyn.cli.golden.checking import checkable
     from sysdyn.cli.page.junit import junit
@@ -168,9 +174,9 @@ def _report(console: Console, cases: Sequence[Case], junit_file: str | None, htm
         "failed": len(wrong),
     }
     if junit_file:
-        write(junit_file, junit([(c.label, c.seconds, c.cases) for c in cases]))
+        whole_files.write(junit_file, junit([(c.label, c.seconds, c.cases) for c in cases]))
     if html_file:
-        write(html_file, page(cases))
+        whole_files.write(html_file, page(cases))
     if not console.quiet and "-" not in (junit_file, html_file):
         if wrong:
             console.data(f"{len(wrong)} of {len(cases)} checks failed; worst: {wrong[0].label}: {wrong[0].message}")
@@ -261,8 +267,8 @@ def accept(
         if reason is None:
             code = worst((code, USAGE))
             continue
-        accepted = (*golden.accepted, book.Accepted(reason.strip(), change))
-        code = worst((code, _keep(console, replace(_golden(wanted, found), accepted=accepted), found, size)))
+        accepted = book.Accepted(reason.strip(), change)
+        code = worst((code, _keep(console, _golden(wanted, found, accepted), found, size)))
     console.result = {"changes": changes, "reason": reason}
     if code == USAGE:
         console.complain("nothing is recorded without a reason: --reason 'why the change is right'", USAGE)
@@ -321,19 +327,6 @@ def list_(console: Console, folder: str) -> int:
 # ---- what record and accept share
 
 
-def _target(
-    console: Console, file: str, scene: str | None, model: str | None
-) -> tuple[str, str | None, str | None] | None:
-    """(name of the golden, scene, model); None where the text has errors."""
-    from sysdyn.cli.run.request import targets
-
-    target = targets.one(targets.read(file, console.report), file, model, scene, console.report)
-    if target is None:
-        return None
-    model_name = target.model.name.name
-    return (target.scene.name.name, target.scene.name.name, None) if target.scene else (model_name, None, model_name)
-
-
 def _measured(console: Console, request: Request, rtol: float, atol: float, jobs: int | None) -> Recorded | int:
     """The record; the exit code after saying why there is none."""
     from sysdyn.cli.golden import recording
@@ -347,7 +340,8 @@ def _measured(console: Console, request: Request, rtol: float, atol: float, jobs
         return code
 
 
-def _golden(golden: Golden, found: Recorded) -> Golden:
+def _golden(golden: Golden, found: Recorded, accepted: Accepted) -> Golden:
+    """A golden with what was measured, and why it is right."""
     return replace(
         golden,
         tau=found.tau,
@@ -356,24 +350,8 @@ def _golden(golden: Golden, found: Recorded) -> Golden:
         energy=found.energy,
         constraints=found.constraints,
         formulations=tuple(found.structure),
+        accepted=(*golden.accepted, accepted),
     )
-
-
-def _kept(console: Console, golden: Golden, found: Recorded, size: float) -> int:
-    code = _keep(console, golden, found, size)
-    console.result = {
-        "golden": golden.label,
-        "trace": str(golden.trace),
-        "error": golden.error,
-        "rtol": golden.rtol,
-        "accuracy": golden.accuracy,
-        "points": int(found.trace.time.size),
-        "formulations": list(golden.formulations),
-    }
-    if code == 0:
-        kept = golden.trace.stat().st_size / 1e3
-        console.say(f"{golden.label}: {found.trace.time.size} instants, {kept:.0f} kB")
-    return console.finish(code)
 
 
 def _keep(console: Console, golden: Golden, found: Recorded, size: float) -> int:

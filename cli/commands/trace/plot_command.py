@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
+from sysdyn.cli.page.columns import terminal
 from sysdyn.cli.page.named import destination, label, opened, quantities
 
 if TYPE_CHECKING:
@@ -34,20 +33,17 @@ def command(console: Console, trace: str, names: tuple[str, ...], output: str | 
     files = [trace, *(name for name in names if _is_trace(name))]
     wanted = list(dict.fromkeys(name for name in names if not _is_trace(name)))
     traces = [(label(file), opened(file)) for file in files]
-    target = destination(trace, output, console, KINDS, "a picture")
+    target, kind = destination(trace, output, console, KINDS, "a picture")
     drawn = quantities([t for _, t in traces], wanted)
-    data = _drawn(traces, drawn, target.suffix.lower())
+    data = _drawn(traces, drawn, kind)
     if output is None and not console.quiet:
         from sysdyn.cli.page.sparkline import summary
 
-        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
-        console.data(summary(traces, drawn, width))
-    if output == "-":
-        sys.stdout.buffer.write(data)
-    else:
-        whole_files.write(target, data)
+        console.data(summary(traces, drawn, terminal() or WIDTH))
+    whole_files.write(target, data)
+    if target != "-":
         console.say(f"{target}: {', '.join(drawn)}")
-    console.result = {"picture": output if output == "-" else str(target), "traces": files, "quantities": drawn}
+    console.result = {"picture": target, "traces": files, "quantities": drawn}
     return console.finish()
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import scene_command
@@ -22,10 +23,9 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         raise UsageError("-o - and --json both want standard output")
     if output not in (None, "-") and Path(str(output)).suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"'{output}': a report is an .html")
-    from sysdyn.cli.commands.trace.diff_command import write
     from sysdyn.cli.report.collect import collect
     from sysdyn.cli.report.page import page
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.asked import Request, default_output
     from sysdyn.dsl.model import expression as ex
 
     request = Request(**options)
@@ -35,8 +35,8 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         if study is None:
             return console.unable()
         text = page(study)
-    target = output or _default(request.file, study.network.scene.name if study.network.scene else "")
-    write(target, text)
+    target = output or default_output(request.file, study.network.scene.name if study.network.scene else "", ".html")
+    whole_files.write(target, text)
     console.say(f"{target}: {study.target.name}, {len(text) / 1e3:.0f} kB")
     console.result = {
         "report": target,
@@ -48,8 +48,3 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         "failure": None if study.ran is None else study.ran.failure,
     }
     return console.finish(0 if study.ran is None else study.ran.exit)
-
-
-def _default(file: str, scene: str) -> str:
-    stem = "model" if file == "-" else Path(file).stem
-    return f"{stem}-{scene}.html" if scene else f"{stem}.html"

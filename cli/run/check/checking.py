@@ -91,7 +91,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
         if report.failed:
             return {"ok": False}
     value = prepared.binding.evaluate
-    t0 = value(scene.start) if scene and scene.start else 0.0
+    t0 = prepared.begin
     t1 = value(scene.end) if scene and scene.end else t0
     report.extend(jumps(prepared.network, prepared.binding.parameters, (t0, t1)))
     if report.failed:

@@ -135,8 +135,7 @@ class Loaded:
         check_tolerances(request)
         self.request = request
         report = Report()
-        document = targets.read(request.file, report)
-        target = targets.one(document, request.file, request.model, request.scene, report)
+        target = targets.asked(request, report)
         if target is None or report.failed:
             raise ModelError(report.diagnostics)
         self.target: Target = target

@@ -131,7 +131,7 @@ def options_of(
     scene = prepared.network.scene or Scene("", prepared.network.place)
     value = prepared.binding.evaluate
 
-    t0 = value(scene.start) if scene.start is not None else 0.0
+    t0 = prepared.begin
     t1 = value(scene.end) if scene.end is not None else None
     if request.until is None and t1 is None and not report.failed:
         raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
@@ -290,10 +290,10 @@ def separate(text: str) -> list[str]:
     return parts
 
 
-def default_output(file: str, scene: str) -> str:
-    """The trace's file where none is named."""
+def default_output(file: str, scene: str, end: str = ".h5") -> str:
+    """The file where none is named: a trace's, or with another end."""
     stem = "model" if file == "-" else Path(file).stem
-    return f"{stem}-{scene}.h5" if scene else f"{stem}.h5"
+    return f"{stem}-{scene}{end}" if scene else f"{stem}{end}"
 
 
 def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:

@@ -9,7 +9,6 @@ are taken together, in the formulation in which they were.  A lock that is out o
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from typing import Any
 from sysdyn.cli import whole_files
 from sysdyn.cli.options import FORMULATIONS, INDICES
 from sysdyn.cli.run.request.targets import Target
+from sysdyn.cli.whole_files import toml_text
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.text.source import real
@@ -62,10 +62,11 @@ def path_of(file: str) -> Path:
     return Path(file + SUFFIX)
 
 
-def hashes(source: SourceText, items: tuple[syntax.TopLevel, ...]) -> dict[str, str]:
-    """sha256 of a text, of what it imports from its own folder, and of its tables' files, by name beside it."""
+def hashes(target: Target) -> dict[str, str]:
+    """sha256 of the text, of what it imports from its own folder, and of its tables' files, by name beside it."""
     found: dict[str, str] = {}
-    top = real(source.name).parent
+    file = target.document.file
+    top = real(file.source.name).parent
 
     def name(path: Path) -> str:
         return path.relative_to(top).as_posix() if path.is_relative_to(top) else str(path)
@@ -80,7 +81,7 @@ def hashes(source: SourceText, items: tuple[syntax.TopLevel, ...]) -> dict[str, 
             elif other.is_file():
                 found[name(other)] = hashlib.sha256(other.read_bytes()).hexdigest()
 
-    take(real(source.name), items)
+    take(real(file.source.name), file.items)
     return dict(sorted(found.items()))
 
 
@@ -123,7 +124,7 @@ def _stale(held: Mapping[str, Any], target: Target, version: str) -> str:
     """Why a lock no longer holds; "" where it does."""
     if held["version"] != FORMAT or held["sysdyn"] != version:
         return f"sysdyn {held['sysdyn']} wrote it, this is {version}"
-    now = hashes(target.document.file.source, target.document.file.items)
+    now = hashes(target)
     changed = sorted(name for name in now.keys() | held["files"].keys() if now.get(name) != held["files"].get(name))
     return f"{', '.join(changed)} changed since it was measured" if changed else ""
 
@@ -212,26 +213,22 @@ def write(file: str, target: Target, lock: Lock, version: str) -> Path:
         "accuracy": lock.accuracy,
         "level": dict(lock.levels),
     }
-    files = hashes(target.document.file.source, target.document.file.items)
-    whole_files.replace(path, _text(files, version, scenes))
+    whole_files.replace(path, _text(hashes(target), version, scenes))
     return path
 
 
 def _text(files: Mapping[str, str], version: str, scenes: Mapping[str, Mapping[str, Any]]) -> str:
     lines = ["# Written by sysdyn trade --lock, read by sysdyn simulate; out of date once a file below changes."]
-    lines += [f"version = {FORMAT}", f"sysdyn = {_quoted(version)}", "", "[files]"]
-    lines += [f"{_quoted(name)} = {_quoted(value)}" for name, value in files.items()]
+    lines += [f"version = {FORMAT}", f"sysdyn = {toml_text(version)}", "", "[files]"]
+    lines += [f"{toml_text(name)} = {toml_text(value)}" for name, value in files.items()]
     for name, said in sorted(scenes.items()):
-        lines += ["", f"[scene.{_quoted(name)}]"]
+        lines += ["", f"[scene.{toml_text(name)}]"]
         for key in ("formulation", "index", "method"):
-            lines.append(f"{key} = {_quoted(str(said[key]))}")
+            lines.append(f"{key} = {toml_text(str(said[key]))}")
         for key in ("tolerance", "accuracy"):
             lines.append(f"{key} = {float(said[key])!r}")
-        levels = ", ".join(f"{_quoted(path)} = {_quoted(str(level))}" for path, level in said.get("level", {}).items())
+        levels = ", ".join(
+            f"{toml_text(path)} = {toml_text(str(level))}" for path, level in said.get("level", {}).items()
+        )
         lines.append(f"level = {{ {levels} }}" if levels else "level = {}")
     return "\n".join(lines) + "\n"
-
-
-def _quoted(text: str) -> str:
-    """A basic string of TOML: JSON's, which escapes the same."""
-    return json.dumps(text, ensure_ascii=False)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import glob
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from sysdyn.cli.failures import UsageError
+from sysdyn.cli.failures import UsageError, instead
 from sysdyn.dsl import load
 from sysdyn.dsl.load import Document
-from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.text.decoding import decode
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
+
+if TYPE_CHECKING:
+    from sysdyn.cli.run.request.asked import Request
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +108,17 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
     return whole(document, path, model, None, report)
 
 
+def asked(request: Request, report: Report, choose: Callable[..., Target | None] = one) -> Target | None:
+    """What a request means of its file, by `one`, `still` or `whole`."""
+    document = read(request.file, report, request.text)
+    return choose(document, request.file, request.model, request.scene, report)
+
+
+def held(request: Request, target: Target) -> Request:
+    """The request for other processes: what stood on standard input is read once."""
+    return replace(request, text=target.document.file.source.text if request.file == "-" else None)
+
+
 def still(document: Document, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
     """As `one`, of what needs no scene to run: where there are several and none is named it is the model by itself."""
     several = [s for s in document.scenes.values() if model is None or s.model.names == (model,)]
@@ -141,7 +155,5 @@ def _nothing(document: Document, path: str, what: str, name: str, names: list[st
         from sysdyn.dsl.text.diagnostics import ModelError
 
         return ModelError(report.diagnostics)
-    near = nearest(name, names)
-    listed = f"nearest: '{near}'" if near else f"there are: {', '.join(names) or 'none'}"
     code = "E901" if what == "scene" else "E902"
-    return UsageError(f"{code}: {path} has no {what} '{name}'; {listed}")
+    return UsageError(f"{code}: {path} has no {what} '{name}'; {instead(name, names)}")
