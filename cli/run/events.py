@@ -28,20 +28,24 @@ def plan(prepared: Prepared, system: System, rest: float = 1e-6) -> Plan:
 
 
 def zeno(prepared: Prepared, events: Sequence[Happened], report: Report) -> None:
-    """N923 for each contact whose impacts came ever faster until they were too slow to tell from rest."""
+    """N923 for the contacts whose impacts came ever faster until they were too slow to tell from rest: one for those of
+    an array.
+    """
     impacts: dict[str, list[float]] = {}
-    said: set[str] = set()
-    places = {s.name: s.place for s in prepared.network.switches}
+    rested: dict[str, dict[str, str]] = {}  # what is told of each contact, by arrays
     for event in events:
         name = event.element
         if event.name.startswith("impact ") and event.after == "free":
             impacts.setdefault(name, []).append(event.time)
-        elif event.after == "holds":
-            times = impacts.pop(name, [])
-            if len(times) >= ZENO and name not in said:
-                said.add(name)
-                text = f"{name}: {len(times)} impacts from {times[0]:.9g} s on, ever faster, end at {event.time:.9g} s"
-                report.note("N923", f"{text}: what was left of them is rest", places.get(name, prepared.network.place))
+        elif event.after == "holds" and len(times := impacts.pop(name, [])) >= ZENO:
+            text = f"{len(times)} impacts from {times[0]:.9g} s on, ever faster, end at {event.time:.9g} s"
+            rested.setdefault(name.partition("[")[0], {}).setdefault(name, text)
+    places = {s.name: s.place for s in prepared.network.switches}
+    for told in rested.values():
+        (name, text), others = next(iter(told.items())), len(told) - 1
+        alike = f" (and so do those of {others} more)" if others else ""
+        place = places.get(name, prepared.network.place)
+        report.note("N923", f"{name}: {text}{alike}: what was left of them is rest", place)
 
 
 class _Planner:

@@ -32,6 +32,7 @@ from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.numerics.tall import free_unknowns
 from sysdyn.runtime.start.integrated import BROKEN, integrated, missed
 from sysdyn.runtime.start.settled import inertial_rows
+from sysdyn.values import dataclass
 
 FOLLOWS = ("f", "p", "e", "kappa", "mu")
 LOOSE = 1e3
@@ -62,6 +63,20 @@ class UnbalancedError(Exception):
     def __init__(self, row: int) -> None:
         super().__init__(row)
         self.row = row
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a jump is asked for.  behind [rows]: what holds behind the instant, in what moves [unknowns]; met [rows]:
+    whose integrals must be met; integrals: entries linear in moves and integrals, from dF/dy, dF/dyd and y; ease
+    [unknowns]: times their magnitudes, how far these may move.
+    """
+
+    behind: Mask
+    moves: Mask
+    met: Mask
+    integrals: Callable[[Floats, Floats, Floats], Entries]
+    ease: Floats | float
 
 
 class Instant:
@@ -178,7 +193,8 @@ class Instant:
         behind[self.system.held[0]] = True  # they read "multiplier = 0"
         # other dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
         moves = (self.system.kinds != "s") | jumps
-        found, impulse = self._jump((t, y, yd), magnitude, behind, moves, met, lambda *_: (i, j, v, v), ease)
+        asked = Asked(behind, moves, met, lambda *_: (i, j, v, v), ease)
+        found, impulse = self._jump((t, y, yd), magnitude, asked)
         found = np.where(jumps, found, y)
         return found, self._pushed(slope, found - y, impulse, inertia * magnitude[self._column])
 
@@ -235,9 +251,8 @@ class Instant:
 
         aim = np.stack([np.zeros(self.system.rows) if aims is None else aims, -push], axis=1)
         begun = self._sloping(t, y, yd, magnitude)
-        return self._jump(
-            (t, y, yd), magnitude, behind, moves, met, integrals, ease, begun=begun, aims=aim, asked=aims is not None
-        )
+        asked = Asked(behind, moves, met, integrals, ease)
+        return self._jump((t, y, yd), magnitude, asked, begun=begun, aims=aim, sure=aims is not None)
 
     def _mean(self, t: float, way: tuple[Floats, Floats], yd: Floats, jyd: Floats) -> Floats:
         """Mean of dF/dyd [entries] along the straight way, jyd at its end: times the jumps of flows and contents what
@@ -273,33 +288,27 @@ class Instant:
         self,
         before: tuple[float, Floats, Floats],
         magnitude: Floats,
-        behind: Mask,
-        moves: Mask,
-        met: Mask,
-        integrals: Callable[[Floats, Floats, Floats], Entries],
-        ease: Floats | float,
+        asked: Asked,
         *,
         begun: Floats | None = None,
         aims: Floats | float = 0.0,
-        asked: bool = False,
+        sure: bool = False,
     ) -> tuple[Floats, Floats]:
         """The least change of y that meets the rows, from where it has begun, without its round-off; impulses of forces
         [unknowns]; UnbalancedError.  Where that comes to no numbers y is as it was, and there are none.
 
-        before: t, y, yd; behind [rows]: what holds behind the instant, in what moves [unknowns]; met [rows]: whose
-        integrals must be met; integrals: entries linear in moves and integrals, from dF/dy, dF/dyd and y; ease
-        [unknowns]: times their magnitudes, how far these may move; aims [rows, 2]: what the rows behind the instant
-        shall be, and the integrals.  asked: numbers there must be, else NotFiniteError.
+        before: t, y, yd; aims [rows, 2]: what the rows behind the instant shall be, and the integrals.  sure: numbers
+        there must be, else NotFiniteError.
         """
         t, start, yd = before
         y, integral, step = start if begun is None else begun, np.zeros(start.size), np.inf
-        here = behind[self._row] & moves[self._column]
-        scale = np.stack([magnitude * ease, np.full(start.size, np.nan)], axis=1).ravel()
+        here = asked.behind[self._row] & asked.moves[self._column]
+        scale = np.stack([magnitude * asked.ease, np.full(start.size, np.nan)], axis=1).ravel()
         for _ in range(ITERATIONS):
             jy, jyd = (np.where(np.isfinite(item), item, 0.0) for item in self.system.jacobian(t, y, yd))
-            i, j, v, mean = integrals(jy, jyd, y)
+            i, j, v, mean = asked.integrals(jy, jyd, y)
             aim = np.zeros((self.system.rows, 2)) + aims
-            aim[behind, 0] -= self.system.residual(t, y, yd)[behind]
+            aim[asked.behind, 0] -= self.system.residual(t, y, yd)[asked.behind]
             change, aim = np.stack([y - start, integral], axis=1).ravel(), aim.ravel()
             np.add.at(aim, i, -mean * change[j])
             if step <= CONVERGED:
@@ -308,14 +317,14 @@ class Instant:
             try:
                 move = least_measured(entries, aim, scale)
             except NotFiniteError:
-                if asked:
+                if sure:
                     raise
                 return start, np.zeros(start.size)
             y, integral = y + move[::2], integral + move[1::2]
             step = float((np.abs(move[::2]) / np.maximum(magnitude, np.abs(y))).max(initial=0.0))
         wanted = (np.zeros((self.system.rows, 2)) + aims).ravel()
         size = np.fmax(scale, np.stack([np.maximum(np.abs(y), np.abs(start)), 0.0 * y], axis=1).ravel())
-        off = np.where(met, missed((i, j, mean), size, (aim, wanted))[1::2], 0.0)
+        off = np.where(asked.met, missed((i, j, mean), size, (aim, wanted))[1::2], 0.0)
         if off.any():
             raise UnbalancedError(int(np.argmax(off)))
         return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._integrated, integral, 0.0)

@@ -29,7 +29,10 @@ from sysdyn.values import dataclass
 DENSE = 300
 SMALL = 32
 """Unknowns up to which the core looks at a pencil first (core/linear/dense/dense.h)."""
-MAX_INDEX = 6
+MAX_INDEX, USUAL = 6, 2
+"""An index up to USUAL is believed at once.  Where entries lie far apart ranks come out too small, which makes it larger
+(operational amplifiers: 4 for 2): then it is the least of that as written and that in sizes of the unknowns.
+"""
 ROUSED = 1e-2
 """Slopes of steep laws, as part of the largest term of their row, where only structure is asked."""
 
@@ -266,20 +269,23 @@ def _index_at(system: System, t: float, y: Floats, yd: Floats) -> tuple[int | No
     if system.unknowns == 0:
         return 0, ()
     jy, jyd = system.jacobian(t, y, yd)
+    least = None
     if system.unknowns <= SMALL and system.rows == system.unknowns:
         found = _small_index(system, jy, jyd)
-        if found >= 0:
+        if 0 <= found <= USUAL:
             return found, ()
+        least = found if found >= 0 else None
     size = balanced(system, y, jy)[system.pattern.columns_of()]
     undetermined: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
     looks = (jy, jyd), (jy * size, jyd * size), (_roused(system, t, jy * size), jyd * size)
-    for at, rates in looks:
+    for at, rates in looks[0 if least is None else 1 :]:
         names = null_place(system, at, rates)[0]
         index = None if names else pencil_index(system.dense(rates), system.dense(at))
-        if index is not None:
-            return index, ()
-        undetermined = undetermined or names
+        known = [k for k in (least, index) if k is not None]
+        if known and (at is not jy or known[0] <= USUAL):
+            return min(known), ()
+        least, undetermined = index, undetermined or names
     # regular, and entries lie too far apart for ranks
     index = None if names else _growth_index(system, list(looks[-1]))
     return index, () if index is not None else undetermined

@@ -188,6 +188,13 @@ def test_ngspice_agrees(name, tmp_path, capsys):
         assert np.abs(values - table[:, k + 1]).max() < 3e-4 * np.abs(table[:, k + 1]).max(), asked
 
 
+def test_an_amplifier_of_many_frequencies_has_the_index_of_its_form(tmp_path, capsys):
+    """A pole at 160 kHz behind a gain of 10000: ranks of the rows as written say 4."""
+    assert run(["import", str(NETLISTS / "wien.cir"), "-o", str(tmp_path / "wien.sd")]) == 0
+    assert run(["check", str(tmp_path / "wien.sd")]) == 0
+    assert "index 2" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [

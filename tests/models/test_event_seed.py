@@ -157,5 +157,6 @@ def test_a_stop_in_the_plane_with_other_parameters(changed, tmp_path):
     assert happened(trace, [stop]) < INSTANTS
     before = int(np.searchsorted(trace.time, stop - 1e-6))  # the row at which it stops, where its flow has no direction
     for name, v in (("ex", p["vx_0"]), ("ey", p["vy_0"])):
-        assert trace[name].values[before] == pytest.approx(p["mu"] * 2.0 * p["g"] * v / speed, rel=1e-8)
+        # of a speed of 1e-7 m/s, whose round-off turns it by 1e-8
+        assert trace[name].values[before] == pytest.approx(p["mu"] * 2.0 * p["g"] * v / speed, rel=5e-8)
         assert trace[name].values[before + 1] == 0.0
