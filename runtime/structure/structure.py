@@ -30,7 +30,7 @@ DENSE = 300
 SMALL = 32
 """Unknowns up to which the core looks at a pencil first (core/linear/dense/dense.h)."""
 MAX_INDEX, USUAL = 6, 2
-"""An index up to USUAL is believed at once.  Where entries lie far apart ranks come out too small, which makes it larger
+"""An index up to USUAL is believed at once.  Where entries lie far apart ranks come out too small, and it too large
 (operational amplifiers: 4 for 2): then it is the least of that as written and that in sizes of the unknowns.
 """
 ROUSED = 1e-2
