@@ -12,7 +12,7 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.events.bounces import thrown
+from sysdyn.runtime.events.bounces import LEAST, flights, thrown
 from sysdyn.runtime.events.choices import Choices
 from sysdyn.runtime.events.conditions import Conditions, Round, with_momenta
 from sysdyn.runtime.events.contacts import Standing as Stood
@@ -20,7 +20,6 @@ from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.kinks import NoBranchError
 from sysdyn.runtime.events.pivoting import NoActiveSetError
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
-from sysdyn.runtime.events.returns import LEAST, flights
 from sysdyn.runtime.events.succession import Point, Succession
 from sysdyn.runtime.events.turns import Turns
 from sysdyn.runtime.events.watches import BOUNDED, Watched

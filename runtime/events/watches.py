@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.kinks import SLIDES
+from sysdyn.runtime.events.locate import Numbers
 from sysdyn.runtime.events.plan import Contact, Kink, Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.values import dataclass
 
-Numbers = NDArray[np.int64]
 HOLDS, FREE = 1, -1
 """When a row of a contact is watched: while it holds, while it does not; 0: always."""
 BOUNDED = ("friction", "planar")

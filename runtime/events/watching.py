@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sysdyn.runtime.events.bounces import Bounce
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.kinks import Kinks
@@ -48,17 +47,14 @@ class Watching:
         watched = self.watched()
         array: Any = (lib.Watch * max(len(watched), 1))()
         columns = np.frombuffer(array, dtype=np.dtype(lib.Watch))[: len(watched)]
-        small, level = self._edges(watched.row)
-        columns["row"], columns["side"], columns["tolerance"] = watched.row, watched.side, small - level
+        edges = self._edges(watched)
+        columns["row"], columns["side"], columns["tolerance"] = edges.row, edges.side, edges.small - edges.level
         return array, len(watched)
 
     def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
         """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
         watched = self.watched()
-        small, level = self._edges(watched.row)
-        flies = np.isin(watched.row, list(self.bounces))  # let go, at rest
-        still = np.where(flies & (watched.rate >= 0), self.observer.zeros(watched.rate), 0.0)
-        found = crossing(dense, Edges(watched.row, watched.side, watched.rate, small, level, still), begin, end)
+        found = crossing(dense, self._edges(watched), begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 
     def turned(self, t: float, y: Floats, yd: Floats) -> list[Watched]:
@@ -67,21 +63,22 @@ class Watching:
         other = watched.side * values[watched.row] < -self.observer.zeros(watched.row)
         return watched.each(other & (watched.relation >= 0))
 
-    def _edges(self, rows: NDArray[np.int64]) -> tuple[Floats, Floats]:
-        """What each watched value may fall by unseen (behind an impact nearly nothing, for bounces become small), and
-        the value at which it begins: that of a bounce, else zero.
+    def _edges(self, watched: Watches) -> Edges:
+        """What each watched value may fall by unseen (behind an impact nearly nothing, for bounces become small), the
+        value at which it begins (that of a bounce, else zero), and what its rate is beside at rest, once it is let go.
         """
-        small, level = self.observer.zeros(rows), np.zeros(rows.size)
+        rows = watched.row
+        small, level, still = self.observer.zeros(rows), np.zeros(rows.size), np.zeros(rows.size)
         if self.bounces:
-            height = np.full(self.observer.largest.size, np.inf)
-            begins = np.zeros(self.observer.largest.size)
-            thrown = list(self.bounces)
+            thrown, number = list(self.bounces), self.observer.largest.size
+            height, begins, flies = np.full(number, np.inf), np.zeros(number), np.zeros(number, dtype=bool)
             height[thrown] = [b.height for b in self.bounces.values()]
             begins[thrown] = [b.level for b in self.bounces.values()]
-            flies = np.isin(rows, thrown)
-            small[flies] = FALLEN * np.minimum(small, height[rows])[flies]
+            flies[thrown] = True
+            small = np.where(flies[rows], FALLEN * np.minimum(small, height[rows]), small)
             level = begins[rows]
-        return small, level
+            still = np.where(flies[rows] & (watched.rate >= 0), self.observer.zeros(watched.rate), 0.0)
+        return Edges(rows, watched.side, watched.rate, small, level, still)
 
     def flight(self, unseen: float) -> float:
         """Time (s) until the first bounce ends that rises less than `unseen` times the largest value of its gap."""

@@ -1,5 +1,8 @@
 """Events that the core takes by itself in a model of so many unknowns that arrays nobody needs exactly are halved."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from sysdyn import api
@@ -7,6 +10,9 @@ from sysdyn.cli.main import run
 from sysdyn.runtime.events.handler import Handler
 from sysdyn.runtime.model.system import LARGE
 from sysdyn.runtime.trace.trace import Trace
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+from many_events import TEXTS
 
 ROOMS = """
 model rooms {
@@ -61,29 +67,11 @@ def test_the_core_takes_transitions_of_a_large_model_as_of_a_small_one(tmp_path,
     assert asked[LARGE + 2] == asked[10]
 
 
-BANK = """
-model bank {
-  param n = 40
-  for i in 1..n {
-    state T[i]: K = 15 K + 3 K*i/n
-    discrete heating[i] = true
-    dynamic T[i]' = (50 W/K*(5 K - T[i]) + (if heating[i] then 2 kW else 0 W))/(100 kJ/K)
-    when T[i] >= 21 K { heating[i] := false }
-    when T[i] <= 19 K { heating[i] := true }
-  }
-}
-
-scene day of bank {
-  time 0 s to 1000 s
-  trace T[1], T[n]
-}
-"""
-
-
 def test_each_room_of_a_bank_switches_at_its_own_times(tmp_path):
     """The heat takes T to 45 K, the cold to 5 K, in 2000 s."""
-    (tmp_path / "bank.sd").write_text(BANK)
-    trace = api.simulate(tmp_path / "bank.sd", accuracy=1e-6, output=tmp_path / "t.h5")
+    (tmp_path / "bank.sd").write_text(TEXTS["thermostats"])
+    asked = {"set": {"n": 40}, "until": "1000 s", "accuracy": 1e-6}
+    trace = api.simulate(tmp_path / "bank.sd", **asked, output=tmp_path / "t.h5")
     first = 2000.0 * np.log((30.0 - 3.0 * np.arange(1, 41) / 40.0) / 24.0)
     off, on = 2000.0 * np.log(16.0 / 14.0), 2000.0 * np.log(26.0 / 24.0)
     wanted = np.concatenate([first, first + off, first + off + on, first + 2.0 * off + on, first + 2.0 * (off + on)])
@@ -94,29 +82,12 @@ def test_each_room_of_a_bank_switches_at_its_own_times(tmp_path):
 
 
 def test_balls_of_an_array_come_to_rest_in_one_note(tmp_path, capsys):
-    text = """
-    model balls {
-      param n = 12
-      coord h[1..n]: translation
-      for i in 1..n {
-        energy T* = 1/2*1 kg*h[i]'^2
-        energy V = 1 kg*9.81 m/s^2*h[i]
-        phi floor[i]: h[i] >= 0 m restitution 0.5
-        init h[i] = 1 m + 1 cm*i
-        init h[i]' = 0 m/s
-      }
-    }
-    scene s of balls {
-      time 0 s to 2 s
-      trace h[1], h[n]
-    }
-    """
-    (tmp_path / "balls.sd").write_text(text)
-    assert run(["simulate", str(tmp_path / "balls.sd"), "-o", str(tmp_path / "t.h5")]) == 0
+    (tmp_path / "balls.sd").write_text(TEXTS["balls"])
+    assert run(["simulate", str(tmp_path / "balls.sd"), "--set", "n=12", "-o", str(tmp_path / "t.h5")]) == 0
     said = capsys.readouterr()
     assert (said.out + said.err).count("N923") == 1
     assert "(and so do those of 11 more)" in said.out + said.err
     trace = Trace.open(tmp_path / "t.h5")
-    rest = np.sqrt(2.0 * (1.0 + 0.01 * np.arange(1, 13)) / 9.81) * 3.0  # the flights: 1 + 2 (1/2 + 1/4 + ...)
+    rest = np.sqrt(2.0 * (1.0 + np.arange(1, 13) / 12.0) / 9.81) * 3.0  # the flights: 1 + 2 (1/2 + 1/4 + ...)
     held = [event.time for event in trace.events if event.after == "holds"]
     assert np.abs(np.sort(held) - rest).max() < 1e-4

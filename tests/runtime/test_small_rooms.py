@@ -4,8 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from sysdyn.runtime.events.bounces import thrown
-from sysdyn.runtime.events.returns import SEEN, flights
+from sysdyn.runtime.events.bounces import SEEN, flights, thrown
 from sysdyn.runtime.events.watching import FALLEN, Watching
 from sysdyn.runtime.integrate.jumps.first_step import PARTS, WIDER, FirstStep
 from sysdyn.runtime.integrate.jumps.modes import EARLY
@@ -68,12 +67,12 @@ def test_samples_are_due_once_each_whatever_their_instants_are_rounded_to():
 
 @pytest.mark.parametrize("speed", [1e-4, 0.1])
 def test_behind_an_impact_a_gap_closes_below_a_part_of_what_it_rises_to(speed):
-    watch, gap = Watch(), np.array([3])
-    assert watch._edges(gap) == (1e-6, 0.0)
+    watch, gap = Watch(), SimpleNamespace(row=np.array([3]), side=np.array([1]), rate=np.array([4]))
+    assert (watch._edges(gap).small, watch._edges(gap).level) == (1e-6, 0.0)
     watch.bounces[3] = thrown(-1e-9, speed, G)
     rises = 0.5 * speed**2 / G
-    assert watch._edges(gap)[0] == pytest.approx(FALLEN * min(1e-6, rises), rel=1e-12)
-    assert watch._edges(gap)[1] == -1e-9
+    assert watch._edges(gap).small == pytest.approx(FALLEN * min(1e-6, rises), rel=1e-12)
+    assert watch._edges(gap).level == -1e-9
     assert watch.flight(2.0 * rises) == pytest.approx(2.0 * speed / G, rel=1e-12)
     assert watch.flight(0.5 * rises) == np.inf
 
