@@ -67,6 +67,7 @@ class Runs:
         self.compared = Compared(options, self.instants, len(self.names))
         self.accounts = Accounts(options)
         self.keeping = keeping(options.output)
+        self.most: Floats | None = None
         self.take(way)
         if options.events:  # laws are as the text says, whatever a run before from this start left
             description.p[[kink.branch for kink in options.events.kinks]] = LIVE
@@ -95,6 +96,8 @@ class Runs:
         self.patience: int | None = patience
         self.patience_with_draft: int | None = None
         self.opening = 0.0
+        if before.system is not way.system:
+            self.most = None
         self._compared_before = self.instants.common
         if before is way or (before.system, before.index) != (way.system, way.index):
             self._origin: Origin | None = None
@@ -144,6 +147,7 @@ class Runs:
             unstrained=draft and rtol > 1.01 * TAME and not self.system.form.scales,
             audited=bool(self.quantities.meters),
             opening=self.opening,
+            most=self.most,
             apart=APART if draft and self.instants.open else 0.0,
             events=options.events or None,
             begin=self.begin,
@@ -212,7 +216,7 @@ class Runs:
             self.writer.flush()
             self.keeping.take(self.writer, self.done[2])
         self.done, self.finished = (finished, self.samples, self.writer), finished
-        self.opening = finished.opening
+        self.opening, self.most = finished.opening, finished.most
         return finished
 
     def _integrate(self, integration: Integration) -> Finished:

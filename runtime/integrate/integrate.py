@@ -35,7 +35,7 @@ from sysdyn.runtime.integrate.weights.told import Told
 from sysdyn.runtime.integrate.weights.unknown_roles import Roles, general_rates, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.scales import confirmed, group_maxima
+from sysdyn.runtime.model.scales import GROUP, confirmed, group_maxima
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import Order, net_order_of
 from sysdyn.runtime.start.settled import Settler
@@ -264,10 +264,13 @@ class Integration:
         y, yd = self.method.point()
         return y, yd, self.sizes.at(y)[0]
 
-    def confirmed(self, met: Floats, magnitude: Floats) -> Floats:
-        """Largest magnitude of each kind and unit as the run confirmed them, by those it met and went by [unknowns]."""
-        span = self.request.t_end - self.start.t
-        return group_maxima(self.system, confirmed(self.system, span, met, magnitude))
+    def _confirmed(self, met: Floats, magnitude: Floats) -> tuple[Floats, Floats | None]:
+        """By the sizes that the run met and went by [unknowns]: the largest that it confirmed of each kind and unit,
+        and what guesses of the next run are no larger than [unknowns].
+        """
+        found = confirmed(self.system, self.request.t_end - self.start.t, met, magnitude)
+        most = None if self.system.unknowns > LARGE else np.maximum(met, GROUP * found)
+        return group_maxima(self.system, found), most
 
     def _drift(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
@@ -411,9 +414,9 @@ class Integration:
             del method
             self._leave_method()
         met, magnitude = self.sizes.at(last()[0], last=True)
-        magnitude, met = self.confirmed(met, magnitude), group_maxima(self.system, met)
+        (magnitude, most), met = self._confirmed(met, magnitude), group_maxima(self.system, met)
         self._spare()
-        return replace(found, magnitude=magnitude, last=(last, met))
+        return replace(found, magnitude=magnitude, last=(last, met), most=most)
 
     def _leave_method(self) -> None:
         """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""

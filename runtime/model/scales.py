@@ -11,8 +11,9 @@ nothing of what relieves it (the whole of a source on a diode would drive 1e8 A)
 it is round-off (a diode that blocks): those that carry the state lie within what the sources make of them by the time
 in which they move, or a thousandth of that of their like, and what by the whole span (core/start/response.h).  They are
 no less than round-off of the terms that balance there makes of them, for what is held answers to nothing.
-During a run magnitudes grow with max |y|, and what begins to move gets a thousandth of its like; a second run starts
-with the maxima of the first.
+During a run magnitudes grow with max |y|, and what begins to move gets a thousandth of its like.  Behind a run that
+has met less of a state than was guessed the next one guesses no more than that: else both would pass over what is small
+beside the guess, and agree (a light mass that rings on a spring, 1272 times less than balances would let it).
 """
 
 from __future__ import annotations

@@ -51,15 +51,22 @@ def test_meters_are_relative_to_what_went_round():
     assert of.of_run(finished).tolist() == [1.0, 0.5, 3.0, 7.0, 1.0]
 
 
-def sizes(found, least):
+def sizes(found, least, most=None):
     """Of a run with tolerance 1e-3."""
     origin = SimpleNamespace(sized=lambda _: (np.array(found), 2.0), least=np.array(least))
-    return Sizes(masses(), None, SimpleNamespace(rtol=1e-3, t_end=1.0), origin)
+    return Sizes(masses(), None, SimpleNamespace(rtol=1e-3, t_end=1.0, most=most), origin)
 
 
 def test_no_tolerance_is_less_than_round_off_leaves_open():
     """A tolerance of 1e-3 of 0.1 is less than the 1e-3 that is open of it."""
     assert sizes([1.0, 0.1, 1.0, 1.0], [1e-3, 1e-3, 0.0, 0.0]).magnitude.tolist() == [1.0, 1.0, 1.0, 1.0]
+
+
+def test_no_guess_is_larger_than_what_the_run_before_met():
+    """Of 1 and 2 m it met 0.25 and 5: the first guess was too large, and what grows late hides nothing early."""
+    met = np.array([0.25, 5.0, 3.0, 4.0])
+    assert sizes([1.0, 2.0, 3.0, 4.0], [0.0] * 4, met).magnitude.tolist() == [0.25, 2.0, 3.0, 4.0]
+    assert sizes([1.0, 2.0, 3.0, 4.0], [5e-4] * 4, met).magnitude.tolist() == [0.5, 2.0, 3.0, 4.0]
 
 
 def test_what_a_method_of_fewer_unknowns_meets_is_shared():
