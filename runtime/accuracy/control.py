@@ -6,7 +6,8 @@ instants of the last one's.  Where little happens in a draft of radau, the run b
 Where the estimate (estimate.py) misses what was asked, a finer run follows and is compared with the last one.  The
 finest run is handed back with its estimate; laws.py says what tolerances promise.
 Each run finds the magnitudes of its unknowns for itself, though none larger than the run before has met: those that it
-met late would hide what is small early and grows, those that were never met what is small always.  Two runs that took the same steps say nothing: a third takes steps of half the length elsewhere.
+met late would hide what is small early and grows, those that were never met what is small always.  Two runs that took
+the same steps say nothing: a third takes steps of half the length elsewhere.
 """
 
 from __future__ import annotations

@@ -264,13 +264,9 @@ class Integration:
         y, yd = self.method.point()
         return y, yd, self.sizes.at(y)[0]
 
-    def _confirmed(self, met: Floats, magnitude: Floats) -> tuple[Floats, Floats | None]:
-        """By the sizes that the run met and went by [unknowns]: the largest that it confirmed of each kind and unit,
-        and what guesses of the next run are no larger than [unknowns].
-        """
-        found = confirmed(self.system, self.request.t_end - self.start.t, met, magnitude)
-        most = None if self.system.unknowns > LARGE else np.maximum(met, GROUP * found)
-        return group_maxima(self.system, found), most
+    def confirmed(self, met: Floats, magnitude: Floats) -> Floats:
+        """Magnitudes as the run confirmed them, by those it met and went by [unknowns]."""
+        return confirmed(self.system, self.request.t_end - self.start.t, met, magnitude)
 
     def _drift(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
@@ -414,7 +410,9 @@ class Integration:
             del method
             self._leave_method()
         met, magnitude = self.sizes.at(last()[0], last=True)
-        (magnitude, most), met = self._confirmed(met, magnitude), group_maxima(self.system, met)
+        magnitude = self.confirmed(met, magnitude)
+        most = None if self.system.unknowns > LARGE else np.maximum(met, GROUP * magnitude)
+        magnitude, met = (group_maxima(self.system, sizes) for sizes in (magnitude, met))
         self._spare()
         return replace(found, magnitude=magnitude, last=(last, met), most=most)
 

@@ -28,7 +28,7 @@ from sysdyn.runtime.many.mass_matrix import mass_matrix
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, stated
 from sysdyn.runtime.model.failures import SolverFailure
-from sysdyn.runtime.model.scales import sizing
+from sysdyn.runtime.model.scales import group_maxima, sizing
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.simulate import close
@@ -372,7 +372,7 @@ class Batch:
         finished = Finished(
             self.options.t_end,
             runs.accounts.statistics,
-            made.confirmed(*made.sizes.at(made.method.point()[0])),
+            group_maxima(made.system, made.confirmed(*made.sizes.at(made.method.point()[0]))),
             made.driver.largest(),
             core.spent,
             made.settler.core.contents.failures,

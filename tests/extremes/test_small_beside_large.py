@@ -112,7 +112,7 @@ def test_a_light_mass_that_rings_is_not_passed_over(formulation, accuracy, tmp_p
     found, t = ran(tmp_path, RINGS, formulation=formulation, accuracy=accuracy), np.linspace(0.0, 0.3, 301)
     w = 250.0
     step = expm(1e-3 * np.array([  # of flow, contents, the light flow, sin(w t), cos(w t)
-        [-1.0 / 4e-3, -1e3 / 4e-3, 0.0, 1.0 / 4e-3, 0.0], [1.0, 0.0, -1.0, 0.0, 0.0], [0.0, 1e3 / 1e-6, -100.0, 0.0, 0.0],
+        [-250.0, -2.5e5, 0.0, 250.0, 0.0], [1.0, 0.0, -1.0, 0.0, 0.0], [0.0, 1e9, -100.0, 0.0, 0.0],
         [0.0, 0.0, 0.0, 0.0, w], [0.0, 0.0, 0.0, -w, 0.0],
     ]))  # fmt: skip
     rows = [np.array([0.0, 0.0, 0.0, 0.0, 1.0])]
