@@ -73,7 +73,7 @@ LAWS = {
     # hundredth of the draft's tolerance spares some third runs, and left every third one below a hundredth of what was
     # asked; a tenth lets no draft of the dearest models do.  Error of the finer run over its difference from a draft
     # (239 pairs): 0.02 in the median, 95 % below 0.27, all below 0.74; the estimate says 0.25
-    "radau": Law(21.0, 0.95, 0.6, 1e-17, ratio=0.03, little=0.2, safety=1.8),
+    "radau": Law(21.0, 0.95, 0.6, 1e-17, ratio=0.03, little=0.2, safety=1.8, order=5.0),
     # its error is 0.01 to 4 times the tolerance (20 models); pairs that agree by chance say less (rober: a hundredth)
     # where events hold the steps its error hardly falls with the tolerance: of 100 pairs of the gallery it was over
     # three times the estimate in 57 by the tolerances alone, in 10 by the steps too (of 122 without events in 38 and 4)
