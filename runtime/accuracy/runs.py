@@ -67,7 +67,7 @@ class Runs:
         self.compared = Compared(options, self.instants, len(self.names))
         self.accounts = Accounts(options)
         self.keeping = keeping(options.output)
-        self.most: Floats | None = None
+        self.ceiling: Floats | None = None
         self.take(way)
         if options.events:  # laws are as the text says, whatever a run before from this start left
             description.p[[kink.branch for kink in options.events.kinks]] = LIVE
@@ -97,7 +97,7 @@ class Runs:
         self.patience_with_draft: int | None = None
         self.opening = 0.0
         if before.system is not way.system:
-            self.most = None
+            self.ceiling = None
         self._compared_before = self.instants.common
         if before is way or (before.system, before.index) != (way.system, way.index):
             self._origin: Origin | None = None
@@ -147,7 +147,7 @@ class Runs:
             unstrained=draft and rtol > 1.01 * TAME and not self.system.form.scales,
             audited=bool(self.quantities.meters),
             opening=self.opening,
-            most=self.most,
+            ceiling=self.ceiling,
             apart=APART if draft and self.instants.open else 0.0,
             events=options.events or None,
             begin=self.begin,
@@ -216,7 +216,7 @@ class Runs:
             self.writer.flush()
             self.keeping.take(self.writer, self.done[2])
         self.done, self.finished = (finished, self.samples, self.writer), finished
-        self.opening, self.most = finished.opening, finished.most
+        self.opening, self.ceiling = finished.opening, finished.ceiling
         return finished
 
     def _integrate(self, integration: Integration) -> Finished:

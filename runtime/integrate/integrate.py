@@ -35,7 +35,7 @@ from sysdyn.runtime.integrate.weights.told import Told
 from sysdyn.runtime.integrate.weights.unknown_roles import Roles, general_rates, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.scales import GROUP, confirmed, group_maxima
+from sysdyn.runtime.model.scales import ceiling, confirmed, group_maxima
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import Order, net_order_of
 from sysdyn.runtime.start.settled import Settler
@@ -411,10 +411,10 @@ class Integration:
             self._leave_method()
         met, magnitude = self.sizes.at(last()[0], last=True)
         magnitude = self.confirmed(met, magnitude)
-        most = None if self.system.unknowns > LARGE else np.maximum(met, GROUP * magnitude)
+        most = None if self.system.unknowns > LARGE else ceiling(self.system, met, magnitude)
         magnitude, met = (group_maxima(self.system, sizes) for sizes in (magnitude, met))
         self._spare()
-        return replace(found, magnitude=magnitude, last=(last, met), most=most)
+        return replace(found, magnitude=magnitude, last=(last, met), ceiling=most)
 
     def _leave_method(self) -> None:
         """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""

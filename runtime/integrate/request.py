@@ -46,7 +46,7 @@ class Request:
     condense: what constant sums define leaves the system (condense/);
     stages: of radau, in the first step and at most, None: chosen;
     opening: of dopri, rosenbrock: first step as an earlier run found it fit (steppers/explicit/dopri.h), 0: chosen;
-    most [unknowns]: what guessed sizes of states are no larger than, as an earlier run met them, None: any;
+    ceiling [unknowns]: what guessed sizes of states are no larger than, as an earlier run met them, None: any;
     unstrained: it is given up where Newton fails in every second step (cause strained);
     apart: part of a step; instants within it that are nearer to the row before are passed over;
     extrema: what is observed is looked at within steps for its least and largest values.
@@ -81,7 +81,7 @@ class Request:
     stages: tuple[int, int] | None = None
     unstrained: bool = False
     opening: float = 0.0
-    most: Floats | None = None
+    ceiling: Floats | None = None
 
     @property
     def tolerance(self) -> float:
@@ -118,7 +118,7 @@ class Finished:
     magnitude [kinds and units]: the largest, as the run confirmed it; largest [observed]: of the values and of the
     terms of their expressions; cpu [s]; ledgers: what came of them is read of the run that is kept; beyond: the largest
     unknown of a row within a step, in magnitudes that it has at steps; last: what gives y and yd at its end
-    [unknowns], the largest |y| of each kind and unit; opening, most: for the next run's request; extrema: least and
+    [unknowns], the largest |y| of each kind and unit; opening, ceiling: for the next run's request; extrema: least and
     largest values within steps [2, observed] (infinite where there are none), where these were looked into;
     open: rows of block observe that nothing determined at times, and the contacts between which they floated.
     """
@@ -134,7 +134,7 @@ class Finished:
     beyond: float = 0.0
     last: tuple[Callable[[], tuple[Floats, Floats]], Floats] | None = None
     opening: float = 0.0
-    most: Floats | None = None
+    ceiling: Floats | None = None
     extrema: Floats | None = None
     open: dict[int, tuple[str, ...]] = field(default_factory=dict)
 

@@ -287,7 +287,7 @@ class Batch:
         many.system, many.sizing = c.addressof(system.core), c.addressof(sizes.core)
         many.order = net_order_of(system).address
         many.form_jy, many.form_jyd = (self._kept(np.zeros(system.pattern.entries + 1)) for _ in range(2))
-        many.found = self._kept(np.zeros(system.unknowns + 1))
+        many.found, many.ceiling = (self._kept(np.zeros(system.unknowns + 1)) for _ in range(2))
         for k in (0, 1):
             self._fill(k, min((DRAFT, 1.0)[k] * longest * span, options.longest or np.inf))
         many.column = self._kept(np.array([column.place for column in runs.columns], dtype=np.int32))
@@ -305,6 +305,7 @@ class Batch:
         many.late = min(pairs.TIMING, pairs.SHARE * asked) * span
         for name in ("power", "credit", "finest", "far", "ratio", "little", "growth"):
             setattr(many, name, getattr(law, name))
+        many.fall = law.order
         many.few_steps, many.many_steps = FEW_STEPS, law.most
         many.tolerance[0], many.tolerance[1] = draft, fine
         many.max_steps = min(options.max_steps or 2**62, 2**62)

@@ -285,11 +285,26 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
     kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
     round-off altogether.
     """
-    found, kind, like, nominal = np.zeros(system.unknowns), _kinds(system), alike(system), system.named
-    rows = lib.Balance(unknowns=like.size, kinds=1 + int(like.max(initial=0)), kind=lib.pointer(like))  # none is read
-    tables = lib.Sizing(balance=c.addressof(rows), nominal=lib.pointer(nominal), kind=lib.pointer(kind))
+    found, (tables, _kept) = np.zeros(system.unknowns), _by_kind(system)
     arrays = lib.pointer(met), lib.pointer(magnitude), lib.pointer(found)
     bare, _held = system.bare()
     if lib.core.sd_confirmed(c.byref(tables), c.byref(bare), span, *arrays):
         raise MemoryError
     return found
+
+
+def ceiling(system: System, met: Floats, confirmed: Floats) -> Floats:
+    """What guesses of the next run are no larger than [unknowns]: of a state that nothing names the largest |y| met, or
+    a thousandth of what the run confirmed.
+    """
+    found, (tables, _kept) = confirmed.copy(), _by_kind(system)
+    lib.core.sd_ceiling(c.byref(tables), lib.pointer(met), lib.pointer(found))
+    return found
+
+
+def _by_kind(system: System) -> tuple[lib.Sizing, tuple[object, ...]]:
+    """The core's tables without the rows, which nobody reads who goes by kinds alone, and what they point to."""
+    kind, like, nominal = _kinds(system), alike(system), system.named
+    rows = lib.Balance(unknowns=like.size, kinds=1 + int(like.max(initial=0)), kind=lib.pointer(like))
+    tables = lib.Sizing(balance=c.addressof(rows), nominal=lib.pointer(nominal), kind=lib.pointer(kind))
+    return tables, (rows, kind, like, nominal)

@@ -426,6 +426,11 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     return failed ? -1 : 0;
 }
 
+static int guessed(const sd_sizing *s, int32_t k)
+{
+    return (s->kind[k] & SD_STATE) && named(s, k) == 0.0;
+}
+
 int sd_confirmed(const sd_sizing *s, const sd_system *system, double span, const double *met, const double *magnitude,
                  double *found)
 {
@@ -438,9 +443,14 @@ int sd_confirmed(const sd_sizing *s, const sd_system *system, double span, const
         found[k] = sd_larger(met[k], GROUP * most[b->kind[k]]);
     flows(system, span, found, most + b->kinds);
     for (int32_t k = 0; k < b->unknowns; k++) {
-        int free_ = (s->kind[k] & SD_STATE) && named(s, k) == 0.0;
-        found[k] = free_ ? sd_smaller(sd_larger(found[k], NOISE * magnitude[k]), magnitude[k]) : magnitude[k];
+        found[k] = guessed(s, k) ? sd_smaller(sd_larger(found[k], NOISE * magnitude[k]), magnitude[k]) : magnitude[k];
     }
     free(most);
     return 0;
+}
+
+void sd_ceiling(const sd_sizing *s, const double *met, double *found)
+{
+    for (int32_t k = 0; k < s->balance->unknowns; k++)
+        found[k] = guessed(s, k) ? sd_larger(met[k], GROUP * found[k]) : INFINITY;
 }

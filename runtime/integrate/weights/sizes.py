@@ -43,8 +43,8 @@ class Sizes:
         self.system, self._start, self._request = system, start, request
         self._origin: Origin | None = origin
         found, self.time = origin.sized(request.t_end)
-        if request.most is not None:
-            found = np.where(self.unnamed, np.minimum(found, request.most), found)
+        if request.ceiling is not None:
+            found = np.minimum(found, request.ceiling)
         self._magnitude: Floats = np.maximum(found, self.least)
         self._own: tuple[Ints | Ascents, Floats, Floats] | None = None
         self._met = np.zeros(0)

@@ -18,6 +18,7 @@
 #define SLOWEST 0.75
 #define STRETCH 1.5
 #define SHORT 60
+#define UNSEEN 0.5
 #define SHORT_CREDIT 0.85
 #define FIRST_DROP 1e-2
 #define LOOSE 1e-5
@@ -72,7 +73,7 @@ static void prepare(sd_many *many, sd_pass *pass, double tolerance, double longe
         if (pass->differential[i])
             pass->yd[i] = yd[i];
     for (int32_t i = 0; i < pass->n; i++)
-        pass->magnitude[i] = fmax(many->found[i], pass->least[i]);
+        pass->magnitude[i] = fmax(fmin(many->found[i], many->ceiling[i]), pass->least[i]);
     sd_many_scale(run->settle, pass->magnitude, many->tau);
     if (pass->project)
         sd_many_scale(pass->project, pass->magnitude, many->tau);
@@ -213,6 +214,9 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
             return SD_MANY_FAILED;
     }
     count(many, pass, 1);
+    if (sd_confirmed(many->sizing, many->system, many->t1 - many->t0, pass->met, pass->magnitude, many->ceiling))
+        return SD_MANY_FAILED;
+    sd_ceiling(many->sizing, pass->met, many->ceiling);
     for (int32_t q = 0; q < many->columns && run->extrema; q++) {
         many->least[q] = fmin(many->least[q], run->extrema->least[many->column[q]]);
         many->most[q] = fmax(many->most[q], run->extrema->most[many->column[q]]);
@@ -224,9 +228,12 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
 
 /* --- the accuracy ---------------------------------------------------------------------------------------------- */
 
-static double shrink(double power, double step, double far)
+/* of tolerances a power of ten^step apart; longer: the steps of the finer run over those of the coarser one */
+static double shrink(const sd_many *many, double power, double step, double longer)
 {
-    double ratio = fmax(pow(10.0, -power * step), pow(far, power));
+    double ratio = fmax(pow(10.0, -power * step), pow(many->far, power));
+    if (many->fall > 0.0)
+        ratio = fmax(ratio, fmin(pow(fmax(longer, 1.0), -many->fall), UNSEEN));
     return SAFETY * ratio / (1.0 - ratio);
 }
 
@@ -271,15 +278,16 @@ typedef struct fall {
     double over, step, before, step_before, power;
 } fall;
 
-/* the part of a difference that is the later run's error, `taken` steps long */
-static double part_of(const sd_many *many, fall *f, int64_t taken)
+/* the part of a difference that is the later run's error, `taken` steps long, the other one `before` */
+static double part_of(const sd_many *many, fall *f, int64_t taken, int64_t before)
 {
     if (f->before >= 0.0 && f->over > f->before)
         return 1.0;
     double credit = taken >= SHORT ? many->credit : fmin(many->credit, SHORT_CREDIT);
     if (f->before >= 0.0 && f->over > 0.0 && isfinite(f->before))
         f->power = fmax(0.3, fmin(1.0, log10(f->before / f->over) / f->step_before));
-    return shrink(f->power < 0.0 ? credit : fmin(f->power, credit), f->step, many->far);
+    double longer = (double)taken / (double)(before > 0 ? before : 1);
+    return shrink(many, f->power < 0.0 ? credit : fmin(f->power, credit), f->step, longer);
 }
 
 /* the tolerance behind one whose error was so many times what is aimed at; away: the runs have parted */
@@ -312,6 +320,8 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
     /* of a run that is the last one, nobody asks for rows at its own steps */
     int lean = many->keep == 0 && !many->claims && !many->known;
     /* the draft */
+    for (int32_t i = 0; i < many->passes[0].n; i++)
+        many->ceiling[i] = INFINITY;
     prepare(many, &many->passes[0], tolerance, many->passes[0].longest, NULL, 0.0);
     int state = integrate(many, &many->passes[0], last, there, &taken);
     *steps += taken;
@@ -344,7 +354,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         f.step = log10(tolerance / next);
         if (taken == taken_before && apart < SD_MANY_ROUND_OFF)
             return SD_MANY_ACCURACY; /* two runs that took the same steps say nothing */
-        double part = part_of(many, &f, taken);
+        double part = part_of(many, &f, taken, taken_before);
         *estimate = apart * part;
         int away = next > LOOSE && sd_many_parted(many, &many->passes[1], last, there);
         if (f.over * part <= 1.0 && !away)

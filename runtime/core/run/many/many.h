@@ -93,6 +93,7 @@ typedef struct sd_many {
     const sd_order *order;        /* of its columns; NULL: dense */
     double *form_jy, *form_jyd;  /* [entries] at the start */
     double *found;               /* [n] magnitudes of this run */
+    double *ceiling;             /* [n] what its next integration's are no larger than */
     double tau;                  /* time scale of its start [s] */
     /* accuracy */
     sd_pass passes[2];
@@ -101,7 +102,7 @@ typedef struct sd_many {
     const int32_t *unit, *unit_of; /* [columns], [written]; unit_of -1: none */
     int32_t units, known;        /* known 1: instants of comparison are set up, else steps of the run before */
     double late;                 /* time tolerance of comparisons [s] */
-    double power, credit, finest, far, ratio, little, growth, few_steps, many_steps; /* of the method's law (accuracy/laws.py) */
+    double power, credit, finest, far, ratio, little, growth, fall, few_steps, many_steps; /* of the method's law (accuracy/laws.py) */
     double tolerance[2];         /* of the draft, of the run behind one of few steps */
     int64_t max_steps;
     double energy;               /* part of a ledger's turnover that its balance may be */
