@@ -51,10 +51,10 @@ def test_meters_are_relative_to_what_went_round():
     assert of.of_run(finished).tolist() == [1.0, 0.5, 3.0, 7.0, 1.0]
 
 
-def sizes(found, least, most=None):
+def sizes(found, least, ceiling=None):
     """Of a run with tolerance 1e-3."""
     origin = SimpleNamespace(sized=lambda _: (np.array(found), 2.0), least=np.array(least))
-    return Sizes(masses(), None, SimpleNamespace(rtol=1e-3, t_end=1.0, most=most), origin)
+    return Sizes(masses(), None, SimpleNamespace(rtol=1e-3, t_end=1.0, ceiling=ceiling), origin)
 
 
 def test_no_tolerance_is_less_than_round_off_leaves_open():
