@@ -12,8 +12,8 @@ it is round-off (a diode that blocks): those that carry the state lie within wha
 in which they move, or a thousandth of that of their like, and what by the whole span (core/start/response.h).  They are
 no less than round-off of the terms that balance there makes of them, for what is held answers to nothing.
 During a run magnitudes grow with max |y|, and what begins to move gets a thousandth of its like.  Behind a run that
-has met less of a state than was guessed the next one guesses no more than that: else both would pass over what is small
-beside the guess, and agree (a light mass that rings on a spring, 1272 times less than balances would let it).
+has met less of a content than was guessed the next one guesses no more than that: else both would pass over what is
+small beside the guess, and agree (a light mass that rings on a spring, 1272 times less than balances would let it).
 """
 
 from __future__ import annotations
@@ -294,8 +294,9 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
 
 
 def ceiling(system: System, met: Floats, confirmed: Floats) -> Floats:
-    """What guesses of the next run are no larger than [unknowns]: of a state that nothing names the largest |y| met, or
-    a thousandth of what the run confirmed.
+    """What guesses of the next run are no larger than [unknowns]: of contents that nothing names the largest |y| met,
+    or a thousandth of what the run confirmed.  Flows are left alone: those of branches that block are round-off
+    (bridges of exponential diodes at 1e-5: 192596 steps by theirs too, 4297 without, 31547 by guesses alone).
     """
     found, (tables, _kept) = confirmed.copy(), _by_kind(system)
     lib.core.sd_ceiling(c.byref(tables), lib.pointer(met), lib.pointer(found))

@@ -442,9 +442,8 @@ int sd_confirmed(const sd_sizing *s, const sd_system *system, double span, const
     for (int32_t k = 0; k < b->unknowns; k++)
         found[k] = sd_larger(met[k], GROUP * most[b->kind[k]]);
     flows(system, span, found, most + b->kinds);
-    for (int32_t k = 0; k < b->unknowns; k++) {
+    for (int32_t k = 0; k < b->unknowns; k++)
         found[k] = guessed(s, k) ? sd_smaller(sd_larger(found[k], NOISE * magnitude[k]), magnitude[k]) : magnitude[k];
-    }
     free(most);
     return 0;
 }
@@ -452,5 +451,5 @@ int sd_confirmed(const sd_sizing *s, const sd_system *system, double span, const
 void sd_ceiling(const sd_sizing *s, const double *met, double *found)
 {
     for (int32_t k = 0; k < s->balance->unknowns; k++)
-        found[k] = guessed(s, k) ? sd_larger(met[k], GROUP * found[k]) : INFINITY;
+        found[k] = guessed(s, k) && !(s->kind[k] & SD_FLOW) ? sd_larger(met[k], GROUP * found[k]) : INFINITY;
 }
