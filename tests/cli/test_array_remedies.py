@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from sysdyn import api
+from sysdyn.cli.main import run
 
 CHAINS = """\
 from std.electrical import capacitor, resistor, voltage
@@ -101,3 +103,46 @@ def test_elements_of_an_input_that_vary_are_listed_where_its_size_is_a_number():
     (error,) = errors(pushed("n", "u = [1 N, t*1 N/s, 0 N]"))
     assert error.code == "E805"
     assert error.help.endswith("input u[1..3]")
+
+
+CRANKS = """\
+model cranks {
+  coord th[1..3]: rotation ~ 0.01
+  coord x, y: translation ~ 0.1 m
+  coord turn: rotation ~ 0
+  param px[1..3] = [0 m, 1 m, 0.4 m]
+  param py[1..3] = [0 m, 0 m, 0.6 m]
+  init th[1] = 0.01
+  init th[1]' = 0 rad/s
+  energy T* = sum(i in 1..3: 1/2*(0.1 kg.m^2)*th[i]'^2) + 1/2*(2 kg)*(x'^2 + y'^2) + 1/2*(0.05 kg.m^2)*turn'^2
+  energy V = 2 kg*g0*y
+  for i in 1..3 {
+ROWS
+  }
+}
+scene s of cranks {
+  time 0 s to 0.5 s
+  redundancy minimum_norm
+  trace th[1] as th every 10 ms
+}
+"""
+ALONG = "    phi along[i]: 0.3 m*cos(th[i]) = x + px[i]*(cos(turn) - 1) - py[i]*sin(turn)"
+ACROSS = "    phi across[i]: 0.3 m*sin(th[i]) = y + px[i]*sin(turn) + py[i]*(cos(turn) - 1)"
+
+
+def test_a_constraint_left_out_where_it_is_needed_is_named(tmp_path, capsys):
+    """Three parallel cranks fall through the horizontal: across[3] says there what no other does.  As told, in another
+    order, all is well: until 0.5 s they fall as one pendulum, J th'' = -m g r cos th.
+    """
+    for name, rows in (("needed", (ALONG, ACROSS)), ("not", (ACROSS, ALONG))):
+        (tmp_path / f"{name}.sd").write_text(CRANKS.replace("ROWS", "\n".join(rows)))
+    given = ["--method", "rosenbrock", "-o", str(tmp_path / "t.h5")]
+    assert run(["simulate", str(tmp_path / "needed.sd"), *given]) == 3
+    said = capsys.readouterr().err
+    assert "another of its group is the last (left out as redundant, and needed there: across[3])" in said
+    found = api.simulate(tmp_path / "not.sd", method="rosenbrock", accuracy=1e-6, output=tmp_path / "t.h5")
+    fall = solve_ivp(
+        lambda t, u: (u[1], -2.0 * 9.80665 * 0.3 * np.cos(u[0]) / (3 * 0.1 + 2.0 * 0.09)),
+        (0.0, 0.5), (0.01, 0.0), t_eval=found.time, rtol=1e-11, atol=1e-12,
+    )  # fmt: skip
+    assert np.abs(found["th"].values - fall.y[0]).max() < 1e-6 * np.abs(fall.y[0]).max()

@@ -103,6 +103,10 @@ _BY_SLOPES = (
 _TWICE = "constraints that hold at one time may say the same twice: leave one out, or put a resistance between them"
 
 
+_LEFT_OUT = "an order in which another of its group is the last (left out as redundant, and needed there: %s)"
+_LEFT_OUT += ", or an earlier end: --until"
+
+
 _BOUNDED = "a law that keeps it in bounds (an energy with a minimum, a stop), or an earlier end: --until"
 
 
@@ -167,12 +171,20 @@ def stopped(
         usual = _BLOCKED if error.cause == "singular" else f"{usual}; {_BLOCKED}"
     if error.cause == "singular" and len(started.system.description.switches.places):
         usual = _TWICE
+    if error.cause == "singular" and (names := _left_out(started)):
+        usual = _LEFT_OUT % names
     usual = usual.replace(LOOSER, _knob(options, code))
     remedy = _BOUNDED if why else _RANK if lost else usual
     known = f"last good state at {last.time:.9g} s: {last.listed()}" if last is not None and last.states() else ""
     help_ = "; ".join(filter(None, (remedy, known)))
     report.error(code, text, where, help=help_)
     return text
+
+
+def _left_out(started: Started) -> str:
+    """Constraints that the start has found redundant, as the text names them."""
+    families = started.system.description.families
+    return ", ".join(families[k].named(at).removesuffix(".multiplier") for k, at in started.facts.left_out)
 
 
 def _instead_of(method: str) -> str:
