@@ -41,7 +41,7 @@ LENGTHY, DEAR = 1000, 1e-8
 less than another method's draft (the ring modulator at 1e-2, 1e-3, 1e-6: 0.10, 0.16, 0.6 s for 0.27, 0.63, 1.1);
 tolerance below which methods of more stages or steps cost less."""
 APART, HELD = 1.8, 7.0
-"""Decades between two tolerances from which on, where events happen, methods that change their order are doubted whose
+"""Decades between two tolerances from which on, where events happen, methods of no counted order are doubted whose
 steps are shorter by less than makes of errors, with that power, what is credited (play by radau: a hundredth of the
 tolerance took 1.35 times the steps, and left half of the error, told as an eighth)."""
 UNSEEN = 0.5

@@ -72,7 +72,8 @@ LAWS = {
     # its error test works with a tenth of the power 2/3 of the tolerance (radau.h); on stiff models its order is 3: a
     # hundredth of the draft's tolerance spares some third runs, and left every third one below a hundredth of what was
     # asked; a tenth lets no draft of the dearest models do.  Error of the finer run over its difference from a draft
-    # (239 pairs): 0.02 in the median, 95 % below 0.27, all below 0.74; the estimate says 0.25
+    # (239 pairs): 0.02 in the median, 95 % below 0.27, all below 0.74; the estimate says 0.25.  By the tolerances alone
+    # runs of 41 and 43 steps (a plate that is pulled in) were met and 2.05 times what was asked off
     "radau": Law(21.0, 0.95, 0.6, 1e-17, ratio=0.03, little=0.2, safety=1.8, order=5.0),
     # its error is 0.01 to 4 times the tolerance (20 models); pairs that agree by chance say less (rober: a hundredth)
     # where events hold the steps its error hardly falls with the tolerance: of 100 pairs of the gallery it was over

@@ -285,10 +285,10 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
     kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
     round-off altogether.
     """
-    found, (tables, _kept) = np.zeros(system.unknowns), _by_kind(system)
+    found, by_kind = np.zeros(system.unknowns), _by_kind(system)
     arrays = lib.pointer(met), lib.pointer(magnitude), lib.pointer(found)
     bare, _held = system.bare()
-    if lib.core.sd_confirmed(c.byref(tables), c.byref(bare), span, *arrays):
+    if lib.core.sd_confirmed(c.byref(by_kind.core), c.byref(bare), span, *arrays):
         raise MemoryError
     return found
 
@@ -298,14 +298,18 @@ def ceiling(system: System, met: Floats, confirmed: Floats) -> Floats:
     or a thousandth of what the run confirmed.  Flows are left alone: those of branches that block are round-off
     (bridges of exponential diodes at 1e-5: 192596 steps by theirs too, 4297 without, 31547 by guesses alone).
     """
-    found, (tables, _kept) = confirmed.copy(), _by_kind(system)
-    lib.core.sd_ceiling(c.byref(tables), lib.pointer(met), lib.pointer(found))
+    found, by_kind = confirmed.copy(), _by_kind(system)
+    lib.core.sd_ceiling(c.byref(by_kind.core), lib.pointer(met), lib.pointer(found))
     return found
 
 
-def _by_kind(system: System) -> tuple[lib.Sizing, tuple[object, ...]]:
-    """The core's tables without the rows, which nobody reads who goes by kinds alone, and what they point to."""
+def _by_kind(system: System) -> Sizing:
+    """The core's tables without the rows, which nobody reads who goes by kinds alone."""
+    return system.once_if_small("sizing by kind", lambda: _of_kinds(system))
+
+
+def _of_kinds(system: System) -> Sizing:
     kind, like, nominal = _kinds(system), alike(system), system.named
     rows = lib.Balance(unknowns=like.size, kinds=1 + int(like.max(initial=0)), kind=lib.pointer(like))
-    tables = lib.Sizing(balance=c.addressof(rows), nominal=lib.pointer(nominal), kind=lib.pointer(kind))
-    return tables, (rows, kind, like, nominal)
+    core = lib.Sizing(balance=c.addressof(rows), nominal=lib.pointer(nominal), kind=lib.pointer(kind))
+    return Sizing(core, (rows, kind, like, nominal))

@@ -35,12 +35,11 @@ def _chamber(instants):
     return found
 
 
-@pytest.mark.parametrize("accuracy", [2e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7])
+@pytest.mark.parametrize("accuracy", [1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7])
 @pytest.mark.one_in(3)
 def test_a_pump_draws(tmp_path, accuracy):
     """By rosenbrock the flow drawn, zero for a third of a second, was tested below round-off once the valve opened.  At
     1e-3 the row 4 us behind an event, which the draft has before its own, was compared with nothing: 2.4 times off.
-    It moves by what is asked within 0.2 us: of 81 accuracies from 1e-2 to 1e-6 one (1e-3) is 1.5 times off, by chance.
     """
     trace = api.simulate(PUMP, method="rosenbrock", accuracy=accuracy, output=tmp_path / "out.h5")
     chamber = _chamber(trace.time)

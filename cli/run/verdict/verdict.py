@@ -21,6 +21,7 @@ from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.judgement import Cancelled, NotMet
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
+from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.slopes import WITH_A_SLOPE, no_slope, without_slope
 from sysdyn.runtime.simulate import Outcome
@@ -183,8 +184,8 @@ def stopped(
 
 def _left_out(started: Started) -> str:
     """Constraints that the start has found redundant, as the text names them."""
-    families = started.system.description.families
-    return ", ".join(families[k].named(at).removesuffix(".multiplier") for k, at in started.facts.left_out)
+    of = started.system.description
+    return ", ".join(of.rows[multiplier_row(of, k)].at(at).label for k, at in started.facts.left_out)
 
 
 def _instead_of(method: str) -> str:
