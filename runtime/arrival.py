@@ -70,7 +70,7 @@ def _arrived(
         events=options.events or None,
         begin=begin,
         condense=False,
-        least_norm=options.redundancy == "minimum_norm" and bool(way.system.left_out),
+        least_norm=options.redundancy == "minimum_norm" and way.system.leaves_out,
     )
     run = Integration(way.system, start, request)
     run.run(_nothing, spent=False)

@@ -25,6 +25,7 @@ from sysdyn.runtime.model.failures import SolverFailure, WrongOption
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.one_underlying import refuse_contacts, refuse_sliding, refuse_undetermined
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
+from sysdyn.runtime.structure.left_out import following
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
 from sysdyn.runtime.trace.trace import Trace
@@ -259,7 +260,9 @@ def counted(
     if options.redundancy not in ("error", "drop", "minimum_norm"):
         raise WrongOption(f"redundancy {options.redundancy}: error, drop or minimum_norm")
     if facts.left_out and options.redundancy != "error":
-        written = written.without(facts.left_out)
+        alike = options.redundancy == "minimum_norm" and not options.events
+        followed = following(written, start, len(facts.left_out)) if alike else None
+        written = followed or written.without(facts.left_out)
         start = replace(consistent_start(written, options.t_start, start), moved=start.moved)
         facts = replace(facts, index=index_of(written, start)[0], undetermined=())
     return written, start, facts

@@ -151,7 +151,7 @@ class Runs:
             apart=APART if draft and self.instants.open else 0.0,
             events=options.events or None,
             begin=self.begin,
-            least_norm=options.redundancy == "minimum_norm" and bool(self.system.left_out),
+            least_norm=options.redundancy == "minimum_norm" and self.system.leaves_out,
             max_order=1 if self.method == "euler" else options.order or lib.MAX_ORDER,
             fixed_step=options.euler_step if self.method == "euler" else None,
         )

@@ -21,6 +21,7 @@ from sysdyn.runtime.integrate.causes import NEWTON, failure, placed
 from sysdyn.runtime.integrate.creeping import Creeping
 from sysdyn.runtime.integrate.jumps.corners import Corners, serves
 from sysdyn.runtime.integrate.jumps.crossing import cross
+from sysdyn.runtime.integrate.jumps.exchange import Exchange
 from sysdyn.runtime.integrate.jumps.pieces import Pieces
 from sysdyn.runtime.integrate.jumps.segments import segments
 from sysdyn.runtime.integrate.methods import Method
@@ -102,6 +103,7 @@ class Integration:
         if self.underlying is None and system.form.scales:
             self.driver.run.magnitude = lib.pointer(self.sizes.magnitude)
         self.pieces = Pieces(self, request.events) if request.events else None
+        self.exchange = Exchange(self) if request.least_norm and system.description.switches.redundant else None
         self.corners = Corners(self) if serves(self) else None
         self._spare()
         self._put_away()
@@ -312,6 +314,8 @@ class Integration:
             left = CHUNK_STEPS if request.max_steps is None else request.max_steps - method.steps
             if request.unstrained:
                 most, failed = WINDOW + method.steps // 4, method.newton_failures
+            if self.exchange is not None:
+                most = 1
             before = time.process_time()
             state = lib.core.sd_run_advance(self.driver.core, min(most, max(left, 1)), CHUNK_SECONDS)
             self.cpu += time.process_time() - before
@@ -320,6 +324,8 @@ class Integration:
             self.settler.system.failure.check()
             if progress is not None:
                 progress(method.t)
+            if self.exchange is not None and state in (0, 3) and self.exchange.due():
+                continue
             if state == 3:
                 if lib.CAUSES[method.cause] in NEWTON and self._resolved():
                     continue

@@ -269,6 +269,14 @@ class Underlying(Accelerations):
         core.position, core.velocity = (item and c.addressof(item) for item in (parts.position, parts.velocity))
         core.direct, core.displaced = int(parts.direct), lib.pointer(parts.displaced)
 
+    def switch(self) -> None:
+        """Other rows are held now."""
+        for copied in (self.matrix, self.applied):
+            for name in ("held", "clear", "held_row", "held_unknown", "held_slot", "held_rate", "cleared"):
+                setattr(copied, name, getattr(self.system.core, name))
+        self._taken.made.beside.held = self.system.held[0]
+        lib.core.sd_underlying_switched(self.core)
+
     @property
     def selection(self) -> Selection:
         """The tables of the core's structure."""

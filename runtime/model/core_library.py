@@ -169,6 +169,7 @@ def _load() -> Any:
         "sd_radau_rest": (None, [_P]),
         "sd_underlying_new": (c.POINTER(Underlying), [_P, _P]),
         "sd_underlying_free": (None, [_P]),
+        "sd_underlying_switched": (None, [_P]),
         "sd_underlying_slopes": (c.c_int, [_P, _D, _P, _P]),
         "sd_underlying_project": (c.c_int, [_P, _D, _P, _P]),
         "sd_dopri_new": (c.POINTER(Dopri), [_P, _P]),

@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 
 
 class Switches:
-    """Which of the constraints at `places` (family, position of the multiplier) hold: `active` [places]."""
+    """Which of the constraints at `places` (family, position of the multiplier) hold: `active` [places]; redundant:
+    they depend on each other, and those that do not hold hold with the others.
+    """
 
-    def __init__(self, places: tuple[tuple[int, int], ...]) -> None:
-        self.places = places
+    def __init__(self, places: tuple[tuple[int, int], ...], *, redundant: bool = False) -> None:
+        self.places, self.redundant = places, redundant
         self.active: NDArray[np.bool_] = np.ones(len(places), dtype=bool)
         self._systems: WeakSet[System] = WeakSet()
 

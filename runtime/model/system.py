@@ -260,6 +260,11 @@ class System(Facts):
         held = row, unknown, slots[now].copy(), self._reads_rate[now], cleared
         return held, tuple(map(lib.pointer, held))
 
+    @property
+    def leaves_out(self) -> bool:
+        """Whether redundant constraints do not count."""
+        return bool(self.left_out) or self.description.switches.redundant
+
     def idle_multipliers(self) -> Ints:
         """Places of the multipliers of constraints that do not hold now."""
         switches = self.description.switches

@@ -106,6 +106,7 @@ _TWICE = "constraints that hold at one time may say the same twice: leave one ou
 
 _LEFT_OUT = "an order in which another of its group is the last (left out as redundant, and needed there: %s)"
 _LEFT_OUT += ", or an earlier end: --until"
+_FOLLOWS = "--redundancy minimum_norm, which leaves out others as the motion goes on; or "
 
 
 _BOUNDED = "a law that keeps it in bounds (an energy with a minimum, a stop), or an earlier end: --until"
@@ -172,8 +173,9 @@ def stopped(
         usual = _BLOCKED if error.cause == "singular" else f"{usual}; {_BLOCKED}"
     if error.cause == "singular" and len(started.system.description.switches.places):
         usual = _TWICE
-    if error.cause == "singular" and (names := _left_out(started)):
-        usual = _LEFT_OUT % names
+    dropped = options.redundancy == "drop"
+    if error.cause == "singular" and (dropped or options.events) and (names := _left_out(started)):
+        usual = dropped * _FOLLOWS + _LEFT_OUT % names
     usual = usual.replace(LOOSER, _knob(options, code))
     remedy = _BOUNDED if why else _RANK if lost else usual
     known = f"last good state at {last.time:.9g} s: {last.listed()}" if last is not None and last.states() else ""

@@ -7,24 +7,36 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define TELLS 1e-3 /* of the largest part that an unknown has of any row: where it has less, the row says nothing of it */
+
 int sd_unresolved(const sd_system *system, const uint8_t *constraint, const double *y, const double *jy, double *found)
 {
-    double *size = calloc((size_t)system->rows + 1, sizeof *size); /* largest term of each row */
-    if (!size)
+    double *size = calloc(2 * (size_t)system->rows + 1, sizeof *size), *leading = size + system->rows;
+    if (!size) /* size, leading: largest term and largest slope of each row */
         return -1;
     memset(found, 0, (size_t)system->unknowns * sizeof *found);
-    for (int pass = 0; pass < 2; pass++)
-        for (int32_t j = 0; j < system->unknowns; j++)
+    for (int32_t j = 0; j < system->unknowns; j++)
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++) {
+            int32_t i = system->row[e];
+            if (constraint[i] && isfinite(jy[e])) {
+                size[i] = sd_larger(size[i], fabs(jy[e] * y[j]));
+                leading[i] = sd_larger(leading[i], fabs(jy[e]));
+            }
+        }
+    for (int32_t j = 0; j < system->unknowns; j++) {
+        double most = 0.0;
+        for (int pass = 0; pass < 2; pass++)
             for (int32_t e = system->column[j]; e < system->column[j + 1]; e++) {
                 int32_t i = system->row[e];
                 double slope = fabs(jy[e]);
                 if (!constraint[i] || !isfinite(slope) || slope == 0.0)
                     continue;
                 if (pass == 0)
-                    size[i] = sd_larger(size[i], slope * fabs(y[j]));
-                else
+                    most = sd_larger(most, slope / leading[i]);
+                else if (slope >= TELLS * most * leading[i])
                     found[j] = sd_larger(found[j], DBL_EPSILON * size[i] / slope);
             }
+    }
     free(size);
     return 0;
 }

@@ -264,6 +264,13 @@ static int at_once(sd_underlying *u, double t, double *y, double *yd)
     return u->flows ? kinematics(u, y, yd) : SD_FINE;
 }
 
+void sd_underlying_switched(sd_underlying *u)
+{
+    sd_straight_free(u->straight);
+    u->straight = NULL;
+    u->ready = 0;
+}
+
 void sd_underlying_begin(sd_underlying *u, double tolerance, double *yd)
 {
     u->tolerance = tolerance;

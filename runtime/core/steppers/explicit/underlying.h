@@ -54,6 +54,8 @@ typedef struct sd_underlying {
 
 sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear);
 void sd_underlying_free(sd_underlying *underlying);
+/* other rows are held: code that was written for those of before goes */
+void sd_underlying_switched(sd_underlying *underlying);
 /* before a start: Newton's tolerance; what is solved for itself has no slope in yd [n] */
 void sd_underlying_begin(sd_underlying *underlying, double tolerance, double *yd);
 /* z at (t, x): y [n] holds x and a guess of (kappa, mu, e), yd [n] one of the slopes; both are completed.  0 or a

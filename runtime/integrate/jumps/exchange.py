@@ -1,0 +1,57 @@
+"""Dependent constraints: which of them are left out changes as the motion turns what depends on what.
+
+After a step the coefficients of what depends are looked at (structure/left_out.py); where one that holds counts much
+more than those left out, the method begins anew with others left out.  The motion and the reactions are the same on
+both sides, and so are the multipliers that rows show, which are the least (rows/least_norm.py): nothing is seen of it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from sysdyn.runtime.integrate.jumps.crossing import go_on
+from sysdyn.runtime.structure.left_out import Dependence, chosen, turned
+
+if TYPE_CHECKING:
+    from sysdyn.runtime.integrate.integrate import Integration
+
+
+class Exchange:
+    """Of one integration whose system can leave out others (`Switches.redundant`)."""
+
+    def __init__(self, run: Integration) -> None:
+        self.run, system = run, run.system.another("3")
+        self._dependence = system.own("dependence", lambda: Dependence(system))
+        places = system.description.switches.places
+        at = [int(system.form.at[family]) + position for family, position in places]
+        self._members = np.searchsorted(self._dependence.multipliers, at)
+
+    def due(self) -> bool:
+        """Whether others should be left out behind the last step; then they are, and the method begins anew."""
+        run, switches = self.run, self.run.system.description.switches
+        n, method, before = run.system.form.written, run.method.contents, switches.active
+        y, yd = (values[:n] for values in run.method.point())
+        left = np.flatnonzero(~before)
+        null = self._dependence.null(method.t, y, yd, left.size)
+        if null is None or not turned(null[self._members], left):
+            return False
+        with run.settler.exactly():
+            y, yd, _ = run.settler.settle(method.t, y, yd)
+            active = np.ones_like(before)
+            active[chosen(null[self._members])] = False
+            self._leave_out(active)
+            found = run.settlers.across(method.t, y, yd)
+        if found is None:
+            self._leave_out(before)
+            return False
+        run.sizes.share(y)
+        run.driver.leave(y, yd)
+        go_on(run, method.t, method.t, [*found])
+        return True
+
+    def _leave_out(self, active: NDArray[np.bool_]) -> None:
+        self.run.system.description.switches.set(active)
+        if self.run.underlying is not None:
+            self.run.underlying.switch()

@@ -1,0 +1,93 @@
+"""Which of dependent constraints are left out: those whose coefficients in what depends are the largest.
+
+Rows of J (scaled to one) combine to zero by the columns of N [members, k]: J^T N = 0.  With k of them left out the others
+determine the motion and their multipliers where the rows of N of those left out are regular, and lose nothing where no
+coefficient of the others is much larger: those are the first pivots of N^T (QR with column pivoting, Businger and Golub
+1965).  As the motion goes on N turns: of three parallel cranks any fixed choice loses rank twice a turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+from weakref import WeakValueDictionary
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.switches import Switches
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
+from sysdyn.runtime.numerics.rank import decomposed
+from sysdyn.runtime.start.start import ConsistentState
+from sysdyn.runtime.structure.redundancy import nearby
+
+MOST = 300
+"""Constraints up to which the choice follows the motion."""
+SOME = 1e-8
+"""Of a unit vector: a constraint's share of what depends."""
+APART = 1e-3
+"""Singular values of what depends, as part of those of what does not: near a point where more depends nothing is told."""
+TURNED = 2.0
+"""A coefficient of one that holds, of those left out, from which these are chosen anew."""
+
+
+class Dependence:
+    """J of all constraints of a system, whether they hold or not."""
+
+    def __init__(self, system: System) -> None:
+        pattern, columns = system.pattern, system.pattern.columns_of()
+        self.system, self.multipliers = system, np.flatnonzero(system.are("kappa", "mu"))
+        reacting = np.isin(columns, self.multipliers) & system.of_groups("dynamics")[pattern.row]
+        self._entry = np.flatnonzero(reacting)
+        self._which = np.searchsorted(self.multipliers, columns[self._entry]).astype(np.int32)
+        rows, row = np.unique(pattern.row[self._entry], return_inverse=True)
+        self._row, self._shape = row.astype(np.int32), (self.multipliers.size, rows.size)
+
+    def null(self, t: float, y: Floats, yd: Floats, number: int) -> Floats | None:
+        """N [multipliers, number], orthonormal, near a consistent point [unknowns]; None where more depends."""
+        value = self.system.jacobian(t, y, yd)[0][self._entry]
+        scale, other = sparse_factors(self._which, self._row, np.abs(value), self._shape)
+        matrix = np.zeros(self._shape)
+        np.add.at(matrix, (self._which, self._row), scale[self._which] * value * other[self._row])
+        if not np.isfinite(matrix).all():
+            return None
+        left, sigma, _ = decomposed(matrix)
+        rank = len(matrix) - number
+        sigma = np.append(sigma, np.zeros(len(matrix)))
+        return left[:, rank:] if rank == 0 or sigma[rank] <= APART * sigma[rank - 1] else None
+
+
+def chosen(null: Floats) -> Ints:
+    """The constraints (rows of N) that are left out."""
+    from scipy.linalg import qr
+
+    return np.sort(qr(null.T, mode="r", pivoting=True)[1][: null.shape[1]])
+
+
+def turned(null: Floats, left: Ints) -> bool:
+    """Whether others count much more than those that are left out."""
+    return not np.abs(np.linalg.lstsq(null[left].T, null.T, rcond=None)[0]).max() <= TURNED
+
+
+def following(system: System, state: ConsistentState, number: int) -> System | None:
+    """The system as written without `number` of its dependent constraints, which can be chosen anew (as `Switches`);
+    None where they are too many to be followed, or where it does not tell how they depend.
+    """
+    dependence = Dependence(system)
+    if not number or dependence.multipliers.size > MOST or system.description.switches.places:
+        return None
+    rates, members = state.for_form(system)[1], np.zeros(dependence.multipliers.size, dtype=bool)
+    start = None
+    for y in (*nearby(system, state), state.for_form(system)[0]):
+        start = dependence.null(state.t, y, rates, number)
+        if start is not None:
+            members |= np.abs(start).max(axis=1) > SOME
+    if start is None:
+        return None
+    at = dependence.multipliers[members]
+    families = system.family_of[at]
+    places = tuple((int(k), int(place - system.form.at[k])) for k, place in zip(families, at, strict=True))
+    fresh: dict[str, Any] = {"layouts": {}, "alive": WeakValueDictionary(), "room": [], "systems": None}
+    description = replace(system.description, switches=Switches(places, redundant=True), **fresh)
+    description.switches.set(~np.isin(np.flatnonzero(members), chosen(start)))
+    return System.of(description, system.carrier, system.form.name)
