@@ -1,9 +1,9 @@
 """Which of dependent constraints are left out: those whose coefficients in what depends are the largest.
 
-Rows of J (scaled to one) combine to zero by the columns of N [members, k]: J^T N = 0.  With k of them left out the others
-determine the motion and their multipliers where the rows of N of those left out are regular, and lose nothing where no
-coefficient of the others is much larger: those are the first pivots of N^T (QR with column pivoting, Businger and Golub
-1965).  As the motion goes on N turns: of three parallel cranks any fixed choice loses rank twice a turn.
+Rows of J (scaled to one) combine to zero by the columns of N [members, k]: J^T N = 0.  With k of them left out the
+others determine the motion and their multipliers where the rows of N of those left out are regular, and lose nothing
+where no coefficient of the others is much larger: those are the first pivots of N^T (QR with column pivoting, Businger
+and Golub 1965).  As the motion goes on N turns: of three parallel cranks any fixed choice loses rank twice a turn.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MOST = 300
 SOME = 1e-8
 """Of a unit vector: a constraint's share of what depends."""
 APART = 1e-3
-"""Singular values of what depends, as part of those of what does not: near a point where more depends nothing is told."""
+"""Singular values of what depends, as part of those of what does not: near where more depends nothing is told."""
 TURNED = 2.0
 """A coefficient of one that holds, of those left out, from which these are chosen anew."""
 
