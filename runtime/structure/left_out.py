@@ -71,19 +71,19 @@ def turned(null: Floats, left: Ints) -> bool:
 
 def following(system: System, state: ConsistentState, number: int) -> System | None:
     """The system as written without `number` of its dependent constraints, which can be chosen anew (as `Switches`);
-    None where they are too many to be followed, or where it does not tell how they depend.
+    None where one choice serves for good, they are too many to be followed, or it does not tell how they depend.
     """
     dependence = Dependence(system)
     if not number or dependence.multipliers.size > MOST or system.description.switches.places:
         return None
-    rates, members = state.for_form(system)[1], np.zeros(dependence.multipliers.size, dtype=bool)
-    start = None
-    for y in (*nearby(system, state), state.for_form(system)[0]):
-        start = dependence.null(state.t, y, rates, number)
-        if start is not None:
-            members |= np.abs(start).max(axis=1) > SOME
+    y, yd = state.for_form(system)
+    start, *beside = (dependence.null(state.t, point, yd, number) for point in (y, *nearby(system, state)))
     if start is None:
         return None
+    known = [start, *(null for null in beside if null is not None)]
+    if all(np.abs(null @ null.T - start @ start.T).max() < SOME for null in known):
+        return None
+    members = np.abs(np.hstack(known)).max(axis=1) > SOME
     at = dependence.multipliers[members]
     families = system.family_of[at]
     places = tuple((int(k), int(place - system.form.at[k])) for k, place in zip(families, at, strict=True))

@@ -15,6 +15,7 @@
 #define UNKNOWN 1.0     /* magnitude of what is zero with all that could size it (scales.py) */
 #define GROUP 1e-3      /* of their like: the least that zeros count as (scales.py) */
 #define PART 1e-2       /* of the span: the time scale at most */
+#define NEVER 1e-9      /* of what a run confirmed: a content that was never larger is zero, and its size is not known */
 #define NOISE 1e-6      /* values below this part of what balances their rows are round-off, or zero by chance */
 #define QUIET 1e-9      /* efforts below this part of (largest energy) / q are round-off, and flows of their like */
 #define TINY (DBL_MIN * 1e30) /* less is no magnitude */
@@ -450,6 +451,8 @@ int sd_confirmed(const sd_sizing *s, const sd_system *system, double span, const
 
 void sd_ceiling(const sd_sizing *s, const double *met, double *found)
 {
-    for (int32_t k = 0; k < s->balance->unknowns; k++)
-        found[k] = guessed(s, k) && !(s->kind[k] & SD_FLOW) ? sd_larger(met[k], GROUP * found[k]) : INFINITY;
+    for (int32_t k = 0; k < s->balance->unknowns; k++) {
+        int told = guessed(s, k) && !(s->kind[k] & SD_FLOW) && met[k] > NEVER * found[k];
+        found[k] = told ? sd_larger(met[k], GROUP * found[k]) : INFINITY;
+    }
 }

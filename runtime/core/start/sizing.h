@@ -55,7 +55,7 @@ int sd_confirmed(const sd_sizing *sizing, const sd_system *system, double span, 
                  const double *magnitude, double *found);
 
 /* of what a run confirmed: what guesses of the next one are no larger than; infinite of flows (those of branches that
- * block are round-off), of what is no state, and of what is named */
+ * block are round-off), of what is no state, of what is named or never moved */
 void sd_ceiling(const sd_sizing *sizing, const double *met, double *found);
 
 #endif

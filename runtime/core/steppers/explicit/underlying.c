@@ -13,6 +13,7 @@
 #define MOVES 6         /* of a projection */
 #define EXACT 1e-16     /* next move, in magnitudes, that is not worth making */
 #define CLOSE 1e-12     /* move with which a projection, or an iteration, that stagnates is content */
+#define FRESH 1e-9       /* the same by factors of this very point, which contract: round-off of what is nearly zero */
 #define STAGNANT 0.3
 #define BORNE 1e3       /* of multipliers: slopes are solved for once, nothing corrects their digits */
 
@@ -312,8 +313,8 @@ int sd_underlying_slopes(sd_underlying *u, double t, double *y, double *yd)
 }
 
 /* One kind of state moved onto its constraints (`rows` stand where their derivatives do): displacements, or flows and
- * momenta. */
-static int onto(sd_underlying *u, sd_system *rows, int displacements, double t, double *y)
+ * momenta; content: with which move where it stagnates. */
+static int onto(sd_underlying *u, sd_system *rows, int displacements, double content, double t, double *y)
 {
     const sd_system *system = u->system;
     double before = INFINITY;
@@ -347,10 +348,10 @@ static int onto(sd_underlying *u, sd_system *rows, int displacements, double t, 
         if (size <= EXACT || (m > 0 && size * size <= EXACT * before))
             return SD_FINE;
         if (m > 0 && size > STAGNANT * before)
-            return size <= CLOSE ? SD_FINE : SD_NEWTON;
+            return size <= content ? SD_FINE : SD_NEWTON;
         before = size;
     }
-    return before <= CLOSE ? SD_FINE : SD_NEWTON;
+    return before <= content ? SD_FINE : SD_NEWTON;
 }
 
 void sd_underlying_constraints(sd_underlying *u, double t, const double *y, double *position, double *velocity)
@@ -371,12 +372,13 @@ int sd_underlying_project(sd_underlying *u, double t, double *y, const double *y
     if (!u->placed && find_places(u))
         return SD_MEMORY;
     for (int fresh = 0; fresh < 2; fresh++) {
+        double content = fresh ? FRESH : CLOSE;
         u->drift = 0.0;
         if (!u->ready && (cause = factorise(u, t, y, yd)))
             return cause;
-        cause = u->position ? onto(u, u->position, 1, t, y) : SD_FINE;
+        cause = u->position ? onto(u, u->position, 1, content, t, y) : SD_FINE;
         if (cause == SD_FINE && u->velocity)
-            cause = onto(u, u->velocity, 0, t, y);
+            cause = onto(u, u->velocity, 0, content, t, y);
         if (cause != SD_NEWTON)
             return cause;
         u->ready = 0;
