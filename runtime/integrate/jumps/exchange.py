@@ -48,7 +48,10 @@ class Exchange:
             return False
         run.sizes.share(y)
         run.driver.leave(y, yd)
+        core = run.driver.run
+        every, core.every_step = core.every_step, 0  # the step's end has its row
         go_on(run, method.t, method.t, [*found])
+        core.every_step = every
         return True
 
     def _leave_out(self, active: NDArray[np.bool_]) -> None:
