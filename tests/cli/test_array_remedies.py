@@ -163,12 +163,14 @@ def test_of_constraints_that_take_turns_in_being_needed_others_are_left_out_as_t
     text = CRANKS.replace("ROWS", f"{ALONG}\n{ACROSS}").replace("= 0 rad/s", "= 6 rad/s").replace("0.5 s", "1.5 s")
     loads = ", ".join(f"{name}[{k}].multiplier" for name in ("along", "across") for k in (1, 2, 3))
     (tmp_path / "cranks.sd").write_text(text.replace("as th", f"as th, {loads}"))
-    for method, form in (("dopri", "lagrangian"), ("radau", "hamiltonian"), ("bdf", "lagrangian")):
-        given = {"method": method, "formulation": form, "accuracy": 1e-6, "output": tmp_path / f"{method}.h5"}
+    runs = ("dopri", "hamiltonian"), ("energy", "lagrangian"), ("radau", "hamiltonian"), ("bdf", "lagrangian")
+    for method, form in runs:
+        accuracy = 1e-4 if method == "bdf" else 1e-6
+        given = {"method": method, "formulation": form, "accuracy": accuracy, "output": tmp_path / f"{method}.h5"}
         found = api.simulate(tmp_path / "cranks.sd", **given)
         th, rate, push = fallen(found.time, 6.0)
         assert th.max() > 2.0 * np.pi
-        assert np.abs(found["th"].values - th).max() < 1e-6 * np.abs(th).max()
+        assert np.abs(found["th"].values - th).max() < accuracy * np.abs(th).max()
         for k in range(0, th.size, 10):
             sine, cosine = 0.3 * np.sin(th[k]), 0.3 * np.cos(th[k])
             reactions = np.zeros((6, 6))
@@ -180,4 +182,4 @@ def test_of_constraints_that_take_turns_in_being_needed_others_are_left_out_as_t
             due = np.array([*moved, -2.0 * across[0], -2.0 * (across[1] + 9.80665), 0.0])
             least = np.linalg.lstsq(reactions.T, due, rcond=1e-9)[0]
             shown = np.array([found[name].values[k] for name in loads.split(", ")])
-            assert np.abs(shown - least).max() < 1e-4 * np.abs(least).max()
+            assert np.abs(shown - least).max() < 100.0 * accuracy * np.abs(least).max()
