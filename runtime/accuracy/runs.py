@@ -36,6 +36,8 @@ ROUGH = 1e-2
 APART = 0.1
 """Of a step: rows of a draft are no nearer to each other.  With one a step the rows between the steps of others are not
 seen: an amplifier then was estimated 500 times too good."""
+BRIEFLY, LONGER = 24, 200
+"""Steps of the windows in which Newton may fail in part of them: of a draft, of a run on steep laws."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,8 +145,8 @@ class Runs:
             # of steep laws points that settle as loosely would count as failed
             settled_to=ROUGH * rtol if self.controlled and not self.system.form.scales else 0.0,
             draft=draft,
-            # of steep laws Newton fails at any tolerance
-            unstrained=draft and rtol > 1.01 * TAME and not self.system.form.scales,
+            unstrained=self._unstrained(rtol, draft=draft),
+            tried=self.patience is not None,
             audited=bool(self.quantities.meters),
             opening=self.opening,
             ceiling=self.ceiling,
@@ -155,6 +157,14 @@ class Runs:
             max_order=1 if self.method == "euler" else options.order or lib.MAX_ORDER,
             fixed_step=options.euler_step if self.method == "euler" else None,
         )
+
+    def _unstrained(self, rtol: float, *, draft: bool) -> int:
+        """Steps of the windows in which a run is not to be strained: of a draft, which a smaller tolerance may tame; of
+        steep laws, of which Newton fails at any tolerance, of a method that another one follows.
+        """
+        if self.system.form.scales:
+            return LONGER if self.method == "bdf" and self.patience is not None and not draft else 0
+        return BRIEFLY if draft and rtol > 1.01 * TAME else 0
 
     @property
     def _stages(self) -> tuple[int, int] | None:

@@ -10,6 +10,8 @@ TRIED = 10
 RUN, DRAFT = ((20_000, 1e-8), (200_000, 1e-5)), ((20_000, 1e-6),)
 """Steps, or residuals of so many, in which a run, a draft must get this part of the span further: else it would take
 for ever (2e12 to the end, 2e10, of a draft 2e10)."""
+TRIAL = (5_000, 1e-4)
+"""The same of a run that another method follows (5e7)."""
 
 
 @dataclass(slots=True)
@@ -21,11 +23,12 @@ class _Mark:
 
 
 class Creeping:
-    """span: of the run; t: of its last accepted point [s]."""
+    """span: of the run; t: of its last accepted point [s]; tried: another method follows."""
 
-    def __init__(self, span: float, t: float, work: Statistics, *, draft: bool) -> None:
+    def __init__(self, span: float, t: float, work: Statistics, *, draft: bool, tried: bool = False) -> None:
         self._span = span
-        self._marks = [_Mark(most, part, _done(work), t) for most, part in (DRAFT if draft else RUN)]
+        limits = (*(DRAFT if draft else RUN), *([TRIAL] if tried else []))
+        self._marks = [_Mark(most, part, _done(work), t) for most, part in limits]
 
     def goes_on(self, t: float, work: Statistics) -> bool:
         """Whether it may be asked for more."""

@@ -47,7 +47,8 @@ class Request:
     stages: of radau, in the first step and at most, None: chosen;
     opening: of dopri, rosenbrock: first step as an earlier run found it fit (steppers/explicit/dopri.h), 0: chosen;
     ceiling [unknowns]: what guessed sizes of states are no larger than, as an earlier run met them, None: any;
-    unstrained: it is given up where Newton fails in every second step (cause strained);
+    unstrained: steps, with a quarter of those before, in which Newton may not fail in nearly every second one, else it
+    is given up (cause strained); 0: it goes on whatever fails; tried: another method follows where it creeps;
     apart: part of a step; instants within it that are nearer to the row before are passed over;
     extrema: what is observed is looked at within steps for its least and largest values.
     """
@@ -79,7 +80,8 @@ class Request:
     apart: float = 0.0
     condense: bool = True
     stages: tuple[int, int] | None = None
-    unstrained: bool = False
+    unstrained: int = 0
+    tried: bool = False
     opening: float = 0.0
     ceiling: Floats | None = None
 

@@ -7,9 +7,9 @@ from sysdyn.runtime.integrate.request import Statistics
 SPAN = 1000.0
 
 
-def stopped_at(step, residuals, *, draft, most=10_000_000):
+def stopped_at(step, residuals, *, draft, tried=False, most=10_000_000):
     """Steps of a run whose steps are this long [s] and take so many residuals each; `most` where it goes on."""
-    creeping = Creeping(SPAN, 0.0, Statistics(), draft=draft)
+    creeping = Creeping(SPAN, 0.0, Statistics(), draft=draft, tried=tried)
     for steps in range(0, most, 500):
         if not creeping.goes_on(steps * step, Statistics(steps, 0, steps * residuals, 0, 0, 0)):
             return steps
@@ -28,6 +28,12 @@ def stopped_at(step, residuals, *, draft, most=10_000_000):
 )
 def test_what_creeps_is_stopped(draft, step, residuals, steps):
     assert stopped_at(step, residuals, draft=draft) == steps
+
+
+@pytest.mark.parametrize("draft", [False, True])
+def test_what_creeps_is_left_early_to_a_method_that_follows(draft):
+    assert stopped_at(1e-5, 3, draft=draft, tried=True) == 5_000
+    assert stopped_at(1e-4, 3, draft=draft, tried=True, most=1_000_000) == 1_000_000
 
 
 @pytest.mark.parametrize(("draft", "step"), [(False, 1e-7), (True, 1e-7)])
