@@ -316,7 +316,7 @@ class Integration:
             if request.unstrained:
                 most, failed = request.unstrained + method.steps // 4, method.newton_failures
             if self.exchange is not None:
-                most = 1
+                most = self.exchange.steps
             before = time.process_time()
             state = lib.core.sd_run_advance(self.driver.core, min(most, max(left, 1)), CHUNK_SECONDS)
             self.cpu += time.process_time() - before

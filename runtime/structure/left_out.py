@@ -64,9 +64,9 @@ def chosen(null: Floats) -> Ints:
     return np.sort(qr(null.T, mode="r", pivoting=True)[1][: null.shape[1]])
 
 
-def turned(null: Floats, left: Ints) -> bool:
-    """Whether others count much more than those that are left out."""
-    return not np.abs(np.linalg.lstsq(null[left].T, null.T, rcond=None)[0]).max() <= TURNED
+def weight(null: Floats, left: Ints) -> float:
+    """The largest coefficient of a constraint that holds, of those left out: 1 of the best choice."""
+    return float(np.abs(np.linalg.lstsq(null[left].T, null.T, rcond=None)[0]).max())
 
 
 def following(system: System, state: ConsistentState, number: int) -> System | None:

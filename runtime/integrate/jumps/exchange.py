@@ -1,6 +1,6 @@
 """Dependent constraints: which of them are left out changes as the motion turns what depends on what.
 
-After a step the coefficients of what depends are looked at (structure/left_out.py); where one that holds counts much
+Now and then behind a step the coefficients of what depends are looked at (structure/left_out.py); where one that holds counts much
 more than those left out, the method begins anew with others left out.  The motion and the reactions are the same on
 both sides, and so are the multipliers that rows show, which are the least (rows/least_norm.py): nothing is seen of it.
 """
@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate.jumps.crossing import go_on
-from sysdyn.runtime.structure.left_out import Dependence, chosen, turned
+from sysdyn.runtime.structure.left_out import TURNED, Dependence, chosen, weight
+
+MOST = 8
+"""Steps without a look."""
 
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
@@ -27,6 +30,9 @@ class Exchange:
         places = system.description.switches.places
         at = [int(system.form.at[family]) + position for family, position in places]
         self._members = np.searchsorted(self._dependence.multipliers, at)
+        self._weight = 1.0
+        self.steps = 1
+        """Until the next look."""
 
     def due(self) -> bool:
         """Whether others should be left out behind the last step; then they are, and the method begins anew."""
@@ -35,13 +41,14 @@ class Exchange:
         y, yd = (values[:n] for values in run.method.point())
         left = np.flatnonzero(~before)
         null = self._dependence.null(method.t, y, yd, left.size)
-        if null is None or not turned(null[self._members], left):
+        if null is None or not self._turned(weight(null[self._members], left)):
             return False
         with run.settler.exactly():
             y, yd, _ = run.settler.settle(method.t, y, yd)
             active = np.ones_like(before)
             active[chosen(null[self._members])] = False
             self._leave_out(active)
+            self._weight, self.steps = 1.0, 1
             found = run.settlers.across(method.t, y, yd)
         if found is None:
             self._leave_out(before)
@@ -53,6 +60,13 @@ class Exchange:
         go_on(run, method.t, method.t, [*found])
         core.every_step = every
         return True
+
+    def _turned(self, weight: float) -> bool:
+        """Whether those left out weigh too little; else half of the steps are let pass in which that may come."""
+        grown = max(weight - self._weight, 0.0) / self.steps
+        self._weight = weight
+        self.steps = int(np.clip((TURNED - weight) / (2.0 * grown + 1e-300), 1.0, MOST))
+        return not weight <= TURNED
 
     def _leave_out(self, active: NDArray[np.bool_]) -> None:
         self.run.system.description.switches.set(active)
