@@ -1,13 +1,14 @@
-"""Ours against SUNDIALS in one run: python tests/bench/race.py [--targets A,...] [--plot FILE] [FAMILY[:n]...]
+"""Ours against SUNDIALS in one run: python tests/bench/race.py [--targets A,...] [--plot FILE] [FAMILY[:n][@END]...]
 
-The models of models/benchmark (n: sections of a line or ladder), each at its end: the cheapest run whose achieved
-error meets a target.  Ours: over `--accuracy` 10^(-1, -1.5, ..., -12), everything else automatic, `cpu_integrate_s`
-with all runs of the control; beside it the cheapest single run with --rtol by any method.  Peers: IDA and CVODE on the
-residual and the Jacobian that `sysdyn compile` writes of the same model (peers/peer.c), over index forms, tolerances by
-half decades, algebraic unknowns in and out of the error test, two constants of Newton's test, two policies of
-refactoring, dense and KLU, BDF and Adams.  Ours locates jumps of laws (tube), as a command does; peers step over them.
-Error: largest of the traced quantities at the end, over their larger value at both ends, against our radau (dopri where
-constraints lose rank) near round-off (`reference`: how far that is from our bdf, and from published values).
+The models of models/benchmark (n: sections of a line or ladder), each at its end (or END, s): the cheapest run whose
+achieved error meets a target.  Ours: over `--accuracy` 10^(-1, -1.5, ..., -12), everything else automatic,
+`cpu_integrate_s` with all runs of the control; beside it the cheapest single run with --rtol by any method.  Peers: IDA
+and CVODE on the residual and the Jacobian that `sysdyn compile` writes of the same model (peers/peer.c), over index
+forms, tolerances by half decades, algebraic unknowns in and out of the error test, two constants of Newton's test, two
+policies of refactoring, dense and KLU, BDF and Adams.  Ours locates jumps of laws (tube), as a command does; peers step
+over them.  Error: largest of the traced quantities at the end, over their larger value at both ends, against our radau
+(dopri where constraints lose rank) near round-off (`reference`: how far that is from our bdf, and from published
+values).  Beside the best peers that were recorded: field.py.
 Without SUNDIALS (Debian: libsundials-dev, libsuitesparse-dev) it says so and measures ours alone.
 """
 
@@ -48,34 +49,11 @@ POLICIES = (("1", "0.33", "0.25"), ("1", "0.33", "0.01"), ("1", "0.01", "0.25"),
 """Of IDA: algebraic unknowns out of its error test, constant of Newton's test, change of cj that it refactors for."""
 
 
-RECORDED: dict[str, dict[float, tuple[float, float]]] = {
-    "oregonator": {1e-3: (1.2, 0.22), 1e-6: (4.7, 0.36)},
-    "akzo": {1e-3: (0.14, 0.042), 1e-6: (0.41, 0.066)},
-    "caraxis": {1e-3: (2.7, 0.19), 1e-6: (10.9, 0.35)},
-    "rc_ladder:100": {1e-3: (math.nan, 0.25), 1e-6: (math.nan, 0.42)},
-    "rc_ladder:1000": {1e-3: (math.nan, 2.1), 1e-6: (math.nan, 5.4)},
-    "rc_ladder:10000": {1e-3: (math.nan, 25.0), 1e-6: (math.nan, 32.0)},
-    "lc_line:100": {1e-3: (math.nan, 1.34), 1e-6: (math.nan, 2.7)},
-    "pendulum": {1e-3: (0.99, 0.024), 1e-6: (2.21, 0.065)},
-    "andrews": {1e-3: (1.92, 0.29), 1e-6: (5.32, 0.69)},
-    "crank": {1e-3: (16.8, 5.8), 1e-6: (math.nan, 10.8)},
-    "transistor": {1e-3: (8.8, 0.92), 1e-6: (27.0, 2.5)},
-    "ring": {1e-3: (1460.0, 133.0), 1e-6: (6940.0, 181.0)},
-    "hires": {1e-3: (0.58, 0.060), 1e-6: (1.1, 0.19)},
-    "vdpol": {1e-3: (1.1, 0.093), 1e-6: (3.3, 0.27)},
-    "rober": {1e-3: (0.47, 0.050), 1e-6: (0.97, 0.16)},
-    "tube": {1e-3: (16.6, 4.1), 1e-6: (57.6, 25.0)},
-    "beam": {1e-3: (84.5, 8.8), 1e-6: (929.0, 84.0)},
-}
-"""Of the best of RADAU5, RADAU, RODAS, MEBDFI and DOP853, driven by experts on equations reduced by hand: CPU ms of the
-best SUNDIALS run beside it (nan: none got there, or on a line's own text of one unknown a node), its own.
-"""
-
-
-def sized(family: str) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """NAME[:n]: the model and its settings."""
-    name, _, n = family.partition(":")
-    return name, (("n", n),) if n else ()
+def sized(family: str) -> tuple[str, tuple[tuple[str, str], ...], float | None]:
+    """NAME[:n][@END]: the model, its settings, its end (s) where it is not its scene's."""
+    named, _, end = family.partition("@")
+    name, _, n = named.partition(":")
+    return name, (("n", n),) if n else (), float(end) if end else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +87,7 @@ class Peers:
         """The program of one index form, its number of unknowns, its outputs; None where the model has no such form."""
         here = self.folder / f"{family}-{index}"
         sysdyn = Path(sys.executable).parent / "sysdyn"
-        name, settings = sized(family)
+        name, settings, _ = sized(family)
         model = MODELS / "benchmark" / f"{name}.sd"
         given = [word for key, value in settings for word in ("--set", f"{key}={value}")]
         written = subprocess.run(
@@ -187,10 +165,10 @@ def finest(bench: Bench, method: str) -> Measured | None:
 def race(family: str, peers: Peers, seconds: float) -> Family | None:
     """Everybody on one family; None where nothing is exact enough to judge by."""
     with tempfile.TemporaryDirectory() as folder:
-        name, settings = sized(family)
+        name, settings, end = sized(family)
         bench = Bench(f"benchmark/{name}", Path(folder), settings=settings)
-        span = bench.options.t_end - bench.options.t_start
-        bench.options = replace(bench.options, every=span)
+        end = bench.options.t_end if end is None else end
+        bench.options = replace(bench.options, t_end=end, every=end - bench.options.t_start)
         exact, other = finest(bench, "radau") or finest(bench, "dopri"), finest(bench, "bdf")
         if exact is None:
             return None
@@ -222,7 +200,7 @@ def race(family: str, peers: Peers, seconds: float) -> Family | None:
                 if run.cpu > seconds or single[-1].error < ENOUGH:
                     break
         found = [] if peers.missing else [
-            Entry(who, cpu, error(values)) for who, cpu, values in peers.runs(family, bench.options.t_end, seconds)
+            Entry(who, cpu, error(values)) for who, cpu, values in peers.runs(family, end, seconds)
         ]  # fmt: skip
         return Family(family, ends(other) if other is not None else math.nan, ours, single, found)
 
@@ -245,26 +223,6 @@ def line(family: Family, target: float) -> tuple[str, float]:
         f"| {family.name} | {target:.0e} | {cell(mine)} | {cell(alone)} | {cell(peer)} | {ratio:.2g} |",
         ratio,
     )
-
-
-def beside_recorded(families: list[Family], target: float) -> str:
-    """Geometric means of what the recorded best peers take over what ours do, scaled by what SUNDIALS takes here and
-    took there (where it has none of the two: by the median of the others).
-    """
-    known = [(family, RECORDED[family.name][target]) for family in families if target in RECORDED.get(family.name, {})]
-    scales = []
-    for family, (then, _) in known:
-        now = family.best(family.peers, target)
-        scales.append(math.nan if now is None else 1e3 * now.cpu / then)
-    usual = float(np.nanmedian(scales)) if np.isfinite(scales).any() else 1.0
-    ratios: list[list[float]] = [[], []]
-    for (family, (_, best)), scale in zip(known, scales, strict=True):
-        for found, runs in zip(ratios, (family.ours, family.single), strict=True):
-            run = family.best(runs, target)
-            if run is not None:
-                found.append((scale if math.isfinite(scale) else usual) * best / (1e3 * run.cpu))
-    with_accuracy, alone = (f"{math.exp(np.log(r).mean()):.2f} ({len(r)})" if r else "none" for r in ratios)
-    return f"{target:.0e}: beside the best recorded peers {with_accuracy} with --accuracy, one run {alone}"
 
 
 def picture(families: list[Family], file: str) -> None:
@@ -327,7 +285,6 @@ def main() -> None:
                 mean = math.exp(np.log(both).mean())
                 slower = int((both < 1).sum())
                 print(f"{target:.0e}: geometric mean {mean:.2f} over {both.size} families, slower on {slower}")
-            print(beside_recorded(found, target))
     if given.plot:
         picture(found, given.plot)
 
