@@ -80,7 +80,7 @@ def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
     for name, kind in wanted:
         for loops, at, domain, place in families[name, kind]:
             shape = loop_ranges(loops)
-            states.append(State(f"{name}.q", shape, domain.displacement, place))
+            states.append(State(f"{name}.q", shape, domain.displacement, place, measured=True))
             dynamics.append(Dynamic(quadrature(name, at), ex.var(name, f"{kind[0]}f", *at), loops, place))
     told = {(*w, 0) for w in wanted if w[1] == "bq"}
     starts = (i for i in network.initials if i.target.op == "var" and i.target.data in told)

@@ -21,10 +21,10 @@ DENSE = 600
 """Unknowns and rates up to which the null space is taken."""
 
 
-def order_and_manifold(system: System, state: ConsistentState, tangible: AbstractSet[str]) -> tuple[int, int] | None:
+def order_and_manifold(system: System, state: ConsistentState, idle: AbstractSet[str]) -> tuple[int, int] | None:
     """(order, manifold) at a state; None for models too large.
 
-    system: the form as written; tangible: coordinates whose displacement something depends on.
+    system: the form as written; idle: coordinates on whose displacement nothing depends, and states that only measure.
     """
     starter = Starter(system)
     tangent = _tangent(starter, state, starter.every & ~starter.groups("initial"), np.ones_like(starter.free))
@@ -34,8 +34,8 @@ def order_and_manifold(system: System, state: ConsistentState, tangible: Abstrac
     _, jyd = system.jacobian(state.t, state.y, state.yd)
     moving = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & system.differential(jyd))
     families = system.description.families
-    owners = np.array([families[int(k)].owner in tangible for k in system.family_of], dtype=bool)
-    content = moving & ((kinds != "q") | owners)
+    owners = np.array([families[int(k)].owner in idle for k in system.family_of], dtype=bool)
+    content = moving & ~(owners & np.isin(kinds, ("q", "s")))
     return _rank(tangent[:n][content]), _rank(tangent[:n][moving])
 
 

@@ -66,7 +66,7 @@ def _integrated(elaborator: Elaborator, rate: ex.Node, place: Place) -> None:
     parts = elaborator.parts
     name = f"{rate.data[0]} {len(parts.watched)}"
     state = ex.var(name, "s")
-    parts.states.append(State(name, (), si(NONE), place))
+    parts.states.append(State(name, (), si(NONE), place, measured=True))
     parts.dynamics.append(Dynamic(state, rate, (), place))
     parts.given.add(name)
     parts.initials.append(Initial(state, ex.const(0.0), True, (), place))
