@@ -345,7 +345,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
         try:
             if isinstance(value.operand if isinstance(value, syntax.Negative) else value, syntax.Number):
                 return resolver.scalar(value).node.data  # type: ignore[no-any-return]
-            node = resolver.wanted(value, dimension, "E208", f"{name} is in {{}}, wants {dim.show(dimension)}")
+            node = resolver.wanted(value, dimension, "E208", f"{name} is in {{}}, wants {common(dimension)}")
         except Failed:
             return None
         found = Values({}).number(node)
