@@ -16,7 +16,6 @@ from sysdyn.dsl.elaborate.scenes import stopping
 from sysdyn.dsl.elaborate.scenes.scenes import SceneReader
 from sysdyn.dsl.elaborate.statements import switches
 from sysdyn.dsl.model import budget
-from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.depth import deep

@@ -58,12 +58,23 @@ def unwatched(network: Network) -> Network:
             initials=tuple(i for i in network.initials if not _states(i.target) & measured),
             observations=tuple(o for o in network.observations if o.name not in measured),
         )
-        read: set[str] = set()
-        everywhere(less, lambda node: read.update(_states(node)) or node)
+        read = _read(less)
         if not measured & read:
             return less
         measured -= read
     return network
+
+
+def _read(network: Network) -> set[str]:
+    """The states that a statement reads."""
+    found: set[str] = set()
+
+    def seen(node: ex.Node) -> ex.Node:
+        found.update(_states(node))
+        return node
+
+    everywhere(network, seen)
+    return found
 
 
 def _states(node: ex.Node) -> set[str]:
