@@ -320,7 +320,8 @@ def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None]
         report.note("N608", message, claim.place)
     elif not holds(claim.operator, left, right, within):
         unit = "" if claim.unit.text == "1" else f" {claim.unit.text}"
-        found = f"found {left:.9g}{unit} and {right:.9g}{unit}"
+        told = (left, right) if ex.variables(claim.right) or claim.right.op != "const" else (left,)
+        found = "found " + " and ".join(f"{value:.9g}{unit}" for value in told)
         report.error("E909", f"expect failed: {claim.text.removeprefix('expect ')}, {found}", claim.place)
 
 
