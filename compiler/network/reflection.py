@@ -134,11 +134,10 @@ def unreflectable(network: Network) -> Diagnostic | None:
                 beside = node.data[1] == "bf" and node.data[0] in lawful and what.partition(" ")[2] in at_times
                 return Diagnostic("E602", message, place, help_ + series if beside else help_)
     stated = {b.name for b in network.branches if b.stated}
-    dissipators = {b.name for b in network.branches if b.kind == "dissipator"}  # no displacement of theirs is known
     for what, roots, place in (*laws, *moduli, *gammas):
         own = what.removeprefix("law of ")
         for node in ex.topological(roots):
-            if node.op == "var" and node.data[1] in ("nq", "bq") and (node.data[0] != own or own in dissipators):
+            if node.op == "var" and node.data[1] in ("nq", "bq") and node.data[0] != own:
                 if own in stated and node.data[0] in stated:  # one energy over the displacements of several ports
                     continue
                 return Diagnostic("E602", f"{what} depends on displacement {node}", place, help_)

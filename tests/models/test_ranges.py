@@ -148,3 +148,19 @@ scene s of m { time 0 s to 1 s; trace S.energy, D.energy, L.energy, V.p }
 scene c of m { time 0 s to 1 s; trace S.energy, x.q; formulation co_hamiltonian }
 """)
     assert run(["check", str(tmp_path / "m.sd")]) == 0, capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ohm", ["0.1 mohm", "1e-12 ohm", "1 Gohm"])
+def test_the_order_of_a_stiff_model(ohm, tmp_path, capsys):
+    (tmp_path / "m.sd").write_text(f"""model m {{
+  node a, b: electrical
+  V: effort(e = 5 V*sin(100 Hz*t)) a -> ground
+  R: dissipator(e = {ohm}*f) a -> b
+  C: potential(q = 100 uF*e) b -> ground
+  W: dissipator(e = 1 ohm*f) b -> ground
+  init C.e = 0 V
+  expect static: order == 1
+}}
+scene s of m {{ time 0 s to 1 s; trace b.e }}
+""")
+    assert run(["check", str(tmp_path / "m.sd")]) == 0, capsys.readouterr().err
