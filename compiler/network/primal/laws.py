@@ -191,7 +191,7 @@ class _Statement:
 
     def _work(self, effort: Node) -> None:
         b = self.branch
-        stored = self.law.kept is not None or b.stated
+        stored = self.law.kept is not None or (b.stated and b.kind != "dissipator")
         if self.law.kept is not None:
             self.found.energies.append(Energy(f"kept {b.kind}", self.law.kept, b.loops, self.place))
         account = "stored" if stored else "dissipated" if b.kind == "dissipator" else "supplied"
