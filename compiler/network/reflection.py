@@ -21,6 +21,7 @@ from sysdyn.compiler.network.primal.reading import KINDS
 from sysdyn.compiler.network.quadratures import from_masses, massive, with_quadratures
 from sysdyn.compiler.network.stated import ALL, as_elements
 from sysdyn.compiler.network.sticking import as_relations
+from sysdyn.compiler.network.ties import as_transformers
 from sysdyn.compiler.network.ungrounded import grounded
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -47,7 +48,7 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    bare = from_masses(from_stores(grounded(as_elements(as_relations(complements(network)), ALL))))
+    bare = from_masses(from_stores(grounded(as_elements(as_relations(complements(as_transformers(network))), ALL))))
     network = with_positions(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
