@@ -7,6 +7,7 @@ displacements (book 5.14), and coordinates of one style serve one family.
 from __future__ import annotations
 
 from sysdyn.compiler.network.reflection import unreflectable
+from sysdyn.compiler.network.ties import as_transformers
 from sysdyn.dsl.model.expression import Node, variables
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Related
@@ -30,7 +31,9 @@ def choose(network: Network, wanted: str, place: Place | None) -> tuple[str, tup
     if co:
         return _complementary(network, wanted, place)
     if wanted in COMPLEMENTARY:
-        found = _of_efforts(network, wanted) or _obstacle(network, wanted, place) or unreflectable(network)
+        found = _of_efforts(network, wanted)
+        network = as_transformers(network)
+        found = found or _obstacle(network, wanted, place) or unreflectable(network)
         return wanted, ((found,) if found else ())
     if wanted == "auto":
         return ("hamiltonian" if any(e.function == "T" for e in network.energies) else "lagrangian"), ()

@@ -42,6 +42,7 @@ from sysdyn.compiler.network.authors import shown, told
 from sysdyn.compiler.network.gathered import gathered
 from sysdyn.compiler.network.primal import Step, primal
 from sysdyn.compiler.network.primal.precedence import outermost
+from sysdyn.compiler.network.quadratures import with_momenta
 from sysdyn.compiler.network.reflection import reflect, relabelled
 from sysdyn.compiler.network.stated import FOREIGN, as_elements
 from sysdyn.compiler.network.verify import verify_network
@@ -171,7 +172,7 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
     reflected = formulation.startswith("co_")
     with _timed("primal", timings):
         network = along(outermost(network), complementary=reflected)
-        family = reflect(network) if reflected else as_elements(network, FOREIGN)
+        family = reflect(network) if reflected else with_momenta(as_elements(network, FOREIGN))
         verify_network(family)
         network, inverted, steps = primal(family, reflected=reflected)
         verify_network(network, coordinates=True)

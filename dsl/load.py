@@ -16,7 +16,6 @@ from sysdyn.dsl.elaborate.scenes import stopping
 from sysdyn.dsl.elaborate.scenes.scenes import SceneReader
 from sysdyn.dsl.elaborate.statements import switches
 from sysdyn.dsl.model import budget
-from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.depth import deep
@@ -345,7 +344,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
         try:
             if isinstance(value.operand if isinstance(value, syntax.Negative) else value, syntax.Number):
                 return resolver.scalar(value).node.data  # type: ignore[no-any-return]
-            node = resolver.wanted(value, dimension, "E208", f"{name} is in {{}}, wants {dim.show(dimension)}")
+            node = resolver.wanted(value, dimension, "E208", f"{name} is in {{}}, wants {common(dimension)}")
         except Failed:
             return None
         found = Values({}).number(node)

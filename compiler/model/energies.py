@@ -58,6 +58,7 @@ class Family:
 
     balance: of a coordinate, the unit of effort times displacement (J but in pseudo domains).
     less: of a coordinate that is counted from another, that one, as its name is shown with.
+    measured: a state that is an integral which something reads.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Family:
     place: Place
     tangible: bool = False
     less: str = ""
+    measured: bool = False
 
     @property
     def shown(self) -> str:
@@ -184,7 +186,7 @@ def energies(network: Network) -> EnergyModel:
             for c in network.coordinates
         ),
         unknowns=tuple(Family(u.name, u.shape, {"e": u.unit.text}, u.place) for u in network.unknowns),
-        states=tuple(Family(s.name, s.shape, {"s": s.unit.text}, s.place) for s in network.states),
+        states=tuple(Family(s.name, s.shape, {"s": s.unit.text}, s.place, measured=s.measured) for s in network.states),
         positions=tuple(Family(s.name, s.shape, {"start": s.unit.text}, s.place) for s in network.positions),
         functions=_functions(network),
         works=tuple(_works(network)),

@@ -1,12 +1,13 @@
-"""Displacements that no potential store of the complementary family holds: quadratures q' = f of what is read.
+"""Displacements and momenta that a family has no coordinate for: quadratures q' = f, p' = e of what is read.
 
-Where a displacement is traced that has no place there, its quadrature is added as a dynamic variable NAME.q; momenta of
-points are those of the kinetic stores that move with them.
+Where a displacement is read that no potential store of the complementary family holds, by a trace or by the law of its
+own branch (a memristor's), its quadrature is added as a dynamic variable NAME.q; in the primal one likewise NAME.p of a
+dissipator whose law reads its momentum.  Momenta of points are those of the kinetic stores that move with them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Box, Sizes, without
@@ -60,39 +61,62 @@ def from_masses(network: Network) -> Network:
 
 
 def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
-    """Quadratures q' = f of what traces, expectations and dynamics read and no store holds, and what of: a dynamic
-    variable NAME.q each.  That of a branch begins as written, that of a node at its position.
+    """Quadratures q' = f of what traces, expectations, dynamics and laws of their own branch read and no store holds,
+    and what of: a dynamic variable NAME.q each.  That of a branch begins as written, that of a node at its position.
     """
     stores = stores_of(network)
-    roots = ex.topological(expressions(network, "observations", "dynamics", "expectations"))
+    roots = ex.topological(expressions(network, "observations", "dynamics", "expectations", "branches.law"))
     wanted = dict.fromkeys((n.data[0], n.data[1]) for n in roots if is_position(n, stores))
+    return _integrated(network, wanted, "f"), frozenset(wanted)
+
+
+def with_momenta(network: Network) -> Network:
+    """The primal family's: NAME.p, p' = e, of dissipators whose law reads their own momentum."""
+    wanted = {(b.name, "bp"): None for b in network.branches if b.kind == "dissipator" and reads(b, "bp")}
+    return _integrated(network, wanted, "e") if wanted else network
+
+
+def reads(branch: Branch, kind: str) -> bool:
+    """Whether the law of a branch reads its own variable of this kind."""
+    law = () if branch.law is None else ex.variables(branch.law)
+    return any(n.op == "var" and n.data[:2] == (branch.name, kind) for n in law)
+
+
+def _integrated(network: Network, wanted: Iterable[Wanted], rate: str) -> Network:
+    """With a dynamic variable for each of these, of this rate (e or f), read in their places."""
+    wanted = dict.fromkeys(wanted)
 
     def read(root: Node) -> Node:
         found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] in wanted]
-        return ex.substitute(root, {n: quadrature(n.data[0], n.args, n.data[2]) for n in found}) if found else root
+        change = {n: _quadrature(n.data[0], n.data[1][1], n.args, n.data[2]) for n in found}
+        return ex.substitute(root, change) if found else root
 
     families: dict[Wanted, list[tuple[tuple[Loop, ...], tuple[Node, ...], Domain, Place]]] = {}
     for n in network.nodes:
         families[n.name, "nq"] = [(*whole(n), n.domain, n.place)]
     for b in network.branches:
-        families.setdefault((b.name, "bq"), []).append((b.loops, b.at, b.domain, b.place))
+        for kind in ("bq", "bp"):
+            families.setdefault((b.name, kind), []).append((b.loops, b.at, b.domain, b.place))
+    lawful = {(b.name, kind) for b in network.branches for kind in ("bq", "bp") if reads(b, kind)}
     states, dynamics = [], []
     for name, kind in wanted:
+        measured = (name, kind) not in lawful
         for loops, at, domain, place in families[name, kind]:
-            shape = loop_ranges(loops)
-            states.append(State(f"{name}.q", shape, domain.displacement, place))
-            dynamics.append(Dynamic(quadrature(name, at), ex.var(name, f"{kind[0]}f", *at), loops, place))
-    told = {(*w, 0) for w in wanted if w[1] == "bq"}
-    starts = (i for i in network.initials if i.target.op == "var" and i.target.data in told)
-    begun = (replace(i, target=quadrature(i.target.data[0], i.target.args)) for i in starts)
-    network = rewritten(network, read, (*TRACED, "dynamics"))
-    found = replace(
+            shape, unit = loop_ranges(loops), domain.momentum if kind == "bp" else domain.displacement
+            states.append(State(f"{name}.{kind[1]}", shape, unit, place, measured=measured))
+            own = _quadrature(name, kind[1], at)
+            dynamics.append(Dynamic(own, ex.var(name, f"{kind[0]}{rate}", *at), loops, place))
+    told = {(*w, 0) for w in wanted if w[1] != "nq"}
+    starts = [i for i in network.initials if i.target.op == "var" and i.target.data in told]
+    begun = (replace(i, target=read(i.target)) for i in starts)
+    placed = tuple(i for i in network.initials if i not in starts or i.target.data[1] != "bp")
+    network = replace(rewritten(network, read, (*TRACED, "dynamics", "branches")), initials=placed)
+    return replace(
         network,
         states=(*network.states, *states),
         dynamics=(*network.dynamics, *dynamics),
         initials=(*network.initials, *begun),
     )
-    return found, frozenset(wanted)
 
 
 def whole(node: NodeFamily) -> tuple[tuple[Loop, ...], tuple[Node, ...]]:
@@ -126,4 +150,8 @@ def is_position(node: Node, stores: frozenset[str]) -> bool:
 
 def quadrature(name: str, at: Sequence[Node], order: int = 0) -> Node:
     """The dynamic variable that a displacement without a store is."""
-    return ex.var(f"{name}.q", "s", *at, order=order)
+    return _quadrature(name, "q", at, order)
+
+
+def _quadrature(name: str, letter: str, at: Sequence[Node], order: int = 0) -> Node:
+    return ex.var(f"{name}.{letter}", "s", *at, order=order)

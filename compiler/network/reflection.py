@@ -21,6 +21,7 @@ from sysdyn.compiler.network.primal.reading import KINDS
 from sysdyn.compiler.network.quadratures import from_masses, massive, with_quadratures
 from sysdyn.compiler.network.stated import ALL, as_elements
 from sysdyn.compiler.network.sticking import as_relations
+from sysdyn.compiler.network.ties import as_transformers
 from sysdyn.compiler.network.ungrounded import grounded
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -47,7 +48,7 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    bare = from_masses(from_stores(grounded(as_elements(as_relations(complements(network)), ALL))))
+    bare = from_masses(from_stores(grounded(as_elements(as_relations(complements(as_transformers(network))), ALL))))
     network = with_positions(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
@@ -134,11 +135,10 @@ def unreflectable(network: Network) -> Diagnostic | None:
                 beside = node.data[1] == "bf" and node.data[0] in lawful and what.partition(" ")[2] in at_times
                 return Diagnostic("E602", message, place, help_ + series if beside else help_)
     stated = {b.name for b in network.branches if b.stated}
-    dissipators = {b.name for b in network.branches if b.kind == "dissipator"}  # no displacement of theirs is known
     for what, roots, place in (*laws, *moduli, *gammas):
         own = what.removeprefix("law of ")
         for node in ex.topological(roots):
-            if node.op == "var" and node.data[1] in ("nq", "bq") and (node.data[0] != own or own in dissipators):
+            if node.op == "var" and node.data[1] in ("nq", "bq") and node.data[0] != own:
                 if own in stated and node.data[0] in stated:  # one energy over the displacements of several ports
                     continue
                 return Diagnostic("E602", f"{what} depends on displacement {node}", place, help_)

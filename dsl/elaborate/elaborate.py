@@ -148,7 +148,7 @@ class Elaborator(Instances):
                 power = found.power() if callable(found.power) else found.power
             except Failed:
                 continue
-            self.parts.states.append(State(name, found.shape, si(found.dimension), found.place))
+            self.parts.states.append(State(name, found.shape, si(found.dimension), found.place, measured=True))
             self.parts.dynamics.append(Dynamic(state, self._by_nodes(power), loops, found.place))
             self.parts.given.add(name)
             target = state if found.first is None else ex.sub(state, found.first)

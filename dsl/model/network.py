@@ -205,12 +205,13 @@ class Unknown:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """A dynamic variable s."""
+    """A dynamic variable s; measured: an integral that is kept because something reads it, no content of the system."""
 
     name: str
     shape: Shape
     unit: Unit
     place: Place
+    measured: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,13 +82,14 @@ def law_of(
 
 
 def _memristive(side: str, own: dict[str, Node], law: Node) -> bool:
-    """Whether a law of effort and flow is modulated by its own displacement, and stores nothing: one is zero where the
-    other is, wherever that stands.
+    """Whether a law of effort and flow is modulated by its own displacement or momentum, and stores nothing: one is
+    zero where the other is, wherever these stand.
     """
-    if side not in "ef" or set(own) != {*"efq"} - {side}:
+    (other,) = {*"ef"} - {side} if side in "ef" else ("",)
+    memory = {own[letter] for letter in "qp" if letter in own}
+    if not memory or other not in own or side in own:
         return False
-    (other,) = set(own) - {"q"}
-    return own["q"] not in ex.variables(ex.substitute(law, {own[other]: ex.const(0.0)}))
+    return not memory & ex.variables(ex.substitute(law, {own[other]: ex.const(0.0)}))
 
 
 def _in_dimension(context: Context, branch: BranchSymbol, side: str, value: syntax.Expr, wanted: str | None) -> Node:
@@ -145,7 +146,7 @@ def _off_diagram(context: Context, side: str, other: str, span: syntax.Span) -> 
     """E302: the two variables are no edge of the diagram; what to write instead."""
     pair = frozenset((side, other))
     if pair == frozenset("pq"):
-        help_ = "write it as a dissipator e = M(q)*f with M = dp/dq"
+        help_ = "write it as a dissipator, e = M(q)*f with M = dp/dq or f = W(p)*e with W = dq/dp"
         return context.fail("E302", "p-q is the diagonal of the diagram: a memristive law", span, help=help_)
     requirement = "p' = e" if pair == frozenset("pe") else "q' = f"
     message = (

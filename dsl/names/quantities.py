@@ -141,9 +141,10 @@ class Quantities(Paths):
         return name in MEMBERS and law is not None and law.kind == MEMBERS[name].edge
 
     def _summed(self, symbol: BranchSymbol) -> bool:
-        """Whether a branch has no momentum of its own: all but kinetic stores."""
-        law = self.laws.get(symbol.family.name)
-        return law is not None and law.kind != "kinetic"
+        """Whether a branch has no momentum of its own: all but kinetic stores and laws that read it."""
+        law, name = self.laws.get(symbol.family.name), symbol.family.name
+        own = () if law is None else (n for n in ex.variables(law.law) if n.op == "var" and n.data[:2] == (name, "bp"))
+        return law is not None and law.kind != "kinetic" and not any(own)
 
     def _impulse(self, symbol: BranchSymbol, at: tuple[Node, ...], e: syntax.Member) -> Node:
         """The momentum of a branch without a kinetic store, p' = e: the integral of its effort since the start."""

@@ -223,6 +223,21 @@ def test_the_table(tmp_path, capsys):
     assert "x = -2" in out
 
 
+def test_what_a_scene_measures_is_no_rest_left_open(tmp_path, capsys):
+    model = """model m {
+  node x: translation
+  F: effort(e = 2 N) ground -> x
+  M: kinetic(p = 1 kg*f) x
+  S: potential(e = 4 N/m*q) x
+  D: dissipator(e = 1 N.s/m*f) x
+}
+scene s of m { time 0 s to 1 s; trace S.energy, D.energy, F.energy }
+"""
+    (found,) = rests(capsys, write(tmp_path, model))
+    assert (found["free"], found["stability"]) == ([], "asymptotically stable")
+    assert found["values"] == pytest.approx({"x": 0.5, "x'": 0.0})
+
+
 def test_a_long_search_says_how_far_it_is(tmp_path, monkeypatch):
     told = []
     path = write(tmp_path, DUFFING)

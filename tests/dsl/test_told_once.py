@@ -108,3 +108,16 @@ SLIPS = [
 def test_a_slip_of_a_tired_engineer_is_told_with_what_to_write(right, wrong, code, said, help_):
     (error,) = [d for d in api.check(DRIVE.replace(right, wrong)) if d.severity == "error"]
     assert (error.code, said in error.message, help_ in error.help) == (code, True, True), (error.message, error.help)
+
+
+def test_a_setting_of_another_level_names_it():
+    text = """component spring {
+  branch: translation
+  level straight default { law e = 2 N/m*q }
+  level hard { param k3 = 1 N/m^3; law e = k3*q^3 }
+}
+model m { node x: translation; S: spring() x; M: kinetic(p = 1 kg*f) x }
+scene s of m { time 0 s to 1 s; set S.k3 = 2 N/m^3 }
+"""
+    (error,) = [d for d in api.check(text) if d.severity == "error"]
+    assert (error.code, error.help) == ("E910", "level hard of 'S' has it")

@@ -1,9 +1,12 @@
-"""A dissipator whose law reads its own displacement: (R + k q^2) q' = v has the integral R q + k q^3/3 = int v dt."""
+"""A dissipator whose law reads its own displacement, (R + k q^2) q' = v, has the integral R q + k q^3/3 = int v dt; one
+that reads its momentum knows it.
+"""
 
 import numpy as np
 import pytest
 from running import ran
 
+FORMULATIONS = ("lagrangian", "hamiltonian", "kane", "co_lagrangian", "co_hamiltonian")
 LAWS = ("e = (100 ohm + k*q^2)*f", "f = e/(100 ohm + k*q^2)")
 MODEL = """
 component memristor {
@@ -29,8 +32,8 @@ scene run of ladder {
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
-@pytest.mark.one_in(3)
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.one_in(4)
 def test_closed_form(tmp_path, law, formulation):
     run = ran(tmp_path, MODEL.replace("LAW", law), formulation=formulation, accuracy=1e-6)
     assert run.met
@@ -48,6 +51,25 @@ def _charge(linkage):
     return roots[np.abs(roots.imag) < 1e-12].real[0]
 
 
-@pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
-def test_complementary_forms_know_no_displacement_of_it(tmp_path, formulation):
-    assert ran(tmp_path, MODEL.replace("LAW", LAWS[0]), formulation=formulation).refused == "E602"
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize(("law", "begun"), [("f = (0.01 ohm^-1 + k*p^2)*e", 0.0), ("e = f/(0.01 ohm^-1 + k*p^2)", 0.5)])
+@pytest.mark.one_in(4)
+def test_by_its_momentum(tmp_path, law, begun, formulation):
+    """Of V = i sin 3t the linkage is begun + i (1 - cos 3t)/3, whatever the law."""
+    text = (
+        MODEL.replace("LAW", law).replace("ohm/C^2", "ohm^-1/Wb^2").replace("5e6", "0.2").replace(".q as q", ".p as p")
+    )
+    text = text.replace("s[i] -> ground\n  }", f"s[i] -> ground\n    init M[i].p = {begun} Wb\n  }}")
+    run = ran(
+        tmp_path,
+        text.replace("  for i", "  expect static: order == 2\n  for i"),
+        formulation=formulation,
+        accuracy=1e-6,
+    )
+    assert run.met
+    time = np.asarray(run.trace.time)
+    for k in (1, 2):
+        linkage = begun + k * (1.0 - np.cos(3.0 * time)) / 3.0
+        current = k * np.sin(3.0 * time) * (0.01 + 0.2 * linkage**2)
+        for name, exact in ((f"p[{k}]", linkage), (f"i[{k}]", current)):
+            assert np.abs(np.asarray(run.trace[name]) - exact).max() <= 1e-6 * np.abs(exact).max()

@@ -305,6 +305,34 @@ scene s of z { time 0 s to 2 ms; level X = fein; trace X.i as x, Y.i as y }
         EACH,
         CLOSE,
     ),
+    "contents over two ports, whose losses are in the ledger": (
+        """
+component wet { branch a: rotation; branch b: rotation
+  content D = 1/4*(0.02 N.m.s^3)*(a.f^2 + b.f^2 + a.f*b.f)^2 }
+component leak { branch a: electrical; branch b: electrical
+  content G = 1/2*(3 ohm^-1)*(a.e^2 + b.e^2) + (1 ohm^-1)*a.e*b.e }
+model w { node x, y: rotation; node u, v: electrical
+  J: kinetic(p = 0.1 kg.m^2*f) x; K: kinetic(p = 0.3 kg.m^2*f) y
+  B: wet() a = x -> ground, b = y -> ground
+  C: potential(q = 1 F*e) u; D: potential(q = 2 F*e) v
+  L: leak() a = u -> ground, b = v -> ground
+  init x.f = 3 rad/s; init y.f = -2 rad/s; init C.e = 3 V; init D.e = -2 V }
+scene s of w { time 0 s to 1 s; trace x.f, y.f, u.e, v.e; expect always: abs(audit.energy) <= 1e-5 J }
+""",
+        solved(
+            lambda t, y: [
+                -0.1 * (y[0] ** 2 + y[1] ** 2 + y[0] * y[1]) * (2 * y[0] + y[1]),
+                -0.1 / 3 * (y[0] ** 2 + y[1] ** 2 + y[0] * y[1]) * (2 * y[1] + y[0]),
+                -3 * y[2] - y[3],
+                -(3 * y[3] + y[2]) / 2,
+            ],
+            [3, -2, 3, -2],
+            1,
+            **{name: (lambda t, y, k=k: y[k]) for k, name in enumerate(("x.f", "y.f", "u.e", "v.e"))},
+        ),
+        EACH,
+        CLOSE,
+    ),
     "a rheonomic constraint, its effort and its supply": (
         """
 model w { coord r: translation = 0.3 m; coord φ: rotation = 0 rad

@@ -56,6 +56,15 @@ CASES = {
         ", z",
         {"y.q": 0.1, "P.q": 0.1, "G.q": 0.1, "K.q": 0.1, "D.q": 0.2, "z.q": 0.0},
     ),
+    "beside a law that jumps": (
+        """D: dissipator(e = (if f > 1 m/s then 2 N else 1 N.s/m*f)) x -> y
+        G: potential(e = 3 N/m*q) x -> ground
+        H: potential(e = 1 N/m*q) y -> ground
+        init x.q = 0.2 m
+        init y.q ~ 0.5 m""",
+        "",
+        {"x.q": 0.2, "y.q": 0.5, "G.q": 0.2, "H.q": 0.5},
+    ),
     "contents share what is free": (
         """K: potential(q = 0.2 m/N*e) x -> z
         L: potential(q = 0.3 m/N*e) z -> y

@@ -129,3 +129,38 @@ model m {
 scene s of m { time 0 s to 0.3 s; trace x, k(x) every 0.1 s }
 """)
     assert run(["check", str(tmp_path / "m.sd")]) == 0, capsys.readouterr().err
+
+
+def test_what_a_trace_measures_and_the_formulation_are_no_part_of_the_order(tmp_path, capsys):
+    (tmp_path / "m.sd").write_text("""model m {
+  node a, b: electrical
+  node x: translation
+  V: effort(e = 1 V) a -> ground
+  L: kinetic(p = 1 mH*f) a -> b
+  G: gyrator(e1 = 1 N/A*f2) b -> ground, x -> ground
+  M: kinetic(p = 1 kg*f) x
+  S: potential(e = 1 N/m*q + 1 N/m^3*q^3) x
+  D: dissipator(e = 1 N.s/m*f) x
+  init L.f = 0 A; init M.f = 0 m/s; init S.q = 0 m
+  expect static: order == 3
+}
+scene s of m { time 0 s to 1 s; trace S.energy, D.energy, L.energy, V.p }
+scene c of m { time 0 s to 1 s; trace S.energy, x.q; formulation co_hamiltonian }
+""")
+    assert run(["check", str(tmp_path / "m.sd")]) == 0, capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ohm", ["0.1 mohm", "1e-12 ohm", "1 Gohm"])
+def test_the_order_of_a_stiff_model(ohm, tmp_path, capsys):
+    (tmp_path / "m.sd").write_text(f"""model m {{
+  node a, b: electrical
+  V: effort(e = 5 V*sin(100 Hz*t)) a -> ground
+  R: dissipator(e = {ohm}*f) a -> b
+  C: potential(q = 100 uF*e) b -> ground
+  W: dissipator(e = 1 ohm*f) b -> ground
+  init C.e = 0 V
+  expect static: order == 1
+}}
+scene s of m {{ time 0 s to 1 s; trace b.e }}
+""")
+    assert run(["check", str(tmp_path / "m.sd")]) == 0, capsys.readouterr().err

@@ -95,8 +95,8 @@ def test_an_effort_that_its_law_leaves_open_at_rest():
 def test_initial_values_a_model_takes(made, expected):
     system = system_of(made())
     owners = {f.owner for f in system.description.families if f.kind == "q"}
-    tangible = owners if expected[0] == expected[1] else set()
-    assert order_and_manifold(system, consistent_start(system, 0.0), tangible) == expected
+    idle = set() if expected[0] == expected[1] else owners
+    assert order_and_manifold(system, consistent_start(system, 0.0), idle) == expected
 
 
 def test_rates_that_only_a_difference_has():

@@ -78,6 +78,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     from sysdyn.cli.run.request.asked import Request
     from sysdyn.cli.run.request.scene_numbers import wrong_numbers
     from sysdyn.cli.run.start.starting import counted_as, described, start
+    from sysdyn.cli.run.verdict.expectations import missing_goldens
     from sysdyn.compiler.binding.certificate import certificate
     from sysdyn.compiler.binding.jumps import jumps
 
@@ -91,6 +92,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
         if report.failed:
             return {"ok": False}
     value = prepared.binding.evaluate
+    report.extend(missing_goldens(network.goldens, "N907"))
     t0 = prepared.begin
     t1 = value(scene.end) if scene and scene.end else t0
     report.extend(jumps(prepared.network, prepared.binding.parameters, (t0, t1)))

@@ -14,7 +14,6 @@ from sysdyn.cli.run.start.author import names_of
 from sysdyn.cli.run.start.contradiction import inconsistent, place_of
 from sysdyn.cli.run.verdict.last_state import LastState
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.scenes.stopping import RANGE
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Expectation, Parameter
@@ -265,31 +264,36 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
             report.note("N608", text, prepared.network.statics[0].place)
             return
         prepared, (system, state, facts) = written[0], (written[1].system, written[1].state, written[1].facts)
-    facts = counted_as(prepared, state.t, facts) if prepared.network.statics else facts
-    known = facts.counts
+    index = facts.index
+    primal = _primal(prepared, state.t) if prepared.network.statics and _without_primal_rows(prepared) else None
+    if primal is not None:
+        prepared, (system, state, facts) = primal[0], (primal[1].system, primal[1].state, primal[1].facts)
+    known = facts.counts | {"index": index}
     if any(n.data in ("static order", "static manifold") for c in prepared.network.statics for n in _names(c)):
-        tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
-        counted = order_and_manifold(system, state, tangible)
-        watched = sum(RANGE in s.name for s in prepared.network.states)
-        known |= {"order": counted[0] - watched, "manifold": counted[1]} if counted else {}
+        model = prepared.compiled.energies
+        idle = {c.name for c in model.coordinates if not c.tangible} | {s.name for s in model.states if s.measured}
+        counted = order_and_manifold(system, state, idle)
+        known |= {"order": counted[0], "manifold": counted[1]} if counted else {}
     for claim in prepared.network.statics:
         _static(prepared, claim, known, report)
 
 
 def counted_as(prepared: Prepared, t0: float, facts: Structure) -> Structure:
     """The facts with the counts of the Lagrangian formulation, where the present one leaves rows out (Kane's)."""
-    return replace(_primal(prepared, t0) or facts, index=facts.index) if _without_primal_rows(prepared) else facts
+    primal = _primal(prepared, t0) if _without_primal_rows(prepared) else None
+    return facts if primal is None else replace(primal[1].facts, index=facts.index)
 
 
-def _primal(prepared: Prepared, t0: float) -> Structure | None:
-    """The facts of the Lagrangian formulation; None where there is none."""
+def _primal(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None:
+    """The model in the Lagrangian formulation, at its start; None where there is none."""
     silent = Report()
     primal = prepare(prepared.network, silent, formulation="lagrangian", backend=prepared.backend)
     if primal is None:
         return None
     system = System(primal.structure, primal.arrays, primal.carrier)
     try:
-        return structure(system, eventful_start(system, t0, plan(primal, system)))
+        state = eventful_start(system, t0, plan(primal, system))
+        return primal, Started(system, state, structure(system, state))
     except InconsistentStart:
         return None
 
@@ -316,7 +320,8 @@ def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None]
         report.note("N608", message, claim.place)
     elif not holds(claim.operator, left, right, within):
         unit = "" if claim.unit.text == "1" else f" {claim.unit.text}"
-        found = f"found {left:.9g}{unit} and {right:.9g}{unit}"
+        told = (left, right) if ex.variables(claim.right) or claim.right.op != "const" else (left,)
+        found = "found " + " and ".join(f"{value:.9g}{unit}" for value in told)
         report.error("E909", f"expect failed: {claim.text.removeprefix('expect ')}, {found}", claim.place)
 
 

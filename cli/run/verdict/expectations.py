@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.start.starting import holds, where_holds
 from sysdyn.dsl.model.expression import variables
 from sysdyn.dsl.model.network import Expectation, Golden
-from sysdyn.dsl.text.diagnostics import Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.runtime.accuracy.options import Watch
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
@@ -104,13 +104,25 @@ def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report:
     return Claim(text, True, float(left[-1]), float(time[-1]))
 
 
+def _place_of(golden: Golden) -> Path:
+    return Path(golden.place.file).parent / golden.file
+
+
+def missing_goldens(goldens: Iterable[Golden], code: str) -> list[Diagnostic]:
+    """A finding for each golden file that is not there."""
+    return [
+        Diagnostic(code, f"the golden file '{g.file}' is missing", g.place, "sysdyn golden record")
+        for g in goldens
+        if not _place_of(g).is_file()
+    ]
+
+
 def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report, finished: bool) -> Claim:
     """`expect golden "F" within r`: the quantities that F also has, by the comparison of `sysdyn diff`."""
     text = f'golden "{golden.file}"'
-    path = Path(golden.place.file).parent / golden.file
-    if not path.is_file():
-        message = f"the golden file '{golden.file}' is missing"
-        report.error("E907", message, golden.place, help="sysdyn golden record")
+    path = _place_of(golden)
+    if missing := missing_goldens((golden,), "E907"):
+        report.extend(missing)
         return Claim(text, None, None, None)
     if not finished:
         return Claim(text, None, None, None)

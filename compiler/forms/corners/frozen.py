@@ -281,8 +281,9 @@ class _Freezer:
         order = {name: number for number, name in enumerate(BLOCKS)}
         ordered = sorted(made, key=lambda b: order.get(b.name, len(order)))
         with_senses = (*families[:last], *senses, *families[last:])
+        pins = (replace(p, family=p.family + len(senses)) if p.family >= last else p for p in self.before.pins)
         form = replace(self.before, families=with_senses, rows=tuple(rows), shapes=tuple(shapes), kinks=self.kinks)
-        return replace(form, blocks=tuple(ordered))
+        return replace(form, blocks=tuple(ordered), pins=tuple(pins))
 
     def _block(self, block: Block, new: list[Summand]) -> Block:
         kernels = []

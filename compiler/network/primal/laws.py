@@ -132,7 +132,7 @@ def integrate_powers(elements: Sequence[Element], found: Laws, *, reflected: boo
         if b.kind == "dissipator":
             text = f"the contents of '{e.name.partition('#')[0]}' are not known: its law has no closed integral"
             raise ModelError([Diagnostic("E102", text, b.place, "its power is known")])
-        found.states.setdefault(part.name, State(part.name, shape_of(part.box), JOULE, b.place))
+        found.states.setdefault(part.name, State(part.name, shape_of(part.box), JOULE, b.place, measured=True))
         stored, v = var(part.name, "s", *b.at), own(b, OWN[b.kind][0])
         found.dynamics.append(Dynamic(stored, mul(own(b, "be"), own(b, "bf")), b.loops, b.place))
         found.initials.append(Initial(stored, const(0.0), True, b.loops, b.place))
@@ -191,7 +191,7 @@ class _Statement:
 
     def _work(self, effort: Node) -> None:
         b = self.branch
-        stored = self.law.kept is not None or b.stated
+        stored = self.law.kept is not None or (b.stated and b.kind != "dissipator")
         if self.law.kept is not None:
             self.found.energies.append(Energy(f"kept {b.kind}", self.law.kept, b.loops, self.place))
         account = "stored" if stored else "dissipated" if b.kind == "dissipator" else "supplied"

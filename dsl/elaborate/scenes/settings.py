@@ -94,6 +94,10 @@ class Settings:
         if own and symbol is not None:
             near, started = None, " or ".join(f"set {p} = ..." for p in own[:3])
         help_ = f"nearest: '{near}'" if near else started
+        owner = self.resolver.located(s.target.base) if isinstance(s.target, syntax.Member) else None
+        if owner is not None and isinstance(owner.symbol, InstanceSymbol) and owner.symbol.spaces:
+            other = owner.symbol.spaces[0].elsewhere.get(last)
+            help_ = f"level {other} of '{shown.rpartition('.')[0]}' has it" if other else help_
         if name in self.model.parts.inputs:
             help_ = f"the whole: set {name} = [a, b, ...]"
         if isinstance(symbol, Definition) and symbol.kind == "input":

@@ -13,7 +13,7 @@ from dataclasses import replace
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Dynamic, Initial, Network, Observation, State
-from sysdyn.dsl.model.rewriting import expressions
+from sysdyn.dsl.model.rewriting import everywhere, expressions
 from sysdyn.dsl.model.units import NONE, si
 from sysdyn.dsl.text.diagnostics import Place
 
@@ -48,17 +48,37 @@ def watched(elaborator: Elaborator, observations: Iterable[Observation]) -> None
 
 
 def unwatched(network: Network) -> Network:
-    """The network without these states: for whom no time passes."""
-    names = {s.name for s in network.states if RANGE in s.name}
-    if not names:
-        return network
-    return replace(
-        network,
-        states=tuple(s for s in network.states if s.name not in names),
-        dynamics=tuple(d for d in network.dynamics if d.state.data[0] not in names),
-        initials=tuple(i for i in network.initials if i.target.op != "var" or i.target.data[0] not in names),
-        observations=tuple(o for o in network.observations if o.name not in names),
-    )
+    """The network without these states, and without other integrals that nothing reads: for whom no time passes."""
+    measured = {s.name for s in network.states if s.measured}
+    while measured:
+        less = replace(
+            network,
+            states=tuple(s for s in network.states if s.name not in measured),
+            dynamics=tuple(d for d in network.dynamics if d.state.data[0] not in measured),
+            initials=tuple(i for i in network.initials if not _states(i.target) & measured),
+            observations=tuple(o for o in network.observations if o.name not in measured),
+        )
+        read = _read(less)
+        if not measured & read:
+            return less
+        measured -= read
+    return network
+
+
+def _read(network: Network) -> set[str]:
+    """The states that a statement reads."""
+    found: set[str] = set()
+
+    def seen(node: ex.Node) -> ex.Node:
+        found.update(_states(node))
+        return node
+
+    everywhere(network, seen)
+    return found
+
+
+def _states(node: ex.Node) -> set[str]:
+    return {n.data[0] for n in ex.variables(node) if n.op == "var" and n.data[1] == "s"}
 
 
 def _integrated(elaborator: Elaborator, rate: ex.Node, place: Place) -> None:
@@ -66,7 +86,7 @@ def _integrated(elaborator: Elaborator, rate: ex.Node, place: Place) -> None:
     parts = elaborator.parts
     name = f"{rate.data[0]} {len(parts.watched)}"
     state = ex.var(name, "s")
-    parts.states.append(State(name, (), si(NONE), place))
+    parts.states.append(State(name, (), si(NONE), place, measured=True))
     parts.dynamics.append(Dynamic(state, rate, (), place))
     parts.given.add(name)
     parts.initials.append(Initial(state, ex.const(0.0), True, (), place))

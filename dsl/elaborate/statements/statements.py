@@ -237,6 +237,10 @@ class Statements(Declarations):
             within = None if s.within is None else self.resolver.wanted(s.within, dimension, "E208", message)
         finally:
             self.resolver.statics = False
+        for side, node in ((s.left, left.node), (s.right, right.node)) if moment == "static" else ():
+            if any(n.op in ("var", "time") for n in ex.topological([node])):
+                message = f"'{self.source_text(side.span)}' is no static quantity: only a run knows it"
+                raise self.resolver.fail("E908", message, side.span, help="expect always: ..., finally: or at 1 s: ...")
         text = self.source_text(s.span)
         self.parts.expectations.append(
             Expectation(moment, at, s.op, left.node, right.node, within, si(dimension), text, self.place(s.span))
