@@ -143,12 +143,12 @@ class Modes(c.Structure):
         *[(name, P) for name in ["rate", "y", "yd", "before", "before_d", "restart", "restart_d"]],
         *[(name, P) for name in ["values", "low", "high", "p_before", "p_after"]],
         *[(name, P) for name in ["exact", "found", "which", "turning"]],
-        *[(name, P) for name in ["thrown", "level", "height", "flight", "fastest"]],
+        *[(name, P) for name in ["thrown", "level", "height", "begins", "flight", "fastest"]],
         *[(name, D) for name in ["rest", "faint"]],
         *[(name, P) for name in ["watch", "log"]],
         *[(name, L) for name in ["left", "stalled", "chatters"]],
         ("differs", D),
-        *[(name, I) for name in ["pieces", "at", "struck", "flying"]],
+        *[(name, I) for name in ["pieces", "at", "struck"]],
         *[(name, I) for name in ["width", "room", "logged", "waits"]],
     ]
 

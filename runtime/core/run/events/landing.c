@@ -173,7 +173,7 @@ int sd_landing_takes(sd_run *run, const sd_transition *one, double t)
     done = done && sd_landing_arrives(run, one->sides + one->rounds * m->relations, t) && sd_mode_ordinary(m) &&
            sd_mode_decided(m, before, one, m->values);
     m->struck = -1;
-    done = done && sd_strike_throws(run, one->strike);
+    done = done && sd_strike_throws(run, one->strike, t);
     if (!done) {
         memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
         sd_landing_enter(run, from);

@@ -124,8 +124,9 @@ typedef struct sd_modes {
     double *found;                    /* [watches] */
     int32_t *which;                   /* [watches] */
     int32_t *turning;                 /* [kinks] that turn now */
-    int32_t *thrown;                  /* [contacts] 1: an impact has opened the gap, which is in flight (events/bounces.py) */
-    double *level, *height, *flight;  /* [contacts] of these: value at which it begins, what it rises to, s: its time */
+    int32_t *thrown;                  /* [observed] 1: of a gap that an impact has opened, until it closes (events/bounces.py) */
+    double *level, *height;           /* [observed] of these: value at which the flight begins, what it rises to */
+    double *begins, *flight;          /* [observed] s: when it begins, how long it takes */
     double *fastest;                  /* [contacts] speed at which each gap closed at most */
     double rest, faint;               /* of it: a slower impact is the last; of `largest`: lower flights are the handler's */
     sd_watch *watch;                  /* [watches] */
@@ -135,7 +136,7 @@ typedef struct sd_modes {
                                        * that they never end */
     double differs;                   /* of its size: what a value differs by that has jumped */
     int32_t pieces, at;               /* number of the present piece */
-    int32_t struck, flying;           /* the contact that is thrown by the event at hand, -1: none; how many are thrown */
+    int32_t struck;                   /* the contact that is thrown by the event at hand, -1: none */
     int32_t width, room, logged, waits; /* waits: an event has no room for its rows yet */
 } sd_modes;
 

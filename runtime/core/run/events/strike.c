@@ -125,25 +125,32 @@ int sd_strike_gap(sd_run *run, const sd_strike *strike, double t)
     return fabs(m->values[c->rate] - back) <= sd_mode_zero(m, c->rate);
 }
 
-int sd_strike_throws(sd_run *run, const sd_strike *strike)
+/* What holds flies no more. */
+static void land(sd_modes *m)
+{
+    for (int32_t k = 0; k < m->contacts; k++)
+        if (m->contact[k].kind == SD_PHI && sd_mode_now(m)->holds[k])
+            m->thrown[m->contact[k].value] = 0;
+}
+
+int sd_strike_throws(sd_run *run, const sd_strike *strike, double t)
 {
     sd_modes *m = run->modes;
     if (!strike) {
-        memset(m->thrown, 0, (size_t)m->contacts * sizeof *m->thrown);
-        m->flying = 0;
+        land(m);
         return 1;
     }
-    int32_t k = strike->contact;
-    const sd_contact *c = &m->contact[k];
+    const sd_contact *c = &m->contact[strike->contact];
     double speed = m->values[c->rate], pull = -m->values[c->acceleration];
     int back = speed > 0.0 && pull > 0.0;
     double height = back ? 0.5 * speed * speed / pull : INFINITY;
     if (height < m->faint * m->largest[c->value])
         return 0;
-    memset(m->thrown, 0, (size_t)m->contacts * sizeof *m->thrown);
-    m->thrown[k] = m->flying = 1;
-    m->level[k] = fmin(m->values[c->value], 0.0);
-    m->height[k] = height;
-    m->flight[k] = back ? 2.0 * speed / pull : INFINITY;
+    land(m);
+    m->thrown[c->value] = 1;
+    m->level[c->value] = fmin(m->values[c->value], 0.0);
+    m->height[c->value] = height;
+    m->begins[c->value] = t;
+    m->flight[c->value] = back ? 2.0 * speed / pull : INFINITY;
     return 1;
 }
