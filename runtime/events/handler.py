@@ -198,7 +198,7 @@ class Handler(Watching):
         """
         self._count(t)
         self.choices.end(t, y, yd)
-        free = self._free()
+        free, lone = self._free("friction"), self._free("friction", "phi")
         self.simple, self.struck, self.rounds, self.soon = True, -1, [], 0.0
         said, stood, flew = self.contacts.standing(), self.kinks.state(), self.bounces
         self.kinks.anew()
@@ -216,7 +216,7 @@ class Handler(Watching):
         if not (samples or bent or self.rounds or touched):
             return None
         # the point behind it all
-        self.struck = touched[0] if free and touched and len(which) == 1 and not self.rounds else -1
+        self.struck = touched[0] if lone and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
         self.turns.seen(t, point)
         self._return(t, begun, point, which)
@@ -250,15 +250,15 @@ class Handler(Watching):
             self.soon = max(self.soon, LEAST * least)
 
     def _bounced(self, k: int, thrown: list[int]) -> bool:
-        """Whether gap k has closed and opened again, and nothing holds that has impulses; thrown: rows of gaps."""
+        """Whether gap k has closed and opened again, and nothing else did; thrown: rows of gaps."""
         closed, contacts = self.succession.impacts.closed, self.plan.contacts
         bounced = k >= 0 and closed == [k] and thrown == [contacts[k].value]
-        return bounced and self._plain and self._free()
+        return bounced and self._plain and self._free("friction", "phi")
 
-    def _free(self) -> bool:
-        """Whether nothing holds but dry friction, which has no impulses."""
+    def _free(self, *kinds: str) -> bool:
+        """Whether nothing holds but contacts of these kinds, and none that a relation reads."""
         pairs = zip(self.plan.contacts, self.contacts.active.tolist(), strict=True)
-        return not any(holds and (c.kind != "friction" or c.hold >= 0) for c, holds in pairs)
+        return not any(holds and (c.kind not in kinds or c.hold >= 0) for c, holds in pairs)
 
     def _followed(self, t: float, point: Point) -> Point:
         """The point after the conditions that became true where the constraints were found anew."""

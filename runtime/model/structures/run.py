@@ -66,8 +66,8 @@ class Strike(c.Structure):
 
     _fields_ = [
         *[(name, P) for name in ["system", "linear"]],
-        *[(name, I) for name in ["contact", "row", "own", "n", "moves"]],
-        *[(name, P) for name in ["unknown", "of_row", "integral", "column", "row_of", "slot", "rated"]],
+        *[(name, I) for name in ["contact", "row", "own", "n", "moves", "besides"]],
+        *[(name, P) for name in ["beside", "unknown", "of_row", "integral", "column", "row_of", "slot", "rated"]],
         ("held", Held),
         ("restitution", D),
         *[(name, P) for name in ["jy", "jyd", "r", "value", "scale", "x", "impulse"]],

@@ -49,6 +49,8 @@ typedef struct sd_strike {
     struct sd_linear *linear;
     int32_t contact, row, own;        /* the gap, its row of flows in the system, the column of its impulse; -1: none */
     int32_t n, moves;                 /* columns; the first ones are unknowns that move, the others impulses */
+    int32_t besides;
+    const int32_t *beside;            /* [besides] other gaps that an impulse of this one reaches */
     const int32_t *unknown, *of_row, *integral; /* [n] unknown of a column, row of a row; 1: integrated over the instant */
     const int32_t *column, *row_of, *slot, *rated; /* [n + 1], [entries] */
     sd_held held;                     /* of the system: this gap alone holds; or as it was */

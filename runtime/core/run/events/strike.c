@@ -18,16 +18,16 @@
 #define REGULAR 1e-11 /* of its column: a pivot */
 #define STAYS 1e-14  /* of its magnitude, what an unknown is moved by that stays where it is */
 
-/* The flow with which the gap opens again, 0 where it closes no more, or something else is at its zero too. */
+/* The flow with which the gap opens again, 0 where it closes no more, or what it reaches is at its zero too. */
 static double thrown_back(const sd_run *run, const sd_strike *strike)
 {
     const sd_modes *m = run->modes;
     const sd_contact *c = &m->contact[strike->contact];
     const double *v = m->values;
     double speed = v[c->rate], back = -strike->restitution * speed, *fastest = &m->fastest[strike->contact];
-    for (int32_t k = 0; k < m->contacts; k++) {
-        int32_t row = m->contact[k].value;
-        if (k != strike->contact && m->contact[k].kind == SD_PHI && v[row] <= sd_mode_zero(m, row))
+    for (int32_t k = 0; k < strike->besides; k++) {
+        int32_t row = m->contact[strike->beside[k]].value;
+        if (v[row] <= sd_mode_zero(m, row))
             return 0.0;
     }
     for (int32_t k = 0; k < m->relations; k++)
