@@ -246,6 +246,15 @@ static int settled(sd_run *run, double t)
     return sd_settle_point(run->settle, t, m->before, m->before_d);
 }
 
+/* Whether a row is of a gap that does not hold, which inertia leads. */
+static int gap(const sd_modes *m, int32_t row)
+{
+    int32_t k = 0;
+    while (k < m->contacts && (m->contact[k].kind != SD_PHI || sd_mode_now(m)->holds[k] || m->contact[k].value != row))
+        k++;
+    return k < m->contacts;
+}
+
 /* Whether what crosses at t does so early in the first step behind an event, and may be of what relaxes at once, which its
  * dense output does not follow: all but gaps. */
 static int early(const sd_run *run, double t, double end, int32_t crossed)
@@ -253,7 +262,7 @@ static int early(const sd_run *run, double t, double end, int32_t crossed)
     const sd_modes *m = run->modes;
     double since = t - run->t_from;
     int32_t gaps = 0;
-    while (gaps < crossed && m->thrown[sd_mode_now(m)->row[m->which[gaps]]])
+    while (gaps < crossed && gap(m, sd_mode_now(m)->row[m->which[gaps]]))
         gaps++;
     return gaps < crossed && run->t_from == m->begun && since > m->at_once && since < m->early * (end - run->t_from);
 }
