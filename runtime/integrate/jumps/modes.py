@@ -115,6 +115,7 @@ class Modes:
         self._systems = list({id(s): s for s in settled}.values())
         self._fixed = [k.sense for k in plan.contacts if k.sense >= 0] + [k.branch for k in plan.kinks]
         self._fixed += [k.hold for k in plan.contacts if k.hold >= 0]
+        self._alone = all(k.hold < 0 for k in plan.contacts)
         self.core = lib.Modes(now=-1, last=-np.inf, begin=run.start.t, longest=longest, passed=-np.inf, left=UNLIMITED)
         self.core.chatters = STALLED
         self._sizes(plan)
@@ -191,6 +192,8 @@ class Modes:
         core.fastest, core.rest, core.struck = lib.pointer(self.handler.succession.impacts.fastest), plan.rest, -1
         core.early, core.at_once = EARLY.get(run.request.method, 0.0), AT_ONCE * self.handler.nothing
         core.faint = UNSEEN * run.request.rtol if run.request.method == "bdf" else 0.0
+        self._anywhere = np.full(core.contacts + 1, -1, dtype=np.int32)
+        core.anywhere = lib.pointer(self._anywhere)
         core.exact = self._array(np.zeros(core.relations + 1), np.int32)
         core.turning = self._array(np.zeros(core.kinks + 1), np.int32)
         core.own.value = self._array(np.zeros(core.places + 1))
@@ -317,12 +320,16 @@ class Modes:
         same = what[0], what[1], begin, end
         if end < 0 or 2 + 2 * len(flat) > self.core.width or self._tried.setdefault(repr(same), 0) >= AGAIN:
             return
+        anywhere = strike is not None and begin == end and self._alone
+        if anywhere and self._anywhere[handler.struck] >= 0:
+            return
         self._tried[repr(same)] += 1
         self._transitions = _grown(self._transitions, number)
         entries = tuple(handler.happened[before:])
         self._transitions[number] = lib.Transition(
+            number=number,
             to=end,
-            next=self._modes[begin].first,
+            next=-1 if anywhere else self._modes[begin].first,
             crossed=len(crossed),
             due=JUMPS if due is None else len(due),
             rounds=len(handler.rounds),
@@ -340,7 +347,10 @@ class Modes:
             momenta=momenta,
         )
         self.core.transition = c.addressof(self._transitions)
-        self._modes[begin].first = number
+        if anywhere:
+            self._anywhere[handler.struck] = number
+        else:
+            self._modes[begin].first = number
         self._told.append(told_of(groups, entries))
 
     def _strike(self, t: float, point: Any) -> int | None:

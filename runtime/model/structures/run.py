@@ -78,7 +78,7 @@ class Transition(c.Structure):
     """sd_transition."""
 
     _fields_ = [
-        *[(name, I) for name in ["to", "next", "crossed", "due", "rounds", "moves"]],
+        *[(name, I) for name in ["number", "to", "next", "crossed", "due", "rounds", "moves"]],
         *[(name, P) for name in ["which", "sample", "end", "kind", "place", "read", "sides"]],
         ("entries", L),
         ("soon", D),
@@ -117,7 +117,9 @@ class Modes(c.Structure):
         ("own", Mode),
         *[(name, I) for name in ["base", "now", "parameters", "places", "relations", "contacts", "kinks"]],
         *[(name, I) for name in ["systems", "samples", "observed", "alikes", "unknowns"]],
-        *[(name, P) for name in ["p", "place", "relation_row", "relation_moves", "contact", "kink", "system"]],
+        *[(name, P) for name in ["p", "place", "anywhere"]],
+        ("here", Transition),
+        *[(name, P) for name in ["relation_row", "relation_moves", "contact", "kink", "system"]],
         *[(name, P) for name in ["period", "next", "piece"]],
         *[
             (name, D)

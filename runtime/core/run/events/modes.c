@@ -216,6 +216,23 @@ static int refused(const sd_modes *m, const sd_transition *one, double t)
     return one->entries > m->left || (one->moves && (at_once || flies_low(m, t))) || t - m->last < one->soon;
 }
 
+/* The same of a gap alone that closes in flight, from whatever mode; NULL: there is none, or it leads elsewhere. */
+static const sd_transition *anywhere(sd_run *run, double t, int32_t crossed, int32_t due)
+{
+    sd_modes *m = run->modes;
+    const sd_mode *mode = sd_mode_now(m);
+    for (int32_t k = 0; k < m->contacts && crossed == 1 && due == 0; k++) {
+        if (m->anywhere[k] < 0 || mode->holds[k] || m->contact[k].value != mode->row[m->which[0]])
+            continue;
+        m->here = m->transition[m->anywhere[k]];
+        m->here.to = m->now;
+        m->here.which = m->which;
+        m->here.sides = mode->relation;
+        return !refused(m, &m->here, t) && sd_landing_takes(run, &m->here, t) ? &m->here : NULL;
+    }
+    return NULL;
+}
+
 /* The transition that what crossed, or is due (SD_JUMP: the text jumps), takes at t; the model is then in its mode.
  * NULL: none. */
 static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_t due)
@@ -236,7 +253,7 @@ static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_
         if (!one->moves || sd_landing_takes(run, one, t))
             return one;
     }
-    return NULL;
+    return anywhere(run, t, crossed, due);
 }
 
 static int settled(sd_run *run, double t)

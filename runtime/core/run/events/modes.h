@@ -60,7 +60,7 @@ typedef struct sd_strike {
 } sd_strike;
 
 typedef struct sd_transition {
-    int32_t to, next;                 /* next: transition from the same mode, -1: none */
+    int32_t number, to, next;         /* among all; next: transition from the same mode, -1: none */
     int32_t crossed, due, rounds, moves; /* due SD_JUMP: where the text jumps; moves 0: nothing but sides change, the step goes on */
     const int32_t *which, *sample;    /* [crossed] watches, [due] samples, both ascending */
     const int32_t *end;               /* [rounds] of its assignments */
@@ -96,6 +96,9 @@ typedef struct sd_modes {
     int32_t parameters, places, relations, contacts, kinks, systems, samples, observed, alikes, unknowns;
     double *p;                        /* [parameters] */
     const int32_t *place;             /* [places] in p */
+    int32_t *anywhere;                /* [contacts] the transition in which this gap alone opens again, whatever else the mode
+                                       * is, in no mode's list; -1: none */
+    sd_transition here;               /* such a one, as it is from the mode at hand */
     const int32_t *relation_row, *relation_moves; /* [relations] */
     const sd_contact *contact;
     const sd_kink *kink;
