@@ -12,6 +12,7 @@ from contextlib import suppress
 
 import numpy as np
 from sysdyn.runtime.events.observer import Observer
+from sysdyn.runtime.events.plan import Contact
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.numerics.rank import NotFiniteError
@@ -29,19 +30,32 @@ LEAST = 30.0
 @dataclass(frozen=True, slots=True)
 class Bounce:
     """A gap that an impact opened, in free flight: its value there, which is zero but for round-off (level <= 0), what
-    it rises to (height), and the time until it closes again (flight, s; both infinite where nothing pulls it back).
+    it rises to (height), when it begins and the time until it closes again (begins, flight, s; height and flight are
+    infinite where nothing pulls it back).
     """
 
     level: float
     height: float
+    begins: float
     flight: float
 
 
-def thrown(value: float, speed: float, pull: float) -> Bounce:
-    """A gap with its value, that opens at a speed and is pulled back."""
+def thrown(t: float, value: float, speed: float, pull: float) -> Bounce:
+    """A gap with its value, that opens at t (s) at a speed and is pulled back."""
     back = speed > 0.0 and pull > 0.0
     height, flight = (0.5 * speed * speed / pull, 2.0 * speed / pull) if back else (np.inf, np.inf)
-    return Bounce(min(value, 0.0), height, flight)
+    return Bounce(min(value, 0.0), height, t, flight)
+
+
+def begun(t: float, values: Floats, gaps: Sequence[Contact]) -> dict[int, Bounce]:
+    """The flights that begin at t (s), by rows of gaps; values [observed] there."""
+    speed_of = {c.value: (float(values[c.rate]), -float(values[c.acceleration])) for c in gaps}
+    return {row: thrown(t, float(values[row]), *motion) for row, motion in speed_of.items()}
+
+
+def new(now: dict[int, Bounce], before: dict[int, Bounce]) -> list[int]:
+    """The rows of gaps whose flight now is not one of before."""
+    return [row for row, bounce in now.items() if before.get(row) is not bounce]
 
 
 def flights(
@@ -68,7 +82,7 @@ def flights(
     speed, pull = (4.0 * one - two) / (2.0 * step), (2.0 * one - two) / step**2
     found = []
     for row, side in falls:
-        bounce = thrown(side * float(now[row]), side * float(speed[row]), side * float(pull[row]))
+        bounce = thrown(t, side * float(now[row]), side * float(speed[row]), side * float(pull[row]))
         if np.isfinite(bounce.flight):
             found.append((bounce, 2.0 * float(np.sqrt(2.0 * SEEN * observer.zero(row) / (side * pull[row])))))
     return found

@@ -12,7 +12,7 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.events.bounces import LEAST, flights, thrown
+from sysdyn.runtime.events.bounces import LEAST, begun, flights, new
 from sysdyn.runtime.events.choices import Choices
 from sysdyn.runtime.events.conditions import Conditions, Round, with_momenta
 from sysdyn.runtime.events.contacts import Standing as Stood
@@ -198,9 +198,9 @@ class Handler(Watching):
         """
         self._count(t)
         self.choices.end(t, y, yd)
-        free = self._free()
+        free, lone = self._free("friction"), self._free("friction", "phi")
         self.simple, self.struck, self.rounds, self.soon = True, -1, [], 0.0
-        said, stood = self.contacts.standing(), self.kinks.state()
+        said, stood, flew = self.contacts.standing(), self.kinks.state(), self.bounces
         self.kinks.anew()
         which, crossed = self._crossed(t, y, yd, which)
         begun, y, yd = y, y.copy(), yd.copy()
@@ -216,12 +216,13 @@ class Handler(Watching):
         if not (samples or bent or self.rounds or touched):
             return None
         # the point behind it all
-        self.struck = touched[0] if free and touched and len(which) == 1 and not self.rounds else -1
+        self.struck = touched[0] if lone and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
         self.turns.seen(t, point)
         self._return(t, begun, point, which)
-        self.struck = self.struck if self._bounced(self.struck) else -1
-        self.simple &= not self.bounces
+        thrown = new(self.bounces, flew)
+        self.struck = self.struck if self._bounced(self.struck, thrown) else -1
+        self.simple &= not thrown
         self.happened += self.kinks.happened(t, stood)
         self.passes = self.kinks.passing(stood, self.observer(t, *point)) if self.kinks.peaks else np.inf
         return point
@@ -248,16 +249,16 @@ class Handler(Watching):
                 raise SolverFailure("zeno", t, 0.0, self._names())
             self.soon = max(self.soon, LEAST * least)
 
-    def _bounced(self, k: int) -> bool:
-        """Whether gap k has closed and opened again, and nothing holds that has impulses."""
+    def _bounced(self, k: int, thrown: list[int]) -> bool:
+        """Whether gap k has closed and opened again, and nothing else did; thrown: rows of gaps."""
         closed, contacts = self.succession.impacts.closed, self.plan.contacts
-        bounced = k >= 0 and closed == [k] and list(self.bounces) == [contacts[k].value]
-        return bounced and self._plain and self._free()
+        bounced = k >= 0 and closed == [k] and thrown == [contacts[k].value]
+        return bounced and self._plain and self._free("friction", "phi")
 
-    def _free(self) -> bool:
-        """Whether nothing holds but dry friction, which has no impulses."""
+    def _free(self, *kinds: str) -> bool:
+        """Whether nothing holds but contacts of these kinds, and none that a relation reads."""
         pairs = zip(self.plan.contacts, self.contacts.active.tolist(), strict=True)
-        return not any(holds and (c.kind != "friction" or c.hold >= 0) for c, holds in pairs)
+        return not any(holds and (c.kind not in kinds or c.hold >= 0) for c, holds in pairs)
 
     def _followed(self, t: float, point: Point) -> Point:
         """The point after the conditions that became true where the constraints were found anew."""
@@ -286,8 +287,9 @@ class Handler(Watching):
         """The point behind an instant at which the text jumps, and behind the conditions that become true by it."""
         self.simple, self.struck, self.rounds, self.soon, stood = True, -1, [], 0.0, self.kinks.state()
         self.kinks.anew()
+        flew = self.bounces
         point = self._followed(t, self.settled(t, y, yd, self.contacts.standing()))
-        self.simple &= not self.bounces
+        self.simple &= not new(self.bounces, flew)
         self.happened += self.kinks.happened(t, stood)
         return point
 
@@ -310,19 +312,18 @@ class Handler(Watching):
         self._renew(t, *found)
         self.choices.begin(t, *found)
         if anew:
-            self._bounce(t, *found)
+            self._bounce(t, *found, {*touched, *self.succession.impacts.closed})
         self._note(t, said, {*touched, *self.succession.impacts.closed})
         return found
 
-    def _bounce(self, t: float, y: Floats, yd: Floats) -> None:
-        """The gaps that an impact opened."""
-        values = self.observer(t, y, yd)
-        closed = np.abs(values[self._gaps]) <= self.observer.zeros(self._gaps)
-        opened = self._gap[closed & ~self.contacts.active[self._gap]]
-        self.bounces = {
-            c.value: thrown(float(values[c.value]), float(values[c.rate]), -float(values[c.acceleration]))
-            for c in (self.plan.contacts[k] for k in opened)
-        }
+    def _bounce(self, t: float, y: Floats, yd: Floats, met: Set[int]) -> None:
+        """The gaps in flight: that were, and have not been met, or that open here."""
+        values, contacts = self.observer(t, y, yd), self.plan.contacts
+        free = ~self.contacts.active[self._gap]
+        here = np.abs(values[self._gaps]) <= self.observer.zeros(self._gaps)
+        still = {contacts[k].value for k in set(self._gap[free].tolist()) - met}
+        begin = begun(t, values, [contacts[k] for k in self._gap[free & here]])
+        self.bounces = begin | {row: bounce for row, bounce in self.bounces.items() if row in still}
 
     def _note(self, t: float, said: Stood, struck: Set[int]) -> None:
         """What contacts that stand otherwise than `said`, and impacts, are called."""

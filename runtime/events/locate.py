@@ -28,7 +28,8 @@ Dense = Callable[[float], Floats]
 class Edges:
     """Columns [watches]: row, side, row of its rate or -1, tolerance, level <= 0, tolerance of its rate: each changes
     where side*value - level falls below -tolerance.  A bounce begins at the value that the impact before it left, which
-    is zero but for round-off: that is its level, else the round-off of many bounces adds up to a fall.
+    is zero but for round-off: that is its level, until it has been above zero.  So the round-off of many bounces does
+    not add up.
     """
 
     row: Numbers
@@ -63,8 +64,9 @@ def _falling(edges: Edges, low: Floats, high: Floats) -> list[int]:
     part by its jerk alone), and does not fall at the end, has not: a first step of order 1 may pull it below.
     """
     side, rate = edges.side, edges.rate
-    fell = np.flatnonzero(side * high[edges.row] - edges.level < -edges.small)
-    side, row, rate, level = side[fell], edges.row[fell], rate[fell], edges.level[fell]
+    levels = np.where(side * low[edges.row] > 0.0, 0.0, edges.level)
+    fell = np.flatnonzero(side * high[edges.row] - levels < -edges.small)
+    side, row, rate, level = side[fell], edges.row[fell], rate[fell], levels[fell]
     begins = (rate >= 0) & (side * low[row] <= level + edges.small[fell])
     rises = begins & (np.minimum(side * low[rate], side * high[rate]) >= -edges.still[fell])
     return [int(k) for k in fell[~rises]]
@@ -90,12 +92,15 @@ def _instant(dense: Dense, edges: Edges, k: int, low: tuple[float, Floats], high
     its crest, or, where that is round-off too, through its tolerance.
     """
     row, side, rate = (int(column[k]) for column in (edges.row, edges.side, edges.rate))
-    small, level = float(edges.small[k]), float(edges.level[k])
-    begin, value = low[0], side * float(low[1][row]) - level
+    small, level, value = float(edges.small[k]), float(edges.level[k]), side * float(low[1][row])
+    level = 0.0 if value > 0.0 else level
+    begin, value = low[0], value - level
     if value <= 0.0 and rate >= 0 and side * float(low[1][rate]) > 0.0 > side * float(high[1][rate]):
         lower, upper = ((at, side * float(values[rate])) for at, values in (low, high))
         begin = _root(dense, rate, side, lower, upper)
-        value = side * float(dense(begin)[row]) - level
+        top = side * float(dense(begin)[row])
+        level = 0.0 if top > 0.0 else level
+        value = top - level
         if value <= 0.0:
             value, level = value + small, level - small
     return _root(dense, row, side, (begin, value), (high[0], side * float(high[1][row]) - level), level)

@@ -23,7 +23,9 @@ FALLEN = 1e-4
 
 
 class Watching:
-    """side [relations]: 1 or -1 of zero, 0 on neither; bounces: by rows, gaps that an impact opened."""
+    """side [relations]: 1 or -1 of zero, 0 on neither; bounces: by rows, gaps that an impact opened, until
+    they close.
+    """
 
     def __init__(self, plan: Plan, system: System, span: tuple[float, float]) -> None:
         self.plan, self.system, self.span = plan, system, span
@@ -80,10 +82,15 @@ class Watching:
             still = np.where(flies[rows] & (watched.rate >= 0), self.observer.zeros(watched.rate), 0.0)
         return Edges(rows, watched.side, watched.rate, small, level, still)
 
-    def flight(self, unseen: float) -> float:
-        """Time (s) until the first bounce ends that rises less than `unseen` times the largest value of its gap."""
-        low = (b.flight for row, b in self.bounces.items() if b.height < unseen * self.observer.largest[row])
-        return min(low, default=np.inf)
+    def low_flights(self, t: float, unseen: float) -> tuple[float, float]:
+        """How long (s) the shortest takes of the bounces under way at t (s) that rise less than `unseen` times the
+        largest value of their gap, and when (s) the first of them must have ended; inf where there is none.
+        """
+        largest = self.observer.largest
+        low = [b for row, b in self.bounces.items() if b.height < unseen * largest[row]]
+        low = [b for b in low if t + self.nothing < b.begins + 2.0 * b.flight]
+        first = min((b.begins + 2.0 * b.flight for b in low), default=np.inf)
+        return min((b.flight for b in low), default=np.inf), first
 
     # -- samples -------------------------------------------------------------------------------------------------
 

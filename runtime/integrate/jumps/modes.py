@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Sequence
+from dataclasses import astuple, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,6 +51,7 @@ AT_ONCE = 1e3
 """
 UNSEEN = 100.0
 """Times a run's tolerance: of a bounce that rises less, the error test of the bdf hardly sees that it falls."""
+FLIGHT = tuple(field.name for field in fields(Bounce))
 JUMPS = -1
 """Samples due where the text jumps (core/run/events/modes.h)."""
 
@@ -113,6 +115,7 @@ class Modes:
         self._systems = list({id(s): s for s in settled}.values())
         self._fixed = [k.sense for k in plan.contacts if k.sense >= 0] + [k.branch for k in plan.kinks]
         self._fixed += [k.hold for k in plan.contacts if k.hold >= 0]
+        self._alone = all(k.hold < 0 for k in plan.contacts)
         self.core = lib.Modes(now=-1, last=-np.inf, begin=run.start.t, longest=longest, passed=-np.inf, left=UNLIMITED)
         self.core.chatters = STALLED
         self._sizes(plan)
@@ -181,13 +184,16 @@ class Modes:
             setattr(core, name, self._array(np.zeros(run.driver.observed + 1)))
         for name in ("p_before", "p_after"):
             setattr(core, name, self._array(np.zeros(core.parameters + 1)))
-        contacts = core.contacts
-        core.thrown = self._array(np.zeros(contacts), np.int32)
-        for name in ("level", "height", "flight"):
-            setattr(core, name, self._array(np.zeros(contacts)))
+        self._thrown = np.zeros(run.driver.observed + 1, dtype=np.int32)
+        self._flights = [np.zeros(run.driver.observed + 1) for _ in FLIGHT]
+        core.thrown = lib.pointer(self._thrown)
+        for name, array in zip(FLIGHT, self._flights, strict=True):
+            setattr(core, name, lib.pointer(array))
         core.fastest, core.rest, core.struck = lib.pointer(self.handler.succession.impacts.fastest), plan.rest, -1
         core.early, core.at_once = EARLY.get(run.request.method, 0.0), AT_ONCE * self.handler.nothing
         core.faint = UNSEEN * run.request.rtol if run.request.method == "bdf" else 0.0
+        self._anywhere = np.full(core.contacts + 1, -1, dtype=np.int32)
+        core.anywhere = lib.pointer(self._anywhere)
         core.exact = self._array(np.zeros(core.relations + 1), np.int32)
         core.turning = self._array(np.zeros(core.kinks + 1), np.int32)
         core.own.value = self._array(np.zeros(core.places + 1))
@@ -222,27 +228,18 @@ class Modes:
             self.stands()
         return some
 
-    def _flights(self) -> list[Any]:
-        """Views of thrown, level, height, flight [contacts]."""
-        core = self.core
-        number = max(core.contacts, 1)
-        thrown = np.frombuffer((c.c_int32 * number).from_address(core.thrown), dtype=np.int32)
-        return [thrown, *(lib.reader(at, number) for at in (core.level, core.height, core.flight))]
-
     def _bounces(self) -> dict[int, Bounce]:
         """The gaps in flight, as the handler has them."""
-        thrown, *about = self._flights()
-        contacts = self.handler.plan.contacts
-        return {contacts[k].value: Bounce(*(float(a[k]) for a in about)) for k in np.flatnonzero(thrown).tolist()}
+        rows = np.flatnonzero(self._thrown).tolist()
+        return {row: Bounce(*(float(array[row]) for array in self._flights)) for row in rows}
 
     def _throw(self) -> None:
         """The core has the gaps in flight as the handler does."""
-        thrown, level, height, flight = self._flights()
-        thrown[:], self.core.flying = 0, len(self.handler.bounces)
-        for k, contact in enumerate(self.handler.plan.contacts):
-            bounce = self.handler.bounces.get(contact.value)
-            if bounce is not None:
-                thrown[k], level[k], height[k], flight[k] = 1, bounce.level, bounce.height, bounce.flight
+        self._thrown[:] = 0
+        for row, bounce in self.handler.bounces.items():
+            self._thrown[row] = 1
+            for array, value in zip(self._flights, astuple(bounce), strict=True):
+                array[row] = value
 
     def _turned(self, row: Sequence[float]) -> list[Happened]:
         """The entry of a law whose branch the core turned: time (s), -1 - its number, its branches."""
@@ -323,12 +320,16 @@ class Modes:
         same = what[0], what[1], begin, end
         if end < 0 or 2 + 2 * len(flat) > self.core.width or self._tried.setdefault(repr(same), 0) >= AGAIN:
             return
+        anywhere = strike is not None and begin == end and self._alone
+        if anywhere and self._anywhere[handler.struck] >= 0:
+            return
         self._tried[repr(same)] += 1
         self._transitions = _grown(self._transitions, number)
         entries = tuple(handler.happened[before:])
         self._transitions[number] = lib.Transition(
+            number=number,
             to=end,
-            next=self._modes[begin].first,
+            next=-1 if anywhere else self._modes[begin].first,
             crossed=len(crossed),
             due=JUMPS if due is None else len(due),
             rounds=len(handler.rounds),
@@ -346,7 +347,10 @@ class Modes:
             momenta=momenta,
         )
         self.core.transition = c.addressof(self._transitions)
-        self._modes[begin].first = number
+        if anywhere:
+            self._anywhere[handler.struck] = number
+        else:
+            self._modes[begin].first = number
         self._told.append(told_of(groups, entries))
 
     def _strike(self, t: float, point: Any) -> int | None:

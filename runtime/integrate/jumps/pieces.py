@@ -154,13 +154,12 @@ class Pieces:
         self.run.driver.run.end_kind = TRACE if sample <= min(end + near, self._landing) else 0
 
     def _bounce(self, t: float) -> None:
-        """Steps short enough for a bounce that begins at t (s), until it must have ended."""
+        """Steps short enough for the bounces under way at t (s), until the first must have ended."""
         run, method = self.run, self.run.method.contents
         method.h_max, before, self._landing = self._longest, self._landing, np.inf
         if run.request.method == "bdf":
-            flight = self.handler.flight(UNSEEN * run.request.rtol)
-            if np.isfinite(flight):
-                method.h_max, self._landing = min(flight / PARTS, self._longest), t + 2.0 * flight
+            flight, self._landing = self.handler.low_flights(t, UNSEEN * run.request.rtol)
+            method.h_max = min(flight / PARTS, self._longest)
         if self._landing != before:
             self.aim()
 
@@ -352,7 +351,7 @@ class Pieces:
         jumps = method.t >= end and self.at + 1 < len(run.segments)  # the text, which is first
         due = [] if jumps else self.handler.due(method.t)
         if not due and method.t < end:  # a bounce that has not come back
-            self._landing, method.h_max = np.inf, self._longest
+            self._bounce(method.t)
             self.aim()
             self._in_parts(method.t)
             return True

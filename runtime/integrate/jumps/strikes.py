@@ -1,8 +1,9 @@
 """What the core needs to know of a gap that closes in flight: the equations of its impulse (core/run/events/strike.c).
 
 They are those of start/instant.py, of unknowns that move and of impulses that act, where they are as many as these: no
-dry friction tells an impulse, and inertia leaves no flow open.  Momenta follow from flows that are assigned by their
-rows alone.
+dry friction tells an impulse, and inertia leaves no flow open.  They fall apart into the connected parts of their
+pattern, and what is asked of one gap is met in its own: nothing else moves, and what holds elsewhere has no impulse.
+Momenta follow from flows that are assigned by their rows alone.
 """
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.events.handler import Handler
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.components import components
 
 MOST = 60
 """Unknowns and impulses of an impact, which are eliminated as a full matrix."""
@@ -26,7 +28,7 @@ Mask = NDArray[np.bool_]
 
 
 def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Balance | None:
-    """The impulse of contact k, which alone holds, as at a point; None where the core cannot tell it."""
+    """The impulse of contact k, of what it reaches, as at a point; None where the core cannot tell it."""
     assert handler.restart is not None
     system, contact = handler.restart.settler.system, handler.plan.contacts[k]
     active = handler.contacts.active.copy()
@@ -43,12 +45,31 @@ def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Balance
         first = {(group, family): row for group, family, row in system.form.groups}
         family, position = handler.contacts.switches.places[contact.number]
         row = int(first["phi_rate", multiplier_row(system.description, family)]) + position
-        found = Balance(system, (t, y, yd), (behind, system.of_groups("dynamics")), (system.are("f", "p", "e"), acts))
-        place = handler.contacts.multiplier[k]
-        return found.of_gap(k, row, place, contact.restitution) if found.ready else None
+        place, over = handler.contacts.multiplier, system.of_groups("dynamics")
+        part, rows = _reached(system, (behind, over), (system.are("f", "p", "e"), acts), place[k])
+        found = Balance(system, (t, y, yd), (behind, over), (part & ~acts, part & acts))
+        pushed = np.unique(system.pattern.columns_of()[(rows & over)[system.pattern.row]])
+        gaps = np.flatnonzero([c.kind == "phi" for c in handler.plan.contacts])
+        found.beside(gaps[np.isin(np.array(place)[gaps], pushed) & (gaps != k)])
+        return found.of_gap(k, row, place[k], contact.restitution) if found.ready else None
     finally:
         handler.contacts.active[:] = active
         handler.contacts.apply()
+
+
+def _reached(
+    system: System, rows: tuple[Mask, Mask], unknowns: tuple[Mask, Mask], multiplier: int
+) -> tuple[Mask, Mask]:
+    """Unknowns and rows [unknowns], [rows] of the connected part of a multiplier in the equations of `Balance`."""
+    (behind, over), (moves, acts) = rows, unknowns
+    row, column, (in_y, in_rate) = system.pattern.row, system.pattern.columns_of(), system.structural()
+    joined = in_y & np.where(behind[row], moves[column], over[row] & acts[column])
+    joined |= in_rate & over[row] & moves[column]
+    label = components(row[joined], column[joined], system.unknowns)
+    part = label == label[multiplier]
+    there = np.zeros(system.rows, dtype=bool)
+    there[row[joined & part[column]]] = True
+    return part & (moves | acts), there
 
 
 def of_momenta(system: System, t: float, y: Floats, yd: Floats) -> Balance | None:
@@ -86,6 +107,12 @@ class Balance:
         self._keep: list[Any] = [held]
         self._laid_out(system, (own, columns, over[own]), entries, rated)
         self.ready = True
+
+    def beside(self, gaps: Ints) -> None:
+        """Other gaps that the impulse reaches."""
+        if self.ready:
+            self._keep.append(np.ascontiguousarray(gaps, dtype=np.int32))
+            self.core.besides, self.core.beside = gaps.size, lib.pointer(self._keep[-1])
 
     def of_gap(self, k: int, row: int, multiplier: int, restitution: float) -> Balance | None:
         """The same of contact k: its row of flows, the place of its multiplier; None where that has no impulse."""

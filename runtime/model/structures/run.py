@@ -66,8 +66,8 @@ class Strike(c.Structure):
 
     _fields_ = [
         *[(name, P) for name in ["system", "linear"]],
-        *[(name, I) for name in ["contact", "row", "own", "n", "moves"]],
-        *[(name, P) for name in ["unknown", "of_row", "integral", "column", "row_of", "slot", "rated"]],
+        *[(name, I) for name in ["contact", "row", "own", "n", "moves", "besides"]],
+        *[(name, P) for name in ["beside", "unknown", "of_row", "integral", "column", "row_of", "slot", "rated"]],
         ("held", Held),
         ("restitution", D),
         *[(name, P) for name in ["jy", "jyd", "r", "value", "scale", "x", "impulse"]],
@@ -78,7 +78,7 @@ class Transition(c.Structure):
     """sd_transition."""
 
     _fields_ = [
-        *[(name, I) for name in ["to", "next", "crossed", "due", "rounds", "moves"]],
+        *[(name, I) for name in ["number", "to", "next", "crossed", "due", "rounds", "moves"]],
         *[(name, P) for name in ["which", "sample", "end", "kind", "place", "read", "sides"]],
         ("entries", L),
         ("soon", D),
@@ -117,7 +117,9 @@ class Modes(c.Structure):
         ("own", Mode),
         *[(name, I) for name in ["base", "now", "parameters", "places", "relations", "contacts", "kinks"]],
         *[(name, I) for name in ["systems", "samples", "observed", "alikes", "unknowns"]],
-        *[(name, P) for name in ["p", "place", "relation_row", "relation_moves", "contact", "kink", "system"]],
+        *[(name, P) for name in ["p", "place", "anywhere"]],
+        ("here", Transition),
+        *[(name, P) for name in ["relation_row", "relation_moves", "contact", "kink", "system"]],
         *[(name, P) for name in ["period", "next", "piece"]],
         *[
             (name, D)
@@ -143,12 +145,12 @@ class Modes(c.Structure):
         *[(name, P) for name in ["rate", "y", "yd", "before", "before_d", "restart", "restart_d"]],
         *[(name, P) for name in ["values", "low", "high", "p_before", "p_after"]],
         *[(name, P) for name in ["exact", "found", "which", "turning"]],
-        *[(name, P) for name in ["thrown", "level", "height", "flight", "fastest"]],
+        *[(name, P) for name in ["thrown", "level", "height", "begins", "flight", "fastest"]],
         *[(name, D) for name in ["rest", "faint"]],
         *[(name, P) for name in ["watch", "log"]],
         *[(name, L) for name in ["left", "stalled", "chatters"]],
         ("differs", D),
-        *[(name, I) for name in ["pieces", "at", "struck", "flying"]],
+        *[(name, I) for name in ["pieces", "at", "struck"]],
         *[(name, I) for name in ["width", "room", "logged", "waits"]],
     ]
 

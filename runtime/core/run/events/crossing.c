@@ -33,9 +33,9 @@ static int falls(const sd_modes *m, int32_t k, const double *low, const double *
 {
     const sd_mode *mode = sd_mode_now(m);
     int32_t row = mode->row[k], rate = mode->rate[k];
-    double side = mode->side[k], level = sd_mode_level(m, row), least = sd_mode_least(m, row);
+    double side = mode->side[k], level = sd_mode_end(m, row, side * low[row]), least = sd_mode_least(m, row);
     int rises = rate >= 0 && side * low[row] <= 0.0 && side * low[rate] > 0.0 && side * high[rate] >= 0.0;
-    if (rate >= 0 && sd_mode_thrown(m, row) >= 0) {
+    if (rate >= 0 && m->thrown[row]) {
         double still = -sd_mode_zero(m, rate);
         rises = side * low[row] <= level + least && side * low[rate] >= still && side * high[rate] >= still;
     }
@@ -87,13 +87,15 @@ static double instant(sd_run *run, look *at, int32_t k, double a, double b)
 {
     sd_modes *m = run->modes;
     int32_t row = sd_mode_now(m)->row[k], rate = sd_mode_now(m)->rate[k];
-    double side = sd_mode_now(m)->side[k], begin = a, level = sd_mode_level(m, row), value = side * m->low[row] - level;
+    double side = sd_mode_now(m)->side[k], begin = a, from = side * m->low[row];
+    double level = sd_mode_end(m, row, from), value = from - level;
     double enough = at == sd_run_observe ? 0.0 : ENOUGH * sd_mode_zero(m, row);
     if (value <= 0.0 && rate >= 0 && side * m->low[rate] > 0.0 && side * m->high[rate] < 0.0) {
         begin = root(run, at, (sd_fall){rate, side, 0.0, 0.0}, a, side * m->low[rate], b, side * m->high[rate]);
         at(run, begin, m->values);
+        level = sd_mode_end(m, row, side * m->values[row]);
         value = side * m->values[row] - level;
-        if (value <= 0.0 && sd_mode_thrown(m, row) < 0)
+        if (value <= 0.0 && !m->thrown[row])
             return b;
         if (value <= 0.0) { /* that is round-off too: through what it may fall by unseen */
             value += sd_mode_least(m, row);
@@ -190,10 +192,9 @@ static int follow(sd_run *run, int32_t one, double low, double high, double *t)
 {
     sd_modes *m = run->modes;
     int32_t row = sd_mode_now(m)->row[one];
-    double side = sd_mode_now(m)->side[one], level = sd_mode_level(m, row), value = side * m->low[row] - level;
-    double before = low, at = *t, slope = -value / (at - low);
-    int32_t flies = sd_mode_thrown(m, row);
-    double height = flies < 0 ? m->largest[row] : fmin(m->height[flies], m->largest[row]);
+    double side = sd_mode_now(m)->side[one], from = side * m->low[row], level = sd_mode_end(m, row, from);
+    double value = from - level, before = low, at = *t, slope = -value / (at - low);
+    double height = m->thrown[row] ? fmin(m->height[row], m->largest[row]) : m->largest[row];
     double enough = ENOUGH * fmin(sd_mode_zero(m, row), ENOUGH * height);
     if (!(value > 0.0 && at > low))
         return 0;

@@ -14,27 +14,22 @@ static inline double sd_mode_zero(const sd_modes *m, int32_t row)
     return m->small * m->largest[row];
 }
 
-/* the gap in flight whose value a row is, -1: none */
-static inline int32_t sd_mode_thrown(const sd_modes *m, int32_t row)
-{
-    for (int32_t k = 0; k < m->contacts && m->flying; k++)
-        if (m->thrown[k] && m->contact[k].value == row)
-            return k;
-    return -1;
-}
-
 /* what a watched row may fall by unseen: behind an impact nearly nothing, for bounces become small */
 static inline double sd_mode_least(const sd_modes *m, int32_t row)
 {
-    int32_t k = sd_mode_thrown(m, row);
-    return k < 0 ? sd_mode_zero(m, row) : FALLEN * fmin(sd_mode_zero(m, row), m->height[k]);
+    return m->thrown[row] ? FALLEN * fmin(sd_mode_zero(m, row), m->height[row]) : sd_mode_zero(m, row);
 }
 
 /* the value at which it begins: that of a flight, else zero */
 static inline double sd_mode_level(const sd_modes *m, int32_t row)
 {
-    int32_t k = sd_mode_thrown(m, row);
-    return k < 0 ? 0.0 : m->level[k];
+    return m->thrown[row] ? m->level[row] : 0.0;
+}
+
+/* the value through which it falls from one that it has had: what has been above zero ends there */
+static inline double sd_mode_end(const sd_modes *m, int32_t row, double value)
+{
+    return value > 0.0 ? 0.0 : sd_mode_level(m, row);
 }
 
 static inline const sd_mode *sd_mode_now(const sd_modes *m)

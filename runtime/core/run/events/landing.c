@@ -60,7 +60,7 @@ static int assign(sd_run *run, const sd_transition *one, double t)
     sd_modes *m = run->modes;
     double *row = &m->log[(size_t)m->logged * (size_t)m->width];
     row[0] = t;
-    row[1] = (double)(one - m->transition);
+    row[1] = (double)one->number;
     sd_landing_look(run, t, m->y, m->yd, m->values);
     for (int32_t k = 0; k < m->relations; k++)
         m->exact[k] = one->sides[k] != sd_mode_now(m)->relation[k] && m->values[m->relation_row[k]] == 0.0;
@@ -173,7 +173,7 @@ int sd_landing_takes(sd_run *run, const sd_transition *one, double t)
     done = done && sd_landing_arrives(run, one->sides + one->rounds * m->relations, t) && sd_mode_ordinary(m) &&
            sd_mode_decided(m, before, one, m->values);
     m->struck = -1;
-    done = done && sd_strike_throws(run, one->strike);
+    done = done && sd_strike_throws(run, one->strike, t);
     if (!done) {
         memcpy(m->p, m->p_before, (size_t)m->parameters * sizeof(double));
         sd_landing_enter(run, from);

@@ -197,13 +197,48 @@ static int same(int32_t n, const int32_t *a, int32_t number, const int32_t *b)
     return n == number && !memcmp(a, b, (size_t)n * sizeof *a);
 }
 
+/* Whether a flight is under way that is lower than the method sees: the handler takes steps that are short enough. */
+static int flies_low(const sd_modes *m, double t)
+{
+    for (int32_t k = 0; k < m->contacts && m->faint > 0.0; k++) {
+        int32_t row = m->contact[k].value;
+        if (m->contact[k].kind == SD_PHI && m->thrown[row] && m->height[row] < m->faint * m->largest[row] && t < m->begins[row] + 2.0 * m->flight[row])
+            return 1;
+    }
+    return 0;
+}
+
+/* Whether the handler is asked about a known transition: behind a low flight, too soon behind the event before, where it is
+ * one event too many. */
+static int refused(const sd_modes *m, const sd_transition *one, double t)
+{
+    const int at_once = near_the_last(m, t) && m->contacts;
+    return one->entries > m->left || (one->moves && (at_once || flies_low(m, t))) || t - m->last < one->soon;
+}
+
+/* The same of a gap alone that closes in flight, from whatever mode; NULL: there is none, or it leads elsewhere. */
+static const sd_transition *anywhere(sd_run *run, double t, int32_t crossed, int32_t due)
+{
+    sd_modes *m = run->modes;
+    const sd_mode *mode = sd_mode_now(m);
+    for (int32_t k = 0; k < m->contacts && crossed == 1 && due == 0; k++) {
+        if (m->anywhere[k] < 0 || mode->holds[k] || m->contact[k].value != mode->row[m->which[0]])
+            continue;
+        m->here = m->transition[m->anywhere[k]];
+        m->here.to = m->now;
+        m->here.which = m->which;
+        m->here.sides = mode->relation;
+        return !refused(m, &m->here, t) && sd_landing_takes(run, &m->here, t) ? &m->here : NULL;
+    }
+    return NULL;
+}
+
 /* The transition that what crossed, or is due (SD_JUMP: the text jumps), takes at t; the model is then in its mode.
  * NULL: none. */
 static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_t due)
 {
     sd_modes *m = run->modes;
-    const int near = near_the_last(m, t);
-    if (m->logged >= m->room || (near && m->stalled >= m->chatters))
+    if (m->logged >= m->room || (near_the_last(m, t) && m->stalled >= m->chatters))
         return NULL;
     for (int32_t k = sd_mode_now(m)->first; k >= 0; k = m->transition[k].next) {
         const sd_transition *one = &m->transition[k];
@@ -211,14 +246,14 @@ static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_
             continue;
         if (due == SD_JUMP ? one->due != SD_JUMP : !same(one->due, one->sample, due, m->which))
             continue;
-        if (one->entries > m->left || (near && m->contacts && one->moves) || t - m->last < one->soon)
+        if (refused(m, one, t))
             return NULL;
         if (!one->moves)
             sd_landing_enter(run, one->to);
         if (!one->moves || sd_landing_takes(run, one, t))
             return one;
     }
-    return NULL;
+    return anywhere(run, t, crossed, due);
 }
 
 static int settled(sd_run *run, double t)
@@ -228,6 +263,15 @@ static int settled(sd_run *run, double t)
     return sd_settle_point(run->settle, t, m->before, m->before_d);
 }
 
+/* Whether a row is of a gap that does not hold, which inertia leads. */
+static int gap(const sd_modes *m, int32_t row)
+{
+    int32_t k = 0;
+    while (k < m->contacts && (m->contact[k].kind != SD_PHI || sd_mode_now(m)->holds[k] || m->contact[k].value != row))
+        k++;
+    return k < m->contacts;
+}
+
 /* Whether what crosses at t does so early in the first step behind an event, and may be of what relaxes at once, which its
  * dense output does not follow: all but gaps. */
 static int early(const sd_run *run, double t, double end, int32_t crossed)
@@ -235,7 +279,7 @@ static int early(const sd_run *run, double t, double end, int32_t crossed)
     const sd_modes *m = run->modes;
     double since = t - run->t_from;
     int32_t gaps = 0;
-    while (gaps < crossed && sd_mode_thrown(m, sd_mode_now(m)->row[m->which[gaps]]) >= 0)
+    while (gaps < crossed && gap(m, sd_mode_now(m)->row[m->which[gaps]]))
         gaps++;
     return gaps < crossed && run->t_from == m->begun && since > m->at_once && since < m->early * (end - run->t_from);
 }

@@ -49,6 +49,8 @@ typedef struct sd_strike {
     struct sd_linear *linear;
     int32_t contact, row, own;        /* the gap, its row of flows in the system, the column of its impulse; -1: none */
     int32_t n, moves;                 /* columns; the first ones are unknowns that move, the others impulses */
+    int32_t besides;
+    const int32_t *beside;            /* [besides] other gaps that an impulse of this one reaches */
     const int32_t *unknown, *of_row, *integral; /* [n] unknown of a column, row of a row; 1: integrated over the instant */
     const int32_t *column, *row_of, *slot, *rated; /* [n + 1], [entries] */
     sd_held held;                     /* of the system: this gap alone holds; or as it was */
@@ -58,7 +60,7 @@ typedef struct sd_strike {
 } sd_strike;
 
 typedef struct sd_transition {
-    int32_t to, next;                 /* next: transition from the same mode, -1: none */
+    int32_t number, to, next;         /* among all; next: transition from the same mode, -1: none */
     int32_t crossed, due, rounds, moves; /* due SD_JUMP: where the text jumps; moves 0: nothing but sides change, the step goes on */
     const int32_t *which, *sample;    /* [crossed] watches, [due] samples, both ascending */
     const int32_t *end;               /* [rounds] of its assignments */
@@ -94,6 +96,9 @@ typedef struct sd_modes {
     int32_t parameters, places, relations, contacts, kinks, systems, samples, observed, alikes, unknowns;
     double *p;                        /* [parameters] */
     const int32_t *place;             /* [places] in p */
+    int32_t *anywhere;                /* [contacts] the transition in which this gap alone opens again, whatever else the mode
+                                       * is, in no mode's list; -1: none */
+    sd_transition here;               /* such a one, as it is from the mode at hand */
     const int32_t *relation_row, *relation_moves; /* [relations] */
     const sd_contact *contact;
     const sd_kink *kink;
@@ -124,8 +129,9 @@ typedef struct sd_modes {
     double *found;                    /* [watches] */
     int32_t *which;                   /* [watches] */
     int32_t *turning;                 /* [kinks] that turn now */
-    int32_t *thrown;                  /* [contacts] 1: an impact has opened the gap, which is in flight (events/bounces.py) */
-    double *level, *height, *flight;  /* [contacts] of these: value at which it begins, what it rises to, s: its time */
+    int32_t *thrown;                  /* [observed] 1: of a gap that an impact has opened, until it closes (events/bounces.py) */
+    double *level, *height;           /* [observed] of these: value at which the flight begins, what it rises to */
+    double *begins, *flight;          /* [observed] s: when it begins, how long it takes */
     double *fastest;                  /* [contacts] speed at which each gap closed at most */
     double rest, faint;               /* of it: a slower impact is the last; of `largest`: lower flights are the handler's */
     sd_watch *watch;                  /* [watches] */
@@ -135,7 +141,7 @@ typedef struct sd_modes {
                                        * that they never end */
     double differs;                   /* of its size: what a value differs by that has jumped */
     int32_t pieces, at;               /* number of the present piece */
-    int32_t struck, flying;           /* the contact that is thrown by the event at hand, -1: none; how many are thrown */
+    int32_t struck;                   /* the contact that is thrown by the event at hand, -1: none */
     int32_t width, room, logged, waits; /* waits: an event has no room for its rows yet */
 } sd_modes;
 

@@ -18,16 +18,16 @@
 #define REGULAR 1e-11 /* of its column: a pivot */
 #define STAYS 1e-14  /* of its magnitude, what an unknown is moved by that stays where it is */
 
-/* The flow with which the gap opens again, 0 where it closes no more, or something else is at its zero too. */
+/* The flow with which the gap opens again, 0 where it closes no more, or what it reaches is at its zero too. */
 static double thrown_back(const sd_run *run, const sd_strike *strike)
 {
     const sd_modes *m = run->modes;
     const sd_contact *c = &m->contact[strike->contact];
     const double *v = m->values;
     double speed = v[c->rate], back = -strike->restitution * speed, *fastest = &m->fastest[strike->contact];
-    for (int32_t k = 0; k < m->contacts; k++) {
-        int32_t row = m->contact[k].value;
-        if (k != strike->contact && m->contact[k].kind == SD_PHI && v[row] <= sd_mode_zero(m, row))
+    for (int32_t k = 0; k < strike->besides; k++) {
+        int32_t row = m->contact[strike->beside[k]].value;
+        if (v[row] <= sd_mode_zero(m, row))
             return 0.0;
     }
     for (int32_t k = 0; k < m->relations; k++)
@@ -125,25 +125,32 @@ int sd_strike_gap(sd_run *run, const sd_strike *strike, double t)
     return fabs(m->values[c->rate] - back) <= sd_mode_zero(m, c->rate);
 }
 
-int sd_strike_throws(sd_run *run, const sd_strike *strike)
+/* What holds flies no more. */
+static void land(sd_modes *m)
+{
+    for (int32_t k = 0; k < m->contacts; k++)
+        if (m->contact[k].kind == SD_PHI && sd_mode_now(m)->holds[k])
+            m->thrown[m->contact[k].value] = 0;
+}
+
+int sd_strike_throws(sd_run *run, const sd_strike *strike, double t)
 {
     sd_modes *m = run->modes;
     if (!strike) {
-        memset(m->thrown, 0, (size_t)m->contacts * sizeof *m->thrown);
-        m->flying = 0;
+        land(m);
         return 1;
     }
-    int32_t k = strike->contact;
-    const sd_contact *c = &m->contact[k];
+    const sd_contact *c = &m->contact[strike->contact];
     double speed = m->values[c->rate], pull = -m->values[c->acceleration];
     int back = speed > 0.0 && pull > 0.0;
     double height = back ? 0.5 * speed * speed / pull : INFINITY;
     if (height < m->faint * m->largest[c->value])
         return 0;
-    memset(m->thrown, 0, (size_t)m->contacts * sizeof *m->thrown);
-    m->thrown[k] = m->flying = 1;
-    m->level[k] = fmin(m->values[c->value], 0.0);
-    m->height[k] = height;
-    m->flight[k] = back ? 2.0 * speed / pull : INFINITY;
+    land(m);
+    m->thrown[c->value] = 1;
+    m->level[c->value] = fmin(m->values[c->value], 0.0);
+    m->height[c->value] = height;
+    m->begins[c->value] = t;
+    m->flight[c->value] = back ? 2.0 * speed / pull : INFINITY;
     return 1;
 }

@@ -12,8 +12,8 @@ int sd_strike_gap(sd_run *run, const sd_strike *strike, double t);
 /* m->y := the same with the momenta that its flows have; 0: that fails */
 int sd_strike_momenta(sd_run *run, const sd_strike *momenta, double t);
 
-/* What is in flight behind an event, from m->values there; strike NULL: no gap that is near zero.  1; 0: so low that the
- * method has to be told, and nothing has changed. */
-int sd_strike_throws(sd_run *run, const sd_strike *strike);
+/* What is in flight behind an event at t, from m->values there: the gap of the strike (NULL: none) too, and nothing that
+ * holds.  1; 0: it flies so low that the method has to be told, and nothing has changed. */
+int sd_strike_throws(sd_run *run, const sd_strike *strike, double t);
 
 #endif
