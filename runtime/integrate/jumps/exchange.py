@@ -1,8 +1,9 @@
 """Dependent constraints: which of them are left out changes as the motion turns what depends on what.
 
-Now and then behind a step the coefficients of what depends are looked at (structure/left_out.py); where one that holds counts much
-more than those left out, the method begins anew with others left out.  The motion and the reactions are the same on
-both sides, and so are the multipliers that rows show, which are the least (rows/least_norm.py): nothing is seen of it.
+Now and then behind a step the coefficients of what depends are looked at (structure/left_out.py); where one that holds
+counts much more than those left out, the method begins anew with others left out.  The motion and the reactions are the
+same on both sides, and so are the multipliers that rows show, which are the least (rows/least_norm.py): nothing is seen
+of it.
 """
 
 from __future__ import annotations
