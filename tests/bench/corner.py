@@ -1,7 +1,8 @@
 """Lines of the corner of issue 10: what stood in 17 files at commit 17c57ae, by today's files.
 
 `python tests/bench/corner.py [COMMIT]` counts the working tree, or a commit.  A file that was split off one of these
-counts with it; what grew beside them (quadratures, settled, levels, left_out) is shown apart and was never among the 17.
+counts with it; what grew beside them (quadratures, settled, levels, left_out) is shown apart, for it was never among
+the 17.
 """
 
 import subprocess
