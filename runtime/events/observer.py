@@ -71,7 +71,8 @@ class Observer:
 
     def zeros(self, rows: NDArray[np.int64]) -> Floats:
         """Below them values of the rows are zero."""
-        return self.small[rows] * self.largest[rows]
+        part: Floats = self.small[rows]
+        return part * self.largest[rows]
 
     def zero(self, row: int) -> float:
         """Below it a value of the row is zero."""
