@@ -71,8 +71,8 @@ class Observer:
 
     def zeros(self, rows: NDArray[np.int64]) -> Floats:
         """Below them values of the rows are zero."""
-        part: Floats = self.small[rows]
-        return part * self.largest[rows]
+        found: Floats = self.small[rows] * self.largest[rows]
+        return found
 
     def zero(self, row: int) -> float:
         """Below it a value of the row is zero."""
