@@ -320,7 +320,7 @@ class Handler(Watching):
         """The gaps in flight: that were, and have not been met, or that open here."""
         values, contacts = self.observer(t, y, yd), self.plan.contacts
         free = ~self.contacts.active[self._gap]
-        here = np.abs(values[self._gaps]) <= self.observer.zeros(self._gaps)
+        here = values[self._gaps] <= self.observer.zeros(self._gaps)
         still = {contacts[k].value for k in set(self._gap[free].tolist()) - met}
         begin = begun(t, values, [contacts[k] for k in self._gap[free & here]])
         self.bounces = begin | {row: bounce for row, bounce in self.bounces.items() if row in still}

@@ -19,7 +19,9 @@ LEAST = 1e-24
 
 
 class Observer:
-    """largest [observed]: of values and of the terms of their expressions, at the points asked for."""
+    """largest [observed]: of values and of the terms of their expressions, at the points asked for; small [observed]:
+    of it, what counts as zero.
+    """
 
     def __init__(self, system: System) -> None:
         self._number = system.observed_rows("observe")[1]
@@ -29,6 +31,7 @@ class Observer:
         self._pointers = [lib.pointer(item) for item in (self._y, self._yd, self._out)]
         self._functions: dict[int, Any] = {}
         self.largest, self.terms = np.full(self._number, LEAST), np.zeros(self._number)
+        self.small = np.full(self._number, SMALL)
         families = [system.description.rows[k] for k in system.description.rows_of("observe")]
         self._units = [family.unit for family in families for _ in range(family.size)]
         self.groups: list[NDArray[np.int64]] = []
@@ -68,8 +71,9 @@ class Observer:
 
     def zeros(self, rows: NDArray[np.int64]) -> Floats:
         """Below them values of the rows are zero."""
-        return SMALL * self.largest[rows]
+        found: Floats = self.small[rows] * self.largest[rows]
+        return found
 
     def zero(self, row: int) -> float:
         """Below it a value of the row is zero."""
-        return SMALL * float(self.largest[row])
+        return float(self.small[row]) * float(self.largest[row])

@@ -9,7 +9,7 @@ from sysdyn.runtime.events.bounces import Bounce
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.kinks import Kinks
 from sysdyn.runtime.events.locate import Dense, Edges, crossing
-from sysdyn.runtime.events.observer import Observer
+from sysdyn.runtime.events.observer import SMALL, Observer
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.events.watches import Candidates, Watched, Watches
 from sysdyn.runtime.model import core_library as lib
@@ -23,9 +23,7 @@ FALLEN = 1e-4
 
 
 class Watching:
-    """side [relations]: 1 or -1 of zero, 0 on neither; bounces: by rows, gaps that an impact opened, until
-    they close.
-    """
+    """side [relations]: 1 or -1 of zero, 0 on neither."""
 
     def __init__(self, plan: Plan, system: System, span: tuple[float, float]) -> None:
         self.plan, self.system, self.span = plan, system, span
@@ -34,10 +32,21 @@ class Watching:
         self.contacts = Contacts(plan, system, self.observer, self.p)
         self.kinks = Kinks(plan.kinks, self.observer, self.p)
         self.side = np.ones(len(plan.relations))
-        self.bounces: dict[int, Bounce] = {}
+        self._bounces: dict[int, Bounce] = {}
         self.next = np.zeros(max(len(plan.sampled), 1), dtype=np.int64)
         self._candidates = Candidates(plan)
         self._frozen = np.isin(np.arange(len(plan.contacts)), list(self.contacts.frozen))
+
+    @property
+    def bounces(self) -> dict[int, Bounce]:
+        """By rows, gaps that an impact opened, until they close: they are open until then."""
+        return self._bounces
+
+    @bounces.setter
+    def bounces(self, bounces: dict[int, Bounce]) -> None:
+        self.observer.small[list(self._bounces)] = SMALL
+        self._bounces = bounces
+        self.observer.small[list(bounces)] = FALLEN * SMALL
 
     def watched(self) -> Watches:
         """Everything whose change ends a piece: a relation on neither side yet is watched on both."""
@@ -77,7 +86,7 @@ class Watching:
             height[thrown] = [b.height for b in self.bounces.values()]
             begins[thrown] = [b.level for b in self.bounces.values()]
             flies[thrown] = True
-            small = np.where(flies[rows], FALLEN * np.minimum(small, height[rows]), small)
+            small = np.minimum(small, FALLEN * height[rows])
             level = begins[rows]
             still = np.where(flies[rows] & (watched.rate >= 0), self.observer.zeros(watched.rate), 0.0)
         return Edges(rows, watched.side, watched.rate, small, level, still)

@@ -102,3 +102,28 @@ def test_each_ball_bounces_as_often_as_one_alone(tmp_path):
     (tmp_path / "balls.sd").write_text(TEXTS["balls"])
     trace = api.load(tmp_path / "balls.sd", method="bdf", set={"n": 6}).run(rtol=1e-4)
     assert [sum(e.name == f"impact floor[{i}]" for e in trace.events) for i in range(1, 7)] == [16] * 6
+
+
+def carts_that_collide(n, end):
+    """When which neighbours meet, of carts that move on straight on between (TEXTS)."""
+    x, v, t, found = [0.2 * k for k in range(1, n + 1)], [5.0] + [0.0] * (n - 1), 0.0, []
+    while True:
+        closing = [k for k in range(n - 1) if v[k] > v[k + 1]]
+        times = [((x[k + 1] - x[k] - 0.1) / (v[k] - v[k + 1]), k) for k in closing]
+        step, k = min(times)
+        if t + step > end:
+            return found
+        t, x = t + step, [a + b * step for a, b in zip(x, v, strict=True)]
+        x[k + 1] = x[k] + 0.1
+        mean, part = (v[k] + v[k + 1]) / 2, 0.35 * (v[k] - v[k + 1])
+        v[k], v[k + 1] = mean - part, mean + part
+        found.append((t, f"impact touch[{k + 1}]"))
+
+
+def test_carts_meet_one_after_another(tmp_path):
+    """Where a microsecond, 1e-9 of their places, lies between two impacts they are not one."""
+    (tmp_path / "carts.sd").write_text(TEXTS["carts"])
+    trace = api.load(tmp_path / "carts.sd", set={"n": 18}).run(rtol=1e-8, until=3.3)
+    wanted = carts_that_collide(18, 3.3)
+    assert [e.name for e in trace.events] == [name for _, name in wanted]
+    assert max(abs(e.time - t) for e, (t, _) in zip(trace.events, wanted, strict=True)) < 1e-10

@@ -148,8 +148,8 @@ def test_conditions_are_joined():
 
 def test_a_gap_that_is_thrown_open_rises_and_closes_again():
     """h = v^2/(2 g), T = 2 v/g; where nothing pulls it back it does not close."""
-    bounce = thrown(1e-12, 3.0, 9.81)
+    bounce = thrown(2.0, 1e-12, 3.0, 9.81)
     assert (bounce.height, bounce.flight) == (pytest.approx(9.0 / 19.62), pytest.approx(6.0 / 9.81))
-    assert bounce.level == 0.0
-    assert thrown(-1e-12, 3.0, 0.0).flight == np.inf
-    assert thrown(-1e-12, 3.0, 0.0).level == -1e-12
+    assert (bounce.level, bounce.begins) == (0.0, 2.0)
+    assert thrown(2.0, -1e-12, 3.0, 0.0).flight == np.inf
+    assert thrown(2.0, -1e-12, 3.0, 0.0).level == -1e-12

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from sysdyn.runtime.events import observer
 from sysdyn.runtime.events.bounces import SEEN, flights, thrown
 from sysdyn.runtime.events.watching import FALLEN, Watching
 from sysdyn.runtime.integrate.jumps.first_step import PARTS, WIDER, FirstStep
@@ -50,8 +51,11 @@ class Watch(Watching):
         samples = [SimpleNamespace(period=0.01), SimpleNamespace(period=0.025)]
         self.plan = SimpleNamespace(contacts=[contact], sampled=samples, relations=[], kinks=[])
         self.span, self.nothing, self.next = (0.5, 1.5), 1e-12, np.zeros(2, dtype=np.int64)
-        self.observer = SimpleNamespace(zeros=lambda rows: np.full(rows.size, 1e-6), largest=np.ones(5))
-        self.bounces = {}
+        small = np.full(5, observer.SMALL)
+        self.observer = SimpleNamespace(
+            zeros=lambda rows: small[rows] / observer.SMALL * 1e-6, largest=np.ones(5), small=small
+        )
+        self._bounces = {}
 
 
 def test_samples_are_due_once_each_whatever_their_instants_are_rounded_to():
@@ -69,12 +73,15 @@ def test_samples_are_due_once_each_whatever_their_instants_are_rounded_to():
 def test_behind_an_impact_a_gap_closes_below_a_part_of_what_it_rises_to(speed):
     watch, gap = Watch(), SimpleNamespace(row=np.array([3]), side=np.array([1]), rate=np.array([4]))
     assert (watch._edges(gap).small, watch._edges(gap).level) == (1e-6, 0.0)
-    watch.bounces[3] = thrown(-1e-9, speed, G)
+    watch.bounces = {3: thrown(0.7, -1e-9, speed, G)}
     rises = 0.5 * speed**2 / G
     assert watch._edges(gap).small == pytest.approx(FALLEN * min(1e-6, rises), rel=1e-12)
     assert watch._edges(gap).level == -1e-9
-    assert watch.flight(2.0 * rises) == pytest.approx(2.0 * speed / G, rel=1e-12)
-    assert watch.flight(0.5 * rises) == np.inf
+    flight = 2.0 * speed / G
+    assert watch.low_flights(0.7, 2.0 * rises) == pytest.approx((flight, 0.7 + 2.0 * flight), rel=1e-12)
+    assert watch.low_flights(0.7, 0.5 * rises) == watch.low_flights(0.7 + 2.0 * flight, 2.0 * rises) == (np.inf, np.inf)
+    watch.bounces = {}
+    assert watch._edges(gap).small == pytest.approx(1e-6, rel=1e-12)
 
 
 def test_the_rate_of_a_source_at_its_peak_is_zero():

@@ -89,7 +89,7 @@ static double instant(sd_run *run, look *at, int32_t k, double a, double b)
     int32_t row = sd_mode_now(m)->row[k], rate = sd_mode_now(m)->rate[k];
     double side = sd_mode_now(m)->side[k], begin = a, from = side * m->low[row];
     double level = sd_mode_end(m, row, from), value = from - level;
-    double enough = at == sd_run_observe ? 0.0 : ENOUGH * sd_mode_zero(m, row);
+    double enough = at == sd_run_observe ? 0.0 : ENOUGH * m->small * m->largest[row];
     if (value <= 0.0 && rate >= 0 && side * m->low[rate] > 0.0 && side * m->high[rate] < 0.0) {
         begin = root(run, at, (sd_fall){rate, side, 0.0, 0.0}, a, side * m->low[rate], b, side * m->high[rate]);
         at(run, begin, m->values);
@@ -195,7 +195,7 @@ static int follow(sd_run *run, int32_t one, double low, double high, double *t)
     double side = sd_mode_now(m)->side[one], from = side * m->low[row], level = sd_mode_end(m, row, from);
     double value = from - level, before = low, at = *t, slope = -value / (at - low);
     double height = m->thrown[row] ? fmin(m->height[row], m->largest[row]) : m->largest[row];
-    double enough = ENOUGH * fmin(sd_mode_zero(m, row), ENOUGH * height);
+    double enough = ENOUGH * fmin(m->small * m->largest[row], ENOUGH * height);
     if (!(value > 0.0 && at > low))
         return 0;
     for (int k = 0; k < FOLLOWED && low < at && at <= high; k++) {

@@ -8,16 +8,16 @@
 
 #define FALLEN 1e-4 /* of what else counts as zero, and of the height of its flight: a gap closes again below it */
 
-/* what a row is that is zero but for round-off */
+/* what a row is that is zero but for round-off; a gap in flight is open until it ends */
 static inline double sd_mode_zero(const sd_modes *m, int32_t row)
 {
-    return m->small * m->largest[row];
+    return (m->thrown[row] ? FALLEN : 1.0) * m->small * m->largest[row];
 }
 
 /* what a watched row may fall by unseen: behind an impact nearly nothing, for bounces become small */
 static inline double sd_mode_least(const sd_modes *m, int32_t row)
 {
-    return m->thrown[row] ? FALLEN * fmin(sd_mode_zero(m, row), m->height[row]) : sd_mode_zero(m, row);
+    return m->thrown[row] ? fmin(sd_mode_zero(m, row), FALLEN * m->height[row]) : sd_mode_zero(m, row);
 }
 
 /* the value at which it begins: that of a flight, else zero */
