@@ -10,7 +10,7 @@ model m {
   param r = 0.1 m
   node a, b: translation
   node w: rotation
-  F: effort(e = 4 N) ground -> a
+  work 4 N on a.q
   A: kinetic(p = 1 kg*f) a; B: kinetic(p = 2 kg*f) b; J: kinetic(p = 0.02 kg.m^2*f) w
   psi pulley: a.f + b.f = 2*r*w.f + 0.3 m/s*cos(5 rad/s*t)
   init A.f = 0.5 m/s; init B.f = 0.2 m/s
