@@ -95,12 +95,11 @@ def _with_junction(
         elif own.name in bare:
             name, branches[own.name] = own.name, replace(own, kind="port")
         else:
-            between = own.minus
+            plus = own.plus
             if own.domain.common == "effort":
                 nodes.append(NodeFamily(f"{name}#", loop_ranges(c.loops), own.domain, c.place))
-                between = Terminal(f"{name}#", loop_indices(c.loops))
-                branches[own.name] = replace(own, minus=between)
-            plus = between if own.domain.common == "effort" else own.plus
+                plus = Terminal(f"{name}#", loop_indices(c.loops))
+                branches[own.name] = replace(own, minus=plus)
             made.append(_branch(c, name, own.domain, plus, own.minus))
         at = loop_indices(c.loops)
         couplings.append(Coupling("transformer", name, others[k][0], at, c.loops, "e", ex.neg(factor), c.place))
@@ -137,7 +136,7 @@ def _junction(c: Constraint, domain: Domain, number: int) -> tuple[list[tuple[Te
 
 
 def _branch(
-    c: Constraint, name: str, domain: Domain, plus: Terminal, minus: Terminal, flow: Node | None = None
+    c: Constraint, name: str, domain: Domain, plus: Terminal | None, minus: Terminal | None, flow: Node | None = None
 ) -> Branch:
     kind, side = ("port", None) if flow is None else ("flow", "f")
     return Branch(name, loop_indices(c.loops), c.loops, domain, kind, side, flow, plus, minus, None, c.place)
