@@ -1,8 +1,8 @@
 """Displacements and momenta that a family has no coordinate for: quadratures q' = f, p' = e of what is read.
 
-Where a displacement is read that no potential store of the complementary family holds, by a trace or by the law of its
-own branch (a memristor's), its quadrature is added as a dynamic variable NAME.q; in the primal one likewise NAME.p of a
-dissipator whose law reads its momentum.  Momenta of points are those of the kinetic stores that move with them.
+Where a displacement is read that no potential store of the complementary family holds, by a trace or by the law of what
+stores nothing (a memristor), its quadrature is added as a dynamic variable NAME.q; in the primal one likewise NAME.p of
+a dissipator whose law reads its momentum.  Momenta of points are those of the kinetic stores that move with them.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ def from_masses(network: Network) -> Network:
 
 
 def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
-    """Quadratures q' = f of what traces, expectations, dynamics and laws of their own branch read and no store holds,
-    and what of: a dynamic variable NAME.q each.  That of a branch begins as written, that of a node at its position.
+    """Quadratures q' = f of what traces, expectations, dynamics and laws read and no store holds, and what of: a
+    dynamic variable NAME.q each.  That of a branch begins as written, that of a node at its position.
     """
     stores = stores_of(network)
     roots = ex.topological(expressions(network, "observations", "dynamics", "expectations", "branches.law"))
@@ -97,7 +97,8 @@ def _integrated(network: Network, wanted: Iterable[Wanted], rate: str) -> Networ
     for b in network.branches:
         for kind in ("bq", "bp"):
             families.setdefault((b.name, kind), []).append((b.loops, b.at, b.domain, b.place))
-    lawful = {(b.name, kind) for b in network.branches for kind in ("bq", "bp") if reads(b, kind)}
+    laws = (n for law in expressions(network, "branches.law") for n in ex.variables(law) if n.op == "var")
+    lawful = {n.data[:2] for n in laws}
     states, dynamics = [], []
     for name, kind in wanted:
         measured = (name, kind) not in lawful

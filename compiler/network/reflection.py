@@ -124,7 +124,9 @@ def unreflectable(network: Network) -> Diagnostic | None:
     dual = {s.label for s in network.switches if s.dual}
     rest = [c for c in network.constraints if c.kind != "gamma" and c.name not in dual]
     statements += [(f"{c.kind} {c.name}", (c.expression,), c.place) for c in rest]
-    laws = [(f"law of {b.name}", (b.law,), b.place) for b in network.branches if b.law is not None]
+    # what stores nothing may be modulated by a quadrature
+    stores = [b for b in network.branches if b.kind in ("kinetic", "potential")]
+    laws = [(f"law of {b.name}", (b.law,), b.place) for b in stores if b.law is not None]
     moduli = [(f"ratio of {c.first.partition('#')[0]}", (c.ratio,), c.place) for c in network.couplings]
     lawful, at_times = {b.name for b in network.branches if b.law is not None}, {s.label for s in network.switches}
     for what, roots, place in statements:

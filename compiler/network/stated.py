@@ -50,7 +50,35 @@ def as_elements(network: Network, functions: frozenset[str]) -> Network:
                 break
         else:
             kept.append(energy)
-    return replace(network, energies=tuple(kept), branches=(*network.branches, *made))
+    network = replace(network, energies=tuple(kept), branches=(*network.branches, *made))
+    return _with_sources(network, nodes) if functions == ALL else network
+
+
+def _with_sources(network: Network, nodes: dict[str, Domain]) -> Network:
+    """Works along one point, or from one to another, as sources of effort: deltaW = E delta(q(a) - q(b))."""
+    kept, made = [], []
+    for number, work in enumerate(network.works):
+        ends = _ends(work.on)
+        if ends is None or any(n.op == "var" and n.data[1] in ("nq", "bq") for n in ex.variables(work.effort)):
+            kept.append(work)
+            continue
+        domain, at = nodes[next(end.node for end in ends if end.node is not None)], loop_indices(work.loops)
+        name = f"work {number}"
+        made.append(Branch(name, at, work.loops, domain, "effort", "e", work.effort, *ends, None, work.place))
+    return replace(network, works=tuple(kept), branches=(*network.branches, *made))
+
+
+def _ends(on: Node) -> tuple[Terminal, Terminal] | None:
+    """(b, a) of a displacement q(a) - q(b) of points, the ground where one is missing; None of any other."""
+    ends = {1.0: Terminal(None, ()), -1.0: Terminal(None, ())}
+    points = [n for n in ex.variables(on) if n.op == "var"]
+    signs = {n: derivative(on, n) for n in points}
+    for n, sign in signs.items():
+        if n.data[1:] != ("nq", 0) or sign.op != "const" or ends.get(sign.data) != Terminal(None, ()):
+            return None
+        ends[sign.data] = Terminal(n.data[0], n.args)
+    whole = ex.substitute(on, {n: ex.const(0.0) for n in points})
+    return (ends[-1.0], ends[1.0]) if points and ex.is_const(whole, 0.0) else None
 
 
 def element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:

@@ -2,9 +2,9 @@
 
     0 = sum c_j f_j + b     is     g_j = c_j f_j,  e_j = -c_j h,  sum g_j + b = 0,  mu = -h
 
-The f_j are flows of points of common flow, or of branches without a law that nothing else names; each gets a
-transformer.  Their other sides, all of effort h, make a ring between points of common flow, or a star at a node of
-common effort.
+The f_j are flows of points of common flow, or of branches; each gets a transformer, which a branch has in its place
+where it has no law and nothing else names it, else beside it between points, or in series at a node of common effort.
+Their other sides, all of effort h, make a ring between points of common flow, or a star at a node of common effort.
 What b gives is a flow source in it.  A displacement constraint is that of its rate, and what the start fulfils.  Other
 constraints stay as written.
 
@@ -44,14 +44,14 @@ def as_transformers(network: Network) -> Network:
     switched = {s.label for s in network.switches}
     roots = expressions(network, *(sort for sort in EXPRESSIONS if sort not in TRACED))
     named = Counter(n.data[0] for root in roots for n in _read(root) if n.data[1].startswith("b"))
-    free = {b.name: b for b in network.branches if b.kind == "field"}
+    bare = frozenset(b.name for b in network.branches if b.kind == "field" and named[b.name] == 1)
     for c in network.constraints:
         if c.kind == "gamma" or c.adds or labels[c.name] > 1 or c.name in switched or c.at != loop_indices(c.loops):
             continue
         rate = c if c.kind == "psi" else replace(c, expression=time_derivative(c.expression))
-        sides = _sides(network, rate, free, named)
+        sides = _sides(network, rate)
         if sides is not None:
-            network = _with_junction(network, c, *sides)
+            network = _with_junction(network, c, *sides, bare)
     return network
 
 
@@ -59,16 +59,16 @@ def _read(root: Node) -> Iterator[Node]:
     return (n for n in ex.variables(root) if n.op == "var")
 
 
-def _sides(
-    network: Network, c: Constraint, free: dict[str, Branch], named: Counter[str]
-) -> tuple[list[Side], Node] | None:
+def _sides(network: Network, c: Constraint) -> tuple[list[Side], Node] | None:
     """The flows of a constraint with their factors, and what stands beside them; None of any other constraint."""
     flows = sorted((n for n in _read(c.expression) if n.data[1] != "s"), key=lambda n: n.number)
     nodes = {n.name for n in network.nodes if n.domain.common == "flow"}
     for n in flows:
         point = n.data[1:] == ("nf", 0) and n.data[0] in nodes
-        branch = free.get(n.data[0]) if n.data[1:] == ("bf", 0) and named[n.data[0]] == 1 else None
-        if not point and (branch is None or (branch.at, branch.loops) != (n.args, c.loops)):
+        made = [
+            b for b in network.branches if n.data == (b.name, "bf", 0) and b.plus is not None and b.minus is not None
+        ]
+        if not point and [(b.at, b.loops) for b in made] != [(n.args, c.loops)]:
             return None
     sides = [(n, derivative(c.expression, n)) for n in flows]
     if not flows or any(n in ex.variables(factor) for _, factor in sides for n in flows):
@@ -76,7 +76,9 @@ def _sides(
     return sides, ex.substitute(c.expression, {n: ex.const(0.0) for n in flows})
 
 
-def _with_junction(network: Network, c: Constraint, sides: Sequence[Side], beside: Node) -> Network:
+def _with_junction(
+    network: Network, c: Constraint, sides: Sequence[Side], beside: Node, bare: frozenset[str]
+) -> Network:
     """The constraint as transformers into a junction, a flow source in it where something stands beside."""
     domains = {n.name: n.domain for n in network.nodes} | {b.name: b.domain for b in network.branches}
     known = [domains[n.data[0]] for n, _ in sides]
@@ -85,13 +87,20 @@ def _with_junction(network: Network, c: Constraint, sides: Sequence[Side], besid
     others += [] if ex.is_const(beside, 0.0) else [(f"{c.name}#0", beside)]
     ends, nodes = _junction(c, domain, len(others))
     made = [_branch(c, name, domain, *two, flow) for (name, flow), two in zip(others, ends, strict=True)]
-    couplings, ports = [], set()
+    couplings, branches = [], {b.name: b for b in network.branches if any(n.data[0] == b.name for n, _ in sides)}
     for k, (n, factor) in enumerate(sides):
-        name = n.data[0] if n.data[1] == "bf" else f"{c.name}#{2 * k + 1}"
-        if n.data[1] == "bf":
-            ports.add(name)
-        else:
+        name, own = f"{c.name}#{2 * k + 1}", branches.get(n.data[0])
+        if own is None:
             made.append(_branch(c, name, known[k], Terminal(n.data[0], n.args), Terminal(None, ())))
+        elif own.name in bare:
+            name, branches[own.name] = own.name, replace(own, kind="port")
+        else:
+            plus = own.plus
+            if own.domain.common == "effort":
+                nodes.append(NodeFamily(f"{name}#", loop_ranges(c.loops), own.domain, c.place))
+                plus = Terminal(f"{name}#", loop_indices(c.loops))
+                branches[own.name] = replace(own, minus=plus)
+            made.append(_branch(c, name, own.domain, plus, own.minus))
         at = loop_indices(c.loops)
         couplings.append(Coupling("transformer", name, others[k][0], at, c.loops, "e", ex.neg(factor), c.place))
 
@@ -101,14 +110,14 @@ def _with_junction(network: Network, c: Constraint, sides: Sequence[Side], besid
         return ex.substitute(root, {n: ex.neg(ex.var(others[0][0], "be", *n.args)) for n in read}) if read else root
 
     begun = (Initial(c.expression, ex.const(0.0), True, c.loops, c.place),) if c.kind == "phi" else ()
-    network = rewritten(network, felt)
-    branches = (replace(b, kind="port") if b.name in ports else b for b in network.branches)
+    kept = tuple(branches.get(b.name, b) for b in network.branches)
+    network = rewritten(replace(network, branches=kept), felt)
     return replace(
         network,
         initials=(*network.initials, *begun),
         constraints=tuple(other for other in network.constraints if other.name != c.name),
         nodes=(*network.nodes, *nodes),
-        branches=(*branches, *made),
+        branches=(*network.branches, *made),
         couplings=(*network.couplings, *couplings),
     )
 
@@ -127,7 +136,7 @@ def _junction(c: Constraint, domain: Domain, number: int) -> tuple[list[tuple[Te
 
 
 def _branch(
-    c: Constraint, name: str, domain: Domain, plus: Terminal, minus: Terminal, flow: Node | None = None
+    c: Constraint, name: str, domain: Domain, plus: Terminal | None, minus: Terminal | None, flow: Node | None = None
 ) -> Branch:
     kind, side = ("port", None) if flow is None else ("flow", "f")
     return Branch(name, loop_indices(c.loops), c.loops, domain, kind, side, flow, plus, minus, None, c.place)

@@ -73,3 +73,24 @@ def test_by_its_momentum(tmp_path, law, begun, formulation):
         current = k * np.sin(3.0 * time) * (0.01 + 0.2 * linkage**2)
         for name, exact in ((f"p[{k}]", linkage), (f"i[{k}]", current)):
             assert np.abs(np.asarray(run.trace[name]) - exact).max() <= 1e-6 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.one_in(4)
+def test_a_damper_that_reads_where_it_is(tmp_path, formulation):
+    """M v' = -c (1 + (x/d)^2) v has the integral M v + c (x + x^3/(3 d^2))."""
+    text = """model m {
+  node x: translation
+  M: kinetic(p = 1 kg*f) x
+  D: dissipator(e = 2 N.s/m*(1 + (x.q/(0.1 m))^2)*f) x
+  init x.q = -0.1 m
+  init M.f = 1 m/s
+  expect static: order == 2
+}
+scene s of m { time 0 s to 2 s; trace x.q as x, x.f as v every 20 ms }
+"""
+    run = ran(tmp_path, text, formulation=formulation, accuracy=1e-6)
+    assert run.met
+    x, v = np.asarray(run.trace["x"]), np.asarray(run.trace["v"])
+    assert np.abs(v + 2 * (x + x**3 / 0.03) - (1 - 2 * (0.1 + 0.001 / 0.03))).max() <= 3e-6
+    assert np.ptp(x) > 0.2

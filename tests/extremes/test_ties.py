@@ -10,7 +10,7 @@ model m {
   param r = 0.1 m
   node a, b: translation
   node w: rotation
-  F: effort(e = 4 N) ground -> a
+  work 4 N on a.q
   A: kinetic(p = 1 kg*f) a; B: kinetic(p = 2 kg*f) b; J: kinetic(p = 0.02 kg.m^2*f) w
   psi pulley: a.f + b.f = 2*r*w.f + 0.3 m/s*cos(5 rad/s*t)
   init A.f = 0.5 m/s; init B.f = 0.2 m/s
@@ -46,6 +46,23 @@ model m {
 }
 scene s of m { time 0 s to 2 s; trace x.q, w[1].f, w[n].q as th, mesh[1].multiplier as mu every 50 ms }
 """
+LAWS = """
+model m {
+  node a, c: electrical
+  node x, y: translation
+  U: effort(e = 10 V) a -> ground
+  R: dissipator(e = 5 ohm*f) a -> ground
+  L: kinetic(p = 0.1 H*f) a -> c
+  S: dissipator(e = 2 ohm*f) c -> ground
+  psi tie: R.f = 2*L.f
+  F: effort(e = 3 N) ground -> x
+  M: kinetic(p = 1 kg*f) x; N: kinetic(p = 2 kg*f) y
+  D: dissipator(e = 2 N.s/m*f) y -> ground
+  psi link: D.f = 0.2*x.f
+  init L.f = 0.5 A; init M.f = 0 m/s
+}
+scene s of m { time 0 s to 0.3 s; trace R.f, R.e, tie.multiplier as mu, x.f, D.e, link.multiplier as nu every 5 ms }
+"""
 
 
 def pulley(t):
@@ -67,6 +84,14 @@ def core(t):
     return {"L.f": currents[0], "K.f": currents[1], "mu": np.full_like(t, 2.5), "i": third}
 
 
+def laws(t):
+    """In series with R and L, and beside D, of which each keeps its law."""
+    current = 30 / 22 + (0.5 - 30 / 22) * np.exp(-220 * t)
+    speed, push = 3 / 0.08 * (1 - np.exp(-0.08 / 1.08 * t)), 3 / 1.08 * np.exp(-0.08 / 1.08 * t)
+    drawn = {"R.f": 2 * current, "R.e": 10 * current, "mu": 10 - 10 * current}
+    return drawn | {"x.f": speed, "D.e": 0.4 * speed, "nu": -0.4 * (push + speed)}
+
+
 def train(t):
     inertia = 0.1 * (1 + 1 / 4 + 1 / 16 + 1 / 64)
     turned = 0.4 + (t + t**2 / 2 / inertia) / 8
@@ -75,7 +100,7 @@ def train(t):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize(("text", "exact"), [(PULLEY, pulley), (TRAIN, train), (CORE, core)])
+@pytest.mark.parametrize(("text", "exact"), [(PULLEY, pulley), (TRAIN, train), (CORE, core), (LAWS, laws)])
 @pytest.mark.one_in(3)
 def test_closed_form(tmp_path, formulation, text, exact):
     run = ran(tmp_path, text, formulation=formulation, accuracy=1e-6)
