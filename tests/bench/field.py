@@ -25,7 +25,7 @@ from pathlib import Path
 
 import netlists
 import numpy as np
-from measuring import Bench, Measured
+from measuring import MODELS, Bench, Measured
 from price import TOLERANCES
 from race import ASKED, SHORT, Entry, Family, Peers, race, repeated
 from steps import GRID, INSTANTS, SIZES, Peer
@@ -78,17 +78,19 @@ RECORDED = {
 HERE = ("IDA-KLU", "ngspice", "SUNDIALS")
 """Peers that are measured here."""
 LONG = ("pendulum@1000", "ring", "beam", "rc_ladder:10000", "grid:100")
+REACHED = "v[n/2].e as y_mid, v[n].e as y_end", "v[1].e as y_end"
+"""What is traced of the nonlinear line: of 1000 sections the current reaches the first ones."""
 GRIDS = ("grid:10", "grid:20", "grid:30", "grid:60", "grid:100")
 NETLISTS = tuple(f"{path.stem}.cir" for path in sorted(netlists.NETLISTS.glob("*.cir")))
 
 
 def on_own_text(problem: str, folder: Path) -> Family:
-    """A ladder or grid beside IDA with KLU on a text of one unknown a node."""
+    """A ladder or grid beside IDA with KLU on a text of one unknown a node, the nonlinear line alone."""
     name, _, n = problem.partition(":")
-    if name == "grid":
-        (folder / "grid.sd").write_text(GRID)
-    text, size = SIZES[name]
-    bench = Bench(str(folder / "grid") if name == "grid" else f"benchmark/{name}", folder, settings=(("n", n),))
+    written = GRID if name == "grid" else (MODELS / "benchmark" / f"{name}.sd").read_text()
+    (folder / f"{name}.sd").write_text(written.replace(*REACHED) if name == "nltl" else written)
+    text, size = SIZES.get(name, (None, 0.0))
+    bench = Bench(str(folder / name), folder, settings=(("n", n),))
     span = bench.options.t_end - bench.options.t_start
     instants = INSTANTS if name == "grid" else INSTANTS[-1:]
     bench.options = replace(bench.options, every=span, at=tuple(instants))
@@ -100,6 +102,7 @@ def on_own_text(problem: str, folder: Path) -> Family:
     if finest is None:
         raise RuntimeError("no reference")
     exact, sides = values(finest), ([], [])
+    size = size or float(np.abs(exact).max())
     asked = [{"accuracy": a} for a in ASKED], [
         {"accuracy": None, "rtol": rtol, "method": method} for method in ("bdf", "radau") for rtol in TOLERANCES
     ]  # fmt: skip
@@ -115,8 +118,8 @@ def on_own_text(problem: str, folder: Path) -> Family:
             found.append(Entry(f"{run.method} {options.get('accuracy') or options['rtol']:.1e}", run.cpu, error))
             if run.cpu > SECONDS or error < 0.1 * min(TARGETS):
                 done = options.get("method", "auto")
-    peer, theirs = Peer(text, folder), []
-    for policy in ("0.25", "0.01") if peer.program is not None else ():
+    peer, theirs = Peer(text, folder) if text is not None else None, []
+    for policy in ("0.25", "0.01") if peer is not None and peer.program is not None else ():
         for rtol in QUARTERS:
             cpu, steps, ends = peer.run(int(n), rtol, policy, 1)
             if cpu < SHORT:
@@ -136,7 +139,7 @@ def of_netlist(problem: str, folder: Path) -> tuple[Family, int]:
         raise RuntimeError("it cannot be imported")
     nodes = sum(len(line.split(",")) for line in re.findall(r"(?m)^ *node (.*):", model.read_text()))
     least = min(TARGETS)
-    finest = simulate(model, accuracy=1e-3 * least, unmet="warn", scene="tran", output=folder / "f.h5")
+    finest = simulate(model, accuracy=max(1e-3 * least, 1e-8), unmet="warn", scene="tran", output=folder / "f.h5")
     names = netlists.shown(text)
     sides = [
         [Entry(f"{one.setting:.1e}", one.time, one.error) for one in found]
@@ -165,7 +168,7 @@ def measured(problem: str, peers: Peers) -> Measurement:
         try:
             if problem in NETLISTS:
                 return Measurement(*of_netlist(problem, Path(folder)))
-            if problem.startswith(("grid:", "rc_ladder:")):
+            if problem.startswith(("grid:", "rc_ladder:", "nltl:")):
                 side = int(problem.partition(":")[2])
                 return Measurement(on_own_text(problem, Path(folder)), n or side * side)
             family = race(problem, peers, SECONDS)

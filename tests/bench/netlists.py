@@ -24,7 +24,7 @@ from sysdyn.runtime.model.failures import SolverFailure
 
 NETLISTS = Path(__file__).parents[1] / "cli" / "netlists"
 TIMES = 3
-DECADES, HALVES = range(3, 10), range(2, 21)
+DECADES, HALVES = range(3, 10), range(2, 17)
 
 
 def shown(text: str) -> list[str]:

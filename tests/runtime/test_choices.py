@@ -10,7 +10,7 @@ from sysdyn.dsl import load as text
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 from sysdyn.runtime import simulate as simulation
-from sysdyn.runtime.accuracy.alternatives import NOT_STIFF, alternatives
+from sysdyn.runtime.accuracy.alternatives import NOT_STIFF, SMALL, alternatives
 from sysdyn.runtime.accuracy.options import Options, choose_index, choose_method, own_tolerances
 from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.underlying import obstacle, rateless, underlying_form
@@ -105,7 +105,10 @@ def said(model):
     return system, consistent_start(system, 0.0)
 
 
-def test_steep_laws_of_few_unknowns_are_the_bdfs_before_radaus():
+def test_steep_laws_are_the_bdfs_before_radaus_of_many_unknowns_too():
+    many = said(STEEP.replace("  C:", "  for k in 1..60 { E[k]: diode() b -> ground }\n  C:"))
+    assert many[0].unknowns > SMALL
+    assert tried(many, "3", 1) == (["bdf 3", "radau 3"], "steep laws")
     system, start = said(STEEP)
     assert tried((system, start), "3", 1) == (["rosenbrock 3", "bdf 3", "radau 3"], "steep laws")
     # of index 2 there is no method without iteration, but radau where constraints hold by their derivatives

@@ -65,6 +65,7 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_elimination_factor sd_elimination_z_factor
 #define sd_elimination_solve sd_elimination_z_solve
 #define sd_elimination_healthy sd_elimination_z_healthy
+#define sd_elimination_worn sd_elimination_z_worn
 #define sd_sparse sd_sparse_z
 #define sd_sparse_new sd_sparse_z_new
 #define sd_sparse_free sd_sparse_z_free

@@ -197,7 +197,7 @@ class Rosenbrock(c.Structure):
         *[(name, P) for name in ["end", "within", "within_d", "inner"]],
         *[(name, P * ROSENBROCK_STAGES) for name in ["u", "v"]],
         ("bend", P * ROSENBROCK_DENSE),
-        *[(name, P) for name in ["jy", "jyd", "g", "e", "memory", "jy_end", "jyd_end"]],
+        *[(name, P) for name in ["jy", "jyd", "g", "e", "memory", "jy_end", "jyd_end", "begin_end"]],
         ("sloped", I),
         *[(name, P) for name in ["rate_row", "rate_column"]],
         ("rates", I),

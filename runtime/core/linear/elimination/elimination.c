@@ -235,13 +235,28 @@ static void prepare(sd_elimination *e)
     e->interpreted = 0;
 }
 
-/* machine code behind the first times that the lists are interpreted */
-static SD_APART void write_code(sd_elimination *e)
+static int64_t operations(const sd_list *list)
 {
-    int64_t operations = e->factor.sums + e->factor.pairs + e->solve.sums + e->solve.pairs;
-    int64_t before = e->interpreted, due = sd_code_early() ? 0 : TWICE * operations;
-    e->interpreted += operations;
-    if (before <= due && e->interpreted > due)
+    return list->sums + list->pairs;
+}
+
+/* interpreted operations from which on machine code is written */
+static int64_t due(const sd_elimination *e)
+{
+    return sd_code_early() ? 0 : TWICE * (operations(&e->factor) + operations(&e->solve));
+}
+
+int sd_elimination_worn(const sd_elimination *e)
+{
+    return sd_code_possible() && e->interpreted >= due(e);
+}
+
+/* machine code behind the first times that the lists are interpreted, and this one is about to be */
+static SD_APART void write_code(sd_elimination *e, const sd_list *list)
+{
+    int64_t before = e->interpreted;
+    e->interpreted += operations(list);
+    if (before <= due(e) && e->interpreted > due(e))
         e->code = sd_code_new(&e->factor, &e->solve, NUMBERS);
 }
 
@@ -350,7 +365,7 @@ static int factor(sd_elimination *e, const sd_number *values, const double *scal
     if (scale || e->scaled)
         measure(e, scale);
     if (!e->code)
-        write_code(e);
+        write_code(e, &e->factor);
     if (e->code)
         e->code->first(e->cell, (sd_number *)values, NULL, NULL, NULL, NULL);
     else
@@ -374,6 +389,8 @@ int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, 
 void sd_elimination_solve(sd_elimination *elimination, sd_number *x)
 {
     sd_elimination *e = elimination->serves;
+    if (!e->code)
+        write_code(e, &e->solve);
     if (e->code) {
         e->code->second(e->cell, x, NULL, NULL, NULL, NULL);
         return;

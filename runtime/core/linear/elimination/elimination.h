@@ -59,6 +59,8 @@ void sd_elimination_solve(sd_elimination *elimination, sd_number *x);
 
 /* multipliers of the newest factors are moderate, and what is left of each pivot's column is more than round-off */
 int sd_elimination_healthy(const sd_elimination *elimination);
+/* 1: its lists were interpreted so often that machine code is worth writing */
+int sd_elimination_worn(const sd_elimination *elimination);
 
 /* elimination_order.c: pivots of the newest `samples` matrices, and the filled pattern: entry [n][n] by columns, of the
  * caller.  0: found; 1: there is no such order; 2: no memory */

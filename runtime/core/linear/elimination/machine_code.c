@@ -24,6 +24,11 @@ int sd_code_early(void)
 #include <sys/mman.h>
 #include <unistd.h>
 
+int sd_code_possible(void)
+{
+    return permitted && __builtin_cpu_supports("avx");
+}
+
 #define LONGEST 10     /* bytes of an instruction */
 #define LEAST 16384    /* bytes of the pages of one code: what a run wants is less mostly, */
 #define MOST 262144    /* and of those that are kept at most */
@@ -461,7 +466,7 @@ static sd_code *pages(size_t size)
 sd_code *sd_code_new(const sd_list *first, const sd_list *second, enum sd_numbers numbers)
 {
     size_t size = (room_of(first) + room_of(second) + 4095) / 4096 * 4096;
-    sd_code *code = permitted && __builtin_cpu_supports("avx") ? pages(size > LEAST ? size : LEAST) : NULL;
+    sd_code *code = sd_code_possible() ? pages(size > LEAST ? size : LEAST) : NULL;
     if (code && write_lists(code, first, second, numbers)) {
         sd_code_free(code);
         return NULL;
@@ -480,6 +485,11 @@ void sd_code_free(sd_code *code)
         give_back(code);
 }
 #else
+int sd_code_possible(void)
+{
+    return 0;
+}
+
 sd_code *sd_code_new(const sd_list *first, const sd_list *second, enum sd_numbers numbers)
 {
     (void)first, (void)second, (void)numbers, (void)permitted;

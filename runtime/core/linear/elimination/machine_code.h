@@ -35,5 +35,7 @@ void sd_code_free(sd_code *code);
 /* from now on lists are interpreted (0), written where that pays (1), or at once (2; tests) */
 void sd_code_allow(int allowed);
 int sd_code_early(void);
+/* whether any is written, which this machine takes */
+int sd_code_possible(void);
 
 #endif

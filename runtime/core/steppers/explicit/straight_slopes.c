@@ -157,12 +157,12 @@ const sd_straight *sd_straight_of(sd_underlying *u)
 {
     const sd_linear *linear = u->linear;
     const sd_elimination *e = linear->elimination;
-    if (!e || !e->code || e->scaled || !linear->pivoted || linear->null_pivot > SD_LEAST_PIVOT)
+    if (!e || !e->ready || e->scaled || !linear->pivoted || linear->null_pivot > SD_LEAST_PIVOT)
         return NULL;
     const sd_straight *straight = u->straight;
     if (!straight || straight->order != e->prepared) {
-        if (4 * linear->factorisations < e->factor.sums + e->factor.pairs && !sd_code_early())
-            return NULL; /* writing costs about what as many evaluations save: 14 of a pendulum, 42 of 20 unknowns */
+        if (!sd_elimination_worn(e))
+            return NULL;
         straight = straight_code(u);
     }
     return straight && straight->code ? straight : NULL;

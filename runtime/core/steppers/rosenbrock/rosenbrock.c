@@ -48,7 +48,8 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
     size_t m = (size_t)sd_whole_lanes(system->unknowns + 1), nnz = (size_t)system->entries + 1;
     double **vectors[] = {&rosenbrock->phi, &rosenbrock->yd, &rosenbrock->last, &rosenbrock->y, &rosenbrock->rate,
                           &rosenbrock->drift, &rosenbrock->begin, &rosenbrock->ivp.ee, &rosenbrock->ivp.weight,
-                          &rosenbrock->end, &rosenbrock->within, &rosenbrock->within_d, &rosenbrock->inner};
+                          &rosenbrock->end, &rosenbrock->within, &rosenbrock->within_d, &rosenbrock->inner,
+                          &rosenbrock->begin_end};
     size_t number = sizeof vectors / sizeof *vectors;
     rosenbrock->memory = calloc((number + 2 * STAGES + SD_ROSENBROCK_DENSE) * m + 6 * nnz, sizeof(double));
     rosenbrock->rate_row = calloc(2 * nnz, sizeof *rosenbrock->rate_row);
@@ -208,6 +209,7 @@ int sd_rosenbrock_step(void *self)
         }
         rosenbrock->ivp.cause = cause;
         rosenbrock->rejected = 1;
+        rosenbrock->sloped = 0;
         known = known && isfinite(error);
         if (sd_ends(&rosenbrock->ivp, cause))
             return cause;
@@ -241,6 +243,7 @@ int sd_rosenbrock_step(void *self)
         const size_t size = (size_t)rosenbrock->ivp.system->entries * sizeof(double);
         memcpy(rosenbrock->jy, rosenbrock->jy_end, size);
         memcpy(rosenbrock->jyd, rosenbrock->jyd_end, size);
+        memcpy(rosenbrock->begin, rosenbrock->begin_end, (size_t)rosenbrock->ivp.n * sizeof(double));
     }
     return SD_FINE;
 }

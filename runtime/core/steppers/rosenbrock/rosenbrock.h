@@ -45,8 +45,8 @@ typedef struct sd_rosenbrock {
     double *end, *within, *within_d, *inner; /* [n] the end of the step at hand; a point within, its correction */
     double *u[SD_ROSENBROCK_STAGES], *v[SD_ROSENBROCK_STAGES], *bend[SD_ROSENBROCK_DENSE]; /* [n]; bend: of the polynomial */
     double *jy, *jyd, *g, *e, *memory;
-    double *jy_end, *jyd_end; /* slopes at the end of the step at hand */
-    int32_t sloped;           /* whether these are those of the last accepted point, behind a step jy and jyd are */
+    double *jy_end, *jyd_end, *begin_end; /* slopes, and F [n], at the end of the step at hand */
+    int32_t sloped;           /* whether these are those of the last accepted point, behind a step jy, jyd and begin are */
     int32_t *rate_row, *rate_column, rates; /* of the entries e of E that are not zero */
     sd_settle *settle;        /* of steep laws: moves a point that no step goes on from onto all rows; or NULL */
 } sd_rosenbrock;

@@ -76,7 +76,7 @@ static int gives_way(sd_rosenbrock *rosenbrock, double *error, double *state)
     double lead = 1.0 / (sd_rosenbrock_gamma * rosenbrock->ivp.h), *jy = rosenbrock->jy_end, *jyd = rosenbrock->jyd_end;
     for (int32_t i = 0; i < rosenbrock->ivp.n; i++)
         yd[i] = rosenbrock->rate[i] + rosenbrock->v[STAGES - 1][i];
-    int cause = sd_rosenbrock_residual(rosenbrock, t, y, yd, r);
+    int cause = sd_rosenbrock_residual(rosenbrock, t, y, yd, rosenbrock->begin_end);
     if (cause != SD_FINE)
         return cause;
     if (sd_jacobian(system, t, y, yd, rosenbrock->ivp.magnitude, jy, jyd) >= 0)
@@ -91,6 +91,7 @@ static int gives_way(sd_rosenbrock *rosenbrock, double *error, double *state)
         rosenbrock->g[e] = jy[e] + lead * jyd[e];
     if (sd_linear_factor(rosenbrock->linear, rosenbrock->g, rosenbrock->ivp.magnitude))
         return SD_FINE;
+    memcpy(r, rosenbrock->begin_end, (size_t)rosenbrock->ivp.n * sizeof *r);
     sd_linear_solve(rosenbrock->linear, r);
     *error = fmax(*error, sd_rosenbrock_norm(rosenbrock, r, rosenbrock->ivp.h, state));
     /* nor is the difference of both solutions what the begin's factors say */

@@ -27,9 +27,8 @@ int sd_rosenbrock_linearise(sd_rosenbrock *rosenbrock)
 {
     sd_system *system = rosenbrock->ivp.system;
     double t = rosenbrock->ivp.t, *drift = rosenbrock->drift, *jy = rosenbrock->jy, *jyd = rosenbrock->jyd;
-    int32_t bad = -1;
-    if (!rosenbrock->sloped)
-        bad = sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->ivp.magnitude, jy, jyd);
+    const int known = rosenbrock->sloped;
+    int32_t bad = known ? -1 : sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->ivp.magnitude, jy, jyd);
     rosenbrock->sloped = 0;
     if (*system->stop)
         return SD_STOPPED;
@@ -47,7 +46,7 @@ int sd_rosenbrock_linearise(sd_rosenbrock *rosenbrock)
             }
     double over = fmax(SLOPE * rosenbrock->ivp.h, fmin(rosenbrock->ivp.h, TELLS * rosenbrock->ivp.h_max));
     double later = t + fmax(over, RESOLVED * DBL_EPSILON * fabs(t));
-    int cause = sd_rosenbrock_residual(rosenbrock, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->begin);
+    int cause = known ? SD_FINE : sd_rosenbrock_residual(rosenbrock, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->begin);
     if (cause == SD_FINE)
         cause = sd_rosenbrock_residual(rosenbrock, later, rosenbrock->phi, rosenbrock->yd, drift);
     for (int32_t i = 0; i < rosenbrock->ivp.n; i++)
@@ -66,21 +65,42 @@ int sd_rosenbrock_factorise(sd_rosenbrock *rosenbrock)
     return failed == 2 ? SD_MEMORY : failed ? SD_SINGULAR : SD_FINE;
 }
 
-/* y, rate [n] := Y_s, Z_s;  v[s] := Z_s + s_s */
-static SD_WIDE void place(sd_rosenbrock *rosenbrock, int s)
+/* y, rate [n] := Y_s, Z_s;  v[s] := Z_s + s_s: from unknown i on, and from i2 on */
+static inline __attribute__((always_inline)) void place_lanes(sd_rosenbrock *rosenbrock, int s, int32_t i, int32_t i2)
 {
     const double *a = sd_rosenbrock_a[s], *c = sd_rosenbrock_coupling[s], over = 1.0 / rosenbrock->ivp.h;
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i += SD_LANES) {
-        sd_lanes y = SD_FROM(rosenbrock->phi, i), z = SD_FROM(rosenbrock->yd, i), lag = {0.0};
-        for (int j = 0; j < s; j++) {
-            y += a[j] * SD_FROM(rosenbrock->u[j], i);
-            z += a[j] * SD_FROM(rosenbrock->v[j], i);
-            lag += c[j] * SD_FROM(rosenbrock->u[j], i);
+    double *const *u = rosenbrock->u, *const *v = rosenbrock->v;
+    sd_lanes y = SD_FROM(rosenbrock->phi, i), z = SD_FROM(rosenbrock->yd, i), lag = {0.0};
+    sd_lanes y2 = SD_FROM(rosenbrock->phi, i2), z2 = SD_FROM(rosenbrock->yd, i2), lag2 = {0.0};
+    for (int j = 0; j < s; j++) {
+        y += a[j] * SD_FROM(u[j], i);
+        z += a[j] * SD_FROM(v[j], i);
+        lag += c[j] * SD_FROM(u[j], i);
+        if (i2 != i) {
+            y2 += a[j] * SD_FROM(u[j], i2);
+            z2 += a[j] * SD_FROM(v[j], i2);
+            lag2 += c[j] * SD_FROM(u[j], i2);
         }
-        SD_AT(rosenbrock->y, i) = y;
-        SD_AT(rosenbrock->rate, i) = z;
-        SD_AT(rosenbrock->v[s], i) = z + over * lag;
     }
+    SD_AT(rosenbrock->y, i) = y;
+    SD_AT(rosenbrock->rate, i) = z;
+    SD_AT(rosenbrock->v[s], i) = z + over * lag;
+    if (i2 != i) {
+        SD_AT(rosenbrock->y, i2) = y2;
+        SD_AT(rosenbrock->rate, i2) = z2;
+        SD_AT(rosenbrock->v[s], i2) = z2 + over * lag2;
+    }
+}
+
+/* two lanes at a time read the coefficients once */
+static SD_WIDE void place(sd_rosenbrock *rosenbrock, int s)
+{
+    const int32_t n = rosenbrock->ivp.n;
+    int32_t i = 0;
+    for (; i + SD_LANES < n; i += 2 * SD_LANES)
+        place_lanes(rosenbrock, s, i, i + SD_LANES);
+    if (i < n)
+        place_lanes(rosenbrock, s, i, i);
 }
 
 /* u[s] := -F_s - d_s h T, where u[s] is F_s */
