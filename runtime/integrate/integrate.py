@@ -18,7 +18,7 @@ from sysdyn.runtime.condense.condensed import Condensed
 from sysdyn.runtime.condense.condenser import Forms, condensed
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.causes import NEWTON, failure, placed
-from sysdyn.runtime.integrate.creeping import Creeping
+from sysdyn.runtime.integrate.creeping import Creeping, Windows
 from sysdyn.runtime.integrate.jumps.corners import Corners, serves
 from sysdyn.runtime.integrate.jumps.crossing import cross
 from sysdyn.runtime.integrate.jumps.exchange import Exchange
@@ -43,9 +43,6 @@ from sysdyn.runtime.start.settled import Settler
 from sysdyn.runtime.start.start import ConsistentState
 
 CHUNK_SECONDS = 0.05
-STRAINED = 0.45
-"""Of the steps of a window (`Request.unstrained`): where Newton fails in more, the tolerance says little of what a run
-finds (of bdf's on steep laws, in windows of 200, runs that came to their end had up to 0.17, others 0.5)."""
 CHUNK_STEPS = 1 << 20
 OPENED = ("dopri", "rosenbrock")
 """Methods that are told how long their first step may be."""
@@ -310,15 +307,14 @@ class Integration:
         request, method = self.request, self.method.contents
         span = request.t_end - self.start.t
         creeping = Creeping(span, method.t, self.statistics(), draft=request.draft, tried=request.tried)
-        most, failed = CHUNK_STEPS, method.newton_failures
+        windows = Windows(request.unstrained, self.statistics()) if request.unstrained else None
         while True:
             left = CHUNK_STEPS if request.max_steps is None else request.max_steps - method.steps
-            if request.unstrained:
-                most, failed = request.unstrained + method.steps // 4, method.newton_failures
+            until = [max(left, 1), *(item.left(method.steps) for item in (creeping, windows) if item is not None)]
             if self.exchange is not None:
-                most = self.exchange.steps
+                until.append(self.exchange.steps)
             before = time.process_time()
-            state = lib.core.sd_run_advance(self.driver.core, min(most, max(left, 1)), CHUNK_SECONDS)
+            state = lib.core.sd_run_advance(self.driver.core, min(until), CHUNK_SECONDS)
             self.cpu += time.process_time() - before
             self.driver.drain(sink)
             self.system.failure.check()
@@ -333,7 +329,7 @@ class Integration:
                 raise placed(self, lib.CAUSES[method.cause])
             if request.max_steps is not None and method.steps >= request.max_steps and method.t < request.t_end:
                 raise failure(self, "max_steps")
-            if request.unstrained and state == 0 and method.newton_failures - failed > STRAINED * most:
+            if windows is not None and windows.strained(self.statistics()):
                 raise failure(self, "strained")
             late = request.max_wall is not None and time.monotonic() - began > request.max_wall
             if late and method.t < request.t_end:

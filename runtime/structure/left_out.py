@@ -13,6 +13,7 @@ from typing import Any
 from weakref import WeakValueDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.switches import Switches
 from sysdyn.runtime.model.system import System
@@ -64,7 +65,7 @@ def chosen(null: Floats) -> Ints:
     return np.sort(qr(null.T, mode="r", pivoting=True)[1][: null.shape[1]])
 
 
-def weight(null: Floats, left: Ints) -> float:
+def weight(null: Floats, left: NDArray[np.integer]) -> float:
     """The largest coefficient of a constraint that holds, of those left out: 1 of the best choice."""
     return float(np.abs(np.linalg.lstsq(null[left].T, null.T, rcond=None)[0]).max())
 

@@ -173,8 +173,9 @@ def stopped(
         usual = _BLOCKED if error.cause == "singular" else f"{usual}; {_BLOCKED}"
     if error.cause == "singular" and len(started.system.description.switches.places):
         usual = _TWICE
-    dropped = options.redundancy == "drop"
-    if error.cause == "singular" and (dropped or options.events) and (names := _left_out(started)):
+    dropped = options is not None and options.redundancy == "drop"
+    fixed = dropped or (options is not None and bool(options.events))
+    if error.cause == "singular" and fixed and (names := _left_out(started)):
         usual = dropped * _FOLLOWS + _LEFT_OUT % names
     usual = usual.replace(LOOSER, _knob(options, code))
     remedy = _BOUNDED if why else _RANK if lost else usual
