@@ -55,7 +55,7 @@ class NoSuchForm(Exception):  # noqa: N818
 
 
 class SolverFailure(Exception):  # noqa: N818 (a name of the house)
-    """The integration stopped at `time` [s] with step `step` [s]; 0: at an instant.
+    """The integration stopped at `time` [s] with step `step` [s].
 
     cause: newton, error_test, singular, inertia, nonfinite, step_too_small, crawl, stiff, strained, max_steps,
     max_wall, memory.
@@ -78,9 +78,10 @@ class SolverFailure(Exception):  # noqa: N818 (a name of the house)
         self.partial: object = None
         self.state: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
         """t [s], y, yd [unknowns as written] at the last good point."""
-        kind = "unknown " if step else ""  # at an instant it is what happens there
-        parts = f"step {step:.3g} s" * bool(step), f"row {row}" * bool(row), f"{kind}{unknown}" * bool(unknown)
-        super().__init__(", ".join((f"{cause} at t = {time:.17g} s", *filter(None, parts))))
+        place = "".join(
+            [f", row {row}" if row else "", f", unknown {unknown}" if unknown else ""],
+        )
+        super().__init__(f"{cause} at t = {time:.17g} s, step {step:.3g} s{place}")
 
 
 class InconsistentStart(Exception):  # noqa: N818
