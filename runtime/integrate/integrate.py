@@ -43,7 +43,6 @@ from sysdyn.runtime.start.settled import Settler
 from sysdyn.runtime.start.start import ConsistentState
 
 CHUNK_SECONDS = 0.05
-CHUNK_STEPS = 1 << 20
 OPENED = ("dopri", "rosenbrock")
 """Methods that are told how long their first step may be."""
 STAGED = 100_000
@@ -309,8 +308,9 @@ class Integration:
         creeping = Creeping(span, method.t, self.statistics(), draft=request.draft, tried=request.tried)
         windows = Windows(request.unstrained, self.statistics()) if request.unstrained else None
         while True:
-            left = CHUNK_STEPS if request.max_steps is None else request.max_steps - method.steps
-            until = [max(left, 1), *(item.left(method.steps) for item in (creeping, windows) if item is not None)]
+            until = [item.left(method.steps) for item in (creeping, windows) if item is not None]
+            if request.max_steps is not None:
+                until.append(max(request.max_steps - method.steps, 1))
             if self.exchange is not None:
                 until.append(self.exchange.steps)
             before = time.process_time()

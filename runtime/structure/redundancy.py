@@ -67,9 +67,8 @@ class _Places:
     row: Ints
 
 
-def _reacting(system: System) -> _Places:
-    """The multipliers of constraints that hold now, and the reactions of each."""
-    idle = system.idle_multipliers()
+def _reacting(system: System, idle: Ints) -> _Places:
+    """The multipliers of constraints but for these (places in y), and the reactions of each."""
 
     def find() -> _Places:
         pattern, mine = system.pattern, system.are("kappa", "mu").copy()
@@ -82,9 +81,9 @@ def _reacting(system: System) -> _Places:
     return system.once(("reacting places", idle.tobytes()), find)
 
 
-def reactions(system: System, jy: Floats) -> Reactions:
-    """J from the reactions of the multipliers (virtual displacements)."""
-    all_ = _reacting(system)
+def reactions(system: System, jy: Floats, *, every: bool = False) -> Reactions:
+    """J from the reactions of the multipliers (virtual displacements) of constraints that hold now, or of every one."""
+    all_ = _reacting(system, NONE if every else system.idle_multipliers())
     value, largest = jy[all_.entry], np.zeros(all_.multipliers.size)
     np.maximum.at(largest, all_.which, np.abs(value))
     real = np.abs(value) > NOISE * largest[all_.which]
@@ -148,7 +147,7 @@ def vanished(system: System, state: ConsistentState) -> Ints:
     configuration is singular.  Beside: at seeded points that are not brought back onto phi, where a row that can be
     zero on phi alone (a circle of radius 0) has its size.
     """
-    reacting = _reacting(system)
+    reacting = _reacting(system, system.idle_multipliers())
     entry, which, number = reacting.entry, reacting.which, reacting.multipliers.size
     if not number:
         return NONE

@@ -13,24 +13,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.integrate.jumps.crossing import go_on
-from sysdyn.runtime.structure.left_out import TURNED, Dependence, chosen, weight
-
-MOST = 8
-"""Steps without a look."""
+from sysdyn.runtime.structure.left_out import TURNED, chosen, null_space, weight
 
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
+
+MOST = 8
+"""Steps without a look."""
 
 
 class Exchange:
     """Of one integration whose system can leave out others (`Switches.redundant`)."""
 
     def __init__(self, run: Integration) -> None:
-        self.run, system = run, run.system.another("3")
-        self._dependence = system.own("dependence", lambda: Dependence(system))
-        places = system.description.switches.places
-        at = [int(system.form.at[family]) + position for family, position in places]
-        self._members = np.searchsorted(self._dependence.multipliers, at)
+        self.run, self._system = run, run.system.another("3")
+        places = self._system.description.switches.places
+        at = [int(self._system.form.at[family]) + position for family, position in places]
+        self._members = np.searchsorted(np.flatnonzero(self._system.are("kappa", "mu")), at)
         self._weight = 1.0
         self.steps = 1
         """Until the next look."""
@@ -41,7 +40,7 @@ class Exchange:
         n, method, before = run.system.form.written, run.method.contents, switches.active
         y, yd = (values[:n] for values in run.method.point())
         left = np.flatnonzero(~before)
-        null = self._dependence.null(method.t, y, yd, left.size)
+        null = null_space(self._system, method.t, y, yd, left.size)
         if null is None or not self._turned(weight(null[self._members], left)):
             return False
         with run.settler.exactly():
