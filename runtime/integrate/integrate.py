@@ -308,11 +308,9 @@ class Integration:
         creeping = Creeping(span, method.t, self.statistics(), draft=request.draft, tried=request.tried)
         windows = Windows(request.unstrained, self.statistics()) if request.unstrained else None
         while True:
-            until = [item.left(method.steps) for item in (creeping, windows) if item is not None]
+            until = [item.left(method.steps) for item in (creeping, windows, self.exchange) if item is not None]
             if request.max_steps is not None:
                 until.append(max(request.max_steps - method.steps, 1))
-            if self.exchange is not None:
-                until.append(self.exchange.steps)
             before = time.process_time()
             state = lib.core.sd_run_advance(self.driver.core, min(until), CHUNK_SECONDS)
             self.cpu += time.process_time() - before
@@ -321,7 +319,7 @@ class Integration:
             self.settler.system.failure.check()
             if progress is not None:
                 progress(method.t)
-            if self.exchange is not None and state in (0, 3) and self.exchange.due():
+            if self.exchange is not None and state in (0, 3) and self.exchange.due(failed=state == 3):
                 continue
             if state == 3:
                 if lib.CAUSES[method.cause] in NEWTON and self._resolved():

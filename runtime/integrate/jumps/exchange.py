@@ -30,25 +30,32 @@ class Exchange:
         places = self._system.description.switches.places
         at = [int(self._system.form.at[family]) + position for family, position in places]
         self._members = np.searchsorted(np.flatnonzero(self._system.are("kappa", "mu")), at)
-        self._weight = 1.0
-        self.steps = 1
-        """Until the next look."""
+        self._weight, self._steps, self._looked = 1.0, 1, 0
 
-    def due(self) -> bool:
-        """Whether others should be left out behind the last step; then they are, and the method begins anew."""
+    def left(self, steps: int) -> int:
+        """Steps to the next look, which no clock decides."""
+        return max(self._looked + self._steps - steps, 1)
+
+    def due(self, *, failed: bool) -> bool:
+        """Whether others should be left out behind the last step; then they are, and the method begins anew.  failed:
+        the next one did, so that it is looked at at once.
+        """
         run, switches = self.run, self.run.system.description.switches
         n, method, before = run.system.form.written, run.method.contents, switches.active
+        if not failed and method.steps < self._looked + self._steps:
+            return False
         y, yd = (values[:n] for values in run.method.point())
         left = np.flatnonzero(~before)
         null = null_space(self._system, method.t, y, yd, left.size)
-        if null is None or not self._turned(weight(null[self._members], left)):
+        passed, self._looked = max(method.steps - self._looked, 1), method.steps
+        if null is None or not self._turned(weight(null[self._members], left), passed):
             return False
         with run.settler.exactly():
             y, yd, _ = run.settler.settle(method.t, y, yd)
             active = np.ones_like(before)
             active[chosen(null[self._members])] = False
             self._leave_out(active)
-            self._weight, self.steps = 1.0, 1
+            self._weight, self._steps = 1.0, 1
             found = run.settlers.across(method.t, y, yd)
         if found is None:
             self._leave_out(before)
@@ -61,11 +68,13 @@ class Exchange:
         core.every_step = every
         return True
 
-    def _turned(self, weight: float) -> bool:
-        """Whether those left out weigh too little; else half of the steps are let pass in which that may come."""
-        grown = max(weight - self._weight, 0.0) / self.steps
+    def _turned(self, weight: float, passed: int) -> bool:
+        """Whether those left out weigh too little, passed steps behind the last look; else half of the steps are let
+        pass in which that may come.
+        """
+        grown = max(weight - self._weight, 0.0) / passed
         self._weight = weight
-        self.steps = int(np.clip((TURNED - weight) / (2.0 * grown + 1e-300), 1.0, MOST))
+        self._steps = int(np.clip((TURNED - weight) / (2.0 * grown + 1e-300), 1.0, MOST))
         return not weight <= TURNED
 
     def _leave_out(self, active: NDArray[np.bool_]) -> None:
