@@ -53,23 +53,31 @@ def labels(system: System, rows: Ints) -> tuple[RowLabel, ...]:
     return tuple(dict.fromkeys(system.row_label(int(k)) for k in rows))
 
 
-def rows_without_slope(system: System, t: float, y: Floats, yd: Floats) -> Ints:
-    """Rows in which the slope by an unknown of which no rate occurs vanishes, or grows without bound, at the point.
+def rows_without_slope(
+    system: System, t: float, y: Floats, yd: Floats, size: Floats | None = None, *, steep: bool = False
+) -> Ints:
+    """Rows in which the slope by an unknown of which no rate occurs vanishes, or grows without bound, at the point;
+    steep: by any flow or effort grows.
 
-    y, yd [unknowns] of the system.
+    y, yd, size [unknowns] of the system; size: of each (the largest of its group).
     """
-    return np.union1d(*_bent(system, t, y, yd, None))
+    return np.union1d(*_bent(system, t, y, yd, size, steep=steep))
 
 
-def _bent(system: System, t: float, y: Floats, yd: Floats, size: Floats | None) -> tuple[Ints, Ints]:
-    """Rows in which a slope vanishes, and in which one grows; size [unknowns]: of each (its group)."""
+def _bent(
+    system: System, t: float, y: Floats, yd: Floats, size: Floats | None, *, steep: bool = False
+) -> tuple[Ints, Ints]:
+    """Rows in which a slope vanishes, and in which one grows, steep: of any unknown; size [unknowns]: of each (its
+    group).
+    """
     row, column = system.pattern.row, system.pattern.columns_of()
     algebraic = np.isin(system.kinds, ("f", "e"))
+    told = algebraic.copy()
     algebraic[column[system.structural()[1]]] = False
     size = group_maximum(system, np.abs(y)) if size is None else size
     size = np.where(size > NONE, size, 1.0) * (1.0 + 0.1 * (np.arange(y.size) % 7))
     seen = np.zeros(row.size, dtype=np.int64)
-    falls = rises = algebraic[column]
+    falls, rises = algebraic[column], (told if steep else algebraic)[column]
     with np.errstate(all="ignore"):
         before: Floats | None = None
         for part in LADDER:

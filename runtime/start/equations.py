@@ -119,8 +119,8 @@ class Equations:
         return mask
 
     def _momenta(self, settled: System, contents: Mask) -> tuple[Places, Places]:
-        """Unknowns that are contents of the kind of momenta, and a flow with such a content each: what guesses of
-        contents made of flows miss, dynamic variables that integrate efforts of a balance.
+        """Unknowns that are contents of the kind of momenta, and a flow with such a content each: dynamic variables
+        that integrate efforts of a balance, what guesses of these miss and of contents made of flows.
         """
         made = np.full(settled.rows, -1, dtype=np.int64)
         flows = np.flatnonzero(contents[self.rows] & np.append(settled.are("f"), self.rates < 0)[self.columns])
@@ -133,6 +133,11 @@ class Equations:
         made[row[read]] = acts[column[read]]
         gains = np.flatnonzero(in_rate & rates[row] & settled.are("s")[column])
         rows, missed = self.guessed
+        if gains.size:
+            of_gain = np.full(self.unknowns, -1, dtype=np.int64)
+            of_gain[column[gains]] = made[row[gains]]
+            guessed = np.flatnonzero(contents[self.rows] & (of_gain[self.columns] >= 0))
+            made[self.rows[guessed]] = of_gain[self.columns[guessed]]
         unknown, flow = np.append(missed, column[gains]), made[np.append(rows, row[gains])]
         return unknown[flow >= 0], flow[flow >= 0]
 

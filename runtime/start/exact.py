@@ -11,10 +11,10 @@ from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.corrections import EXACT, Corrected, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
-from sysdyn.runtime.start.flat import at_rest
+from sysdyn.runtime.start.flat import at_rest, without_rates
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
-from sysdyn.runtime.start.strategies import CLOSED, own_residual, rescaled
+from sysdyn.runtime.start.strategies import ASTRAY, CLOSED, following, own_residual
 
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
@@ -23,6 +23,7 @@ BACK = 1e-10
 def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """The solution with its state to round-off, in its own magnitudes, and what follows found from x as where no state
     moves: neither depends on the way here; whether that holds.  What is too large for full matrices is left alone.
+    None that holds where its state has moved farther than its rows ask for.
     """
     there = best.x
     state = free & ~starter.following(t, there)
@@ -38,12 +39,15 @@ def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, f
     for moved in (back, near, last):
         begun = np.where(state, moved, x)
         follows = free & ~state & ~at_rest(starter, t, begun, free & ~state)
-        found, holds = rescaled(starter, t, begun, guess, follows, least=False)
+        with starter.granted():
+            found, holds = following(starter, t, begun, guess, free, follows)
         held = holds and found.residual <= max(CLOSED, best.residual)
         # what is left where a guess of twelve digits stays is no round-off: beside steep laws that is no start
         if held and (moved is last or not steep or sharp(starter, t, found, free) is not None):
             return found, True
-    return best, False
+    unbound = stepped(problem_of(starter, t, there, guess, rows=without_rates(starter), free=free, least=True), there)
+    astray = (np.abs(unbound - there) > ASTRAY * largest)[state].any()
+    return (Solution(there, np.inf) if astray else best), False
 
 
 def sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | None:

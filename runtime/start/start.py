@@ -216,7 +216,7 @@ def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | 
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = anew(starter, t, found, x, guess, free)
         with starter.granted():  # what led there has taken its own
-            exact = sharp(starter, t, again, free) if holds or sure else None
+            exact = sharp(starter, t, again, free) if sure or (holds and again.residual < np.inf) else None
         if exact is not None:
             return exact, name
         best = found if found.residual < best.residual else best

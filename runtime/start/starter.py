@@ -236,6 +236,12 @@ class Starter:
         """Whether rows hold sums of rows (balances of what floats)."""
         return len(self._sums) > 0
 
+    def let_go(self, rows: Mask) -> None:
+        """Asks for these rows no longer, nor for sums that hold them."""
+        self.every &= ~rows
+        if self.summed:
+            self.every[self._sums.holding(rows)] = False
+
     @functools.cached_property
     def resting(self) -> Mask:
         """Rows [rows] of laws whose rates are not asked for."""

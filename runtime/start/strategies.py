@@ -6,19 +6,17 @@ Magnitudes that prove wrong on the way are taken anew.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_unknown
-from sysdyn.runtime.model.slopes import rows_without_slope
 from sysdyn.runtime.numerics.gauss_newton import CORRECTED, Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.start.corrections import EXACT, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
-from sysdyn.runtime.start.flat import OWN, off_the_flat, unasked, without_rates
+from sysdyn.runtime.start.flat import OWN, at_rest, off_the_flat, rested, unrated, without_rates
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import contradicting, no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
@@ -32,6 +30,8 @@ CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
 WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
+ASTRAY = 1e-5
+"""Of the largest alike: a state that is farther from the least change has moved for nothing."""
 LEAST_PART = 1e-6
 """Of misses: less is not faded out at once."""
 FOLLOWED, NEARLY = 12, 1e-4
@@ -116,33 +116,99 @@ def _on_its_rows(starter: Starter, t: float, x: Floats, guess: Floats, state: Ma
 
 
 def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """What follows from the state alone, by Newton's method; where that is not enough everything, the least first: a
-    guess rounded to ten digits satisfies rows nearly, and a stiff model pays for the rest with its first step.
+    """What follows from the state alone, by Newton's method, the state as guessed, then as rows without rates have it;
+    where that is not enough everything, the least first: a guess rounded to ten digits satisfies rows nearly, and a
+    stiff model pays for the rest with its first step.
     """
     follows, nearly = free & starter.following(t, x), False
-    begun: Floats | None = x
-    if _beyond(starter, t, x, follows):
-        small = x.size <= DENSE  # a long chain is pulled straight at once
-        begun = _on_its_rows(starter, t, x, guess, free & ~follows, follows) if small else None
-    if begun is not None:
-        flat, whole = off_the_flat(starter, t, begun, follows), [(begun, follows)]
-        for beside, may in itertools.chain(flat, whole) if x.size <= DENSE else itertools.chain(whole, flat):
-            found, nearly = rescaled(starter, t, beside, guess, may, least=False)
-            # where no state can move what is all but at rest has rates
-            if not nearly and may is not follows and (free & ~follows & ~starter.hollow).any():
-                found, nearly = _at_rest(starter, t, beside, guess, may)
-            if nearly:
-                break
+    for begun in _states(starter, t, x, guess, free, follows):
+        with starter.granted():
+            found, nearly = following(starter, t, begun, guess, free, follows)
         exact = nearly and (found.residual <= CLOSED or own_residual(starter, t, found.x, found.x) <= CLOSED)
         near = None if exact else _by_corrections(starter, t, found, follows)
         yield (found, exact) if near is None else (near, True)
+        if nearly:
+            break
     if starter.jumping and (near := _by_corrections(starter, t, Solution(x, 0.0), free)) is not None:
         yield near, True
     with starter.granted():  # what a state that contradicts has taken is not missed then
         everything = rescaled(starter, t, x, guess, free)
+    if nearly and x.size <= DENSE:
+        moved = np.abs(everything[0].x - found.x) > OWN * starter.largest_alike(starter.scale(t, found.x))
+        if (moved & ~follows).any():  # to another root
+            yield found, True
     yield everything
     if nearly:
         yield found, True
+
+
+def _states(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, follows: Mask) -> Iterator[Floats]:
+    """Of a small model points with states that may be held: that of x, on the rows of the state alone; then what rows
+    without rates make of it: a law that is flat where it holds (a turbulent valve at rest) has a rate that asks for
+    another state.  A long chain is pulled straight at once.
+    """
+    small, near = x.size <= DENSE, x
+    if _beyond(starter, t, x, follows):
+        found = _on_its_rows(starter, t, x, guess, free & ~follows, follows) if small else None
+        if found is not None:
+            yield (near := found)
+    else:
+        yield x
+    if small and not starter.jumping:
+        *_, (near, _) = (near, free), *off_the_flat(starter, t, near, follows)
+        with starter.granted():
+            held = _least_without_rates(starter, t, near, guess, free, follows)
+        if held is not None:
+            yield np.where(follows, x, starter.without_noise(held, starter.scale(t, guess)))
+
+
+def _least_without_rates(
+    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, follows: Mask
+) -> Floats | None:
+    """From x where rows without rates hold and the state cannot be nearer to the guess; None where none was found."""
+    for _ in range(_RESCALINGS):
+        problem = problem_of(starter, t, x, guess, rows=without_rates(starter), free=free, least=True)
+        found = solve(problem, x)
+        if found.residual >= EXACT:
+            return None
+        x = stepped(problem_of(starter, t, found.x, guess, rows=problem.use, free=free, least=True), found.x)
+        moved, largest = np.abs(x - found.x), starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(x)))
+        if not (moved > ASTRAY * largest)[free & ~follows].any():
+            return found.x
+    return None
+
+
+def following(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, follows: Mask) -> tuple[Solution, bool]:
+    """What follows from the state at x, beside flat laws first in a small model; whether all rows nearly hold."""
+    for way, near in _ways(starter, t, x, free, follows):
+        found, nearly = way(starter, t, near, guess, follows)
+        if nearly:
+            break
+    return found, nearly
+
+
+def _ways(
+    starter: Starter, t: float, x: Floats, free: Mask, follows: Mask
+) -> Iterator[tuple[Callable[..., tuple[Solution, bool]], Floats]]:
+    """How what follows is sought, and from where."""
+    if x.size > DENSE:
+        yield _at_once, x
+        yield from ((_at_once, near) for near, _ in off_the_flat(starter, t, x, follows))
+        return
+    points = [x, *(near for near, _ in off_the_flat(starter, t, x, follows))][::-1]
+    rated = np.isfinite(starter.residual(t, x)[starter.every]).all()
+    # where no state can move what is all but at rest has rates
+    resting = not rated or (free & ~follows & ~starter.hollow).any()
+    first = resting and (len(points) > 1 or not rated)
+    yield from ((_at_rest, near) for near in points if first)
+    yield from ((_at_once, near) for near in points)
+    if resting and not first:
+        yield _at_rest, x
+
+
+def _at_once(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """From x, in what is free, all rows."""
+    return rescaled(starter, t, x, guess, free, least=False)
 
 
 def _by_corrections(starter: Starter, t: float, found: Solution, free: Mask) -> Solution | None:
@@ -156,16 +222,21 @@ def _by_corrections(starter: Starter, t: float, found: Solution, free: Mask) -> 
 
 
 def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
-    """From x, in what follows from the state, where rates of laws that are flat at rest are not asked for; these are
-    asked for again where that does not hold.
+    """From x, in what follows from the state, first the rows without rates; then all but rates of laws that are flat
+    at rest, as found; these are asked for again where that does not hold.
     """
-    at = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x)
-    if at.residual >= EXACT or x.size > DENSE:
-        return at, False
-    near, before = starter.without_noise(at.x, starter.scale(t, guess)), (starter.every.copy(), starter.resting.copy())
-    if not unasked(starter, rows_without_slope(starter.system, t, *starter.expand(near))):
-        return at, False
-    found, holds = rescaled(starter, t, near, guess, free, least=False)  # what round-off left is no magnitude
+    found, holds = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x), False
+    if found.residual >= EXACT or x.size > DENSE:
+        return found, False
+    before, asking = (starter.every.copy(), starter.resting.copy()), True
+    while asking:
+        near = starter.without_noise(found.x, starter.scale(t, guess))  # what round-off left is no magnitude
+        if not (unrated(starter, t, near) or not holds):
+            break
+        near = rested(starter, t, near, free)
+        may = free & ~at_rest(starter, t, near, free)
+        found, holds = rescaled(starter, t, near, guess, may, least=False)
+        asking = holds
     if not holds:
         starter.every[:], starter.resting[:] = before
     return found, holds

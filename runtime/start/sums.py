@@ -7,6 +7,7 @@ follows from the balances, summed so that the rates go.  A sum stands in the pla
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Places
 from sysdyn.runtime.model.inertia import Inertia
 from sysdyn.runtime.numerics.components import components
@@ -17,6 +18,7 @@ from sysdyn.values import dataclass
 CANCELS = 1e-14
 """Of the terms of a sum: what is less is left of them by round-off, and no coefficient."""
 Entries = tuple[Places, Places]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,11 @@ class Sums:
 
     def __len__(self) -> int:
         return len(self.places)
+
+    def holding(self, rows: Mask) -> Places:
+        """Places of the sums that hold some of these rows [rows]."""
+        own = self.weights
+        return self.places[np.unique(own.sum[rows[self.summed[own.row]]])]
 
     def slopes(self, values: Floats) -> Floats:
         """Values of what is summed with those of the sums behind them; of summed rows by themselves none are left."""

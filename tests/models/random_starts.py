@@ -1,10 +1,11 @@
 """Random networks whose stores are partly said: every formulation must begin with the contents of the closed form.
 
-`python tests/models/random_starts.py scalar|others|bare|arrays NUMBER [FIRST_SEED]` prints the seeds that do not, and a
-table.  `scalar`: trees of resistors, capacitors and inductors with chords (loops of capacitors, meshes of inductors,
-both in series), sizes a thousand apart; about a third of the stores each is fixed, guessed, open.  `others`: something
-is said of one or two resistors too.  `bare`: nodes of capacitors or inductors alone.  `arrays`: chains of families of
-stores over sections, said over ranges.
+`python tests/models/random_starts.py SORT NUMBER [FIRST_SEED]` prints the seeds that do not, and a table.  `scalar`:
+trees of resistors, capacitors and inductors with chords (loops of capacitors, meshes of inductors, both in series),
+sizes a thousand apart; about a third of the stores each is fixed, guessed, open.  `others`: something is said of one or
+two resistors too.  `bare`: nodes of capacitors or inductors alone.  `read`: dynamic variables read one to three
+elements, which must move nothing.  `valves`: resistors are turbulent, many between equal potentials, where they are
+flat or infinitely steep.  `arrays`: chains of families of stores over sections, said over ranges.
 """
 
 import sys
@@ -18,9 +19,13 @@ from sysdyn.runtime.events.observer import Observer
 
 KINDS = {"resistor": ("R", "ohm", ""), "capacitor": ("C", "F", "e"), "inductor": ("L", "H", "f")}
 UNITS = {"e": "V", "f": "A"}
+READ = [("J", "{0}.e*{0}.f"), ("Wb", "{0}.e"), ("C", "{0}.f")]
+HELD = {"capacitor": ("C", "{0}.q/(1 s)"), "inductor": ("Wb", "{0}.p/(1 s)")}
 HEAD = "from std.electrical import resistor, capacitor, inductor\nmodel net {\n"
 CLOSE = 1e-6
 """Of the largest content of its kind: what two formulations may differ by."""
+TURBULENT = ["e = {!r} ohm/(1 A)*f*abs(f)", "f = 1 A*sign(e)*sqrt(abs(e)/({!r} V))"]
+SORTS = {"others": "others", "bare": "bare", "reading": "read", "turbulent": "valves"}
 NONE = 1e-12
 """Entries of bases of unit vectors that are round-off."""
 
@@ -34,8 +39,14 @@ class Circuit:
     text: str = ""
 
 
-def circuit(seed, saying="=~", *, others=False, bare=False):
-    """A circuit of which a part is said; others: of resistors too; bare: nodes that need not leak mostly do not."""
+def circuit(seed, saying="=~", *, others=False, bare=False, reading=False, turbulent=False):
+    """A circuit of which a part is said; others: of resistors too; bare: nodes that need not leak mostly do not;
+    reading: dynamic variables read some elements; turbulent: resistors are.
+    """
+
+    def resistor(value):
+        return f"dissipator({random.choice(TURBULENT).format(value)})" if turbulent else f"resistor(R = {value!r} ohm)"
+
     random, found = np.random.default_rng(seed), Circuit()
     nodes = ["ground", *(f"n{k}" for k in range(int(random.integers(2, 6))))]
     edges = [(nodes[k], nodes[int(random.integers(k))]) for k in range(1, len(nodes))]
@@ -47,21 +58,23 @@ def circuit(seed, saying="=~", *, others=False, bare=False):
         kind = str(random.choice(["resistor", "capacitor", "capacitor", "inductor"]))
         value = float(f"{10.0 ** random.uniform(-1.5, 1.5):.4g}")
         letter, unit, _ = KINDS[kind]
-        lines.append(f"  x{k}: {kind}({letter} = {value!r} {unit}) {a} -> {b}")
+        law = resistor(value) if kind == "resistor" else f"{kind}({letter} = {value!r} {unit})"
+        lines.append(f"  x{k}: {law} {a} -> {b}")
         found.elements.append((f"x{k}", kind, value, a, b))
     stores = [(name, KINDS[kind][2]) for name, kind, *_ in found.elements if KINDS[kind][2]]
     if not stores:
-        return circuit(seed + 1_000_000, saying, others=others, bare=bare)
+        again = {"others": others, "bare": bare, "reading": reading, "turbulent": turbulent}
+        return circuit(seed + 1_000_000, saying, **again)
     for name, content in stores:
         say = str(random.choice(["=", "~", ""]))
-        value = float(f"{random.uniform(-2.0, 2.0):.3f}")
+        value = float(f"{random.uniform(-2.0, 2.0):.{0 if turbulent else 3}f}")
         if say and say in saying:
             found.said[name] = say, value
             lines.append(f"  init {name}.{content} {say} {value!r} {UNITS[content]}")
     ends = Counter(node for *_, a, b in found.elements for node in (a, b))
     leaking = [node for node in nodes[1:] if not bare or ends[node] < 2 or random.random() < 0.4]
     leaks = [f"leak_{node}" for node in leaking]  # what floats is another matter
-    lines += [f"  {leak}: resistor(R = 3 ohm) {leak[5:]} -> ground" for leak in leaks]
+    lines += [f"  {leak}: {resistor(3.0)} {leak[5:]} -> ground" for leak in leaks]
     read = [f"; trace {name}.{content}" for name, content in stores]
     told = [*(e[0] for e in found.elements if e[1] == "resistor"), *leaks]
     found.elements += [(name, "resistor", 3.0, name[5:], "ground") for name in leaks]
@@ -70,6 +83,12 @@ def circuit(seed, saying="=~", *, others=False, bare=False):
         found.said[str(name)] = say, float(f"{random.uniform(-2.0, 2.0):.3f}"), letter
         lines.append(f"  init {name}.{letter} {say} {found.said[str(name)][1]!r} {UNITS[letter]}")
         read.append(f"; trace {name}.e")  # what nothing asks for is not modelled
+    for k in range(int(random.integers(1, 4)) if reading else 0):
+        name, kind, *_ = found.elements[int(random.integers(len(found.elements)))]
+        choice = [*READ, HELD[kind]] if kind in HELD else READ
+        unit, power = choice[int(random.integers(len(choice)))]
+        lines.append(f"  state z{k}: {unit} = 0 {unit}\n  dynamic z{k}' = {power.format(name)}")
+        read.append(f"; trace z{k}")
     head = f"{HEAD}  node {', '.join(nodes[1:])}: electrical"
     found.text = "\n".join([head, *lines, "}", f"scene run of net {{ time 0 s to 1 s{''.join(read)} }}\n"])
     return found
@@ -205,7 +224,7 @@ def contents(text):
 
 def judged(seed, sort="scalar", saying="=~"):
     """agree, refused (no formulation has a start), or how they differ."""
-    of = array(seed) if sort == "arrays" else circuit(seed, saying, others=sort == "others", bare=sort == "bare")
+    of = array(seed) if sort == "arrays" else circuit(seed, saying, **{k: sort == s for k, s in SORTS.items()})
     found, expected = contents(of.text), closed_form(of)
     values = [value for value in found.values() if value is not None]
     if not values:

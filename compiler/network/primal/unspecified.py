@@ -32,8 +32,8 @@ def measured(
 
     Between common-flow nodes of the author's network positions are guessed, not lengths.
     """
-    found: list[tuple[Initial, set[str]]] = []
-    shared: set[str] = set()
+    found: list[tuple[Initial, set[tuple[str, str]]]] = []
+    shared: set[tuple[str, str]] = set()
     held: dict[tuple[str, str], list[Box]] = {}
     known = {initial.store for initial in initials}
     for b in network.branches:
@@ -44,20 +44,19 @@ def measured(
         ):
             continue
         unit = b.domain.displacement if b.kind == "potential" else b.domain.effort
-        for loops, content in _contents(b, b.loops, reader):
-            read = _unknowns(content)
+        for loops, _, read in _contents(b, b.loops, reader):
             if len(read) > 1:
                 shared |= _owners(read)
                 continue
             for node in read:
                 others = held.setdefault((node.data[0], node.data[1]), [])
                 box = sizes.reach(node.args, ranges_of(loops, sizes, b.place), b.place)
-                shared |= {node.data[0]} if any(meet(box, other) for other in others) else set()
+                shared |= _owners((node,)) if any(meet(box, other) for other in others) else set()
                 others.append(box)
         for part in () if b.name in known else _parts(b, initials, sizes):
-            for loops, content in _contents(b, part.loops, reader):
+            for loops, content, moving in _contents(b, part.loops, reader):
                 guess = replace(part, target=content, loops=loops, store=b.name, unit=unit.text)
-                found.append((guess, _owners(_unknowns(content))))
+                found.append((guess, _owners(moving)))
     written, names = _written(network.energies), set[str]()
     shared -= written
     while more := {initial.store for initial, owners in found if owners & shared} - names:
@@ -87,20 +86,30 @@ def _tells(i: Initial, b: Branch) -> bool:
     return i.target.data[1] in TELLING[b.kind] and not i.target.data[2]
 
 
-def _contents(b: Branch, loops: tuple[Loop, ...], reader: Rewriter) -> Iterator[tuple[tuple[Loop, ...], Node]]:
-    """The contents of the elements of a statement over these loops, in coordinates."""
-    content = var(b.name, TELLING[b.kind][1], *b.at)
-    return reader.cut(loops, b.place, lambda ranges: reader.resolve(content, ranges))
+def _contents(
+    b: Branch, loops: tuple[Loop, ...], reader: Rewriter
+) -> Iterator[tuple[tuple[Loop, ...], Node, set[Node]]]:
+    """The contents of the elements of a statement over these loops, in coordinates, and those that move them: of a
+    content that is a state of its own those of its law.
+    """
+    flow, held = TELLING[b.kind]
+    for at, content in reader.cut(loops, b.place, lambda ranges: reader.resolve(var(b.name, held, *b.at), ranges)):
+        moving = _unknowns(content)
+        if b.kind == "kinetic" and moving and all(n.data[1] == "s" for n in moving):
+            law = reader.cut(at, b.place, lambda ranges: reader.resolve(var(b.name, flow, *b.at), ranges))
+            moving = {n for _, told in law for n in _unknowns(told)}
+        yield at, content, moving
 
 
 def _unknowns(root: Node) -> set[Node]:
     return {n for n in variables(root) if n.op == "var"}
 
 
-def _owners(read: Iterable[Node]) -> set[str]:
-    return {n.data[0] for n in read}
+def _owners(read: Iterable[Node]) -> set[tuple[str, str]]:
+    """Names and kinds: contents of efforts and of flows that one node integrates share nothing."""
+    return {(n.data[0], n.data[1]) for n in read}
 
 
-def _written(energies: Iterable[Energy]) -> set[str]:
+def _written(energies: Iterable[Energy]) -> set[tuple[str, str]]:
     """Coordinates that energies of the text read: what these hold is no store's content."""
     return _owners(n for e in energies for n in variables(e.expression) if n.op == "var")

@@ -290,12 +290,13 @@ static int missed(int32_t number, const double *b, const double *noise)
     return 0;
 }
 
-/* whether columns from k on have no pivot for round-off alone: what incidences leave of nothing is nothing */
-static int doubtful(int32_t m, int32_t n, const double *a, int32_t k)
+/* whether entries of columns from k on are more than their round-off alone would be, and yet no pivots: what incidences
+ * leave of nothing is nothing */
+static int doubtful(int32_t m, int32_t n, const double *a, const double *open, int32_t k)
 {
     for (int32_t i = k; i < m; i++)
         for (int32_t j = k; j < n; j++)
-            if (a[(size_t)i * n + j] != 0.0)
+            if (!(fabs(a[(size_t)i * n + j]) <= open[(size_t)i * n + j]))
                 return 1;
     return 0;
 }
@@ -366,7 +367,7 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
             memcpy(missing, noise, (size_t)m * sizeof *missing);
         pivots = eliminate(m, k, first, a, open, b, noise, missing, place);
         failed = !noise && (pivots < k || !(largest(m - k, b + k) <= AGREES * most));
-        left = noise && (missed(m - pivots, b + pivots, noise + pivots) || doubtful(m, k, a, pivots));
+        left = noise && (missed(m - pivots, b + pivots, noise + pivots) || doubtful(m, k, a, open, pivots));
     }
     if (!failed) {
         substitute(pivots, k, a, b);
