@@ -127,6 +127,10 @@ class Parameters:
                     text = f"'{parameter.name}' has {int(np.prod(shape))} elements, {len(values)} are given"
                     raise ModelError([Diagnostic("E805", text, parameter.place)])
                 values = np.repeat(values, int(np.prod(shape)))
+        said = (n.data for n in topological(parameter.values) if n.op == "const")
+        if np.any(np.isinf(values)) and any(map(math.isinf, said)):
+            text = f"parameter '{parameter.name}' is inf, which no parameter can be: a run calculates with it"
+            raise ModelError([Diagnostic("E324", text, parameter.place, "a finite number beyond what is met: 1e9")])
         self.finite(values, parameter.place, f"parameter '{parameter.name}'")
         return values.reshape(shape)
 

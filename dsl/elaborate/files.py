@@ -15,7 +15,7 @@ from sysdyn.dsl.elaborate.tables import read_table
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.dependence import in_order
 from sysdyn.dsl.model.network import Table
-from sysdyn.dsl.model.units import NONE, Unit, multiply, si
+from sysdyn.dsl.model.units import NONE, Unit, known, multiply, si
 from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.resolve import Resolver
@@ -73,6 +73,11 @@ def _of_library(path: Path) -> tuple[syntax.File, tuple[Diagnostic, ...]]:
     return parse(SourceText.read(path, f"std/{path.name}"))
 
 
+def _hides_function(symbol: Symbol) -> bool:
+    """Whether a call of the symbol's name was one of the language's own functions before."""
+    return isinstance(symbol, (FunctionSymbol, TableSymbol)) and symbol.name in dim.FUNCTIONS
+
+
 def _stepped(table: Table, held: tuple[str, ...]) -> dict[str, Table]:
     """The tables that stand for one: of two arguments that hold, each is taken down to its point of the grid, where
     the bilinear table has the value itself.
@@ -120,6 +125,12 @@ class FileScope:
             self.report.error("E106", f"'{symbol.name}' is declared twice", place, related=related)
             return
         scope.symbols[symbol.name] = symbol
+        if scope.outer is not None and (symbol.name in scope.outer.symbols or _hides_function(symbol)):
+            self._hides(symbol.name, self._imported.get(id(symbol), symbol.place))
+
+    def _hides(self, name: str, place: Place | None) -> None:
+        """N102: from here on the name means what this file says."""
+        self.report.note("N102", f"'{name}' of this file hides the '{name}' that the language has", place)
 
     def _ordered(self, units: Sequence[_Declared], scope: Scope, source: SourceText) -> Iterator[_Declared]:
         """The units of a text, each behind those that it is written in; E105 of one that needs itself."""
@@ -140,7 +151,10 @@ class FileScope:
         name = item.name.name
         if name in scope.units:
             self.report.error("E106", f"unit '{name}' is declared twice", Place(source, item.name.span))
-        elif isinstance(item, syntax.UnitBase):
+            return
+        if known(name) is not None:
+            self._hides(name, Place(source, item.name.span))
+        if isinstance(item, syntax.UnitBase):
             scope.units[name] = Unit(((name, 1),), Fraction(1), name)
         else:
             resolver = Resolver(self.report)

@@ -93,6 +93,12 @@ def test_division_by_zero_is_e324():
     assert error.value.diagnostics[0].place is PLACE
 
 
+def test_a_parameter_that_is_said_to_be_inf_is_told_so():
+    model = compile_network(oscillator((parameter("hi", x.const(float("inf"))),), x.param("hi")))
+    with pytest.raises(ModelError, match="'hi' is inf"):
+        model.bind()
+
+
 @pytest.mark.parametrize(
     ("overrides", "code"),
     [

@@ -2,7 +2,9 @@
 
 import json
 
+import numpy as np
 import pytest
+from sysdyn.api import compile_model
 from sysdyn.cli.console import Console
 from sysdyn.cli.main import run
 from sysdyn.cli.run.check.checking import checked
@@ -13,8 +15,8 @@ from sysdyn.dsl.text import codes
 from sysdyn.dsl.text.diagnostics import ModelError, SourceText
 
 PAGES = codes.codes()
-ELSEWHERE = {"W302", "W921"}
-"""What a second file is needed for: tests/dsl/test_authors.py, tests/cli/test_lock.py."""
+ELSEWHERE = {"W302", "W921", "E605"}
+"""What a second file is needed for (test_authors.py, cli/test_lock.py), and what Python alone can ask for."""
 CHECKED = sorted({c for c, page in PAGES.items() if page.by == codes.CHECK} - ELSEWHERE)
 RUN = sorted(set(PAGES) - set(CHECKED) - ELSEWHERE)
 
@@ -58,6 +60,15 @@ def said_by(command, text, folder, monkeypatch, capsys):
         monkeypatch.setenv(name, value)
     run([*("example.sd" if word == "FILE" else word for word in arguments.split()), "--json"])
     return [(d["code"], d["message"]) for d in json.loads(capsys.readouterr().out)["diagnostics"]]
+
+
+def test_bad_example_of_a_compiled_module_is_refused_with_other_numbers(tmp_path):
+    (tmp_path / "example.sd").write_text(PAGES["E605"].bad)
+    module = compile_model(tmp_path / "example.sd", scene="go", formulation="co_lagrangian", backend="numpy")
+    state = np.zeros(len(module.manifest["unknowns"]))
+    module.residual(0.0, state, state)
+    with pytest.raises(ModelError, match="E605: the law of Rs cannot be inverted: R is zero"):
+        module.residual(0.0, state, state, {"R": 0.0})
 
 
 @pytest.mark.parametrize("code", [*RUN, "N101"])

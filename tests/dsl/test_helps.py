@@ -62,12 +62,19 @@ model m {
         ("param p = 0x10 kg", "E114", "16: numbers are written in digits of ten"),
         ("param p = 1_000 kg", "E114", "1000: digits stand together"),
         ("param p = 1_000 kg/m", "E114", "1000: digits stand together"),
+        ("work 10 N/m on x", "E208", "write '10 N'"),  # no joules: what is wanted is an effort
         ("k[1] := 3; let z = 2", "E113", "when CONDITION { k[1] := 3 }, or every 10 ms { k[1] := 3 }"),
     ],
 )
 def test_one_finding_with_what_to_write(line, code, help_):
     found = check(MODEL.replace("LINE", line))
     assert [(d.code, d.help) for d in found] == [(code, help_)]
+
+
+def test_a_name_of_the_file_that_hides_one_of_the_language_is_told():
+    own = "unit l = 2 m\nconst g0 = 1.62 m/s^2\nfn sin(x: 1) -> 1 = 7*x\nconst own = 1\n"
+    found = check(own + MODEL.replace("LINE", "let y = sin(own)*1 l*g0"))
+    assert [(d.code, d.place.start[0]) for d in found] == [("N102", 1), ("N102", 2), ("N102", 3)]
 
 
 def test_a_quantity_of_a_component_of_several_ends_is_that_of_an_end():

@@ -96,7 +96,8 @@ class Statements(Declarations):
             if found != dim.ENERGY:
                 factor = dim.show(dim.quotient(dim.ENERGY, found))
                 message = f"work: effort*displacement is {dim.show(found)}, not J (factor: {factor})"
-                help_ = self.resolver.missing(found, dim.ENERGY, s.effort)
+                wanted = dim.quotient(dim.ENERGY, on.dimension)
+                help_ = self.resolver.missing(effort.dimension, wanted, s.effort)
                 raise self.resolver.fail("E208", message, s.effort.span, help=help_)
         along = self.virtual(on.node, "quasi(w): w", s.on.span) if quasi else ((ex.const(1.0), on.node),)
         for coefficient, node in along:
