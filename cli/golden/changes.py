@@ -30,7 +30,7 @@ def what_changed(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str |
             first = headline(verdict)
             lines += [first, table(verdict)]
     except (Incomparable, TraceError, OSError) as error:
-        first = str(error)
+        first = f"{error.filename}: {error.strerror}" if isinstance(error, OSError) else str(error)
         lines.append(first)
     try:
         kept = json.loads(golden.structure.read_text(encoding="utf-8"))["formulations"]

@@ -147,6 +147,8 @@ def _case(golden: Golden, formulation: str, method: str, backend: str, with_page
         verdict = _verdict(golden, kept, one, structure)
     except Stopped as error:
         return stopped(error.code, str(error))
+    except UsageError as error:  # the golden asks, nobody typed it: its scene is gone
+        return stopped(DIFFERENT, error.message)
     except OSError as error:
         return stopped(INPUT_OUTPUT, f"{error.filename}: {error.strerror}")
     except TraceError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 
+from sysdyn.cli.failures import UsageError
 from sysdyn.cli.golden.book import Golden
 from sysdyn.cli.golden.checking import INPUT_OUTPUT, SOLVER, Case, Mutant, check, mutate, request_of
 from sysdyn.cli.golden.recording import Recorded, Refused, record
@@ -46,11 +47,15 @@ def renewed(golden: Golden) -> tuple[list[str], Recorded | tuple[int, str]]:
     """What is said while a golden is recorded anew, and the record; exit code and reason where there is none."""
     said: list[str] = []
     only = golden.formulations[0] if len(golden.formulations) == 1 else None
-    request = request_of(golden, accuracy=None, formulation=only)
     try:
+        request = request_of(golden, accuracy=None, formulation=only)
         return said, record(request, golden.rtol, golden.atol, said.append)
     except (Refused, Stopped) as error:
-        return said, (getattr(error, "code", 1), str(error))
+        return said, (getattr(error, "code", 1), f"{golden.label}: {error}")
+    except UsageError as error:  # its scene is gone
+        return said, (1, f"{golden.label}: {error.message}")
+    except OSError as error:
+        return said, (INPUT_OUTPUT, f"{golden.label}: {error.filename}: {error.strerror}")
 
 
 def in_processes(

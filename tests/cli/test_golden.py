@@ -325,6 +325,20 @@ def test_a_model_that_is_gone_or_broken(project, capsys):
     assert messages["filter/first"].startswith("equal")
 
 
+def test_a_scene_that_is_gone_is_no_wrong_usage_and_costs_no_other_check(project, capsys):
+    sabotage("filter", "scene first of", "scene renamed of")
+    code, found = run_json(capsys, "golden", "check", "filter", "spring")
+    assert code == 1
+    messages = {c["golden"]: c["message"] for c in found["result"]["checks"]}
+    assert messages["filter/first"].startswith("E901: filter.sd has no scene 'first'")
+    assert messages["spring/ring"].startswith("equal")
+    assert run(["golden", "accept", "filter", "--reason", "renamed"]) == 1
+    assert "filter/first: E901: " in capsys.readouterr().err
+    Path("filter.sd").unlink()
+    assert run(["golden", "accept", "filter", "--reason", "gone"]) == 5
+    assert "filter/first: filter.sd: no such model" in capsys.readouterr().err
+
+
 def test_wrong_usage(project, capsys):
     assert run(["golden", "check", "sprin"]) == 2
     assert "nearest: 'spring/ring'" in capsys.readouterr().err
