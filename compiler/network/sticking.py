@@ -1,22 +1,23 @@
 """Dry friction as relations: the complementary family has no row for flows that are zero, and gammas read any effort
 and flow.
 
-Its sense becomes an unknown s, closed by u = 0 while it sticks, else by the sense; its effort is c*s.  That of a
-content over nodes becomes a branch between them first.
+Its effort c*sense becomes an unknown, closed by u = 0 while it sticks, else by c*sense: c may fall to zero meanwhile.
+Where a sense stands in other terms too it is the unknown itself.  The friction of a content over nodes becomes a branch
+between them first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import replace
 
 from sysdyn.compiler.network.stated import element
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Constraint, Energy, Network, Switch, Unknown, loop_indices
-from sysdyn.dsl.model.rewriting import rewritten
-from sysdyn.dsl.model.units import NONE, si
+from sysdyn.dsl.model.network import Branch, Constraint, Energy, Network, Switch, Unknown, loop_indices
+from sysdyn.dsl.model.rewriting import EXPRESSIONS, expressions, rewritten
+from sysdyn.dsl.model.units import NONE, Unit, si
 
 
 def as_relations(network: Network) -> Network:
@@ -29,24 +30,59 @@ def as_relations(network: Network) -> Network:
         return network
     owners = {s.sense.data: s.label for s in frictions if s.sense is not None}
     own = [p for p in network.parameters if p.name in owners]
+    efforts = _efforts(network, set(owners))
 
     def freed(root: Node) -> Node:
-        found = [n for n in ex.topological([root]) if n.op == "param" and n.data in owners]
-        return ex.substitute(root, {n: ex.var(_set(n.data), "e", *n.args) for n in found}) if found else root
+        for n in _senses(root, owners):
+            unknown = ex.var(_set(n.data), "e", *n.args)
+            alone = ex.substitute(root, {n: ex.const(0.0)})
+            root = ex.add(alone, unknown) if n.data in efforts else ex.substitute(root, {n: unknown})
+        return root
 
     found = rewritten(network, freed)
     said = {o.name: o.expression for o in found.observations}
-    given = dict(pair for s in frictions for pair in _watched(s, said))
+    given = dict(pair for s in frictions for pair in _watched(s, said, efforts))
     senses = {label: iter([name for name, other in owners.items() if other == label]) for label in owners.values()}
     return replace(
         found,
         parameters=(*found.parameters, *(replace(p, name=_holds(p.name)) for p in own)),
         discretes=found.discretes | {_holds(p.name) for p in own},
-        unknowns=(*found.unknowns, *(Unknown(_set(p.name), p.shape, si(NONE), p.place) for p in own)),
-        constraints=tuple(_row(c, next(senses[c.name])) if c.name in senses else c for c in found.constraints),
+        unknowns=(*found.unknowns, *(Unknown(_set(p.name), p.shape, _unit(p.name, efforts), p.place) for p in own)),
+        constraints=tuple(_row(c, next(senses[c.name]), efforts) if c.name in senses else c for c in found.constraints),
         observations=tuple(replace(o, expression=given.get(o.name, o.expression)) for o in found.observations),
         switches=tuple(_relation(s) if s.sense is not None and s.sense.data in owners else s for s in network.switches),
     )
+
+
+def _senses(root: Node, names: Container[str]) -> list[Node]:
+    return [n for n in ex.topological([root]) if n.op == "param" and n.data in names]
+
+
+def _coefficient(root: Node, sense: Node) -> Node:
+    """What a sense is multiplied by; it reads the sense where that stands in another way."""
+    mark = ex.var("#sense", "s")
+    return ex.substitute(derivative(ex.substitute(root, {sense: mark}), mark), {mark: sense})
+
+
+def _efforts(network: Network, names: set[str]) -> dict[str, tuple[Branch, Node]]:
+    """The branch and the c of senses that stand in nothing but c*sense, its effort."""
+    found = {}
+    for branch in network.branches:
+        for n in _senses(branch.law, names) if branch.law is not None else ():
+            c = _coefficient(branch.law, n)
+            if n.args == loop_indices(branch.loops) and not _senses(c, names):
+                found[n.data] = branch, c
+    for root in expressions(network, *EXPRESSIONS):
+        for n in _senses(root, names):
+            if n.data in found and _coefficient(root, n) is not _factor(found[n.data], n.args):
+                del found[n.data]
+    return found
+
+
+def _factor(effort: tuple[Branch, Node], at: tuple[Node, ...]) -> Node:
+    """The c of an effort at these indices."""
+    branch, c = effort
+    return ex.substitute(c, dict(zip(loop_indices(branch.loops), at, strict=True)))
 
 
 def _between_nodes(network: Network, row: Constraint) -> Network:
@@ -97,19 +133,24 @@ def _holds(sense: str) -> str:
     return f"{sense} holds"
 
 
-def _row(c: Constraint, sense: str) -> Constraint:
+def _unit(sense: str, efforts: Mapping[str, tuple[Branch, Node]]) -> Unit:
+    return efforts[sense][0].domain.effort if sense in efforts else si(NONE)
+
+
+def _row(c: Constraint, sense: str, efforts: Mapping[str, tuple[Branch, Node]]) -> Constraint:
     """The psi u = 0 of a statement as the gamma that closes its unknown."""
     at = loop_indices(c.loops)
-    slips = ex.sub(ex.var(_set(sense), "e", *at), ex.param(sense, *at))
+    factor = _factor(efforts[sense], at) if sense in efforts else ex.const(1.0)
+    slips = ex.sub(ex.var(_set(sense), "e", *at), ex.mul(factor, ex.param(sense, *at)))
     sticks = ex.compare("!=", ex.param(_holds(sense), *at), ex.const(0.0))
     return replace(c, kind="gamma", name=_set(sense), at=at, expression=ex.conditional(sticks, c.expression, slips))
 
 
-def _watched(s: Switch, said: Mapping[str, Node]) -> Iterator[tuple[str, Node]]:
-    """What events read of a friction: its effort c*s, and what that lacks to c on both sides."""
+def _watched(s: Switch, said: Mapping[str, Node], efforts: Container[str]) -> Iterator[tuple[str, Node]]:
+    """What events read of a friction: its effort, and what that lacks to c on both sides."""
     assert s.sense is not None
-    bound = said[s.bound or ""]
-    effort = ex.mul(bound, ex.var(_set(s.sense.data), "e", *s.sense.args))
+    bound, effort = said[s.bound or ""], ex.var(_set(s.sense.data), "e", *s.sense.args)
+    effort = effort if s.sense.data in efforts else ex.mul(bound, effort)
     yield s.multiplier, effort
     yield s.upper or "", ex.sub(bound, effort)
     yield s.lower or "", ex.add(bound, effort)
