@@ -263,13 +263,18 @@ def _cancelled(sympy: Any, value: Any) -> Any:
 
 
 def _turned(sympy: Any, value: Any) -> Any:
-    """The same with squares of sines written by cosines: equal expressions become equal."""
+    """The same with squares of sines written by cosines: equal expressions become equal.  A sine that stands inside
+    another function, sin(w*t + a*sin(t)), stays.
+    """
     if not value.has(sympy.sin):
         return value
     sines = {s: 1 - sympy.cos(s.args[0]) ** 2 for s in value.atoms(sympy.sin)}
     found = value
     for sine, square in sines.items():
-        polynomial = sympy.Poly(found, sine)
+        try:
+            polynomial = sympy.Poly(found, sine)
+        except sympy.PolynomialError:
+            continue
         found = sum(c * square ** (k // 2) * sine ** (k % 2) for (k,), c in polynomial.terms())
         found = sympy.expand(found)
     return found

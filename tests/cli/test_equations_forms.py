@@ -4,6 +4,7 @@ import json
 import re
 
 import pytest
+import sympy
 from printed_equations import SEED, Values, model, printed
 from sysdyn.cli.analysis.asked import compiled
 from sysdyn.cli.main import run
@@ -111,6 +112,14 @@ def test_a_solution_that_nobody_reads_is_refused(tmp_path, capsys, monkeypatch):
     assert code == 1
     assert "more than 250 operations" in found["diagnostics"][-1]["message"]
     assert "--form matrices" in found["diagnostics"][-1]["message"]
+
+
+def test_a_sine_inside_a_sine_is_left_where_it_is():
+    """It was a fault of sysdyn (exit 4): an angle that swings is no polynomial in the sine of its swing."""
+    t = sympy.Symbol("t")
+    inner, angle = sympy.sin(t), 3 * t + sympy.sin(t)
+    value = inner * sympy.sin(angle) ** 2 + inner * sympy.cos(angle) ** 2
+    assert matrices._turned(sympy, value) == inner
 
 
 def test_a_circuit_has_no_underlying_equation(capsys):
