@@ -119,3 +119,36 @@ def test_a_light_mass_that_rings_is_not_passed_over(formulation, accuracy, tmp_p
     assert found.met
     for name, wanted in (("p", 1e3 * exact[:, 1]), ("v", exact[:, 2])):
         assert np.abs(found.at(name, t) - wanted).max() < accuracy * np.abs(wanted).max()
+
+
+AT_ONCE = """
+model m {
+  node s, b, c: electrical
+  U: effort(e = 5 V*cos(60 rad/s*t)) s -> ground
+  L: kinetic(p = 10 nH*f) s -> b
+  M: dissipator(e = (10 ohm + 1e9 ohm/C^2*q^2)*f) b -> c
+  R: dissipator(e = 5 ohm*(1 + (100 C^-1*M.q)^2)*f) c -> ground
+  init L.f = 0 A
+  init M.q = 1 mC
+}
+scene s of m {
+  time 0 s to 0.5 s
+  trace L.f as i, M.q as q every 5 ms
+}
+"""
+
+
+@pytest.mark.parametrize("accuracy", [8.5e-7, 1e-7, 1.3e-8])
+def test_a_momentum_that_is_taken_at_once_is_as_large_as_it_gets(accuracy, tmp_path):
+    """50 pWb behind a kiloohm, 1e9 times less than 5 V make of them in the span: no draft resolved them, and pairs of
+    runs agreed that were up to 3.2 times what was asked off (14 of 60 accuracies from 1e-2 to 1e-8).
+    """
+    found, t = ran(tmp_path, AT_ONCE, formulation="hamiltonian", accuracy=accuracy), np.linspace(0.0, 0.5, 101)[1:]
+
+    def current(t, q):
+        return 5.0 * np.cos(60.0 * t) / (15.0 + 1e9 * q**2 + 5.0 * (100.0 * q) ** 2)
+
+    charge = solve_ivp(current, (0.0, 0.5), [1e-3], t_eval=t, rtol=1e-12, atol=1e-16, method="DOP853").y[0]
+    assert found.met
+    for name, wanted in (("i", current(t, charge)), ("q", charge)):
+        assert np.abs(found.at(name, t) - wanted).max() < accuracy * np.abs(wanted).max()

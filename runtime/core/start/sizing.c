@@ -248,10 +248,11 @@ static void efforts(const sd_sizing *s, const double *found, const double *row, 
     }
 }
 
-/* found [n]: what is too small beside what balances the rows is taken from these; size [entries], excited [rows]; bearing:
- * where laws are steep, or NULL; kept [n], balanced [n]: room */
-static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const double *size, double *excited,
-                          const sd_bearing *bearing, double *found, double *kept, double *balanced)
+/* found [n]: what is too small beside what balances the rows is taken from these, but what its rate brings no farther (of
+ * told, in tau, where it is no round-off: a momentum that a resistance takes at once); size [entries], excited [rows];
+ * bearing: where laws are steep, or NULL; kept [n], balanced [n]: room */
+static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const double *told, double tau, const double *size,
+                          double *excited, const sd_bearing *bearing, double *found, double *kept, double *balanced)
 {
     const sd_balance *b = s->balance;
     int32_t n = b->unknowns;
@@ -268,7 +269,9 @@ static int balanced_sizes(const sd_sizing *s, const int32_t *carries, const doub
         balanced[k] = carries[k] && (s->kind[k] & (SD_DISPLACEMENT | SD_FLOW)) ? found[k] : 0.0;
     failed |= sd_propagate_beside(b, size, small, excited, NULL, bearing, SD_LARGEST | SD_CAPPED, balanced);
     for (int32_t k = 0; k < n; k++) {
-        int whole = !(s->kind[k] & (SD_MOMENTUM | SD_DYNAMIC)) || found[k] > NOISE * balanced[k];
+        double rated = told ? tau * fabs(told[k]) : 0.0;
+        int relaxed = rated > NOISE * balanced[k] && found[k] > ROUND_OFF * rated;
+        int whole = !(s->kind[k] & (SD_MOMENTUM | SD_DYNAMIC)) || found[k] > NOISE * balanced[k] || relaxed;
         found[k] = whole ? found[k] : balanced[k];
         balanced[k] = kept[k] = carries[k] ? found[k] : 0.0;
     }
@@ -410,7 +413,7 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     }
     flows(system, span, found, kept);
     sd_bearing bearing = {system, t0, y, yd, behind + own};
-    failed |= balanced_sizes(s, carries, size, excited, borne ? &bearing : NULL, found, kept, balanced);
+    failed |= balanced_sizes(s, carries, rate, *tau, size, excited, borne ? &bearing : NULL, found, kept, balanced);
     group_largest(b, found, most);
     for (size_t k = 0; k < n; k++)
         found[k] = found[k] == 0.0 ? most[b->kind[k]] : found[k];
