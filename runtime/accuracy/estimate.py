@@ -169,7 +169,7 @@ class Estimate:
                 if power > self._fastest(fine):  # by chance: the pair before speaks for the last run
                     luck = 10.0 ** ((power - credit) * step_before)
         if shrink is None and _unlike(self.law, coarse, fine):
-            shrink, slow = 1.0, True
+            shrink, slow, unseen = 1.0, True, True
         if shrink is None:
             power = credit if self._power is None else min(self._power, credit)
             shrink = _shrink(self.law, power, step, coarse, fine)

@@ -241,7 +241,7 @@ def _load() -> Any:
         "sd_magnitudes": (c.c_int, [_P, _P, _D, _D, *[_P] * 6, c.c_int, _P, _P]),
         "sd_compliance": (c.c_int, [_P] * 4),
         "sd_confirmed": (c.c_int, [_P, _P, _D, _P, _P, _P]),
-        "sd_ceiling": (None, [_P, _P, _P]),
+        "sd_ceiling": (None, [_P, c.c_int, _P, _P]),
         "sd_unresolved": (c.c_int, [*[_P] * 5]),
         "sd_noise": (c.c_int, [*[_P] * 7, _D, _I, _D, _P]),
         "sd_scale": (c.c_int, [_P, _P, _I, _P, _P, _I, _P, _P, _P, _I, _P]),

@@ -300,7 +300,7 @@ def ceiling(system: System, met: Floats, confirmed: Floats) -> Floats:
     without, 31547 by guesses alone).
     """
     found, by_kind = confirmed.copy(), _by_kind(system)
-    lib.core.sd_ceiling(c.byref(by_kind.core), lib.pointer(met), lib.pointer(found))
+    lib.core.sd_ceiling(c.byref(by_kind.core), bool(system.form.scales), lib.pointer(met), lib.pointer(found))
     return found
 
 

@@ -216,7 +216,7 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
     count(many, pass, 1);
     if (sd_confirmed(many->sizing, many->system, many->t1 - many->t0, pass->met, pass->magnitude, many->ceiling))
         return SD_MANY_FAILED;
-    sd_ceiling(many->sizing, pass->met, many->ceiling);
+    sd_ceiling(many->sizing, many->system->scales > 0, pass->met, many->ceiling);
     for (int32_t q = 0; q < many->columns && run->extrema; q++) {
         many->least[q] = fmin(many->least[q], run->extrema->least[many->column[q]]);
         many->most[q] = fmax(many->most[q], run->extrema->most[many->column[q]]);
