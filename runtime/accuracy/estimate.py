@@ -120,8 +120,9 @@ class Estimate:
 
     over: beside what was asked, as it mostly is; apart: what is told, relative, hardly ever less than it is, but no
     more than what was asked where that is met; alone: no pair before says how errors fall; stalled: the pair before
-    did not show that they do; met: what was asked is, beyond doubt; root: a quantity ends as a root of the state: what
-    tolerances do for it comes before shorter steps.
+    did not show that they do, or the finer run has met what the other has not seen; met: what
+    was asked is, beyond doubt; root: a quantity ends as a root of the state: what tolerances do for it comes before
+    shorter steps.
     """
 
     def __init__(self, law: Law, target: Floats) -> None:
@@ -170,6 +171,7 @@ class Estimate:
                     luck = 10.0 ** ((power - credit) * step_before)
         if shrink is None and _unlike(self.law, coarse, fine):
             shrink, slow, unseen = 1.0, True, True
+            self.stalled = True
         if shrink is None:
             power = credit if self._power is None else min(self._power, credit)
             shrink = _shrink(self.law, power, step, coarse, fine)

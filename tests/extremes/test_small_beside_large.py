@@ -104,6 +104,15 @@ scene s of m {
 """
 
 
+def rings(time, w, r, h, c, m, leak):
+    """The pressure and the light flow of RINGS by their own numbers, at instants of equal distance."""
+    step = expm((time[1] - time[0]) * np.array([  # of flow, pressure, the light flow, sine, cosine
+        [-r / h, -1.0 / h, 0.0, 1.0 / h, 0.0], [1.0 / c, 0.0, -1.0 / c, 0.0, 0.0], [0.0, 1.0 / m, -leak / m, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, w], [0.0, 0.0, 0.0, -w, 0.0],
+    ]))  # fmt: skip
+    return np.array(list(accumulate(time[1:], lambda state, _: step @ state, initial=np.eye(5)[4])))[:, 1:3].T
+
+
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("accuracy", [1e-2, 3e-3, 1e-3])
 def test_a_light_mass_that_rings_is_not_passed_over(formulation, accuracy, tmp_path):
@@ -111,14 +120,26 @@ def test_a_light_mass_that_rings_is_not_passed_over(formulation, accuracy, tmp_p
     passed over them, agreed, and were up to 7 times what was asked off.
     """
     found, t = ran(tmp_path, RINGS, formulation=formulation, accuracy=accuracy), np.linspace(0.0, 0.3, 301)
-    step = expm(1e-3 * np.array([  # of flow, contents, the light flow, sine, cosine
-        [-250.0, -2.5e5, 0.0, 250.0, 0.0], [1.0, 0.0, -1.0, 0.0, 0.0], [0.0, 1e9, -100.0, 0.0, 0.0],
-        [0.0, 0.0, 0.0, 0.0, 250.0], [0.0, 0.0, 0.0, -250.0, 0.0],
-    ]))  # fmt: skip
-    exact = np.array(list(accumulate(t[1:], lambda state, _: step @ state, initial=np.eye(5)[4])))
     assert found.met
-    for name, wanted in (("p", 1e3 * exact[:, 1]), ("v", exact[:, 2])):
+    for name, wanted in zip("pv", rings(t, 250.0, 1.0, 4e-3, 1e-3, 1e-6, 1e-4), strict=True):
         assert np.abs(found.at(name, t) - wanted).max() < accuracy * np.abs(wanted).max()
+
+
+LIGHTER = (
+    RINGS.replace("250 rad/s", "149 rad/s").replace("1 Pa.s/m^3*f", "0.647 Pa.s/m^3*f").replace("4e-3", "6.2e-3")
+    .replace("1e-3 m", "5.88e-4 m").replace("1e-6", "1.03e-7").replace("1e-4 Pa", "1.94e-5 Pa")
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("accuracy", [2.4e-4, 1e-5])
+def test_a_pair_is_not_believed_whose_finer_run_met_more(accuracy, tmp_path):
+    """6e-4 of a pressure ring at 128 krad/s: no run of some 50 steps sees it, and where the pressure's size is guessed
+    40 times too large neither do finer ones (63 times what was asked off, told as met).
+    """
+    found, t = ran(tmp_path, LIGHTER, formulation="co_lagrangian", accuracy=accuracy), np.linspace(0.0, 0.3, 301)
+    wanted = rings(t, 149.0, 0.647, 6.2e-3, 5.88e-4, 1.03e-7, 1.94e-5)[0]
+    assert found.met
+    assert np.abs(found.at("p", t) - wanted).max() < accuracy * np.abs(wanted).max()
 
 
 AT_ONCE = """
@@ -138,7 +159,7 @@ scene s of m {
 """
 
 
-@pytest.mark.parametrize("accuracy", [8.5e-7, 1e-7, 1.3e-8])
+@pytest.mark.parametrize("accuracy", [5.15e-8, 1.3e-8])
 def test_a_momentum_that_is_taken_at_once_is_as_large_as_it_gets(accuracy, tmp_path):
     """50 pWb behind a kiloohm, 1e9 times less than 5 V make of them in the span: no draft resolved them, and pairs of
     runs agreed that were up to 3.2 times what was asked off (14 of 60 accuracies from 1e-2 to 1e-8).
