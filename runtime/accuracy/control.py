@@ -27,7 +27,7 @@ RUNS = 7
 TENTH = 0.1
 """Of the tolerance of a draft as loose as any: a run with less need not follow."""
 RETRIED = (1.0, 0.1, 1e-2)
-"""Of the tolerance of a first run: the next ones where it fails."""
+"""Of the tolerance of a first run: the next ones where it fails; the last of a draft is tame."""
 WORTH = 0.3
 """Of the last tolerance: a run with more than that says little beside it."""
 CHANCES = ("newton", "error_test", "singular")
@@ -115,7 +115,7 @@ def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
             tried += 1
             if tried == len(RETRIED) or _limited(failure) or failure.cause == "stiff":
                 raise
-            if failure.cause == "strained":
+            if failure.cause == "strained" or tried == len(RETRIED) - 1:
                 tolerance = min(tolerance, TAME * law.ratio / RETRIED[tried])
 
 

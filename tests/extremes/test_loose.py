@@ -209,3 +209,31 @@ def test_rows_within_a_step_begin_at_the_nearest_stage(tmp_path):
     found = solve_ivp(rates, (0.0, 0.05), [0.0, 1.0], "DOP853", trace.time, rtol=1e-12, atol=1e-14)
     for name, true in zip(("p", "v"), found.y, strict=True):
         assert np.abs(trace[name].values - true).max() < 5e-8 * np.abs(true).max()
+
+
+FALLS = """model falls {
+  state x = 0.5
+  state z = 0.1
+  dynamic x' = (x*(1 - x) - 0.891*z*(x - 2.4e-5)/(x + 2.4e-5))/(14.3 ms)
+  dynamic z' = (x - z)/(1 s)
+}
+scene s of falls {
+  time 0 s to 7.38 s
+  trace x every 20 ms
+}
+"""
+
+
+@pytest.mark.parametrize("accuracy", [1e-1, 1e-2])
+def test_what_falls_beside_a_pole_is_met_loosely_too(accuracy, tmp_path):
+    """An Oregonator, whose x falls from 0.85 to 2.4e-5 beside its pole at -2.4e-5: every loose draft stepped over it,
+    all methods were refused (22 of 56 such runs), though at 1e-4 and finer it is met.
+    """
+    (tmp_path / "falls.sd").write_text(FALLS, encoding="utf-8")
+    run = simulate(tmp_path / "falls.sd", accuracy=accuracy, output=tmp_path / "t.h5")
+    known = solve_ivp(
+        lambda t, y: [(y[0] * (1 - y[0]) - 0.891 * y[1] * (y[0] - 2.4e-5) / (y[0] + 2.4e-5)) / 14.3e-3, y[0] - y[1]],
+        (0.0, 7.38), [0.5, 0.1], method="LSODA", t_eval=np.asarray(run.time), rtol=1e-9, atol=1e-14,
+    ).y[0]  # fmt: skip
+    assert run.met
+    assert np.abs(np.asarray(run["x"]) - known).max() < accuracy * known.max()
