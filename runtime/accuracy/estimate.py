@@ -171,7 +171,7 @@ class Estimate:
                     luck = 10.0 ** ((power - credit) * step_before)
         if shrink is None and _unlike(self.law, coarse, fine):
             shrink, slow, unseen = 1.0, True, True
-            self.stalled = True
+            self.stalled |= self.law.damps
         if shrink is None:
             power = credit if self._power is None else min(self._power, credit)
             shrink = _shrink(self.law, power, step, coarse, fine)
