@@ -81,19 +81,9 @@ LAWS = {
     # where events hold the steps its error hardly falls with the tolerance: of 100 pairs of the gallery it was over
     # three times the estimate in 57 by the tolerances alone, in 10 by the steps too (of 122 without events in 38 and 4)
     "rosenbrock": Law(
-        8.0,
-        1.0,
-        0.9,
-        1e-10,
-        ratio=0.05,
-        loosest=0.01,
-        little=0.3,
-        safety=1.5,
-        least=0.5,
-        brief=True,
-        order=5.0,
+        8.0, 1.0, 0.9, 1e-10, ratio=0.05, loosest=0.01, little=0.3, safety=1.5, least=0.5, brief=True, order=5.0,
         damps=True,
-    ),
+    ),  # fmt: skip
     # the tolerance that would do falls with the power 1.9 of the draft's steps: where the longest step holds them, any
     # would.  Of 1980 orbits of eccentricity 0.05 to 0.8 (8 to 15 steps a turn, far from what an order says) 38 were met
     # and off by more than three times what was asked, up to 22, by their tolerances alone; 5, up to 5.2, by their steps
