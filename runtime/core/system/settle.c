@@ -185,10 +185,12 @@ static void put_near(const sd_settle *settle, double *y, double *yd)
             *(j < settle->unknowns ? &y[j] : &yd[settle->rate[j - settle->unknowns]]) = *next++;
 }
 
-/* what the point makes of other unknowns, and its residuals; measured: those of the point as it comes are known */
-static void finish(sd_settle *settle, double t, double *y, double *yd, int done, int measured)
+/* what the point makes of other unknowns, and its residuals; measured: those of the point as it comes are known; 0 */
+static int finish(sd_settle *settle, double t, double *y, double *yd, int done, int measured)
 {
     int stays = measured;
+    if (done)
+        note_met(settle, y, yd);
     for (int32_t i = 0; done && i < settle->system->held; i++) {
         double *open = &y[settle->system->held_unknown[i]];
         stays &= *open == 0.0;
@@ -203,6 +205,7 @@ static void finish(sd_settle *settle, double t, double *y, double *yd, int done,
         sd_follow_flows(settle->k_span, settle->k_spans, y, yd);
     if (!stays)
         measure(settle, t, y, yd);
+    return 0;
 }
 
 /* 1: magnitudes that the iteration left far beyond the point (y, yd) are those of the motion and of this point again: of
@@ -255,6 +258,16 @@ static int strays(const sd_settle *settle)
     return 0;
 }
 
+/* Whether the point holds as it comes, by the scales of the last slopes. */
+static int holds_by_old(sd_settle *settle, double t, double *y, double *yd, double limit)
+{
+    if (!(measure(settle, t, y, yd) <= fmax(limit, settle->enough)))
+        return 0;
+    settle->drift = settle->constraints;
+    finish(settle, t, y, yd, 1, 1);
+    return 1;
+}
+
 /* sd_settle_point with the unknowns of the system itself; the rows are measured once more where q' = f */
 static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
 {
@@ -262,16 +275,15 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     double best;
     settle->calls++;
     settle->contracted = 0.0;
+    if (settle->ready == SD_BY_NONE && settle->calls - 1 > settle->failures && holds_by_old(settle, t, y, yd, EXACT))
+        return 0; /* it asks for no slopes */
     take(settle, y, yd, settle->x0);
     const size_t steep = settle->system->scales > 0 ? (size_t)settle->unknowns * sizeof(double) : 0;
     memcpy(settle->usual, settle->scale, steep);
     int tried = settle->refused < REFUSALS || (settle->refused < SD_BASIS_OUT && settle->calls % AGAIN == 0);
     if (settle->basis && (settle->hold == 1.0 || settle->determined) && tried) {
-        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, close)) {
-            note_met(settle, y, yd);
-            finish(settle, t, y, yd, 1, 1);
-            return 0;
-        }
+        if (follow(settle, t, y, yd, &best) && holds(settle, t, y, yd, best, close))
+            return finish(settle, t, y, yd, 1, 1);
         put(settle, settle->x0, y, yd);
     }
     if (!sd_settle_provide_best(settle)) {
@@ -311,9 +323,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     /* the best point met, or the given one; a rate may have no bound */
     put(settle, settle->x, y, yd);
     done = (done || holds(settle, t, y, yd, best, close)) && !strays(settle);
-    if (done)
-        note_met(settle, y, yd);
-    else
+    if (!done)
         put(settle, settle->x0, y, yd);
     settle->failures += !done;
     finish(settle, t, y, yd, done, 0);
@@ -357,10 +367,7 @@ int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd)
 {
     if (settle->calls == settle->failures || settle->seen || settle->system->left || !sd_settle_provide_point(settle))
         return 0;
-    int holds = measure(settle, t, y, yd) <= fmax(FINE, settle->enough);
-    if (holds)
-        finish(settle, t, y, yd, 1, 1);
-    return holds;
+    return holds_by_old(settle, t, y, yd, FINE);
 }
 
 int sd_settle_meets(sd_settle *settle, double t, double *y, double *yd)
