@@ -74,7 +74,7 @@ typedef struct sd_radau {
     int32_t balances;         /* balances are steep: in rates, whose round-off grows as steps shrink */
     int32_t pressed;          /* a steep law lets no length of step do: corrections are shortened at once */
     int32_t ready, old_jacobian, rejected;
-    int32_t lasting;          /* 1: of a large system: slopes are what they were, wherever they are taken */
+    int32_t lasting;          /* 1: slopes are what they were, wherever they are taken */
     const sd_radau_method *method, *used;           /* of the step at hand, of the last accepted one */
     int32_t since;                                  /* steps accepted since the method changed */
     int32_t hold;                                   /* steps that still take three stages */

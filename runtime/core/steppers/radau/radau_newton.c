@@ -16,6 +16,7 @@
                             * what follows from rates grows as steps shrink, goes into no other step, and may be the method's */
 #define FAINTEST 1e-9      /* of magnitudes: what round-off may leave of what follows from rates */
 #define LAX 100.0          /* a steep row may be off by as many times Newton's tolerance times the method's */
+#define SOLVED 1e-6        /* of a correction: what factors of the very matrix leave at most, where slopes never change */
 #define LEAST_PART 1e-7    /* of a correction that is still tried */
 #define FAINT_ROW 1e-6     /* the same where slopes are too faint to move an unknown */
 #define FINEST_ROW 1e-9    /* part of a steep row's terms that round-off of its unknowns leaves */
@@ -177,7 +178,8 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
 {
     double tolerance = sd_radau_newton_tolerance(radau);
     double aim = newton_tolerance(radau, aimed_at[radau->method - sd_radau_methods]);
-    double before = 0.0, ratio_before = 0.0, trust = 1.0;
+    double before = 0.0, ratio_before = 0.0;
+    double trust = radau->ivp.system->steady && radau->ivp.h == radau->h_factored ? SOLVED : 1.0;
     int patient = full || radau->ivp.fixed_h > 0.0;
     *retry = 0.5;
     int usual = sd_radau_iterations(radau), most = patient ? PATIENT : usual, converged = 0, idle = 0;

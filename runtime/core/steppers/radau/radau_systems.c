@@ -175,7 +175,7 @@ int sd_radau_factorise(sd_radau *radau, int at_end)
         }
         sd_radau_share_slopes(radau);
         radau->old_jacobian = 1;
-        radau->lasting = system->steady && sd_radau_sparing(radau);
+        radau->lasting = system->steady;
     }
     radau->ready = 0;
     int failed = factorise_all(radau);
