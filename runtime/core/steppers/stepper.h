@@ -120,6 +120,8 @@ double sd_first_step(const sd_ivp *ivp, double longest, double part, double chan
 /* h, fitted to t_end: the step ends there exactly, and never leaves less than its half for the last one.  slack: part of a
  * step that is round-off */
 double sd_fitted(const sd_ivp *ivp, double slack);
+/* the longest step; where few are left the length of as few that are all alike, whose factors serve to the end */
+double sd_longest(const sd_ivp *ivp);
 /* t + h is t, or nearly (the last bit of the span is a step nonetheless) */
 int sd_too_small(const sd_ivp *ivp);
 /* behind a cause no shorter step is tried */

@@ -218,10 +218,11 @@ static void accept(sd_radau *radau, double error, int iterations, int troubled)
     /* the Jacobian lasts while Newton converges fast; the factors while the step hardly changes */
     if (radau->theta > GOOD)
         radau->old_jacobian = radau->ready = 0;
+    next = fmin(next, sd_longest(&radau->ivp));
     if (radau->ivp.fixed_h > 0.0)
         radau->ivp.h = radau->ivp.fixed_h;
-    else if (!(radau->ready && next / h >= KEEP_LOW && next / h <= KEEP_HIGH))
-        radau->ivp.h = fmin(next, radau->ivp.h_max);
+    else if (!(radau->ready && next / h >= KEEP_LOW - SD_SLACK && next / h <= KEEP_HIGH))
+        radau->ivp.h = next;
 }
 
 /* the new point moved onto every constraint, and q' with f */
