@@ -22,6 +22,7 @@ scene s of discharge {{
 """
 
 
+@pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock"])
 @pytest.mark.parametrize(
     ("content", "end", "steady"),
     [
@@ -30,12 +31,12 @@ scene s of discharge {{
         ("1/2*r*x'^2/(1 + x^2/(1 C)^2)", 1.0 / math.sqrt(2.0 * math.exp(10.0) - 1.0), False),
     ],
 )
-def test_only_slopes_that_change_are_taken_again(content, end, steady, tmp_path):
+def test_only_slopes_that_change_are_taken_again(content, end, steady, method, tmp_path):
     (tmp_path / "d.sd").write_text(DISCHARGE.format(content=content))
-    asked = ["simulate", str(tmp_path / "d.sd"), "--method", "bdf", "--rtol", "1e-8", "-o", str(tmp_path / "d.h5")]
+    asked = ["simulate", str(tmp_path / "d.sd"), "--method", method, "--rtol", "1e-8", "-o", str(tmp_path / "d.h5")]
     assert run([*asked, "--quiet"]) == 0
     trace = Trace.open(tmp_path / "d.h5")
     assert trace["x"].values[-1] == pytest.approx(end, abs=5e-8)
     taken = json.loads(trace.attributes["statistics"])
-    assert taken["factorisations"] > 5
+    assert taken["factorisations"] >= 5
     assert taken["jacobian_evaluations"] <= 3 if steady else taken["jacobian_evaluations"] > 3

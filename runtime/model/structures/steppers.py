@@ -198,7 +198,7 @@ class Rosenbrock(c.Structure):
         *[(name, P * ROSENBROCK_STAGES) for name in ["u", "v"]],
         ("bend", P * ROSENBROCK_DENSE),
         *[(name, P) for name in ["jy", "jyd", "g", "e", "memory", "jy_end", "jyd_end", "begin_end"]],
-        ("sloped", I),
+        *[(name, I) for name in ["sloped", "lasting"]],
         *[(name, P) for name in ["rate_row", "rate_column"]],
         ("rates", I),
         ("settle", P),

@@ -125,7 +125,7 @@ void sd_rosenbrock_start(void *self, double t, const double *y, const double *yd
         rosenbrock->opening = INFINITY;
     rosenbrock->ivp.h = fmin(rosenbrock->ivp.fixed_h > 0.0 ? rosenbrock->ivp.fixed_h : h, rosenbrock->ivp.h_max);
     rosenbrock->error_accepted = rosenbrock->h_refused = 0.0;
-    rosenbrock->rejected = rosenbrock->sloped = rosenbrock->jumped = 0;
+    rosenbrock->rejected = rosenbrock->sloped = rosenbrock->jumped = rosenbrock->lasting = 0;
 }
 
 /* the new point, and the next step's size */
@@ -241,8 +241,8 @@ int sd_rosenbrock_step(void *self)
     }
     if (rosenbrock->sloped) {
         const size_t size = (size_t)rosenbrock->ivp.system->entries * sizeof(double);
-        memcpy(rosenbrock->jy, rosenbrock->jy_end, size);
-        memcpy(rosenbrock->jyd, rosenbrock->jyd_end, size);
+        memcpy(rosenbrock->jy, rosenbrock->jy_end, rosenbrock->lasting ? 0 : size);
+        memcpy(rosenbrock->jyd, rosenbrock->jyd_end, rosenbrock->lasting ? 0 : size);
         memcpy(rosenbrock->begin, rosenbrock->begin_end, (size_t)rosenbrock->ivp.n * sizeof(double));
     }
     return SD_FINE;

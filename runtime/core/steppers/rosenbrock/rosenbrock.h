@@ -47,6 +47,7 @@ typedef struct sd_rosenbrock {
     double *jy, *jyd, *g, *e, *memory;
     double *jy_end, *jyd_end, *begin_end; /* slopes, and F [n], at the end of the step at hand */
     int32_t sloped;           /* whether these are those of the last accepted point, behind a step jy, jyd and begin are */
+    int32_t lasting;          /* slopes are what they were since the start, whatever the point */
     int32_t *rate_row, *rate_column, rates; /* of the entries e of E that are not zero */
     sd_settle *settle;        /* of steep laws: moves a point that no step goes on from onto all rows; or NULL */
 } sd_rosenbrock;

@@ -79,9 +79,11 @@ static int gives_way(sd_rosenbrock *rosenbrock, double *error, double *state)
     int cause = sd_rosenbrock_residual(rosenbrock, t, y, yd, rosenbrock->begin_end);
     if (cause != SD_FINE)
         return cause;
-    if (sd_jacobian(system, t, y, yd, rosenbrock->ivp.magnitude, jy, jyd) >= 0)
+    if (!rosenbrock->lasting && sd_jacobian(system, t, y, yd, rosenbrock->ivp.magnitude, jy, jyd) >= 0)
         return SD_NONFINITE;
     rosenbrock->sloped = 1;
+    if (rosenbrock->lasting)
+        return SD_FINE;
     int32_t e = 0;
     while (e < system->entries && !(fabs(jy[e]) < GIVEN * fabs(rosenbrock->jy[e])))
         e++;

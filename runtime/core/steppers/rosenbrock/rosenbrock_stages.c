@@ -27,8 +27,10 @@ int sd_rosenbrock_linearise(sd_rosenbrock *rosenbrock)
 {
     sd_system *system = rosenbrock->ivp.system;
     double t = rosenbrock->ivp.t, *drift = rosenbrock->drift, *jy = rosenbrock->jy, *jyd = rosenbrock->jyd;
-    const int known = rosenbrock->sloped;
-    int32_t bad = known ? -1 : sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->ivp.magnitude, jy, jyd);
+    const int known = rosenbrock->sloped, lasting = rosenbrock->lasting;
+    int32_t bad = -1;
+    if (!known && !lasting)
+        bad = sd_jacobian(system, t, rosenbrock->phi, rosenbrock->yd, rosenbrock->ivp.magnitude, jy, jyd);
     rosenbrock->sloped = 0;
     if (*system->stop)
         return SD_STOPPED;
@@ -36,8 +38,9 @@ int sd_rosenbrock_linearise(sd_rosenbrock *rosenbrock)
         rosenbrock->ivp.bad_row = bad;
         return SD_NONFINITE;
     }
-    rosenbrock->rates = 0;
-    for (int32_t j = 0; j < rosenbrock->ivp.n; j++)
+    rosenbrock->rates = lasting ? rosenbrock->rates : 0;
+    rosenbrock->lasting = system->steady;
+    for (int32_t j = 0; j < rosenbrock->ivp.n && !lasting; j++)
         for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
             if (jyd[e] != 0.0) {
                 rosenbrock->e[rosenbrock->rates] = jyd[e];
