@@ -51,24 +51,18 @@ double sd_first_step(const sd_ivp *ivp, double longest, double part, double chan
     return fmax(longest, fmin(least, span));
 }
 
-/* one of so many steps of the same length over what is left, as far as round-off lets them be: the last one is not longer */
-static double one_of(double left, double number)
-{
-    return left / number * (1.0 - 0.25 * SD_SLACK / number);
-}
-
 double sd_fitted(const sd_ivp *ivp, double slack)
 {
     double left = ivp->t_end - ivp->t, h = ivp->h;
     if (h >= left * (1.0 - slack))
-        return h <= left && h >= left * (1.0 - SD_SLACK) ? h : left;
-    return 2.0 * h > left && ivp->taken > 0 && !(ivp->fixed_h > 0.0) ? one_of(left, 2.0) : h;
+        return left;
+    return 2.0 * h > left && ivp->taken > 0 && !(ivp->fixed_h > 0.0) ? 0.5 * left : h;
 }
 
 double sd_longest(const sd_ivp *ivp)
 {
     double left = ivp->t_end - ivp->t, number = ceil(left / ivp->h_max * (1.0 - SD_SLACK));
-    return number >= 1.0 && number <= FEW ? one_of(left, number) : ivp->h_max;
+    return number >= 1.0 && number <= FEW ? left / number : ivp->h_max;
 }
 
 int sd_too_small(const sd_ivp *ivp)

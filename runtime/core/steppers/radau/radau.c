@@ -268,7 +268,7 @@ static int find_stages(sd_radau *radau, trial *one)
     one->retry = 0.5;
     one->fresh = !radau->old_jacobian;
     sd_radau_extrapolate(radau, radau->ivp.h);
-    if (!radau->ready || radau->ivp.h != radau->h_factored)
+    if (!radau->ready || !sd_radau_factored(radau))
         cause = sd_radau_factorise(radau, one->failures > 0 || whole);
     if (cause == SD_FINE) {
         radau->theta = 0.0; /* one iteration: the Jacobian is good enough */

@@ -172,6 +172,8 @@ double sd_radau_strictness(const sd_radau *radau, const sd_radau_method *method)
 void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out);
 void sd_radau_stage(sd_radau *radau, int s, double *y, double *rate);
 int sd_radau_factorise(sd_radau *radau, int at_end);
+/* the last factors are of the step at hand, but for what rounds a sum of steps */
+int sd_radau_factored(const sd_radau *radau);
 /* 1: so large that the room of matrices counts, which are then made where they are factorised */
 int sd_radau_sparing(const sd_radau *radau);
 /* radau_rooms.c: jy, jyd [entries] may be written, 0; -1: no memory.  Then, of a large system, columns that are alike from one to

@@ -179,7 +179,7 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
     double tolerance = sd_radau_newton_tolerance(radau);
     double aim = newton_tolerance(radau, aimed_at[radau->method - sd_radau_methods]);
     double before = 0.0, ratio_before = 0.0;
-    double trust = radau->ivp.system->steady && radau->ivp.h == radau->h_factored ? SOLVED : 1.0;
+    double trust = radau->ivp.system->steady && sd_radau_factored(radau) ? SOLVED : 1.0;
     int patient = full || radau->ivp.fixed_h > 0.0;
     *retry = 0.5;
     int usual = sd_radau_iterations(radau), most = patient ? PATIENT : usual, converged = 0, idle = 0;

@@ -120,6 +120,11 @@ static int factorise_all(sd_radau *radau)
     return failed;
 }
 
+int sd_radau_factored(const sd_radau *radau)
+{
+    return fabs(radau->ivp.h - radau->h_factored) <= SD_SLACK * radau->ivp.h;
+}
+
 /* A^-1 / h, of the step and the method at hand */
 static void set_lead(sd_radau *radau)
 {
