@@ -68,8 +68,9 @@ def _efforts(network: Network, names: set[str]) -> dict[str, tuple[Branch, Node]
     """The branch and the c of senses that stand in nothing but c*sense, its effort."""
     found = {}
     for branch in network.branches:
-        for n in _senses(branch.law, names) if branch.law is not None else ():
-            c = _coefficient(branch.law, n)
+        law = branch.law
+        for n in _senses(law, names) if law is not None else ():
+            c = _coefficient(law, n)
             if n.args == loop_indices(branch.loops) and not _senses(c, names):
                 found[n.data] = branch, c
     for root in expressions(network, *EXPRESSIONS):

@@ -14,7 +14,7 @@ from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.flat import at_rest, without_rates
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
-from sysdyn.runtime.start.strategies import ASTRAY, CLOSED, following, own_residual
+from sysdyn.runtime.start.strategies import ASTRAY, CLOSED, following, least_change, own_residual
 
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
@@ -46,8 +46,17 @@ def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, f
         if held and (moved is last or not steep or sharp(starter, t, found, free) is not None):
             return found, True
     unbound = stepped(problem_of(starter, t, there, guess, rows=without_rates(starter), free=free, least=True), there)
-    astray = (np.abs(unbound - there) > ASTRAY * largest)[state].any()
-    return (Solution(there, np.inf) if astray else best), False
+    if not (np.abs(unbound - there) > ASTRAY * largest)[state].any():
+        return best, False
+    for rows in (without_rates(starter), starter.every.copy()):
+        with starter.granted():
+            settled = least_change(starter, t, there, guess, rows, free, state)
+            if settled is None:
+                continue
+            found, holds = following(starter, t, np.where(state, settled, x), guess, free, free & ~state)
+        if holds:
+            return found, True
+    return Solution(there, np.inf), False
 
 
 def sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | None:

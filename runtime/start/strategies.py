@@ -30,8 +30,8 @@ CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
 WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
-ASTRAY = 1e-5
-"""Of the largest alike: a state that is farther from the least change has moved for nothing."""
+ASTRAY, _SETTLING = 1e-5, 20
+"""Of the largest alike: a state that is farther from the least change has moved for nothing; steps along what bends."""
 LEAST_PART = 1e-6
 """Of misses: less is not faded out at once."""
 FOLLOWED, NEARLY = 12, 1e-4
@@ -157,23 +157,22 @@ def _states(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, fo
     if small and not starter.jumping:
         *_, (near, _) = (near, free), *off_the_flat(starter, t, near, follows)
         with starter.granted():
-            held = _least_without_rates(starter, t, near, guess, free, follows)
+            held = least_change(starter, t, near, guess, without_rates(starter), free, free & ~follows)
         if held is not None:
             yield np.where(follows, x, starter.without_noise(held, starter.scale(t, guess)))
 
 
-def _least_without_rates(
-    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, follows: Mask
+def least_change(
+    starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask, state: Mask
 ) -> Floats | None:
-    """From x where rows without rates hold and the state cannot be nearer to the guess; None where none was found."""
-    for _ in range(_RESCALINGS):
-        problem = problem_of(starter, t, x, guess, rows=without_rates(starter), free=free, least=True)
-        found = solve(problem, x)
+    """From x where these rows hold and the state cannot be nearer to the guess; None where none was found."""
+    for _ in range(_SETTLING):
+        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free, least=True), x)
         if found.residual >= EXACT:
             return None
-        x = stepped(problem_of(starter, t, found.x, guess, rows=problem.use, free=free, least=True), found.x)
+        x = stepped(problem_of(starter, t, found.x, guess, rows=rows, free=free, least=True), found.x)
         moved, largest = np.abs(x - found.x), starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(x)))
-        if not (moved > ASTRAY * largest)[free & ~follows].any():
+        if not (moved > ASTRAY * largest)[state].any():
             return found.x
     return None
 

@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize
 from start_strategies import started
 from sysdyn import api
 from sysdyn.runtime.model.failures import SolverFailure
@@ -159,6 +159,36 @@ def test_two_loops_of_three_capacitors_of_which_one_is_said(formulation, read):
         assert volts == pytest.approx([1.0, b, c], rel=1e-9)
     else:
         assert [values[f"C{k}"] for k in range(1, 6)] == pytest.approx(charges, rel=1e-9)
+
+
+BENT = """
+model bent {
+  node n0, n1, n2: electrical
+  V: effort(e = 1 V) n0 -> n1
+  C1: potential(q = 0.3 F*e) n1 -> n2
+  C2: potential(e = 2 V*(q/(1 C) + 2*(q/(1 C))^3)) n2 -> ground
+  C3: potential(q = 0.3 F*(e + e^3/(1 V)^2)) ground -> n0
+  R: dissipator(e = 1 ohm*f) n2 -> n0
+}
+"""
+
+
+@pytest.mark.parametrize("formulation", FOUR)
+def test_bent_capacitors_in_a_loop_begin_with_the_least_charges(formulation):
+    """In co-Lagrangian form n0 began at 0.42 V, told as what nothing else asks for."""
+
+    def charges(volts):
+        n0, n2 = volts
+        bent = brentq(lambda q: 2.0 * (q + 2.0 * q**3) - n2, -5.0, 5.0, xtol=1e-15)
+        return np.array([0.3 * (n0 - 1.0 - n2), bent, -0.3 * (n0 + n0**3)])
+
+    best = minimize(lambda v: np.sum(charges(v) ** 2), [0.3, -0.2], method="Nelder-Mead", options={"fatol": 1e-17})
+    begun = started(BENT, formulation)
+    values = dict(zip(map(begun.system.name, range(begun.state.y.size)), begun.state.y, strict=True))
+    if formulation.startswith("co_"):
+        assert [values["n0'"], values["n2'"]] == pytest.approx(best.x, abs=1e-6)
+    else:
+        assert [values[f"C{k}"] for k in (1, 2)] == pytest.approx(charges(best.x)[:2], abs=1e-6)
 
 
 SERIES = """

@@ -70,7 +70,7 @@ model far {{
 }}
 scene s of far {{ time 0 s to 5 s; trace x, y every 0.1 s }}
 """
-    one, other = (run(tmp_path, said, formulation) for said in (text, text.replace("setsign", "sign")))
+    one, other = (run(tmp_path, said, formulation, 1e-8) for said in (text, text.replace("setsign", "sign")))
     at = np.linspace(0.0, 5.0, 51)
     values = [np.interp(at, trace.time, trace["x"].values) for trace in (one, other)]
     assert np.abs(values[0] - values[1]).max() < 1e-9

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Box, Sizes, meet
 from sysdyn.compiler.network.primal.contents import TELLING, told
+from sysdyn.compiler.network.primal.integrals import line
 from sysdyn.compiler.network.primal.overlaps import narrowed, ranges_of, untold
 from sysdyn.compiler.network.primal.reading import Rewriter
 from sysdyn.dsl.model.expression import Node, const, var, variables
@@ -44,8 +45,10 @@ def measured(
         ):
             continue
         unit = b.domain.displacement if b.kind == "potential" else b.domain.effort
-        for loops, _, read in _contents(b, b.loops, reader):
-            if len(read) > 1:
+        for loops, content, read in _contents(b, b.loops, reader):
+            if len(read) > 1 or (
+                b.kind == "kinetic" and any(line(content, n) is None for n in read & _unknowns(content))
+            ):
                 shared |= _owners(read)
                 continue
             for node in read:

@@ -194,7 +194,7 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
         if (m > 1 && radau->ivp.system->scales > 0)
             note_change(radau, radau->moved);
         double size = radau->ivp.system->scales > 0 ? noted_correction(radau) : sd_radau_correct(radau);
-        *used = m;
+        *used = trust < 1.0 && m == 1 ? 2 : m; /* steps grow no longer for it */
         if (!isfinite(size))
             return SD_NEWTON;
         converged = 0;
