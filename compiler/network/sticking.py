@@ -68,8 +68,8 @@ def _efforts(network: Network, names: set[str]) -> dict[str, tuple[Branch, Node]
     """The branch and the c of senses that stand in nothing but c*sense, its effort."""
     found = {}
     for branch in network.branches:
-        law = branch.law
-        for n in _senses(law, names) if law is not None else ():
+        law = branch.law or ex.const(0.0)
+        for n in _senses(law, names):
             c = _coefficient(law, n)
             if n.args == loop_indices(branch.loops) and not _senses(c, names):
                 found[n.data] = branch, c

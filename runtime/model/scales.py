@@ -295,12 +295,13 @@ def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Fl
 
 def ceiling(system: System, met: Floats, confirmed: Floats) -> Floats:
     """What guesses of the next run are no larger than [unknowns]: of contents that nothing names the largest |y| met,
-    or a thousandth of what the run confirmed; nothing of one that is zero but for round-off.  Flows are left alone:
-    those of branches that block are round-off (bridges of exponential diodes at 1e-5: 192596 steps by theirs too, 4297
-    without, 31547 by guesses alone).
+    or a thousandth of what the run confirmed; nothing of one that is zero but for round-off.  Flows are left alone
+    where branches may block: theirs are round-off (bridges of exponential diodes at 1e-5: 192596 steps by theirs too,
+    4297 without, 31547 by guesses alone).
     """
     found, by_kind = confirmed.copy(), _by_kind(system)
-    lib.core.sd_ceiling(c.byref(by_kind.core), bool(system.form.scales), lib.pointer(met), lib.pointer(found))
+    blocks = bool(system.form.scales) or bool(system.description.switches.places)
+    lib.core.sd_ceiling(c.byref(by_kind.core), blocks, lib.pointer(met), lib.pointer(found))
     return found
 
 

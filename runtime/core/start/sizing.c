@@ -452,10 +452,10 @@ int sd_confirmed(const sd_sizing *s, const sd_system *system, double span, const
     return 0;
 }
 
-void sd_ceiling(const sd_sizing *s, int steep, const double *met, double *found)
+void sd_ceiling(const sd_sizing *s, int blocks, const double *met, double *found)
 {
     for (int32_t k = 0; k < s->balance->unknowns; k++) {
-        int told = guessed(s, k) && !(steep && (s->kind[k] & SD_FLOW)) && met[k] > NEVER * found[k];
+        int told = guessed(s, k) && !(blocks && (s->kind[k] & SD_FLOW)) && met[k] > NEVER * found[k];
         found[k] = told ? sd_larger(met[k], GROUP * found[k]) : INFINITY;
     }
 }

@@ -54,8 +54,8 @@ int sd_compliance(const sd_sizing *sizing, const double *jy, const double *jyd, 
 int sd_confirmed(const sd_sizing *sizing, const sd_system *system, double span, const double *met,
                  const double *magnitude, double *found);
 
-/* of what a run confirmed: what guesses of the next one are no larger than; infinite of flows where laws are
- * steep (those of branches that block are round-off), of what is no state, of what is named or never moved */
-void sd_ceiling(const sd_sizing *sizing, int steep, const double *met, double *found);
+/* of what a run confirmed: what guesses of the next one are no larger than; infinite of flows where branches may
+ * block (theirs are round-off), of what is no state, of what is named or never moved */
+void sd_ceiling(const sd_sizing *sizing, int blocks, const double *met, double *found);
 
 #endif
