@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
+from sysdyn.runtime.numerics.gauss_newton import Solution, solve
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.corrections import EXACT, Corrected, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.flat import at_rest, without_rates
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
-from sysdyn.runtime.start.strategies import ASTRAY, CLOSED, following, least_change, own_residual
+from sysdyn.runtime.start.strategies import CLOSED, astray, following, least_change, nearest, own_residual
 
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
@@ -29,13 +29,13 @@ def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, f
     state = free & ~starter.following(t, there)
     if best.residual >= EXACT or there.size > DENSE or not (there != guess)[state].any():
         return best, False
-    near = stepped(problem_of(starter, t, there, guess, rows=starter.every, free=free, least=True), there)
+    near = nearest(starter, t, there, guess, starter.every, free)
     largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
     near = np.where(np.abs(near - there) <= NOISE * largest, there, near)
     back = np.where(np.abs(near - guess) <= BACK * largest, guess, near)
     steep, last = bool(starter.system.form.scales), near
     if steep:  # rows of small terms are lost beside all that moves: the rest by the least change from there
-        last = stepped(problem_of(starter, t, near, near, rows=starter.every, free=free, least=True), near)
+        last = nearest(starter, t, near, near, starter.every, free)
     for moved in (back, near, last):
         begun = np.where(state, moved, x)
         follows = free & ~state & ~at_rest(starter, t, begun, free & ~state)
@@ -45,8 +45,8 @@ def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, f
         # what is left where a guess of twelve digits stays is no round-off: beside steep laws that is no start
         if held and (moved is last or not steep or sharp(starter, t, found, free) is not None):
             return found, True
-    unbound = stepped(problem_of(starter, t, there, guess, rows=without_rates(starter), free=free, least=True), there)
-    if not (np.abs(unbound - there) > ASTRAY * largest)[state].any():
+    unbound = nearest(starter, t, there, guess, without_rates(starter), free)
+    if not astray(starter, t, there, unbound, guess, state):
         return best, False
     for rows in (without_rates(starter), starter.every.copy()):
         with starter.granted():

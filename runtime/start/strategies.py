@@ -170,11 +170,21 @@ def least_change(
         found = solve(problem_of(starter, t, x, guess, rows=rows, free=free, least=True), x)
         if found.residual >= EXACT:
             return None
-        x = stepped(problem_of(starter, t, found.x, guess, rows=rows, free=free, least=True), found.x)
-        moved, largest = np.abs(x - found.x), starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(x)))
-        if not (moved > ASTRAY * largest)[state].any():
+        x = nearest(starter, t, found.x, guess, rows, free)
+        if not astray(starter, t, found.x, x, guess, state):
             return found.x
     return None
+
+
+def nearest(starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask) -> Floats:
+    """The point nearest to the guess on these rows as they are linear at x."""
+    return stepped(problem_of(starter, t, x, guess, rows=rows, free=free, least=True), x)
+
+
+def astray(starter: Starter, t: float, x: Floats, near: Floats, guess: Floats, state: Mask) -> bool:
+    """Whether the state at x has moved farther than to this nearest point."""
+    largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
+    return bool((np.abs(near - x) > ASTRAY * largest)[state].any())
 
 
 def following(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, follows: Mask) -> tuple[Solution, bool]:
@@ -224,18 +234,17 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     """From x, in what follows from the state, first the rows without rates; then all but rates of laws that are flat
     at rest, as found; these are asked for again where that does not hold.
     """
-    found, holds = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x), False
+    found = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x)
     if found.residual >= EXACT or x.size > DENSE:
         return found, False
-    before, asking = (starter.every.copy(), starter.resting.copy()), True
-    while asking:
-        near = starter.without_noise(found.x, starter.scale(t, guess))  # what round-off left is no magnitude
-        if not (unrated(starter, t, near) or not holds):
-            break
+    before, scale = (starter.every.copy(), starter.resting.copy()), starter.scale(t, guess)
+    near, fewer = starter.without_noise(found.x, scale), True  # what round-off left is no magnitude
+    unrated(starter, t, near)
+    while fewer:
         near = rested(starter, t, near, free)
-        may = free & ~at_rest(starter, t, near, free)
-        found, holds = rescaled(starter, t, near, guess, may, least=False)
-        asking = holds
+        found, holds = rescaled(starter, t, near, guess, free & ~at_rest(starter, t, near, free), least=False)
+        near = starter.without_noise(found.x, scale)
+        fewer = holds and unrated(starter, t, near)
     if not holds:
         starter.every[:], starter.resting[:] = before
     return found, holds

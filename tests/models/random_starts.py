@@ -25,7 +25,6 @@ HEAD = "from std.electrical import resistor, capacitor, inductor\nmodel net {\n"
 CLOSE = 1e-6
 """Of the largest content of its kind: what two formulations may differ by."""
 TURBULENT = ["e = {!r} ohm/(1 A)*f*abs(f)", "f = 1 A*sign(e)*sqrt(abs(e)/({!r} V))"]
-SORTS = {"others": "others", "bare": "bare", "reading": "read", "turbulent": "valves"}
 NONE = 1e-12
 """Entries of bases of unit vectors that are round-off."""
 
@@ -39,10 +38,9 @@ class Circuit:
     text: str = ""
 
 
-def circuit(seed, saying="=~", *, others=False, bare=False, reading=False, turbulent=False):
-    """A circuit of which a part is said; others: of resistors too; bare: nodes that need not leak mostly do not;
-    reading: dynamic variables read some elements; turbulent: resistors are.
-    """
+def circuit(seed, saying="=~", sort="scalar"):
+    """A circuit of which a part is said; bare: nodes that need not leak mostly do not."""
+    turbulent = sort == "valves"
 
     def resistor(value):
         return f"dissipator({random.choice(TURBULENT).format(value)})" if turbulent else f"resistor(R = {value!r} ohm)"
@@ -63,8 +61,7 @@ def circuit(seed, saying="=~", *, others=False, bare=False, reading=False, turbu
         found.elements.append((f"x{k}", kind, value, a, b))
     stores = [(name, KINDS[kind][2]) for name, kind, *_ in found.elements if KINDS[kind][2]]
     if not stores:
-        again = {"others": others, "bare": bare, "reading": reading, "turbulent": turbulent}
-        return circuit(seed + 1_000_000, saying, **again)
+        return circuit(seed + 1_000_000, saying, sort)
     for name, content in stores:
         say = str(random.choice(["=", "~", ""]))
         value = float(f"{random.uniform(-2.0, 2.0):.{0 if turbulent else 3}f}")
@@ -72,18 +69,18 @@ def circuit(seed, saying="=~", *, others=False, bare=False, reading=False, turbu
             found.said[name] = say, value
             lines.append(f"  init {name}.{content} {say} {value!r} {UNITS[content]}")
     ends = Counter(node for *_, a, b in found.elements for node in (a, b))
-    leaking = [node for node in nodes[1:] if not bare or ends[node] < 2 or random.random() < 0.4]
+    leaking = [node for node in nodes[1:] if sort != "bare" or ends[node] < 2 or random.random() < 0.4]
     leaks = [f"leak_{node}" for node in leaking]  # what floats is another matter
     lines += [f"  {leak}: {resistor(3.0)} {leak[5:]} -> ground" for leak in leaks]
     read = [f"; trace {name}.{content}" for name, content in stores]
     told = [*(e[0] for e in found.elements if e[1] == "resistor"), *leaks]
     found.elements += [(name, "resistor", 3.0, name[5:], "ground") for name in leaks]
-    for k, name in enumerate(random.permutation(told)[: int(random.integers(1, 3)) if others else 0]):
+    for k, name in enumerate(random.permutation(told)[: int(random.integers(1, 3)) if sort == "others" else 0]):
         say, letter = str(random.choice(["=", "="] if k else ["=", "~"])), str(random.choice(["e", "f"]))
         found.said[str(name)] = say, float(f"{random.uniform(-2.0, 2.0):.3f}"), letter
         lines.append(f"  init {name}.{letter} {say} {found.said[str(name)][1]!r} {UNITS[letter]}")
         read.append(f"; trace {name}.e")  # what nothing asks for is not modelled
-    for k in range(int(random.integers(1, 4)) if reading else 0):
+    for k in range(int(random.integers(1, 4)) if sort == "read" else 0):
         name, kind, *_ = found.elements[int(random.integers(len(found.elements)))]
         choice = [*READ, HELD[kind]] if kind in HELD else READ
         unit, power = choice[int(random.integers(len(choice)))]
@@ -224,7 +221,7 @@ def contents(text):
 
 def judged(seed, sort="scalar", saying="=~"):
     """agree, refused (no formulation has a start), or how they differ."""
-    of = array(seed) if sort == "arrays" else circuit(seed, saying, **{k: sort == s for k, s in SORTS.items()})
+    of = array(seed) if sort == "arrays" else circuit(seed, saying, sort)
     found, expected = contents(of.text), closed_form(of)
     values = [value for value in found.values() if value is not None]
     if not values:
