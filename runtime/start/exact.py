@@ -12,9 +12,9 @@ from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.corrections import EXACT, Corrected, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.flat import at_rest, without_rates
+from sysdyn.runtime.start.held import CLOSED, astray, following, least_change, nearest, own_residual
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
-from sysdyn.runtime.start.strategies import CLOSED, astray, following, least_change, nearest, own_residual
 
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""

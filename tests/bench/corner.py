@@ -19,7 +19,7 @@ CORNER = {
     "contents": ["compiler/network/primal/contents.py"],
     "floating": ["compiler/forms/relative_coordinates.py"],
     "starter": [f"runtime/start/{name}.py" for name in ("starter", "least", "equations", "sums")],
-    "start": [f"runtime/start/{name}.py" for name in ("start", "exact", "strategies", "flat", "moved")],
+    "start": [f"runtime/start/{name}.py" for name in ("start", "exact", "strategies", "held", "flat", "moved")],
     "impulses": ["runtime/start/instant.py"],
     "redundancy": ["runtime/structure/redundancy.py"],
     "implicit": ["runtime/structure/implicit.py"],

@@ -8,9 +8,10 @@ import small_models as models
 from scipy.optimize import brentq
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.held import own_residual
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.start.starter import Starter
-from sysdyn.runtime.start.strategies import STRATEGIES, applicable, behind, first, own_residual
+from sysdyn.runtime.start.strategies import STRATEGIES, applicable, behind, first
 from sysdyn.runtime.structure.redundancy import nearby, reactions, vanished
 
 

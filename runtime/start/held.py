@@ -1,0 +1,142 @@
+"""What is found from one point: all rows, the least change of the state, what follows from a state that is held.
+
+Where a law has no slope (a turbulent valve at rest) there is no rate of what it passes: decisions.md, 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
+from sysdyn.runtime.numerics.least_change import DENSE
+from sysdyn.runtime.start.corrections import EXACT
+from sysdyn.runtime.start.flat import OWN, at_rest, off_the_flat, rested, unrated, without_rates
+from sysdyn.runtime.start.least import problem_of
+from sysdyn.runtime.start.linearly import no_start
+from sysdyn.runtime.start.starter import NOISE, Mask, Starter
+
+RESCALINGS, _DOUBTED = 6, 3
+"""Times that magnitudes are taken anew; after which of them a state that is held is asked whether it can be, of active
+sets, which may contradict it.
+"""
+CLOSED = 1e-12
+"""Scaled residual of rows that hold to round-off."""
+ASTRAY, _SETTLING = 1e-5, 20
+"""Of the largest alike: a state that is farther from the least change has moved for nothing; steps along what bends."""
+
+
+def rescaled(
+    starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, *, least: bool = True, sized: Floats | None = None
+) -> tuple[Solution, bool]:
+    """Everything at once from x, and whether it holds; magnitudes are those of `sized` at first (None: x).
+
+    Magnitudes that proved wrong (currents of 1e-12 A at the guess, a diode at 2 V) are taken anew: the rows must hold
+    in the magnitudes of the solution too.
+    """
+    at, best = x if sized is None else sized, Solution(x, np.inf)
+    for k in range(RESCALINGS):
+        if k and starter.work.done:
+            break
+        if k == _DOUBTED and not least and starter.system.description.switches.places and no_start(starter, t, x, free):
+            break
+        problem = problem_of(starter, t, at, guess, rows=starter.every, free=free, least=least)
+        best = solve(problem, best.x)
+        if not np.isfinite(best.residual):
+            break
+        at = starter.without_noise(best.x, problem.scale)
+        del problem  # of a large model the room counts
+        if best.residual < EXACT:
+            clean = next((c for c in (at, best.x) if own_residual(starter, t, at, c) < OWN), None)
+            if clean is not None:
+                return replace(best, x=clean), True
+    return best, False
+
+
+def own_residual(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> float:
+    """Largest residual at x of the rows that must hold, relative to their terms in magnitudes of a solution: those of
+    noise beside their like are no less than that.
+    """
+    scale = np.maximum(starter.scale(t, magnitudes), NOISE * starter.largest_alike(magnitudes))
+    size = starter.row_scale(t, magnitudes, scale)[starter.every]
+    return float(np.max(np.abs(starter.residual(t, x)[starter.every]) * size, initial=0.0))
+
+
+def least_change(
+    starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask, state: Mask
+) -> Floats | None:
+    """From x where these rows hold and the state cannot be nearer to the guess; None where none was found."""
+    for _ in range(_SETTLING):
+        found = solve(problem_of(starter, t, x, guess, rows=rows, free=free, least=True), x)
+        if found.residual >= EXACT:
+            return None
+        x = nearest(starter, t, found.x, guess, rows, free)
+        if not astray(starter, t, found.x, x, guess, state):
+            return found.x
+    return None
+
+
+def nearest(starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask) -> Floats:
+    """The point nearest to the guess on these rows as they are linear at x."""
+    return stepped(problem_of(starter, t, x, guess, rows=rows, free=free, least=True), x)
+
+
+def astray(starter: Starter, t: float, x: Floats, near: Floats, guess: Floats, state: Mask) -> bool:
+    """Whether the state at x has moved farther than to this nearest point."""
+    largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
+    return bool((np.abs(near - x) > ASTRAY * largest)[state].any())
+
+
+def following(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, follows: Mask) -> tuple[Solution, bool]:
+    """What follows from the state at x, beside flat laws first in a small model; whether all rows nearly hold."""
+    for way, near in _ways(starter, t, x, free, follows):
+        found, nearly = way(starter, t, near, guess, follows)
+        if nearly:
+            break
+    return found, nearly
+
+
+def _ways(
+    starter: Starter, t: float, x: Floats, free: Mask, follows: Mask
+) -> Iterator[tuple[Callable[..., tuple[Solution, bool]], Floats]]:
+    """How what follows is sought, and from where."""
+    if x.size > DENSE:
+        yield _at_once, x
+        yield from ((_at_once, near) for near, _ in off_the_flat(starter, t, x, follows))
+        return
+    points = [x, *(near for near, _ in off_the_flat(starter, t, x, follows))][::-1]
+    rated = np.isfinite(starter.residual(t, x)[starter.every]).all()
+    # where no state can move what is all but at rest has rates
+    resting = not rated or (free & ~follows & ~starter.hollow).any()
+    first = resting and (len(points) > 1 or not rated)
+    yield from ((_at_rest, near) for near in points if first)
+    yield from ((_at_once, near) for near in points)
+    if resting and not first:
+        yield _at_rest, x
+
+
+def _at_once(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """From x, in what is free, all rows."""
+    return rescaled(starter, t, x, guess, free, least=False)
+
+
+def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """From x, in what follows from the state, first the rows without rates; then all but rates of laws that are flat
+    at rest, as found; these are asked for again where that does not hold.
+    """
+    found = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x)
+    if found.residual >= EXACT or x.size > DENSE:
+        return found, False
+    before, scale = (starter.every.copy(), starter.resting.copy()), starter.scale(t, guess)
+    near, fewer = starter.without_noise(found.x, scale), True  # what round-off left is no magnitude
+    unrated(starter, t, near)
+    while fewer:
+        near = rested(starter, t, near, free)
+        found, holds = rescaled(starter, t, near, guess, free & ~at_rest(starter, t, near, free), least=False)
+        near = starter.without_noise(found.x, scale)
+        fewer = holds and unrated(starter, t, near)
+    if not holds:
+        starter.every[:], starter.resting[:] = before
+    return found, holds
