@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime.accuracy.options import Options, own_tolerances
-from sysdyn.runtime.integrate.rows.ledgers import Balance
+from sysdyn.runtime.integrate.rows.ledgers import Balance, turned_over
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.values import dataclass
@@ -61,12 +61,13 @@ class NotMet:
 @dataclass(frozen=True, slots=True)
 class Judgement:
     """judged: what could be judged, in the order accuracy, energy, invariants; not_met: what was missed; conserved:
-    the ledgers of what should have kept its value.
+    the ledgers of what should have kept its value; turnover [J]: the energy that went round.
     """
 
     judged: tuple[str, ...]
     not_met: tuple[NotMet, ...]
     conserved: tuple[Balance, ...] = ()
+    turnover: float = 0.0
 
     @property
     def met(self) -> bool:
@@ -156,7 +157,7 @@ def judge(
     misses = [e for e in missed if asked or e.undefined]
     found = [NotMet("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined) for e in misses]
     if method == "euler":
-        return Judgement((), tuple(found), conserved)
+        return Judgement((), tuple(found), conserved, turned_over(balances))
     judged = ["accuracy"] if accurate else []
     part = allowed(options)
     for kind, what in (("energy", "energy"), ("invariant", "invariants")):
@@ -168,4 +169,4 @@ def judge(
                 limit = max(limit, float(left_open()[k]))
             if not b.value <= limit:
                 found.append(NotMet(what, b.value, limit, b.element.label, b.first_beyond(limit), b.unit, b.element))
-    return Judgement(tuple(judged), tuple(found), conserved)
+    return Judgement(tuple(judged), tuple(found), conserved, turned_over(balances))

@@ -48,7 +48,9 @@ formulation: the value there is a matter of the last digit of the time.
 ROUNDING = 0.25
 """Of that: what is kept has no digits that nobody compares, and packs to a third."""
 BOUND = 10.0
-"""Bounds of the meters, of the largest that any run showed."""
+"""Bounds of the meters, of the largest that any run showed; of energy at least what the accuracy of checks leaves open
+of what went round, of constraints LEAST.
+"""
 LEAST = 1e-12
 """Smallest bound of a meter (J; scaled residual): below it is rounding."""
 FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane")
@@ -116,7 +118,7 @@ def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | Non
         error,
         tau,
         checked,
-        max(BOUND * max(r.energy for r in meters), LEAST),
+        max(*(BOUND * r.energy for r in meters), *(checked * r.turnover for r in meters)),
         max(BOUND * max(r.constraints for r in meters), LEAST),
         structure,
         base.method,
@@ -143,7 +145,8 @@ def _reference(request: Request, accuracy: float, rtol: float, atol: float, say:
     golden = _thin(base, rtol, atol)
     also = between(golden.time)
     for _ in range(DENSER):
-        base = run(replace(request, accuracy=accuracy), also)
+        dense = also
+        base = run(replace(request, accuracy=accuracy), dense)
         untold = _untold(golden, base.trace, rtol, atol)
         golden = _thin(base, rtol, atol)
         if not untold.any():
@@ -153,7 +156,6 @@ def _reference(request: Request, accuracy: float, rtol: float, atol: float, say:
         also = np.concatenate([time, *(np.linspace(time[k], time[k + 1], FEW + 1)[1:-1] for k in cells)])
     rows = f"{golden.time.size} of {base.trace.time.size} instants"
     say(f"reference: {base.formulation}, {base.method}, accuracy {accuracy:.0e}, {rows}")
-    dense = between(golden.time)
     runs = [run(replace(request, accuracy=max(accuracy * FINER, FINEST)), dense)]
     other = "bdf" if base.method == "radau" else "radau"
     try:

@@ -35,13 +35,14 @@ def between(time: Floats) -> Floats:
 @dataclass(frozen=True, slots=True)
 class Run:
     """trace: its curves; structure: of this formulation; energy [J], constraints: largest of the meters;
-    parameters: name to value in SI.
+    turnover [J]: the energy that went round; parameters: name to value in SI.
     """
 
     trace: Arrays
     structure: dict[str, Any]
     energy: float
     constraints: float
+    turnover: float
     formulation: str
     method: str
     parameters: dict[str, float]
@@ -82,7 +83,8 @@ def run(request: Request, also: Floats | None = None) -> Run:
     parameters = {name: value for name, (value, _) in trace.parameters.items()}
     source = arrays_of(trace)
     formulation, method = ran.prepared.formulation, ran.outcome.method
-    return Run(source, _structure(ran, source), energy, constraints, formulation, method, parameters)
+    turnover = ran.outcome.judgement.turnover if ran.outcome.judgement else 0.0
+    return Run(source, _structure(ran, source), energy, constraints, turnover, formulation, method, parameters)
 
 
 def _largest(values: Floats) -> float:

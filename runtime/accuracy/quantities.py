@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.integrate.request import Finished
+from sysdyn.runtime.integrate.rows.ledgers import turned_over
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import ROUND_OFF, kinds_and_units
@@ -92,5 +93,4 @@ class Quantities:
 
 def _turned_over(meter: str, finished: Finished) -> float:
     """What an error of a meter is relative to: the norm of constraints is scaled, energies are what went round."""
-    turnover = sum(b.turnover for b in finished.balances if b.kind == "energy" and b.unit == "J")
-    return 1.0 if meter == "audit.constraints" else turnover
+    return 1.0 if meter == "audit.constraints" else turned_over(finished.balances)

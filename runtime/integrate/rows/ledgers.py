@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes as c
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,11 @@ class Balance:
     def conserved(self) -> bool:
         """Whether it should keep its value: an invariant, or what is nowhere dissipated or supplied."""
         return self.turnover > 0.0 and (self.kind == "invariant" or self.passed == 0.0)
+
+
+def turned_over(balances: Iterable[Balance]) -> float:
+    """The energy [J] that went through all parts of a model: what an error of `audit.energy` is relative to."""
+    return sum(b.turnover for b in balances if b.kind == "energy" and b.unit == "J")
 
     def first_beyond(self, limit: float) -> float | None:
         """The instant [s] from which the balance was beyond a limit; None where it never was."""
