@@ -92,7 +92,7 @@ def test_what_is_recorded(project):
     assert scene["formulations"] == ["lagrangian", "hamiltonian"]
     assert 0.0 < 10.0 * scene["error"] <= scene["rtol"] == 2e-4
     went_round = 2 * (0.5 * 40.0 * 0.1**2)  # what the mass and the spring store at most
-    assert scene["accuracy"] * went_round * 0.999 <= scene["energy"] < scene["rtol"] * went_round
+    assert scene["accuracy"] * went_round * 0.999 <= scene["energy"] < 1e-3 * went_round
     assert scene["accepted"][0]["reason"] == "recorded"
     structure = json.loads((project / "golden/spring/ring.json").read_text())["formulations"]
     assert structure["lagrangian"]["dof"] == 1

@@ -44,14 +44,14 @@ class Balance:
         """Whether it should keep its value: an invariant, or what is nowhere dissipated or supplied."""
         return self.turnover > 0.0 and (self.kind == "invariant" or self.passed == 0.0)
 
+    def first_beyond(self, limit: float) -> float | None:
+        """The instant [s] from which the balance was beyond a limit; None where it never was."""
+        return next((t for t, value in self.risen if not value <= limit), None)
+
 
 def turned_over(balances: Iterable[Balance]) -> float:
     """The energy [J] that went through all parts of a model: what an error of `audit.energy` is relative to."""
     return sum(b.turnover for b in balances if b.kind == "energy" and b.unit == "J")
-
-    def first_beyond(self, limit: float) -> float | None:
-        """The instant [s] from which the balance was beyond a limit; None where it never was."""
-        return next((t for t, value in self.risen if not value <= limit), None)
 
 
 def _kept(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[RowFamily], Ints, Signs]:
