@@ -380,3 +380,38 @@ scene s of hoop { time 0 s to 6 s; trace x, y every 0.05 s }
     assert np.abs(trace["x"].values - np.cos(expected)).max() < 1e-6
     turns = [e.time for e in trace.events if e.time > 0.0]
     assert turns == pytest.approx([*(b for b, _ in pieces[1:]), begin], abs=1e-6)
+
+
+@PRIMAL
+@pytest.mark.parametrize("method", ["radau", "bdf"])
+def test_what_sticks_is_let_go_while_its_bound_falls_to_zero(tmp_path, formulation, method):
+    """A clutch of 150 N.m is opened between 1.5 s and 1.6 s: its moment is what the second disc asks for up to their
+    release, then what it can bear.
+    """
+    text = """\
+table opens(x: s) -> 1 linear clamp [ (0, 1), (1.5, 1), (1.6, 0) ]
+model clutch {
+  node a, b: rotation
+  Ja: kinetic(p = 0.2 kg.m^2*f) a
+  Jb: kinetic(p = 0.3 kg.m^2*f) b
+  M: effort(e = 20 N.m - 0.1 N.m.s*a.f) ground -> a
+  implicit F: N.m ~ 0 N.m
+  work -F on a.q
+  work F on b.q
+  gamma rub: F = 150 N.m*opens(t)*setsign(a.f - b.f)
+  init Ja.f = 20 rad/s
+  init Jb.f = 20 rad/s
+}
+scene s of clutch { time 0 s to 2 s; trace a.f, b.f }
+"""
+    release = brentq(lambda t: 1500.0 * (1.6 - t) - 0.3 * 36.0 * np.exp(-0.2 * t), 1.5, 1.6, xtol=1e-14)
+    together, left = 200.0 - 180.0 * np.exp(-0.2 * release), 1.6 - release
+    driven = together + 2500.0 * left**2
+    # 0.2 f' = 20 - 0.1 f - 1500 (1.6 - t), of which -29800 - 15000 (1.6 - t) is a solution; then without it
+    opened = (together + 29800.0 + 15000.0 * left) * np.exp(-0.5 * left) - 29800.0
+    driver = 200.0 + (opened - 200.0) * np.exp(-0.2)
+    for asked in (*({"accuracy": None, "rtol": 10.0**-k} for k in range(3, 10)), {"accuracy": 1e-6}):
+        trace = run(tmp_path, text, formulation, **{"method": method} | asked)
+        found = [trace[name].values[-1] for name in ("b.f", "a.f")]
+        limit = 1e-6 if "rtol" not in asked else 100.0 * asked["rtol"]
+        assert found == pytest.approx([driven, driver], rel=limit)

@@ -10,6 +10,7 @@ from sysdyn.dsl.elaborate.statements import friction
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Coupling, Shape, Terminal
+from sysdyn.dsl.model.units import NONE, si
 from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.laws import ONE_PORTS, law_of, own_variables, ratio_of
 from sysdyn.dsl.names.symbols import (
@@ -125,7 +126,8 @@ class Elements(Connections):
         def part() -> None:
             """Of the loops in sight: of all, or where the law reads several statements of a label, of a part."""
             law, loops = law_of(self.resolver, symbol, whole, side, value, kind, span), self.resolver.loops
-            node = friction.of_law(self, law, symbol.family.name, whole, loops, self.place(s.span))
+            unit = si(own_variables(symbol, whole)[law.side].dimension or NONE)
+            node = friction.of_law(self, law, symbol.family.name, whole, loops, self.place(s.span), unit)
             law = replace(law, law=node)
             self.resolver.laws[symbol.family.name] = law
             said = law.kind, law.side, law.law

@@ -22,7 +22,7 @@ from sysdyn.dsl.model.network import (
     loop_indices,
     loop_ranges,
 )
-from sysdyn.dsl.model.units import NONE, si
+from sysdyn.dsl.model.units import NONE, Unit, si
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.laws import LawOf
 from sysdyn.dsl.text.diagnostics import Place
@@ -54,9 +54,15 @@ def sticking(
 
 
 def of_law(
-    frame: ElaborationContext, law: LawOf, label: str, at: tuple[Node, ...], loops: tuple[Loop, ...], place: Place
+    frame: ElaborationContext,
+    law: LawOf,
+    label: str,
+    at: tuple[Node, ...],
+    loops: tuple[Loop, ...],
+    place: Place,
+    unit: Unit,
 ) -> Node:
-    """The law of a branch: dry friction of its own flow sticks by a reaction, else it is a relation."""
+    """The law of a branch, in its unit: dry friction of its own flow sticks by a reaction, else it is a relation."""
     terms = [n.args[0] for n in ex.calls(law.law, "setsign")]
     if law.kind in ("kinetic", "potential") and not all(map(_steady, terms)):
         return law.law
@@ -64,7 +70,7 @@ def of_law(
     if law.kind == "dissipator" and law.side == "e" and all(_steady(ex.sub(u, flow)) for u in terms):
         return sticking(frame, law.law, label, at, loops, place)
     own = {"e": flow, "f": ex.var(label, "be", *at)}.get(law.side) if law.kind == "dissipator" else None
-    return relation(frame, law.law, ex.var(label, f"b{law.side}", *at), label, loops, place, absorbs=own)
+    return relation(frame, law.law, ex.var(label, f"b{law.side}", *at), label, loops, place, unit, absorbs=own)
 
 
 def relation(
@@ -74,11 +80,13 @@ def relation(
     label: str,
     loops: tuple[Loop, ...],
     place: Place,
+    unit: Unit,
     *,
     absorbs: Node | None = None,
 ) -> Node:
-    """The text of a relation given = text with each term c*setsign(u) as c*s: s closes  u = 0  where that holds, else
-    s = sense, the sign of u.  It holds as long as c*s, what the others leave, is within abs(c): a relation may be
+    """The text of a relation given = text with each term c*setsign(u) as c*sense + w, by the sign of u: w closes  u = 0
+    where that holds, and is zero else, so that c may fall to zero meanwhile.  Where terms multiply one another their
+    signs are the unknowns.  It holds as long as the term, what the others leave, is within abs(c): a relation may be
     written with either sign of c.  Where u is what a dissipator `absorbs` by, c itself is the bound, which is not
     negative.  A c that a reaction tells is watched (aim).  Where u moves at finite rates alone it is a sign, which may
     slide (forms/corners).
@@ -94,28 +102,36 @@ def relation(
             continue
         name = f"{label} set" + (f" {again + len(made) + 1}" if again + len(made) else "")
         change[node] = ex.var(name, "e", *at)
-        frame.parts.unknowns.append(Unknown(name, shape, si(NONE), place))
         made.append((change[node], u))
     text = ex.substitute(text, change)
     root = ex.sub(given, text)
+    factors = {s: derivative(root, s) for s, _ in made}
+    read = frozenset().union(*(ex.variables(n) for n in (*factors.values(), *(u for _, u in made))))
+    whole = [s for s, _ in made if s not in read and ex.variables(factors[s]).isdisjoint(factors)]
+    senses = {s: _sense(frame, f"{s.data[0]} sense", at, loops, place) for s, _ in made}
+    said = ex.add(ex.substitute(text, {s: senses[s] for s in whole}), *whole)
     for s, u in made:
-        factor, name = derivative(root, s), s.data[0]
+        factor, name = factors[s], s.data[0]
+        frame.parts.unknowns.append(Unknown(name, shape, unit if s in whole else si(NONE), place))
         inside = {n for n in ex.topological([u, factor]) if n.op == "index"} - set(at)
         if s in ex.variables(factor) or ex.is_const(factor, 0.0) or inside:
-            said = f"setsign enters {label} in another way than c*setsign(u)"
-            frame.report.error("E705", said, place, help="implicit s: 1, closed by gamma set: s = setsign(u)")
+            why = f"setsign enters {label} in another way than c*setsign(u)"
+            frame.report.error("E705", why, place, help="implicit s: 1, closed by gamma set: s = setsign(u)")
             raise Failed
-        sense, holds = (_sense(frame, f"{name} {what}", at, loops, place) for what in ("sense", "holds"))
-        row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, ex.sub(s, sense))
+        sense, holds = senses[s], _sense(frame, f"{name} holds", at, loops, place)
+        slips = s if s in whole else ex.sub(s, sense)
+        row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, slips)
         frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
-        rest = ex.substitute(root, {s: ex.const(0.0)})
+        others = [o for o in whole if o is not s]
+        rest = ex.substitute(root, dict.fromkeys((s, *others), ex.const(0.0)))
+        rest = ex.add(rest, *(ex.sub(ex.mul(factors[o], senses[o]), o) for o in others))
         left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
         bound = ex.neg(factor) if u is absorbs else ex.call("abs", factor)
-        told = u is not absorbs and any(n.data[1] in ("kappa", "mu") for n in ex.variables(factor) if n.op == "var")
-        aim = (factor,) if told else ()
+        aimed = u is not absorbs and any(n.data[1] in ("kappa", "mu") for n in ex.variables(factor) if n.op == "var")
+        aim = (factor,) if aimed else ()
         draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, aim=aim, holds=holds)
         frame.parts.drafts.append(draft)
-    return text
+    return said
 
 
 def _said_before(frame: ElaborationContext, label: str) -> int:

@@ -46,7 +46,7 @@ class Statements(Declarations):
             raise Failed
         node = ex.sub(left.node, right.node)
         if s.kind == "gamma":
-            node = friction.relation(self, node, ex.const(0.0), family.name, self.resolver.loops, place)
+            node = friction.relation(self, node, ex.const(0.0), family.name, self.resolver.loops, place, si(dimension))
         constraint = Constraint(s.kind, family.name, at, node, self.resolver.loops, si(dimension), place)
         constraint = events.guarded(self, s, constraint)
         self.said(constraint)
