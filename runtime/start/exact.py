@@ -11,7 +11,7 @@ from sysdyn.runtime.numerics.gauss_newton import Solution, solve
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.corrections import EXACT, Corrected, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
-from sysdyn.runtime.start.flat import at_rest, without_rates
+from sysdyn.runtime.start.flat import at_rest, rested, resting, without_rates
 from sysdyn.runtime.start.held import CLOSED, astray, following, least_change, nearest, own_residual
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
@@ -38,7 +38,7 @@ def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, f
         last = nearest(starter, t, near, near, starter.every, free)
     for moved in (back, near, last):
         begun = np.where(state, moved, x)
-        follows = free & ~state & ~at_rest(starter, t, begun, free & ~state)
+        follows = free & ~state & ~resting(starter, t, begun, free & ~state)
         with starter.granted():
             found, holds = following(starter, t, begun, guess, free, follows)
         held = holds and found.residual <= max(CLOSED, best.residual)
@@ -68,8 +68,12 @@ def sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | 
     if best.x.size > SINGULAR_VALUES:
         return best
     follows, steep = free & starter.following(t, best.x), bool(starter.system.form.scales)
-    follows &= ~at_rest(starter, t, best.x, follows)
-    values = _values(starter, t, best.x, follows)
+    at = rested(starter, t, best.x, follows)
+    for x, rests in ((at, at_rest(starter, t, at, follows)), (best.x, resting(starter, t, best.x, follows))):
+        values = _values(starter, t, x, follows, rests)
+        if values.holds:
+            break
+    follows &= ~rests
     if not values.holds and steep:
         return None
     found = values.holds and bool(values.known.any())
@@ -87,13 +91,14 @@ def _of_y(starter: Starter) -> Mask:
     return np.arange(starter.free.size) < starter.n
 
 
-def _values(starter: Starter, t: float, x: Floats, follows: Mask) -> Corrected:
-    """X with what rows as written determine, together with the rates that these read, from zero: of capacitors that
-    float with 1e13 V/s rows hold differences of rates alone, microvolts a second.  Where they do not determine all of
-    that (coils whose currents other rates tie), beside rates as they are.
+def _values(starter: Starter, t: float, x: Floats, follows: Mask, rests: Mask) -> Corrected:
+    """X with what rows as written determine of what follows and does not rest, together with the rates that these read,
+    from zero: of capacitors that float with 1e13 V/s rows hold differences of rates alone, microvolts a second.  Where
+    they do not determine all of that (coils whose currents other rates tie), beside rates as they are.
     """
     of_y = _of_y(starter)
     written = rows = starter.every & ~starter.groups(*HIDDEN) & starter.reading(follows & of_y)
+    follows = follows & ~rests
     for _ in range(2):  # rates of momenta read those of flows
         rates = follows & ~of_y & _read(starter, rows)
         rows = rows | (starter.every & starter.groups("momentum_rate") & starter.reading(rates))

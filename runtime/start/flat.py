@@ -9,14 +9,14 @@ from collections.abc import Iterator
 
 import numpy as np
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.slopes import rows_without_slope
+from sysdyn.runtime.model.slopes import FALLS, rows_without_slope
 from sysdyn.runtime.numerics.gauss_newton import solve
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import Mask, Starter
 
-NEXT_TO_NOTHING, HOLDS = 1e-8, 1e-15
-"""Of the largest alike: roots of round-off; scaled residual of rows that hold to it."""
+NEXT_TO_NOTHING, HOLDS, STEEPLY = 1e-7, 1e-15, 1e-13
+"""Of the largest alike: roots of round-off; scaled residual of rows that hold to it, that such roots of it make."""
 NO_SLOPE = 1e-10
 """Of the slope beside: what is less is none (slopes are those next to a root where others are no numbers at it)."""
 OWN = 1e-6
@@ -59,22 +59,47 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
         yield np.where(flat_here, beside, x), follows
 
 
-def at_rest(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
-    """Of what follows what stays as it is at x: flows of laws without a slope there whose rates are not asked for."""
-    if not starter.resting.any():
-        return np.zeros_like(follows)
+def _steep_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
+    """Entries [entries] of rows whose slope is beyond all bounds in what follows from the state, where that is zero."""
+    here, beside = (np.abs(starter.jacobian(t, at)) for at in (x, _beside(starter, t, x, follows)))
+    at_zero = (follows & (x == 0.0))[starter.columns]
+    return np.asarray(at_zero & (beside < FALLS * here) & ~starter.groups(*HIDDEN)[starter.rows])
+
+
+def resting(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
+    """Of what follows the flows of laws without a slope at x whose rates are not asked for."""
     flat = flat_at(starter, t, x, follows) & starter.resting[starter.rows]
     return np.asarray(np.bincount(starter.columns, flat, x.size) > 0.0)
 
 
+def at_rest(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
+    """Of what follows what stays as it is at x: these, and what is zero where slopes by it are beyond all bounds, and
+    these rows hold.
+    """
+    steep = _steep_at(starter, t, x, follows)
+    steep &= (_missed(starter, t, x) <= STEEPLY)[starter.rows]
+    return resting(starter, t, x, follows) | np.asarray(np.bincount(starter.columns, steep, x.size) > 0.0)
+
+
 def rested(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats:
-    """X with nothing where laws whose rates are not asked for pass next to nothing, and hold so to round-off."""
+    """X with nothing where flat laws pass next to nothing, and laws that are steep at nothing have next to nothing
+    across them, and hold so to round-off.
+    """
     size = starter.largest_alike(np.maximum(starter.scale(t, starter.guess), np.abs(x)))
-    near = np.where(follows & (np.abs(x) <= NEXT_TO_NOTHING * size), 0.0, x)
-    at = np.where(at_rest(starter, t, near, follows), near, x)
-    laws = starter.resting & starter.reading(at != x)
-    missed = np.abs(starter.residual(t, at)) * starter.row_scale(t, at, size)
-    return at if (missed[laws] <= HOLDS).all() else x
+    for bent, most in ((flat_at, HOLDS), (_steep_at, STEEPLY)):
+        near = np.where(follows & (np.abs(x) <= NEXT_TO_NOTHING * size), 0.0, x)
+        entries = bent(starter, t, near, follows)
+        at = np.where(np.bincount(starter.columns, entries, x.size) > 0.0, near, x)
+        laws = starter.reading(at != x) & (np.bincount(starter.rows, entries, starter.settled.rows) > 0.0)
+        x = at if (_missed(starter, t, at)[laws] <= most).all() else x
+    return x
+
+
+def _missed(starter: Starter, t: float, x: Floats) -> Floats:
+    """Misses of rows [rows], of their terms in the largest magnitudes alike."""
+    size = starter.largest_alike(np.maximum(starter.scale(t, starter.guess), np.abs(x)))
+    with np.errstate(invalid="ignore"):
+        return np.abs(starter.residual(t, x)) * starter.row_scale(t, x, size)
 
 
 def unasked(starter: Starter, flat: Ints) -> bool:
@@ -83,16 +108,31 @@ def unasked(starter: Starter, flat: Ints) -> bool:
     Where a law is flat, or infinitely steep, the flow that it determines grows as a root of time: the equations hold,
     and a rate of it there is none.
     """
-    before, rated = int(starter.every.sum()), np.zeros_like(starter.every)
-    first = {(group, family): row for group, family, row in starter.settled.form.groups}
+    rated = np.zeros_like(starter.every)
+    first = _first_rows(starter)
     for group, family, row in starter.system.form.groups:
         own = flat[(flat >= row) & (flat < row + starter.system.description.rows[family].size)]
         rates = first.get((f"{group}_rate", family))
         if rates is not None:
             rated[rates + own - row] = True
-            starter.resting[first[group, family] + own - row] = True
+    return _let_go(starter, rated)
+
+
+def _let_go(starter: Starter, rated: Mask) -> bool:
+    """Asks for these rates of rows no more, which then are at rest; whether any were asked for."""
+    before, first = int(starter.every.sum()), _first_rows(starter)
+    for (group, family), row in first.items():
+        own = slice(row, row + starter.system.description.rows[family].size)
+        law = first.get((group.removesuffix("_rate"), family), row)
+        if law != row:
+            starter.resting[law : law + own.stop - row] |= rated[own]
     starter.let_go(rated)
     return int(starter.every.sum()) < before
+
+
+def _first_rows(starter: Starter) -> dict[tuple[str, int], int]:
+    """First row of each group and family."""
+    return {(group, family): row for group, family, row in starter.settled.form.groups}
 
 
 def unrated(starter: Starter, t: float, x: Floats) -> bool:
@@ -100,10 +140,10 @@ def unrated(starter: Starter, t: float, x: Floats) -> bool:
     slope times none); whether any were asked for.
     """
     nothing = starter.every & ~np.isfinite(starter.residual(t, x)) & starter.groups(*HIDDEN)
-    starter.let_go(nothing)
+    fewer = _let_go(starter, nothing)
     y, yd = starter.expand(x)
     size = starter.largest_alike(np.maximum(starter.scale(t, starter.guess), np.abs(x)))[: y.size]
-    return unasked(starter, rows_without_slope(starter.system, t, y, yd, size, steep=True)) or bool(nothing.any())
+    return unasked(starter, rows_without_slope(starter.system, t, y, yd, size, steep=True)) or fewer
 
 
 def without_rates(starter: Starter) -> Mask:

@@ -13,7 +13,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.start.corrections import EXACT
-from sysdyn.runtime.start.flat import OWN, at_rest, off_the_flat, rested, unrated, without_rates
+from sysdyn.runtime.start.flat import OWN, at_rest, off_the_flat, rested, resting, unrated, without_rates
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
@@ -24,8 +24,10 @@ sets, which may contradict it.
 """
 CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
-ASTRAY, _SETTLING = 1e-5, 20
-"""Of the largest alike: a state that is farther from the least change has moved for nothing; steps along what bends."""
+ASTRAY, SETTLED, _SETTLING = 1e-5, 1e-10, 20
+"""Of the largest alike: a state farther from the least change has moved for nothing; of its scale: what searches
+leave; steps along what bends.
+"""
 
 
 def rescaled(
@@ -84,18 +86,26 @@ def nearest(starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, fr
 
 
 def astray(starter: Starter, t: float, x: Floats, near: Floats, guess: Floats, state: Mask) -> bool:
-    """Whether the state at x has moved farther than to this nearest point."""
-    largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
-    return bool((np.abs(near - x) > ASTRAY * largest)[state].any())
+    """Whether the state at x has moved farther than to this nearest point, of the largest state alike.  What scales say
+    is of no size here: slopes beyond all bounds make them so too.
+    """
+    size = starter.largest_alike(np.where(state, np.maximum(np.abs(near), np.abs(x)), 0.0))
+    left = SETTLED * np.minimum(starter.scale(t, guess), starter.scale(t, x))
+    return bool((np.abs(near - x) > ASTRAY * size + left)[state].any())
 
 
 def following(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, follows: Mask) -> tuple[Solution, bool]:
-    """What follows from the state at x, beside flat laws first in a small model; whether all rows nearly hold."""
+    """What follows from the state at x, beside flat laws first in a small model; whether all rows nearly hold.  Where a
+    law passes but a root of round-off, whose rate is of any size, rather than that without such a rate, if there is.
+    """
+    best: tuple[Solution, bool] | None = None
     for way, near in _ways(starter, t, x, free, follows):
         found, nearly = way(starter, t, near, guess, follows)
-        if nearly:
-            break
-    return found, nearly
+        if nearly and (x.size > DENSE or way is _at_rest or (rested(starter, t, found.x, follows) == found.x).all()):
+            return found, True
+        if best is None or nearly > best[1]:
+            best = found, nearly
+    return best
 
 
 def _ways(
@@ -130,13 +140,16 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     if found.residual >= EXACT or x.size > DENSE:
         return found, False
     before, scale = (starter.every.copy(), starter.resting.copy()), starter.scale(t, guess)
-    near, fewer = starter.without_noise(found.x, scale), True  # what round-off left is no magnitude
-    unrated(starter, t, near)
-    while fewer:
-        near = rested(starter, t, near, free)
-        found, holds = rescaled(starter, t, near, guess, free & ~at_rest(starter, t, near, free), least=False)
-        near = starter.without_noise(found.x, scale)
-        fewer = holds and unrated(starter, t, near)
-    if not holds:
+    begun = starter.without_noise(found.x, scale)  # what round-off left is no magnitude
+    for still in (at_rest, resting):
+        near, fewer = begun, True
+        while fewer:
+            near = rested(starter, t, near, free)
+            unrated(starter, t, near)
+            found, holds = rescaled(starter, t, near, guess, free & ~still(starter, t, near, free), least=False)
+            near = starter.without_noise(found.x, scale)
+            fewer = holds and unrated(starter, t, near)
+        if holds:
+            break
         starter.every[:], starter.resting[:] = before
     return found, holds
