@@ -33,9 +33,9 @@ HOLDS, SHORTEN = 1.2, 1.0 / 32.0
 """Steps of a run over those of the longest length, up to which that length holds them and the tolerance does not (what
 algebra alone determines has no error that a step could test), in both runs of a pair; the least that the next run's is
 of it."""
-BY_STEPS, TOWARDS, ENOUGH = 2.0, 2.5, 20_000
-"""The power of the steps with which such errors fall at least, and mostly (rates of what is interpolated: 2.3 to 3);
-steps of a run behind which none is shortened."""
+TOWARDS, ENOUGH = 2.5, 20_000
+"""The power of the steps with which such errors mostly fall (rates of what is interpolated: 2.3 to 3); steps of a run
+behind which none is shortened."""
 LENGTHY, DEAR = 1000, 1e-8
 """Steps of a run in which so much happens that every method's loose runs have nothing in common, and a finer one costs
 less than another method's draft (the ring modulator at 1e-2, 1e-3, 1e-6: 0.10, 0.16, 0.6 s for 0.27, 0.63, 1.1);
@@ -155,7 +155,7 @@ class Estimate:
         credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
         credit *= ROOT if self.root else 1.0
         if shorter is not None:
-            part = shorter ** (ROOT * BY_STEPS if self.root else BY_STEPS)
+            part = shorter ** (self.law.by_steps * (ROOT if self.root else 1.0))
             shrink = self.law.safety * part / (1.0 - part)
         elif self._before is not None:
             over_before, step_before = self._before

@@ -171,7 +171,7 @@ class Runs:
         """Of radau, in the first step and at most; None: chosen.  The order of s stages is 2 s - 1."""
         if self.method == "radau" and self.options.order is not None:
             return (self.options.order + 1) // 2, (self.options.order + 1) // 2
-        return (3, lib.STAGES) if self.way.smooth else None
+        return (3, lib.STAGES) if self.way.smooth else self.way.stages
 
     @property
     def most_steps(self) -> int | None:

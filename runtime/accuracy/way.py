@@ -27,7 +27,8 @@ system of which radau's factors are cheap enough for it to take over."""
 class Way:
     """A method on a form of the model; index: of the form as the error test takes it, name: as the trace names it;
     reason: why method auto takes it; lasting: stability may hold its steps, for those of another are no longer; smooth:
-    the motion is long and smooth, however steep its laws; reduced: equations of index 2 taken at index 1.
+    the motion is long and smooth, however steep its laws; reduced: equations of index 2 taken at index 1; stages: of
+    radau, in the first step and at most (None: chosen).
     """
 
     method: str
@@ -38,6 +39,7 @@ class Way:
     lasting: bool = False
     smooth: bool = False
     reduced: bool = False
+    stages: tuple[int, int] | None = None
 
     @property
     def law(self) -> Law:
