@@ -28,7 +28,7 @@ FEW_STAGES = 3e-6
 EASY, FALLS = 2e-4, 4.0
 """Accuracy that the longest step of all reaches with three stages (of two periods of a sine in 20 steps 1e-5 to 1e-4 are
 left), and the power of the longest step with which errors mostly fall."""
-BESIDE, ROOT = 100.0, 0.2
+BESIDE, ROOT = 100.0, 0.1
 """Times the accuracy: the tolerance of the first run of three stages, whose errors are a tenth of it where it holds the
 steps; times the root of the accuracy: that with all stages, whose errors of what relaxes fall with the power 1.4 (1e-7
 and 5e-9 at 1e-4 and 1e-5, ladders and grids)."""
@@ -48,7 +48,7 @@ def by_steps(run: Run, target: Floats, take: Take) -> Achieved | None:
         return None
     few = wanted >= FEW_STAGES
     stages, law = ((3, 3), RELAXING[0]) if few else ((3, lib.STAGES), RELAXING[1])
-    longest = LONGEST / SHORTER * min((wanted / EASY) ** (1.0 / FALLS) if few else 1.0, 1.0)
+    longest = LONGEST / SHORTER * min((wanted / EASY) ** (1.0 / FALLS), 1.0) if few else 2.0 * LONGEST
     tolerance = min(BESIDE * wanted if few else ROOT * wanted**0.5, law.loosest)
     estimate, last, shorter = Estimate(law, target), None, SHORTER
     try:
