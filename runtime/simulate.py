@@ -157,14 +157,18 @@ def _achieved(
 
 def _relaxed(runs: Runs, options: Options, target: Floats) -> Achieved | None:
     """Runs of radau whose steps alone are shortened, of a model that can but relax; None where they come to nothing."""
-    way = runs.way
-    if way.method != "radau" or options.order or options.events or not relaxes(runs.system, runs.start):
+    way, stops = runs.way, options.stops is not None and bool(np.any(np.isfinite(options.stops)))
+    if way.method != "radau" or options.order or options.events or stops or not relaxes(runs.system, runs.start):
         return None
 
     def taken(stages: tuple[int, int] | None, steps: int | None) -> None:
         runs.take(replace(way, stages=stages), steps)
 
-    achieved = by_steps(runs.sampled, target, taken)
+    def since() -> Floats:
+        assert runs.compared.at is not None
+        return (runs.compared.at - options.t_start) / (options.t_end - options.t_start)
+
+    achieved = by_steps(runs.sampled, target, taken, since)
     taken(way.stages if achieved is None else runs.way.stages, None)
     return achieved
 

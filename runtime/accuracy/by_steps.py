@@ -1,18 +1,20 @@
 """An accuracy met by steps and tolerances that shrink together, of a model that can do nothing but relax (relaxing.py).
 
 Two runs of Radau IIA, every step of the second shorter than the first's: where the longest step holds it, by r, and where
-its tolerance does, by a tolerance r^3 times as large.  Of real decays and smooth sources errors fall with r^3, the stage
-order of three stages, at least: of the difference r^3 / (1 - r^3) is left.  With three stages steps of one length share
-their factors, which of grids cost as much as twenty steps; finer accuracies take all stages.  The first run costs a
-third of the second.  Where more happens than the longest step holds the runs are left to the tolerance (control.py).
+its tolerance does, by one r^3 times as large.  Of real decays and smooth sources errors fall with r^3, the stage order of
+three stages, at least: of the difference r^3 / (1 - r^3) is left; with r^2 where something relaxes from the start on and
+the error test, which takes the tolerance to 2/3, holds the steps.  With three stages steps of one length
+share their factors, which of grids cost as much as twenty steps; finer accuracies take all stages.  The first run costs
+a third of the second.  Where more happens than the longest step holds the runs are left to the tolerance (control.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.accuracy.control import QUIET, Achieved, Run
+from sysdyn.runtime.accuracy.control import Achieved, Run
 from sysdyn.runtime.accuracy.estimate import AIM, Estimate
 from sysdyn.runtime.accuracy.laws import RELAXING
 from sysdyn.runtime.accuracy.pairs import Sampled
@@ -23,47 +25,62 @@ from sysdyn.runtime.model.failures import SolverFailure
 
 SHORTER, CUBED = 0.35, 3.0
 """Of the longest step of the first run: that of the second; the power of it that is left of the tolerance."""
+BEGUN = 1.0
+"""Longest steps of the coarser run behind the start within which the tolerance may hold them."""
 FEW_STAGES = 3e-6
 """Accuracy from which on three stages take less work."""
-EASY, FALLS = 2e-4, 4.0
+EASY, FALLS = 2.5e-4, 4.0
 """Accuracy that the longest step of all reaches with three stages (of two periods of a sine in 20 steps 1e-5 to 1e-4 are
 left), and the power of the longest step with which errors mostly fall."""
-BESIDE, ROOT = 100.0, 0.1
+BESIDE, ROOT = 80.0, 0.08
 """Times the accuracy: the tolerance of the first run of three stages, whose errors are a tenth of it where it holds the
 steps; times the root of the accuracy: that with all stages, whose errors of what relaxes fall with the power 1.4 (1e-7
 and 5e-9 at 1e-4 and 1e-5, ladders and grids)."""
+FEWER = 0.8
+"""Of the longest steps of all: with all stages (first runs a third longer left third ones to follow on grids)."""
 RUNS, ONCE_MORE, LEAST = 3, 0.6, 0.2
 """Runs at most; of the longest step of the second: that of a third, and the least that is worth it."""
-CROWDED = 1.5
-"""Times as many steps as the longest would take, and QUIET each decade of the tolerance: with more it holds too many."""
+CROWDED, EVER, DECADE = 1.2, 3.0, 2.5
+"""Times as many steps as the longest would take, with so many more ever, and each decade of the tolerance: with more
+the tolerance holds too many (ladders and grids take up to 1.15 times, with 1 and 2)."""
 
 Take = Callable[[tuple[int, int] | None, int | None], None]
 """Takes the stages of the next runs, at first and at most, and how many steps they may take."""
 
 
-def by_steps(run: Run, target: Floats, take: Take) -> Achieved | None:
-    """What two or three runs are worth; None: too much happens, or they miss what was asked."""
+def _weighed(coarse: Sampled, fine: Sampled, weight: Floats) -> tuple[Sampled, Sampled]:
+    """Two runs whose values where they are compared count so much [instants]."""
+    values, late = coarse.own
+    fine = replace(fine, values=fine.values * weight[:, None], late=fine.late * weight[:, None])
+    return replace(coarse, there=(values * weight[:, None], late * weight[:, None])), fine
+
+
+def by_steps(run: Run, target: Floats, take: Take, since: Callable[[], Floats]) -> Achieved | None:
+    """What two or three runs are worth; None: too much happens, or they miss what was asked.  since: the start, as parts
+    of the span, where the last two are compared.
+    """
     wanted = float(np.min(target))
     if not wanted < 1.0:
         return None
     few = wanted >= FEW_STAGES
-    stages, law = ((3, 3), RELAXING[0]) if few else ((3, lib.STAGES), RELAXING[1])
-    longest = LONGEST / SHORTER * min((wanted / EASY) ** (1.0 / FALLS), 1.0) if few else 2.0 * LONGEST
-    tolerance = min(BESIDE * wanted if few else ROOT * wanted**0.5, law.loosest)
-    estimate, last, shorter = Estimate(law, target), None, SHORTER
+    stages = (3, 3 if few else lib.STAGES)
+    longest = LONGEST / SHORTER * (min((wanted / EASY) ** (1.0 / FALLS), 1.0) if few else FEWER)
+    tolerance = min(BESIDE * wanted if few else ROOT * wanted**0.5, RELAXING.loosest)
+    estimate, last, shorter, before = Estimate(RELAXING, target), None, SHORTER, longest
     try:
         for number in range(1, RUNS + 1):
-            take(stages, int(CROWDED / longest - QUIET * np.log10(tolerance)))
+            take(stages, int(CROWDED / longest + EVER - DECADE * np.log10(tolerance)))
             now: Sampled = run(tolerance, longest)
             if last is not None:
-                estimate.compare(last, now, shorter)
+                weight = np.where(since() < BEGUN * before, 1.0 / shorter, 1.0)
+                estimate.compare(*_weighed(last, now, weight), shorter)
                 if estimate.met:
                     return Achieved(estimate.apart, True, number, now.tolerance)
-                shorter = min(ONCE_MORE, (AIM * estimate.over) ** (-1.0 / law.by_steps))
+                shorter = min(ONCE_MORE, (AIM * estimate.over) ** (-1.0 / RELAXING.by_steps))
                 if not shorter >= LEAST:
                     return None
-            last, tolerance = now, tolerance * shorter**CUBED
-            longest = longest * shorter if few else LONGEST
+            last, before, tolerance = now, longest, tolerance * shorter**CUBED
+            longest = longest * shorter
     except SolverFailure as failure:
         if failure.late or failure.cause == "max_wall":
             raise

@@ -36,6 +36,8 @@ ROUGH = 1e-2
 APART = 0.1
 """Of a step: rows of a draft are no nearer to each other.  With one a step the rows between the steps of others are not
 seen: an amplifier then was estimated 500 times too good."""
+FIRST = 0.15
+"""Of the longest step: the first one of what relaxes, at most, so that runs that are compared begin apart."""
 BRIEFLY, LONGER = 24, 200
 """Steps of the windows in which Newton may fail in part of them: of a draft, of a run on steep laws."""
 
@@ -123,7 +125,8 @@ class Runs:
         """One integration's request; longest: step, as part of the span."""
         options, draft = self.options, self.controlled and self.done is None
         tried = options.method == "auto" and not self.way.lasting
-        instants, kinds = self.instants.rows(compared=self.controlled, draft=draft)
+        relaxes = self.way.stages is not None
+        instants, kinds = self.instants.rows(compared=self.controlled, draft=draft, early=relaxes)
         return Request(
             t_end=options.t_end,
             instants=instants,
@@ -140,6 +143,7 @@ class Runs:
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
             stages=self._stages,
+            begins=FIRST if relaxes else 0.0,
             stiff_steps=HELD if tried else STIFF,
             spare_steps=SPARE if draft and tried and self.system.unknowns <= FACTORED else 0.0,
             # of steep laws points that settle as loosely would count as failed
@@ -150,7 +154,7 @@ class Runs:
             audited=bool(self.quantities.meters),
             opening=self.opening,
             ceiling=self.ceiling,
-            apart=APART if draft and self.instants.open else 0.0,
+            apart=APART if draft and (self.instants.open or relaxes) else 0.0,
             events=options.events or None,
             begin=self.begin,
             least_norm=options.redundancy == "minimum_norm" and self.system.leaves_out,

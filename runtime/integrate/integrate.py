@@ -225,7 +225,7 @@ class Integration:
             method.max_order = request.max_order
         elif request.method == "radau":
             steep = any(scale.block == "dynamics_scale" for scale in self.system.form.scales)
-            method.stages, method.balances = first, int(steep)
+            method.stages, method.balances, method.begins = first, int(steep), self.request.begins
         elif self.underlying is not None:
             method.patience = request.stiff_steps
         if request.method == "dopri":

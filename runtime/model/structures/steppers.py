@@ -121,6 +121,7 @@ class Radau(c.Structure):
         ("linear", P),
         ("complex_linear", P * PAIRS),
         *[(name, I) for name in ["stages", "most_stages"]],
+        ("begins", D),
         *[(name, P) for name in ["smooth", "common_from", "common"]],
         ("commons", I),
         ("tolerance", D),
