@@ -1,11 +1,11 @@
 """An accuracy met by steps and tolerances that shrink together, of a model that can do nothing but relax (relaxing.py).
 
-Two runs of Radau IIA, every step of the second shorter than the first's: where the longest step holds it, by r, and where
-its tolerance does, by one r^3 times as large.  Of real decays and smooth sources errors fall with r^3, the stage order of
-three stages, at least: of the difference r^3 / (1 - r^3) is left; with r^2 where something relaxes from the start on and
-the error test, which takes the tolerance to 2/3, holds the steps.  With three stages steps of one length
+Two runs of Radau IIA, every step of the second shorter than the first's: where the longest step holds it, by r, and
+where its tolerance does, by one r^3 times as large.  Of real decays and smooth sources errors fall with r^3, the stage
+order of three stages, at least: of the difference r^3 / (1 - r^3) is left; with r^2 where something relaxes from the
+start on and the error test, which takes the tolerance to 2/3, holds the steps.  With three stages steps of one length
 share their factors, which of grids cost as much as twenty steps; finer accuracies take all stages.  The first run costs
-a third of the second.  Where more happens than the longest step holds the runs are left to the tolerance (control.py).
+a third to a half of the second.  Where more happens than the longest step holds the tolerance leads (control.py).
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ BEGUN = 1.0
 FEW_STAGES = 3e-6
 """Accuracy from which on three stages take less work."""
 EASY, FALLS = 2.5e-4, 4.0
-"""Accuracy that the longest step of all reaches with three stages (of two periods of a sine in 20 steps 1e-5 to 1e-4 are
-left), and the power of the longest step with which errors mostly fall."""
+"""Accuracy that the longest step of all reaches with three stages (of two periods of a sine in 20 steps 1e-5 to 1e-4
+are left), and the power of the longest step with which errors mostly fall."""
 BESIDE, ROOT = 80.0, 0.08
 """Times the accuracy: the tolerance of the first run of three stages, whose errors are a tenth of it where it holds the
 steps; times the root of the accuracy: that with all stages, whose errors of what relaxes fall with the power 1.4 (1e-7
 and 5e-9 at 1e-4 and 1e-5, ladders and grids)."""
-FEWER = 0.8
+FEWER = 0.7
 """Of the longest steps of all: with all stages (first runs a third longer left third ones to follow on grids)."""
 RUNS, ONCE_MORE, LEAST = 3, 0.6, 0.2
 """Runs at most; of the longest step of the second: that of a third, and the least that is worth it."""
@@ -80,7 +80,7 @@ def by_steps(run: Run, target: Floats, take: Take, since: Callable[[], Floats]) 
                 if not shorter >= LEAST:
                     return None
             last, before, tolerance = now, longest, tolerance * shorter**CUBED
-            longest = longest * shorter
+            longest = longest * shorter if few else LONGEST * ONCE_MORE ** (number - 1)
     except SolverFailure as failure:
         if failure.late or failure.cause == "max_wall":
             raise

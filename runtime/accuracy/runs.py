@@ -125,8 +125,8 @@ class Runs:
         """One integration's request; longest: step, as part of the span."""
         options, draft = self.options, self.controlled and self.done is None
         tried = options.method == "auto" and not self.way.lasting
-        relaxes = self.way.stages is not None
-        instants, kinds = self.instants.rows(compared=self.controlled, draft=draft, early=relaxes)
+        early = self.way.stages == (3, 3)
+        instants, kinds = self.instants.rows(compared=self.controlled, draft=draft, early=early)
         return Request(
             t_end=options.t_end,
             instants=instants,
@@ -143,7 +143,7 @@ class Runs:
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
             stages=self._stages,
-            begins=FIRST if relaxes else 0.0,
+            begins=FIRST if early else 0.0,
             stiff_steps=HELD if tried else STIFF,
             spare_steps=SPARE if draft and tried and self.system.unknowns <= FACTORED else 0.0,
             # of steep laws points that settle as loosely would count as failed
@@ -154,7 +154,7 @@ class Runs:
             audited=bool(self.quantities.meters),
             opening=self.opening,
             ceiling=self.ceiling,
-            apart=APART if draft and (self.instants.open or relaxes) else 0.0,
+            apart=APART if draft and (self.instants.open or early) else 0.0,
             events=options.events or None,
             begin=self.begin,
             least_norm=options.redundancy == "minimum_norm" and self.system.leaves_out,
