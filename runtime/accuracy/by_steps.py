@@ -19,7 +19,6 @@ from sysdyn.runtime.accuracy.estimate import AIM, Estimate
 from sysdyn.runtime.accuracy.laws import RELAXING
 from sysdyn.runtime.accuracy.pairs import Sampled
 from sysdyn.runtime.integrate.request import LONGEST
-from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 
@@ -27,18 +26,18 @@ SHORTER, CUBED = 0.35, 3.0
 """Of the longest step of the first run: that of the second; the power of it that is left of the tolerance."""
 BEGUN = 1.0
 """Longest steps of the coarser run behind the start within which the tolerance may hold them."""
-FEW_STAGES = 3e-6
-"""Accuracy from which on three stages take less work."""
-EASY, FALLS = 2.5e-4, 4.0
+FEW_STAGES, FINEST = 3e-6, 1e-10
+"""Accuracies from which on three stages take less work, and down to which steps are known to serve."""
+EASY, FALLS = 4e-4, 4.0
 """Accuracy that the longest step of all reaches with three stages (of two periods of a sine in 20 steps 1e-5 to 1e-4
 are left), and the power of the longest step with which errors mostly fall."""
-BESIDE, ROOT = 80.0, 0.08
+BESIDE, ROOT = 60.0, 0.06
 """Times the accuracy: the tolerance of the first run of three stages, whose errors are a tenth of it where it holds the
 steps; times the root of the accuracy: that with all stages, whose errors of what relaxes fall with the power 1.4 (1e-7
 and 5e-9 at 1e-4 and 1e-5, ladders and grids)."""
 FEWER = 0.7
 """Of the longest steps of all: with all stages (first runs a third longer left third ones to follow on grids)."""
-RUNS, ONCE_MORE, LEAST = 3, 0.6, 0.2
+RUNS, ONCE_MORE, LEAST = 3, 0.6, 0.5
 """Runs at most; of the longest step of the second: that of a third, and the least that is worth it."""
 CROWDED, EVER, DECADE = 1.2, 3.0, 2.5
 """Times as many steps as the longest would take, with so many more ever, and each decade of the tolerance: with more
@@ -56,14 +55,14 @@ def _weighed(coarse: Sampled, fine: Sampled, weight: Floats) -> tuple[Sampled, S
 
 
 def by_steps(run: Run, target: Floats, take: Take, since: Callable[[], Floats]) -> Achieved | None:
-    """What two or three runs are worth; None: too much happens, or they miss what was asked.  since: the start, as parts
-    of the span, where the last two are compared.
+    """What two or three runs are worth; None: too much happens, or they miss what was asked.  since: the start, as
+    parts of the span, where the last two are compared.
     """
     wanted = float(np.min(target))
-    if not wanted < 1.0:
+    if not FINEST <= wanted < 1.0:
         return None
     few = wanted >= FEW_STAGES
-    stages = (3, 3 if few else lib.STAGES)
+    stages = (3, 3) if few else None
     longest = LONGEST / SHORTER * (min((wanted / EASY) ** (1.0 / FALLS), 1.0) if few else FEWER)
     tolerance = min(BESIDE * wanted if few else ROOT * wanted**0.5, RELAXING.loosest)
     estimate, last, shorter, before = Estimate(RELAXING, target), None, SHORTER, longest
@@ -72,7 +71,10 @@ def by_steps(run: Run, target: Floats, take: Take, since: Callable[[], Floats]) 
             take(stages, int(CROWDED / longest + EVER - DECADE * np.log10(tolerance)))
             now: Sampled = run(tolerance, longest)
             if last is not None:
-                weight = np.where(since() < BEGUN * before, 1.0 / shorter, 1.0)
+                times = since()
+                if not len(times) == len(now.values) == len(last.own[0]):
+                    return None
+                weight = np.where(times < BEGUN * before, 1.0 / shorter, 1.0)
                 estimate.compare(*_weighed(last, now, weight), shorter)
                 if estimate.met:
                     return Achieved(estimate.apart, True, number, now.tolerance)

@@ -44,7 +44,9 @@ def _reciprocal(system: System, start: ConsistentState) -> bool:
     """Whether what a flow does to a coordinate is what the flow of that does to its own, and reactions are what
     constraints ask: of two motions at random, for no entry's number cancels another's.
     """
-    slopes = [system.slopes(start.t, *start.for_form(system), rate=rate) for rate in (False, True)]
+    point = start.for_form(system)
+    slopes = RATE * system.slopes(start.t, *point, rate=True)
+    slopes += system.slopes(start.t, *point, rate=False)
     rows, flows = _along(system, "dynamics", "f")
     chance = np.random.default_rng(1)
     one, two = (chance.uniform(1.0, 2.0, flows.size) for _ in range(2))
@@ -64,16 +66,23 @@ def _reciprocal(system: System, start: ConsistentState) -> bool:
 
 def _along(system: System, group: str, kind: str) -> tuple[Ints, Ints]:
     """Rows of a group, and places of the unknowns of one kind with the same owners."""
+    return system.once(("along", group, kind), lambda: _found_along(system, group, kind))
+
+
+def _found_along(system: System, group: str, kind: str) -> tuple[Ints, Ints]:
     form, description = system.form, system.description
     place = {description.families[k].owner: int(form.at[k]) for k in description.families_of(kind)}
-    found = [(first, place[row.owner], row.size) for name, k, first in form.groups
-             if name == group and (row := description.rows[k]).owner in place]
+    found = [
+        (first, place[row.owner], row.size)
+        for name, k, first in form.groups
+        if name == group and (row := description.rows[k]).owner in place
+    ]
     parts = [np.stack([first + np.arange(n), at + np.arange(n)]) for first, at, n in found]
     both = np.concatenate(parts, axis=1) if parts else np.zeros((2, 0), dtype=np.int64)
     return both[0], both[1]
 
 
-def _motion(system: System, slopes: list[Floats], flows: Ints, f: Floats) -> Floats:
+def _motion(system: System, slopes: Floats, flows: Ints, f: Floats) -> Floats:
     """Of all unknowns where flows are f e^(sigma t): displacements their integrals, momenta what they are of them."""
     found = np.zeros(system.unknowns)
     found[flows] = f
@@ -87,11 +96,10 @@ def _motion(system: System, slopes: list[Floats], flows: Ints, f: Floats) -> Flo
     return found
 
 
-def _rows(system: System, slopes: list[Floats], x: Floats) -> Floats:
-    """What a motion x e^(sigma t) [unknowns] puts into every row; slopes: dF/dy, dF/dyd [entries]."""
+def _rows(system: System, slopes: Floats, x: Floats) -> Floats:
+    """What a motion x e^(sigma t) [unknowns] puts into every row; slopes: dF/dy + sigma dF/dyd [entries]."""
     pattern = system.pattern
-    terms = (slopes[0] + RATE * slopes[1]) * x[pattern.columns_of()]
-    return np.bincount(pattern.row, terms, minlength=system.rows)
+    return np.bincount(pattern.row, slopes * x[pattern.columns_of()], minlength=system.rows)
 
 
 def _equal(one: Floats, two: Floats) -> bool:

@@ -44,8 +44,8 @@ class Request:
     by which runs are compared and nothing else, of a draft for all, 0: round-off; audited: they are compared by the
     audit's members too;
     condense: what constant sums define leaves the system (condense/);
-    stages: of radau, in the first step and at most, None: chosen; begins: its first step at most, as part of the longest,
-    0: chosen;
+    stages: of radau, in the first step and at most, None: chosen; begins: its first step at most, as part of the
+    longest, 0: chosen;
     opening: of dopri, rosenbrock: first step as an earlier run found it fit (steppers/explicit/dopri.h), 0: chosen;
     ceiling [unknowns]: what guessed sizes of states are no larger than, as an earlier run met them, None: any;
     unstrained: steps, with a quarter of those before, in which Newton may not fail in nearly every second one, else it
