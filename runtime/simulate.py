@@ -164,11 +164,7 @@ def _relaxed(runs: Runs, options: Options, target: Floats) -> Achieved | None:
     def taken(stages: tuple[int, int] | None, steps: int | None) -> None:
         runs.take(replace(way, stages=stages), steps)
 
-    def since() -> Floats:
-        assert runs.compared.at is not None
-        return (runs.compared.at - options.t_start) / (options.t_end - options.t_start)
-
-    achieved = by_steps(runs.sampled, target, taken, since)
+    achieved = by_steps(runs.sampled, target, taken)
     taken(way.stages if achieved is None else runs.way.stages, None)
     return achieved
 

@@ -2,8 +2,8 @@
 
 Two runs of Radau IIA, every step of the second shorter than the first's: where the longest step holds it, by r, and
 where its tolerance does, by one r^3 times as large.  Of real decays and smooth sources errors fall with r^3, the stage
-order of three stages, at least: of the difference r^3 / (1 - r^3) is left; with r^2 where something relaxes from the
-start on and the error test, which takes the tolerance to 2/3, holds the steps.  With three stages steps of one length
+order of three stages, at least; with r^2 where the error test, which takes the tolerance to 2/3, holds the steps: of
+the difference r^2.5 / (1 - r^2.5) is left (laws.py).  With three stages steps of one length
 share their factors, which of grids cost as much as twenty steps; finer accuracies take all stages.  The first run costs
 a third to a half of the second.  Where more happens than the longest step holds the tolerance leads (control.py).
 """
@@ -11,7 +11,6 @@ a third to a half of the second.  Where more happens than the longest step holds
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.accuracy.control import Achieved, Run
@@ -24,8 +23,6 @@ from sysdyn.runtime.model.failures import SolverFailure
 
 SHORTER, CUBED = 0.35, 3.0
 """Of the longest step of the first run: that of the second; the power of it that is left of the tolerance."""
-BEGUN = 1.0
-"""Longest steps of the coarser run behind the start within which the tolerance may hold them."""
 FEW_STAGES, FINEST = 3e-6, 1e-10
 """Accuracies from which on three stages take less work, and down to which steps are known to serve."""
 EASY, FALLS = 4e-4, 4.0
@@ -47,17 +44,8 @@ Take = Callable[[tuple[int, int] | None, int | None], None]
 """Takes the stages of the next runs, at first and at most, and how many steps they may take."""
 
 
-def _weighed(coarse: Sampled, fine: Sampled, weight: Floats) -> tuple[Sampled, Sampled]:
-    """Two runs whose values where they are compared count so much [instants]."""
-    values, late = coarse.own
-    fine = replace(fine, values=fine.values * weight[:, None], late=fine.late * weight[:, None])
-    return replace(coarse, there=(values * weight[:, None], late * weight[:, None])), fine
-
-
-def by_steps(run: Run, target: Floats, take: Take, since: Callable[[], Floats]) -> Achieved | None:
-    """What two or three runs are worth; None: too much happens, or they miss what was asked.  since: the start, as
-    parts of the span, where the last two are compared.
-    """
+def by_steps(run: Run, target: Floats, take: Take) -> Achieved | None:
+    """What two or three runs are worth; None: too much happens, or they miss what was asked."""
     wanted = float(np.min(target))
     if not FINEST <= wanted < 1.0:
         return None
@@ -65,23 +53,19 @@ def by_steps(run: Run, target: Floats, take: Take, since: Callable[[], Floats]) 
     stages = (3, 3) if few else None
     longest = LONGEST / SHORTER * (min((wanted / EASY) ** (1.0 / FALLS), 1.0) if few else FEWER)
     tolerance = min(BESIDE * wanted if few else ROOT * wanted**0.5, RELAXING.loosest)
-    estimate, last, shorter, before = Estimate(RELAXING, target), None, SHORTER, longest
+    estimate, last, shorter = Estimate(RELAXING, target), None, SHORTER
     try:
         for number in range(1, RUNS + 1):
             take(stages, int(CROWDED / longest + EVER - DECADE * np.log10(tolerance)))
             now: Sampled = run(tolerance, longest)
             if last is not None:
-                times = since()
-                if not len(times) == len(now.values) == len(last.own[0]):
-                    return None
-                weight = np.where(times < BEGUN * before, 1.0 / shorter, 1.0)
-                estimate.compare(*_weighed(last, now, weight), shorter)
+                estimate.compare(last, now, shorter)
                 if estimate.met:
                     return Achieved(estimate.apart, True, number, now.tolerance)
                 shorter = min(ONCE_MORE, (AIM * estimate.over) ** (-1.0 / RELAXING.by_steps))
                 if not shorter >= LEAST:
                     return None
-            last, before, tolerance = now, longest, tolerance * shorter**CUBED
+            last, tolerance = now, tolerance * shorter**CUBED
             longest = longest * shorter if few else LONGEST * ONCE_MORE ** (number - 1)
     except SolverFailure as failure:
         if failure.late or failure.cause == "max_wall":

@@ -28,15 +28,13 @@ BEYOND = 100.0
 
 
 class Compared:
-    """samplings: of the last two runs; jumps (s): events of the last; at (s): where it was compared
-    with the one before; observed: how many values a row has.
-    """
+    """samplings: of the last two runs; jumps (s): events of the last; observed: how many values a row has."""
 
     def __init__(self, options: Options, instants: Instants, observed: int) -> None:
         self.options, self.instants, self._observed = options, instants, observed
         self.samplings: tuple[Sampled, ...] = ()
         self.jumps: Floats | None = None
-        self.at: Floats | None = None
+        self._at: Floats | None = None
         self._opened: tuple[Finished, LeftOpen] | None = None
         self._own: list[Floats] = []
         self.begin()
@@ -88,7 +86,7 @@ class Compared:
         own = self._of_its_own(finished)
         if own is not None:
             there = _values(own, finished, quantities), self._late(own, quantities, steps=True)
-        self.at = instants if instants is not None else self.instants.common
+        self._at = instants if instants is not None else self.instants.common
         values = there[0] if there is not None and instants is None else _values(rows, finished, quantities)
         noise = pairs.ROUND_OFF * quantities.beside(finished.largest, finished.magnitude)
         noise = np.append(noise, np.zeros(len(quantities.meters)))
@@ -140,10 +138,10 @@ class Compared:
         """
         jumps = np.unique([e.time for e in finished.events]) if finished.events else np.zeros(0)
         last, self.jumps = self.jumps, jumps
-        assert self.at is not None
-        if last is None or len(rows) != len(self.at):
+        assert self._at is not None
+        if last is None or len(rows) != len(self._at):
             return None
-        late = late_by(self.at, last, jumps, self.options.t_end - self.options.t_start)[:, None]
+        late = late_by(self._at, last, jumps, self.options.t_end - self.options.t_start)[:, None]
         if not late.any():
             return None
         moved = _with_meters(late * np.abs(self._rates(rows, quantities)), quantities)
@@ -187,7 +185,7 @@ class Compared:
         if len(self.samplings) < 2 or self.samplings[0].own[0].shape != self.samplings[1].values.shape:
             return name, asked.get(name, 0.0), None, False
         one, two = self.samplings
-        assert self.at is not None
+        assert self._at is not None
         size = (one if one.tolerance < two.tolerance else two).largest
         with np.errstate(all="ignore"):
             ratio = pairs.apart(one, two) / (size * target)
@@ -198,7 +196,7 @@ class Compared:
         beyond = np.flatnonzero(ratio[:, k] > 1.0)
         name, at = names[k], int(beyond[0]) if beyond.size else None
         undefined = at is not None and not np.isfinite([one.own[0][at, k], two.values[at, k]]).all()  # or at the edge
-        return name, asked[name], None if at is None else float(self.at[at]), undefined
+        return name, asked[name], None if at is None else float(self._at[at]), undefined
 
 
 def _values(rows: Floats, finished: Finished, quantities: Quantities) -> Floats:

@@ -122,8 +122,9 @@ in common with the run behind it, and is not cheaper."""
 
 
 RELAXING = Law(1.0, 1.0, 1.0, 1e-17, safety=1.8, by_steps=2.5)
-"""Of radau on what can but relax (by_steps.py): the power is the stage order of three stages, 3, less half a one: where a
-pulse comes in the midst of rest the tolerance holds the steps (of 40 lines, grids and chains with 3 one was 7 times off).
+"""Of radau on what can but relax (by_steps.py): the power is the stage order of three stages, 3, less half a one: where
+a pulse comes in the midst of rest the tolerance holds the steps (of 70 lines, grids and chains with 3 one was 7 times
+further off than was asked, with this none).
 """
 
 
