@@ -15,7 +15,6 @@ from sysdyn.runtime.accuracy.alternatives import alternatives
 from sysdyn.runtime.accuracy.by_steps import by_steps
 from sysdyn.runtime.accuracy.control import Achieved, Lighter, control
 from sysdyn.runtime.accuracy.options import Options, choose_index, choose_method, own_tolerances
-from sysdyn.runtime.accuracy.relaxing import relaxes
 from sysdyn.runtime.accuracy.runs import Runs, Samples
 from sysdyn.runtime.accuracy.second_opinion import confirmed
 from sysdyn.runtime.accuracy.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
@@ -148,25 +147,11 @@ def _achieved(
 ) -> Achieved:
     """Runs by one method; last: no other takes over, so that it goes on where it would be left to the next."""
     target, first = _targets(runs, options), options.first
-    relaxed = _relaxed(runs, options, target) if first is None and not (doubted or tame) else None
-    if relaxed is not None:
+    relaxed = by_steps(runs, options, target) if first is None and not (doubted or tame) else None
+    if isinstance(relaxed, Achieved):
         return relaxed
     law = replace(runs.way.law, brief=False) if last else runs.way.law
-    return control(runs.sampled, target, law, doubted=doubted, tame=tame, first=first, lighter=lighter)
-
-
-def _relaxed(runs: Runs, options: Options, target: Floats) -> Achieved | None:
-    """Runs of radau whose steps alone are shortened, of a model that can but relax; None where they come to nothing."""
-    way, stops = runs.way, options.stops is not None and bool(np.any(np.isfinite(options.stops)))
-    if way.method != "radau" or options.order or options.events or stops or not relaxes(runs.system, runs.start):
-        return None
-
-    def taken(stages: tuple[int, int] | None, steps: int | None) -> None:
-        runs.take(replace(way, stages=stages), steps)
-
-    achieved = by_steps(runs.sampled, target, taken)
-    taken(way.stages if achieved is None else runs.way.stages, None)
-    return achieved
+    return control(runs.sampled, target, law, doubted=doubted, tame=tame, first=first, lighter=lighter, draft=relaxed)
 
 
 def _lighter(runs: Runs, options: Options, others: tuple[Way, ...]) -> Lighter | None:

@@ -1,28 +1,33 @@
 """An accuracy met by steps and tolerances that shrink together, of a model that can do nothing but relax (relaxing.py).
 
 Two runs of Radau IIA, every step of the second shorter than the first's: where the longest step holds it, by r, and
-where its tolerance does, by one r^3 times as large.  Of real decays and smooth sources errors fall with r^3, the stage
-order of three stages, at least; with r^2 where the error test, which takes the tolerance to 2/3, holds the steps: of
-the difference r^2.5 / (1 - r^2.5) is left (laws.py).  With three stages steps of one length
-share their factors, which of grids cost as much as twenty steps; finer accuracies take all stages.  The first run costs
-a third to a half of the second.  Where more happens than the longest step holds the tolerance leads (control.py).
+where its tolerance does, by one r^3 times as large or less.  Of real decays and smooth sources errors fall with r^3,
+the stage order of three stages, at least; with r^2 where the error test, which takes the tolerance to 2/3, holds the
+steps: of the difference r^2.5 / (1 - r^2.5) is left (laws.py).  With three stages steps of one length share their
+factors, which of grids cost as much as twenty steps; finer accuracies take all stages.  The first run costs a third to
+a half of the second.  Where more happens than the longest step holds the tolerance leads (control.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.accuracy.control import Achieved, Run
 from sysdyn.runtime.accuracy.estimate import AIM, Estimate
 from sysdyn.runtime.accuracy.laws import RELAXING
+from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.accuracy.pairs import Sampled
+from sysdyn.runtime.accuracy.relaxing import relaxes
+from sysdyn.runtime.accuracy.runs import Runs
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 
-SHORTER, CUBED = 0.35, 3.0
-"""Of the longest step of the first run: that of the second; the power of it that is left of the tolerance."""
+SHORTER, FEW, ALL = 0.35, 3.0, 4.5
+"""Of the longest step of the first run: that of the second; the power of it that is left of the tolerance, with three
+stages and with all, whose errors where something relaxes fell with the power 0.43 of it at worst."""
 FEW_STAGES, FINEST = 3e-6, 1e-10
 """Accuracies from which on three stages take less work, and down to which steps are known to serve."""
 EASY, FALLS = 4e-4, 4.0
@@ -40,15 +45,34 @@ CROWDED, EVER, DECADE = 1.2, 3.0, 2.5
 """Times as many steps as the longest would take, with so many more ever, and each decade of the tolerance: with more
 the tolerance holds too many (ladders and grids take up to 1.15 times, with 1 and 2)."""
 
+SIMPLE = 30
+"""Unknowns up to which the question whether they relax costs what the answer saves."""
+
 Take = Callable[[tuple[int, int] | None, int | None], None]
 """Takes the stages of the next runs, at first and at most, and how many steps they may take."""
 
 
-def by_steps(run: Run, target: Floats, take: Take) -> Achieved | None:
-    """What two or three runs are worth; None: too much happens, or they miss what was asked."""
-    wanted = float(np.min(target))
-    if not FINEST <= wanted < 1.0:
+def by_steps(runs: Runs, options: Options, target: Floats) -> Achieved | Sampled | None:
+    """What runs of a model that can but relax are worth, or the last of them where they miss what was asked; None: it
+    is another, or too much happens.
+    """
+    way, stops = runs.way, options.stops is not None and bool(np.isfinite(options.stops).any())
+    if way.method != "radau" or options.order or options.events or stops or runs.system.unknowns <= SIMPLE:
         return None
+    if not FINEST <= float(np.min(target)) < 1.0 or not relaxes(runs.system, runs.start):
+        return None
+
+    def take(stages: tuple[int, int] | None, steps: int | None) -> None:
+        runs.take(replace(way, stages=stages), steps)
+
+    found = shortened(runs.sampled, target, take)
+    take(runs.way.stages if isinstance(found, Achieved) else way.stages, None)
+    return found
+
+
+def shortened(run: Run, target: Floats, take: Take) -> Achieved | Sampled | None:
+    """What two or three runs are worth; the last of them where they miss what was asked; None: too much happens."""
+    wanted = float(np.min(target))
     few = wanted >= FEW_STAGES
     stages = (3, 3) if few else None
     longest = LONGEST / SHORTER * (min((wanted / EASY) ** (1.0 / FALLS), 1.0) if few else FEWER)
@@ -64,10 +88,11 @@ def by_steps(run: Run, target: Floats, take: Take) -> Achieved | None:
                     return Achieved(estimate.apart, True, number, now.tolerance)
                 shorter = min(ONCE_MORE, (AIM * estimate.over) ** (-1.0 / RELAXING.by_steps))
                 if not shorter >= LEAST:
-                    return None
-            last, tolerance = now, tolerance * shorter**CUBED
+                    return now
+            last, tolerance = now, tolerance * shorter ** (FEW if few else ALL)
             longest = longest * shorter if few else LONGEST * ONCE_MORE ** (number - 1)
     except SolverFailure as failure:
         if failure.late or failure.cause == "max_wall":
             raise
-    return None
+        return None
+    return last

@@ -153,18 +153,19 @@ def control(
     tame: bool = False,
     first: float | None = None,
     lighter: Lighter | None = None,
+    draft: Sampled | None = None,
 ) -> Achieved:
     """Runs until the last one's estimated error meets `target` [quantities], at most RUNS times.
 
     doubted: another method failed here, and a pair of runs is not believed on its own; tame: loose runs are
     known to have nothing in common here; first: the tolerance of the run behind the draft, where one is known that
-    does; lighter: takes over where little happens.
+    does; lighter: takes over where little happens; draft: a run to begin with (None: one of its own).
 
     Raises SolverFailure where the first runs fail.
     """
     wanted = float(np.min(target, initial=1.0))
     tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
-    last = _draft(run, min(tolerance, TAME * law.ratio) if tame else tolerance, law)
+    last = draft or _draft(run, min(tolerance, TAME * law.ratio) if tame else tolerance, law)
     estimate, longest = Estimate(law, target), LONGEST
     still = _quiet(last)
     shorter: float | None = None
@@ -173,7 +174,7 @@ def control(
         tolerance = law.tolerance(wanted, last.steps)
     ratio = max(law.ratio, TENTH) if last.tolerance >= law.loosest else law.ratio
     tolerance = max(min(tolerance, ratio * last.tolerance), law.far * last.tolerance, law.finest)
-    usual = first is None and LIGHTLY <= wanted < 1.0 and not doubted
+    usual = first is None and draft is None and LIGHTLY <= wanted < 1.0 and not doubted
     light = _agreed(run, last, lighter, target, wanted) if lighter is not None and usual else None
     if light is not None:
         return light
