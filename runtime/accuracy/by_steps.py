@@ -28,8 +28,9 @@ from sysdyn.runtime.model.failures import SolverFailure
 SHORTER, FEW, ALL = 0.35, 3.0, 4.5
 """Of the longest step of the first run: that of the second; the power of it that is left of the tolerance, with three
 stages and with all, whose errors where something relaxes fell with the power 0.43 of it at worst."""
-FEW_STAGES, FINEST = 3e-6, 1e-10
-"""Accuracies from which on three stages take less work, and down to which steps are known to serve."""
+COARSEST, FEW_STAGES, FINEST = 3e-3, 3e-6, 1e-10
+"""Accuracies above which the bdf behind a draft costs no more (control.py), from which on three stages take less work,
+and down to which steps are known to serve."""
 EASY, FALLS = 4e-4, 4.0
 """Accuracy that the longest step of all reaches with three stages (of two periods of a sine in 20 steps 1e-5 to 1e-4
 are left), and the power of the longest step with which errors mostly fall."""
@@ -59,7 +60,7 @@ def by_steps(runs: Runs, options: Options, target: Floats) -> Achieved | Sampled
     way, stops = runs.way, options.stops is not None and bool(np.isfinite(options.stops).any())
     if way.method != "radau" or options.order or options.events or stops or runs.system.unknowns <= SIMPLE:
         return None
-    if not FINEST <= float(np.min(target)) < 1.0 or not relaxes(runs.system, runs.start):
+    if not FINEST <= float(np.min(target)) <= COARSEST or not relaxes(runs.system, runs.start):
         return None
 
     def take(stages: tuple[int, int] | None, steps: int | None) -> None:

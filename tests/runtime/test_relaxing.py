@@ -61,7 +61,7 @@ def test_one_sort_of_store_and_no_gyrator_relax(formulation, store, more, so, tm
     told = questions(monkeypatch)
     monkeypatch.setattr(by_steps, "SIMPLE", 0)
     path = asked(tmp_path, store=store, more=more)
-    simulate(path, method="radau", formulation=formulation, accuracy=1e-2, output=tmp_path / "t.h5", unmet="warn")
+    simulate(path, method="radau", formulation=formulation, accuracy=1e-3, output=tmp_path / "t.h5", unmet="warn")
     assert told == [so]
 
 
