@@ -16,7 +16,7 @@ from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
 
-ALIKE = 1e-9
+ALIKE = 1e-12
 """Of the terms of two sums that symmetry makes equal."""
 RATE = 0.7548776662466927
 """sigma, of no meaning (1 / s): of K and M one is absent."""
@@ -49,7 +49,9 @@ def _reciprocal(system: System, start: ConsistentState) -> bool:
     slopes += system.slopes(start.t, *point, rate=False)
     rows, flows = _along(system, "dynamics", "f")
     chance = np.random.default_rng(1)
-    one, two = (chance.uniform(1.0, 2.0, flows.size) for _ in range(2))
+    terms = np.bincount(system.pattern.row, np.abs(slopes), minlength=system.rows)[rows]
+    own = 1.0 / np.sqrt(np.where(terms > 0.0, terms, 1.0))  # a weak gyrator beside a busbar is seen as it is
+    one, two = (own * chance.uniform(1.0, 2.0, flows.size) for _ in range(2))
     forces = [_rows(system, slopes, _motion(system, slopes, flows, f)) for f in (one, two)]
     if not _equal(two * forces[0][rows], one * forces[1][rows]):
         return False
@@ -99,7 +101,8 @@ def _motion(system: System, slopes: Floats, flows: Ints, f: Floats) -> Floats:
 def _rows(system: System, slopes: Floats, x: Floats) -> Floats:
     """What a motion x e^(sigma t) [unknowns] puts into every row; slopes: dF/dy + sigma dF/dyd [entries]."""
     pattern = system.pattern
-    return np.bincount(pattern.row, slopes * x[pattern.columns_of()], minlength=system.rows)
+    terms = slopes * x[pattern.columns_of()]
+    return np.bincount(pattern.row, terms, minlength=system.rows).astype(np.float64)
 
 
 def _equal(one: Floats, two: Floats) -> bool:
