@@ -91,7 +91,7 @@ class Integration:
         self._stepper()
         keeps = self.settlers.keeps
         told = self.start_rate, self._drift(), self.sizes.magnitude
-        self.driver = Driver(system, request, self.method, self.settler, keeps, *told)
+        self.driver = Driver(system, request, self.method, self.settlers.of_trace, keeps, *told)
         if self.forms is not None:
             self.driver.unread = np.asarray(self.forms.settled.unread, dtype=np.int32)
         if self.method.name == "rosenbrock" and system.form.scales and self.forms is None:
@@ -316,7 +316,8 @@ class Integration:
             self.cpu += time.process_time() - before
             self.driver.drain(sink)
             self.system.failure.check()
-            self.settler.system.failure.check()
+            for settler in self.settlers.both:
+                settler.system.failure.check()
             if progress is not None:
                 progress(method.t)
             if self.exchange is not None and state in (0, 3) and self.exchange.due(failed=state == 3):
@@ -396,7 +397,7 @@ class Integration:
             np.zeros(0),
             self.driver.largest(),
             self.cpu,
-            self.settler.core.contents.failures,
+            self.settlers.failures,
             self.driver.ledgers,
             self.happened(),
             self.driver.run.beyond,

@@ -11,7 +11,8 @@ begin); nothing else distinguishes the forms (q' = f are rows of the runtime's o
   0/3,5 the same with the constraints of the row families 3 and 5 not differentiated (structure/levels.py)
   constraints   what holds between displacements, flows and momenta alone (no rows q' - f)
   settled   all rows that hold at a consistent point: as written and hidden (no rows q' - f)
-  rated     the same and dynamics_rate: what has no inertia follows from the rate of its balance
+  valued    of these what no row derives by the rate of a flow: enough where values are shown and no rates
+  rated     settled and dynamics_rate: what has no inertia follows from the rate of its balance
   start     the same and the block `initial`; unknowns of the start alone
 """
 
@@ -73,12 +74,15 @@ FORMS: dict[str, tuple[tuple[str, str], ...]] = {
         ("lambda", "lambda"),
     ),
 }
+FORMS["valued"] = tuple(
+    call for call in FORMS["settled"] if call[1] not in ("momentum_rate", "phi_acceleration", "psi_rate", "gamma_rate")
+)
 FORMS["rated"] = (*FORMS["settled"], ("dynamics_rate", "dynamics_rate"))
 FORMS["start"] = (*FORMS["rated"], ("initial", "initial"))
 """form -> (block, group of rows it is added to); blocks a model lacks are skipped."""
 UNDERIVED = {"phi_acceleration": "phi_rate", "psi_rate": "psi"}
 """Block of form 0 -> what stands in its place where it is not differentiated."""
-BARE = ("constraints", "settled", "rated", "start")
+BARE = ("constraints", "settled", "valued", "rated", "start")
 """Forms without rows q' - f."""
 
 

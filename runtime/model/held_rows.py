@@ -23,6 +23,7 @@ _HELD = {
     "0": (("phi_acceleration", "kappa"), ("psi_rate", "mu")),
     "constraints": (("phi", "kappa"), ("phi_rate", "kappa"), ("psi", "mu")),
 }
+_HELD["valued"] = _HELD["constraints"]
 _HELD["settled"] = _HELD["rated"] = _HELD["start"] = (
     *_HELD["constraints"], ("phi_acceleration", "kappa"), ("psi_rate", "mu"),
 )  # fmt: skip

@@ -99,21 +99,54 @@ def flows_open(
 
 
 def _flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_], turning: bool) -> bool:
-    (jy, jyd), pattern, rates = settled.jacobian(t, y, yd), settled.pattern, rates_of(settled)
+    flows = (settled.kinds == "f") & ~state
+    open_ = _open(settled, (t, y, yd), state, flows if turning else np.zeros_like(flows))
+    return open_ is None or bool(open_[: settled.unknowns][flows].any())
+
+
+def _open(
+    settled: System, point: tuple[float, Floats, Floats], state: NDArray[np.bool_], untold: NDArray[np.bool_]
+) -> NDArray[np.bool_] | None:
+    """What settled rows leave open at a point [unknowns, rates]; untold [unknowns]: what laws may be flat for.  None
+    where that cannot be said.
+    """
+    (jy, jyd), pattern, rates = settled.jacobian(*point), settled.pattern, rates_of(settled)
     n, columns = settled.unknowns, pattern.columns_of()
-    if turning:
+    if untold.any():
         laws = settled.of_groups("dynamics", "gamma", "gamma_rate") & ~affine(settled)
-        flows = (settled.kinds == "f") & ~state
-        jy = np.where(laws[pattern.row] & flows[columns], 0.0, jy)
+        jy = np.where(laws[pattern.row] & untold[columns], 0.0, jy)
     moved = columns_of_rates(n, rates, columns)
     free, rated = ~state[columns], moved >= 0
     i = np.concatenate([pattern.row[free], pattern.row[rated]])
     j = np.concatenate([columns[free], moved[rated]])
     v = np.concatenate([jy[free], jyd[rated]])
     if not np.isfinite(v).all():
-        return True
-    open_ = free_unknowns((settled.rows, n + rates.size), (i, j, v))
-    return open_ is None or bool(open_[:n][(settled.kinds == "f") & ~state].any())
+        return None
+    return free_unknowns((settled.rows, n + rates.size), (i, j, v))
+
+
+def values_told(
+    valued: System, settled: System, point: tuple[float, Floats, Floats], state: NDArray[np.bool_], read: frozenset[int]
+) -> bool:
+    """Whether what follows from the state, its rates, and those of the families that are read follow from the rows of
+    form "valued" as from those of "settled".  Asked once of a text, at a point t, y, yd [unknowns as written].
+    """
+    return valued.once(("values told", read), lambda: _values_told(valued, settled, point, state, read))
+
+
+def _values_told(
+    valued: System, settled: System, point: tuple[float, Floats, Floats], state: NDArray[np.bool_], read: frozenset[int]
+) -> bool:
+    if valued.rows == settled.rows:
+        return False
+    n, told, rates = valued.unknowns, rates_of(valued), rates_of(settled)
+    wanted = np.zeros(n, dtype=bool)
+    wanted[settled.pattern.columns_of()[settled.structural()[0]]] = True
+    moving = state | np.isin(settled.family_of, list(read))
+    open_ = _open(valued, point, state, np.zeros(n, dtype=bool))
+    if open_ is None or open_[:n][wanted & ~state].any():
+        return False
+    return bool(np.isin(rates[moving[rates]], told).all() and not open_[n:][moving[told]].any())
 
 
 class Settler:

@@ -70,7 +70,9 @@ static int races(const sd_settle *settle, const double *yd)
  * else the point is as it was. */
 static int follow(sd_settle *settle, double t, double *y, double *yd, double *best)
 {
-    double limit = fmax(EXACT, settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
+    /* what round-off has left of points before this one may be left of it; where events read points no more than need be */
+    const double floor = settle->determined ? EXACT : fmin(settle->floor, FINE);
+    double limit = fmax(fmax(EXACT, floor), settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
     /* near a law's flat place round-off leaves much; of steep ones the saddle-point matrix makes more */
     double bound = settle->system->scales > 0 ? FINE : CLOSE;
     int fresh = settle->ready != SD_BY_BASIS, failed = fresh && !sd_settle_slopes(settle, t, y, yd, 1);
@@ -82,7 +84,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
         sd_settle_leave_slopes(settle);
     }
     for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
-        if (before <= limit && (m == 0 || moved < SMALL))
+        if (before <= limit)
             break;
         double pulled = 0.0;
         moved = sd_settle_move_basic(settle, y, yd, &pulled);
@@ -91,6 +93,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
         failed = !isfinite(now) || state > still;
         if (!failed && moved < SMALL && now > 0.5 * before && now <= (fresh ? bound : FINE)) {
             before = now; /* round-off is what is left */
+            settle->floor = fmax(settle->floor, 2.0 * now);
             break;
         }
         if (!failed && now > CONTRACTS * before && now > fmax(FINE, limit)) {
@@ -196,7 +199,7 @@ static int finish(sd_settle *settle, double t, double *y, double *yd, int done, 
         stays &= *open == 0.0;
         *open = 0.0; /* not nearly: relative errors are taken of it */
     }
-    for (int32_t k = 0; k < settle->k_spans && stays && !settle->system->left; k++) {
+    for (int32_t k = 0; k < settle->k_spans && stays && settle->rates && !settle->system->left; k++) {
         const int32_t *span = settle->k_span + 4 * (size_t)k;
         for (int32_t i = 0; i < span[0]; i++)
             stays &= yd[span[2] + i] == y[span[3] + i];

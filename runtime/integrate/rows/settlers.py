@@ -15,10 +15,12 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.start.restart import Restart, still
-from sysdyn.runtime.start.settled import Settler, flows_open
+from sysdyn.runtime.start.settled import Settler, flows_open, values_told
 
 PROJECTED = ("1", "0")
 """Forms whose rows let the constraints drift: accepted points are moved onto them."""
+SHOWN = ("observe", "observe_rate", "observe_scale", "audit", "ledger")
+"""Blocks that the rows of a trace evaluate."""
 SLACK = 0.1
 """Of the tolerance: what rows within a step may move of the state, in magnitudes, and need not be the least change,
 where constraints are constant sums: their unknowns are interpolated differently (radau_dense.c).  Of curved ones
@@ -33,7 +35,7 @@ of a larger net is dear to find (a driven grid of 35 x 35: 20 s): its loops of s
 
 
 class Settlers:
-    """point: t (s), y, yd [unknowns] of the start; settler: of the rows of the method's points."""
+    """point: t (s), y, yd [unknowns] of the start; settler: of the method's points; of_trace: of rows."""
 
     def __init__(
         self,
@@ -50,7 +52,12 @@ class Settlers:
         self._common = roles.common[:n]
         t, y, yd = point
         self._point = (t, y[:n], yd[:n]) if system.unknowns <= RATED else None
-        self.settler = self.of("settled" if forms is not None else self.whole_form)
+        self.settler = self._by_basis(self.of("settled" if forms is not None else self.whole_form))
+        self.of_trace = self._by_basis(self.of("valued")) if self._values_do() else self.settler
+
+    def _by_basis(self, settler: Settler) -> Settler:
+        """Told how far it may go by basic solutions, and how well points settle."""
+        system, request = self.system, self._request
         # where constraints come and go what is left of a zero counts
         still = 0.0 if request.switched else SLACK * request.tolerance
         sums = system.once("sums", lambda: steady(system.description, ("phi", "phi_rate", "psi")))
@@ -58,9 +65,33 @@ class Settlers:
         slack = still if system.form.scales else SLACK * request.tolerance if sums else 0.0
         # the least change shares what is open: flows between contacts, potentials where all laws are faint
         flat = bool(request.events) and self.whole_form == "rated"
-        self.settler.by_basis(slack, determined=request.switched or flat)
-        self.settler.core.contents.still = still
-        self.settler.core.contents.enough = request.settled_to if request.draft else 0.0
+        settler.by_basis(slack, determined=request.switched or flat)
+        settler.core.contents.still = still
+        settler.core.contents.enough = request.settled_to if request.draft else 0.0
+        return settler
+
+    def _values_do(self) -> bool:
+        """Whether no row shows a rate that hidden rows alone tell."""
+        system, request = self.system, self._request
+        if self._forms is not None or request.events or request.least_norm or self._point is None:
+            return False
+        if self.whole_form != "settled":
+            return False
+        read = [kernel.rates for block in SHOWN for kernel in system.description.blocks.get(block, ())]
+        if None in read:
+            return False
+        valued, settled = system.another("valued"), system.another("settled")
+        return values_told(valued, settled, self._point, self.keeps, frozenset[int]().union(*read))
+
+    @property
+    def both(self) -> frozenset[Settler]:
+        """What settles points of this run."""
+        return frozenset((self.settler, self.of_trace))
+
+    @property
+    def failures(self) -> int:
+        """Points that did not settle."""
+        return sum(settler.core.contents.failures for settler in self.both)
 
     @property
     def keeps(self) -> NDArray[np.bool_]:
