@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define VECTORS 13
+#define VECTORS 12
 #define SELDOM 4 /* of these: where rows are judged or points projected */
 #define ITERATIONS 4        /* of Newton a step */
 #define NEWTON_TOLERANCE 0.33 /* of the error tolerance (Brenan, Campbell & Petzold) */
@@ -56,7 +56,7 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     double *next = bdf->memory;
     for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
         bdf->phi[i] = next;
-    double **vector[VECTORS] = {&bdf->y, &bdf->yd, &bdf->ivp.ee, &bdf->ivp.weight, &bdf->delta, &bdf->scale, &bdf->own,
+    double **vector[VECTORS] = {&bdf->y, &bdf->yd, &bdf->ivp.ee, &bdf->ivp.weight, &bdf->delta, &bdf->own,
                                 &bdf->newton_power, &bdf->test_power, &bdf->moved, &bdf->moved_d, &bdf->terms, &bdf->rate};
     for (size_t i = 0; i < vectors; i++, next += m)
         *vector[i] = next;
@@ -80,15 +80,6 @@ void sd_bdf_free(sd_bdf *bdf)
     free(bdf->memory);
     free(bdf->powered);
     free(bdf);
-}
-
-/* magnitudes of the columns: index-2 unknowns and index-3 multipliers with powers of h */
-static void set_scales(sd_bdf *bdf)
-{
-    const double power[3] = {1.0, 1.0 / bdf->ivp.h, 1.0 / (bdf->ivp.h * bdf->ivp.h)};
-    memcpy(bdf->scale, bdf->ivp.magnitude, (size_t)bdf->ivp.n * sizeof *bdf->scale);
-    for (int32_t k = 0; k < bdf->powers; k++)
-        bdf->scale[bdf->powered[k]] *= power[bdf->ivp.power[bdf->powered[k]]];
 }
 
 void sd_bdf_start(void *self, double t, const double *y, const double *yd, double h)
@@ -134,9 +125,8 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
         }
     }
     sd_bdf_matrix(bdf);
-    set_scales(bdf);
     bdf->ready = 0;
-    int failed = sd_linear_factor(bdf->linear, bdf->g, bdf->scale);
+    int failed = sd_linear_factor(bdf->linear, bdf->g, bdf->ivp.magnitude);
     if (failed) {
         bdf->ivp.bad_row = bdf->linear->bad_row;
         bdf->ivp.bad_column = bdf->linear->bad_column;
@@ -163,8 +153,8 @@ static int rows_hold(sd_bdf *bdf, double t)
         bdf->rate[i] = bdf->cj * (fabs(bdf->y[i]) + bdf->ivp.magnitude[i]);
     double limit = row_limit(bdf);
     int all = bdf->linear->rank < bdf->ivp.n;
-    return sd_first_unmet(bdf->ivp.system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->scale, bdf->ivp.met, all,
-                          bdf->terms) < 0;
+    return sd_first_unmet(bdf->ivp.system, t, bdf->y, bdf->rate, bdf->delta, limit, bdf->g, bdf->ivp.magnitude, bdf->ivp.met,
+                          all, bdf->terms) < 0;
 }
 
 /* Every steep row is as small as round-off of the unknowns (`moved`), by slopes at the point itself, lets it be (see

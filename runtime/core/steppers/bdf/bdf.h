@@ -34,7 +34,7 @@ typedef struct sd_bdf {
     double psi[SD_MAX_ORDER + 2], alpha[SD_MAX_ORDER + 2], beta[SD_MAX_ORDER + 2], sigma[SD_MAX_ORDER + 2],
         gamma[SD_MAX_ORDER + 2];
     double *phi[SD_MAX_ORDER + 2];
-    double *y, *yd, *delta, *moved, *moved_d, *scale;
+    double *y, *yd, *delta, *moved, *moved_d;
     double *terms, *rate, *jy, *jyd, *g, *memory;
     double *own, *newton_power, *test_power, h_weighed; /* [n] weights and powers of h of unknowns in `apart`, and of which h */
     int32_t *powered, powers; /* [powers] unknowns that do not count alike at every h */
