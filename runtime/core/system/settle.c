@@ -15,6 +15,7 @@
 #define COARSE 1e-11    /* but no more than this */
 #define CLOSE 1e-9      /* scaled residual with which one may live */
 #define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
+#define CALM 1e-9       /* the same of a point whose rows are FINE, behind which the next move is none */
 #define TOLD 1e-10      /* scaled residual of a row that points between steps keep */
 #define HELD 1e8        /* weight of the state in a second attempt */
 #define STILL 1e-12     /* move of the state, in magnitudes, that is none */
@@ -70,11 +71,10 @@ static int races(const sd_settle *settle, const double *yd)
  * else the point is as it was. */
 static int follow(sd_settle *settle, double t, double *y, double *yd, double *best)
 {
-    /* what round-off has left of points before this one may be left of it; where events read points no more than need be */
-    const double floor = settle->determined ? EXACT : fmin(settle->floor, FINE);
-    double limit = fmax(fmax(EXACT, floor), settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
+    double limit = fmax(EXACT, settle->enough), still = fmax(STILL, settle->slack), state = 0.0, moved = INFINITY;
     /* near a law's flat place round-off leaves much; of steep ones the saddle-point matrix makes more */
-    double bound = settle->system->scales > 0 ? FINE : CLOSE;
+    const int steep = settle->system->scales > 0;
+    double bound = steep ? FINE : CLOSE;
     int fresh = settle->ready != SD_BY_BASIS, failed = fresh && !sd_settle_slopes(settle, t, y, yd, 1);
     double before = failed ? INFINITY : measure(settle, t, y, yd);
     settle->drift = settle->constraints;
@@ -84,16 +84,16 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
         sd_settle_leave_slopes(settle);
     }
     for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
-        if (before <= limit)
+        if (before <= limit && (m == 0 || moved < SMALL || !steep))
             break;
         double pulled = 0.0;
         moved = sd_settle_move_basic(settle, y, yd, &pulled);
         state += pulled;
         double now = measure(settle, t, y, yd);
         failed = !isfinite(now) || state > still;
-        if (!failed && moved < SMALL && now > 0.5 * before && now <= (fresh ? bound : FINE)) {
-            before = now; /* round-off is what is left */
-            settle->floor = fmax(settle->floor, 2.0 * now);
+        const int stays = moved < SMALL && now > 0.5 * before && now <= (fresh ? bound : FINE);
+        if (!failed && (stays || (moved < CALM && now <= FINE && !settle->determined))) {
+            before = now; /* round-off is what is left, in the rows and in what follows from them */
             break;
         }
         if (!failed && now > CONTRACTS * before && now > fmax(FINE, limit)) {
