@@ -84,7 +84,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
         sd_settle_leave_slopes(settle);
     }
     for (int m = 0; m < ITERATIONS && !failed && !*settle->system->stop; m++) {
-        if (before <= limit && (m == 0 || moved < SMALL || !steep))
+        if (before <= limit && (m == 0 || moved < SMALL || !(steep || settle->determined)))
             break;
         double pulled = 0.0;
         moved = sd_settle_move_basic(settle, y, yd, &pulled);

@@ -350,7 +350,7 @@ int sd_radau_step(void *self)
 {
     sd_radau *radau = self;
     trial one = {0};
-    radau->ivp.cause = radau->work && !radau->lacks ? SD_FINE : SD_MEMORY;
+    radau->ivp.cause = radau->work && radau->scale ? SD_FINE : SD_MEMORY;
     if (radau->ivp.cause)
         return radau->ivp.cause;
     sd_weigh(&radau->ivp, radau->tolerance, radau->phi);

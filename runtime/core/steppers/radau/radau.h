@@ -106,8 +106,8 @@ typedef struct sd_radau {
                                * NULL is made where it is read */
     int32_t *at;              /* [n] of a large system whose columns are alike: where those of each begin in jy, jyd; else NULL,
                                * and they stand as in the pattern */
-    double *newton_weight, *powered; /* of Newton's norm (NULL: as weight); its memory where powers of h count */
-    int32_t lacks;            /* this memory */
+    double *newton_weight, *scale, *powered; /* of Newton's norm (NULL: as weight), of columns; their memory where powers of
+                                              * h count */
     double complex *w[SD_PAIRS]; /* right sides and solutions */
     int32_t in_place;         /* the point of a stage, its rates and its residual take turns in d; y and rate stand there too,
                                * w where the point of the whole system does */

@@ -201,7 +201,7 @@ int sd_radau_iterate_coupled(sd_radau *radau, int *used)
     if (!aligned(radau, coupled))
         return SD_NEWTON;
     for (int i = 0; i < coupled->stages; i++)
-        memcpy(coupled->scale + i * radau->ivp.n, radau->ivp.magnitude, (size_t)radau->ivp.n * sizeof(double));
+        memcpy(coupled->scale + i * radau->ivp.n, radau->scale, (size_t)radau->ivp.n * sizeof(double));
     double before = INFINITY, tolerance = sd_radau_newton_tolerance(radau);
     sd_radau_extrapolate(radau, radau->ivp.h);
     for (int m = 1; m <= ITERATIONS; m++) {

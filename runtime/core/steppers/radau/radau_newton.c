@@ -28,8 +28,8 @@ static const struct {
     int lean;
 } ways[] = {{1e-10, 0}, {1e-13, 0}, {1e-16, 0}, {SD_LEAST_PIVOT, 0}, {1e-10, SD_WHERE_LEFT}, {1e-10, SD_WHERE_IDLE}};
 
-/* Newton's weights: of unknowns that all count as they are those of the error test; NULL, where memory for others is missing,
- * which the first step tells */
+/* Newton's weights and the scale of columns: of unknowns that all count as they are those that there are; where memory for
+ * others is missing no scale, which the first step tells */
 void sd_radau_provide_weights(sd_radau *radau)
 {
     size_t m = (size_t)sd_whole_lanes(radau->ivp.n + 1);
@@ -38,19 +38,20 @@ void sd_radau_provide_weights(sd_radau *radau)
         powers |= radau->ivp.power[i] != 0;
     int others = powers || (radau->ivp.atol && !radau->ivp.weight);
     if (others && !radau->powered)
-        radau->powered = calloc(2 * m, sizeof *radau->powered);
+        radau->powered = calloc(3 * m, sizeof *radau->powered);
     if (others && !radau->ivp.weight && radau->powered)
-        radau->ivp.weight = radau->powered + m;
+        radau->ivp.weight = radau->powered + 2 * m;
     radau->newton_weight = powers ? radau->powered : radau->ivp.weight;
-    radau->lacks = others && !radau->powered;
+    radau->scale = others && !radau->powered ? NULL : powers ? radau->powered + m : radau->ivp.magnitude;
 }
 
 /* index-2 unknowns and index-3 multipliers count with powers of h */
 void sd_radau_weigh(sd_radau *radau)
 {
-    for (int32_t i = 0; i < radau->ivp.n && radau->newton_weight != radau->ivp.weight; i++) {
+    for (int32_t i = 0; i < radau->ivp.n && radau->scale != radau->ivp.magnitude; i++) {
         double power = radau->ivp.power[i] == 0 ? 1.0 : radau->ivp.power[i] == 1 ? radau->ivp.h : radau->ivp.h * radau->ivp.h;
         radau->newton_weight[i] = radau->ivp.weight[i] * power;
+        radau->scale[i] = radau->ivp.magnitude[i] / power;
     }
 }
 
@@ -94,7 +95,7 @@ static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
             radau->rate[i] = (fabs(radau->y[i]) + radau->ivp.magnitude[i]) / radau->ivp.h;
         }
         double t = radau->ivp.t + radau->method->c[s] * radau->ivp.h;
-        if (sd_first_unmet(radau->ivp.system, t, radau->y, radau->rate, radau->d[s], limit, radau->g, radau->ivp.magnitude,
+        if (sd_first_unmet(radau->ivp.system, t, radau->y, radau->rate, radau->d[s], limit, radau->g, radau->scale,
                            radau->ivp.met, judged, radau->terms) >= 0)
             return 0;
     }

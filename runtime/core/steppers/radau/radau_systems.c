@@ -42,7 +42,7 @@ typedef struct factoring {
  * stages (`terms`), whatever the step */
 static const double *column_scale(const sd_radau *radau)
 {
-    return radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->terms : radau->ivp.magnitude;
+    return radau->linear->null_pivot > SD_LEAST_PIVOT ? radau->terms : radau->scale;
 }
 
 /* terms := the same: a node that a source only begins to move is not as small as it was (its row, of the leaks of diodes,
@@ -101,7 +101,7 @@ static int factorise_all(sd_radau *radau)
 {
     factoring all = {radau, {0}};
     int failed = 0;
-    if (column_scale(radau) != radau->ivp.magnitude)
+    if (column_scale(radau) != radau->scale)
         size_columns(radau);
     if (sd_radau_sparing(radau))
         scale_all(radau);
