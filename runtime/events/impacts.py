@@ -5,8 +5,8 @@
 of all gaps that are closed and of all one-way flows at once.  That is the least change of the flows in the metric of
 the inertia under flow+ >= aim; the active set grows by what is violated most and gives up what would pull (Lawson and
 Hanson 1974, chapter 23), so that it never says anything twice.  Aims that contradict each other, in a closed chain of
-contacts, are zero.  Dry friction gives way: a finite effort has no impulse, unless a reaction tells its bound.  Then it
-has one within the bound that the impulses tell (Coulomb's law).
+contacts, or that would make energy are zero.  Dry friction gives way: a finite effort has no impulse, unless a reaction
+tells its bound.  Then it has one within the bound that the impulses tell (Coulomb's law).
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ from sysdyn.runtime.model.system import System
 
 UNSEEN = 16.0 * float(np.finfo(float).eps)
 """Of the terms of a gap: a flight lower than that."""
+
+FED = 1e-3
+"""Of the work of impulses there and back: more than round-off, and than flows miss their aims by."""
 
 Strike = Callable[[float, Floats, Floats, Floats], tuple[Floats, Floats]]
 """t, y, yd, aims [rows of the system that finds impulses] -> y after impulses that bring the flow rows to their aims;
@@ -99,10 +102,21 @@ class Impacts:
             if contacts.active[k]:
                 contacts.slip(k, 0.0)
         found = self._among_frictions(_Blow((t, y, yd), strike, system, aim))
+        if self._feeds(found, values):
+            aim = dict.fromkeys(near, 0.0)
+            found = self._among_frictions(_Blow((t, y, yd), strike, system, aim))
         for k in near:
             contacts.active[k] = aim[k] == 0.0 and found.values[self._flow(k)] <= zero(self._flow(k))
         contacts.apply()
         return found.y
+
+    def _feeds(self, found: _Struck, before: Floats) -> bool:
+        """Whether the impulses do work, as those of several gaps may by Newton's law: what a wall gives back to a ball
+        it gives to another one that just left it too.
+        """
+        flows = [self._flow(k) for k in range(found.impulses.size)]
+        given, speeds = found.impulses, np.stack([before[flows], found.values[flows]])
+        return bool(given @ speeds.sum(axis=0) > FED * (given @ np.abs(speeds).sum(axis=0)))
 
     def _near(self, k: int, values: Floats) -> bool:
         """Whether an impulse may come of a contact: a gap that is closed, whatever flow an inequality may stop."""

@@ -37,6 +37,20 @@ scene s of m { time 0 s to 30 us; trace C.e as v every 5 us }
 """
 """A switch that closes beside a capacitor, which a diode keeps from it."""
 
+SQUEEZED = """
+model m {
+  coord x: translation = 0.2 m
+  coord y: translation = 0.5 m
+  energy T* = 1/2*(1 kg)*x'^2 + 1/2*(1e6 kg)*y'^2
+  phi wall: x >= 0 m restitution 0.9
+  phi gap: y >= x restitution 1
+  init x' = 0 m/s
+  init y' = -0.3 m/s
+}
+scene s of m { time 0 s to 2 s; trace x, y, y' as v every 0.1 s }
+"""
+"""A ball between a wall and a heavy one that comes, which it stops by impacts without end."""
+
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 def test_a_freewheel_does_not_stop_what_turns_on(formulation, tmp_path):
@@ -54,3 +68,12 @@ def test_a_diode_keeps_a_capacitor_from_a_switch_that_closes(formulation, tmp_pa
     v = dict(zip(np.round(trace.time * 1e6).tolist(), trace["v"].values.tolist(), strict=True))
     assert v[20] > 2.0
     assert v[30] == pytest.approx(v[20] * np.exp(-10e-6 / (60 * 20e-6)), rel=1e-6)
+
+
+def test_a_wall_gives_a_ball_no_more_than_it_brought(tmp_path):
+    (tmp_path / "m.sd").write_text(SQUEEZED)
+    trace = simulate(tmp_path / "m.sd", output=tmp_path / "m.h5")
+    late = trace.time > 1.7
+    assert np.abs(trace["v"].values).max() <= 0.3 + 1e-9
+    assert trace["y"].values[late] == pytest.approx(0.0, abs=1e-4)
+    assert trace["x"].values[late] == pytest.approx(0.0, abs=1e-4)
