@@ -189,8 +189,7 @@ class Instant:
         j = np.append(self._pulses.column[taken], 2 * self._moved[self._column[held]])
         v = np.append(self._pulses.values(slope, inertia)[taken], np.where(heavy, inertia, slope)[held])
         ease = np.where(np.isin(self.system.kinds, FOLLOWS), LOOSE, 1.0)
-        # balances without inertia too: what their sum says of displacements is not what each says of its own flow
-        behind = self._given | self._now(self._light)
+        behind = self._given.copy()
         behind[self.system.held[0]] = True  # they read "multiplier = 0"
         # other dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
         moves = (self.system.kinds != "s") | jumps

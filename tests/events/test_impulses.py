@@ -51,20 +51,6 @@ scene s of m { time 0 s to 2 s; trace x, y, y' as v every 0.1 s }
 """
 """A ball between a wall and a heavy one that comes, which it stops by impacts without end."""
 
-OPENED = """from std.electrical import switch, resistor, inductor, capacitor
-model m {
-  node a, b, c: electrical
-  C: capacitor(C = 10 F) a -> ground
-  L: inductor(L = 10 mH) a -> b
-  R: resistor(R = 1 ohm) b -> c
-  S: switch(gate = if t < 5 ms then 1 else 0) c -> ground
-  init C.e = 10 V
-  init L.f = 0 A
-}
-scene s of m { time 0 s to 9 ms; trace L.f as i every 3 ms }
-"""
-"""A switch that opens: nothing passes the resistor any more, nor the coil behind it."""
-
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 def test_a_freewheel_does_not_stop_what_turns_on(formulation, tmp_path):
@@ -91,12 +77,3 @@ def test_a_wall_gives_a_ball_no_more_than_it_brought(tmp_path):
     assert np.abs(trace["v"].values).max() <= 0.3 + 1e-9
     assert trace["y"].values[late] == pytest.approx(0.0, abs=1e-4)
     assert trace["x"].values[late] == pytest.approx(0.0, abs=1e-4)
-
-
-@pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian", "co_hamiltonian"])
-def test_a_switch_that_opens_empties_the_coil_behind_a_resistor(formulation, tmp_path):
-    (tmp_path / "m.sd").write_text(OPENED)
-    trace = simulate(tmp_path / "m.sd", output=tmp_path / "m.h5", formulation=formulation)
-    current = dict(zip(np.round(trace.time * 1e3).tolist(), trace["i"].values.tolist(), strict=True))
-    assert current[3] == pytest.approx(10 * (1 - np.exp(-0.3)), rel=1e-3)
-    assert current[9] == pytest.approx(0.0, abs=1e-9)
