@@ -1,15 +1,18 @@
-"""Branches that end at a node which no other element touches: their flow is zero (their effort, at common-flow nodes).
+"""Branches that carry no flow (no effort, at common-flow nodes), for nothing behind them closes a loop.
 
-Such an element acts on nothing: the balance of that node is its flow alone.  It stays where anything reads it or its
-node, where an initial value is given to either, and where it is a source of what the node balances (the contradiction
-is the compiler's to tell).  Single nodes only; a part without a ground keeps them, for the node that its efforts
-count from is chosen by how many elements touch it.
+    end     it ends at a node which no other element touches, and goes with the node
+    tie     it alone joins a part of common-effort nodes to the ground (the resistor at a winding): the part floats then
+
+Such an element acts on nothing: the balance of what is behind it is its flow alone.  It stays where anything reads it
+or a node behind it, where an initial value is given to either, and where it is a source of what the nodes balance (the
+contradiction is the compiler's to tell).  Ends at single nodes only; a part without a ground keeps them, for the node
+that its efforts count from is chosen by how many elements touch it.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.network.influence import Link, Quantity
 from sysdyn.dsl.model.network import Branch, Network
@@ -18,36 +21,71 @@ STORES = frozenset(("kinetic", "potential", "dissipator"))
 
 
 def dead_branches(network: Network, found: Sequence[Link], asked: frozenset[Quantity]) -> list[frozenset[Quantity]]:
-    """Each dead branch with its end node."""
+    """Each dead branch with its end node; ties where there are no ends any more."""
     touched = Counter(q for link in found for q in link.joined)
     read = set(asked)
     for link in found:
         read |= link.reads - link.joined if isinstance(link.item, Branch) else link.reads
     alone = {q for q, links in touched.items() if links == 1 and q not in read}
-    ends = [(b, end) for b in network.branches if ("b", b.name) in alone for end in _ends(b, alone)]
-    if not ends:
-        return []
-    grounded = _grounded(network)
+    able = [b for b in network.branches if ("b", b.name) in alone and _able(b)]
+    ends = [(b, q) for b in able for q in _nodes(b) if q in alone and len(set(_ends(b))) == 2]
+    grounded = _grounded(network) if ends else set[str | None]()
     single = {("n", n.name) for n in network.nodes if n.name in grounded and not n.shape}
     dead = {b.name: end for b, end in reversed(ends) if end in single}  # of two ends the first
+    if not dead:
+        return list(_ties(network, found, able, asked))
     return [frozenset({("b", b.name), dead[b.name]}) for b in network.branches if b.name in dead]
 
 
-def _ends(b: Branch, alone: Collection[Quantity]) -> Iterator[Quantity]:
-    """End nodes of the branch among those that nothing else touches or reads."""
+def _able(b: Branch) -> bool:
+    """Whether it may carry nothing."""
     balanced = "flow" if b.domain.common == "effort" else "effort"
-    allowed = STORES | {"effort", "flow"} - {balanced}
-    names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]
-    if b.loops or b.kind not in allowed or len(names) != 2 or names[0] == names[1]:
+    return not b.loops and b.kind in STORES | {"effort", "flow"} - {balanced}
+
+
+def _ends(b: Branch) -> list[str | None]:
+    """The nodes at its ends (None: the ground)."""
+    return [end.node for end in (b.plus, b.minus) if end is not None]
+
+
+def _nodes(b: Branch) -> list[Quantity]:
+    return [("n", name) for name in _ends(b) if name is not None]
+
+
+def _ties(
+    network: Network, found: Sequence[Link], able: Sequence[Branch], asked: frozenset[Quantity]
+) -> Iterator[frozenset[Quantity]]:
+    """Each branch that alone joins nodes to the ground, to which nothing but branches refers."""
+    ties = [b for b in able if b.domain.common == "effort" and None in _ends(b) and _nodes(b)]
+    if not ties:
         return
-    yield from (("n", name) for name in names if ("n", name) in alone)
+    told = set(asked)
+    for link in found:
+        plain = isinstance(link.item, Branch) and link.item.on is None
+        told |= link.reads if plain else link.reads | link.joined
+    beside: dict[Quantity, list[Branch]] = {}
+    for b in network.branches:
+        for q in set(_nodes(b)):
+            beside.setdefault(q, []).append(b)
+    seen = set[Quantity]()
+    for b in ties:
+        part, ahead, joins = set[Quantity](), [q for q in _nodes(b) if q not in seen], 0
+        while ahead:
+            q = ahead.pop()
+            if q not in part:
+                part.add(q)
+                joins += sum(None in _ends(other) for other in beside[q])
+                ahead += [q for other in beside[q] for q in _nodes(other)]
+        seen |= part
+        if joins == 1 and not part & told:
+            yield frozenset({("b", b.name)})
 
 
 def _grounded(network: Network) -> set[str | None]:
     """Nodes that branches join to the ground of their domain (None)."""
     beside: dict[str | None, set[str | None]] = {}
     for b in network.branches:
-        ends = {end.node for end in (b.plus, b.minus) if end is not None}
+        ends = set(_ends(b))
         for end in ends:
             beside.setdefault(end, set()).update(ends)
     seen: set[str | None] = {None}

@@ -8,7 +8,7 @@ quantities reach in this graph is kept; an island, and what only reads the rest,
 
     island        nothing joins it to what is kept
     downstream    it reads what is kept, and nothing that is kept reads it
-    dead branch   it ends at a node that no other element touches and nothing reads: its flow (effort) is zero
+    dead branch   nothing else joins what is behind it, and nothing reads that: its flow (effort) is zero
 
 Received: a Network as the front end made it, before any formulation.  Returned: the same without these, as if they
 had not been written, and what was left out; the network itself where the scene traces nothing (it then traces all
@@ -49,7 +49,7 @@ class Removal:
     def why(self) -> str:
         """Why nothing is lost."""
         if self.rule == "dead branch":
-            return "pruned, dead branch: it ends at a node that nothing else touches or reads"
+            return "pruned, dead branch: nothing else joins what is behind it, so nothing passes it"
         if self.rule == "island":
             return "pruned, island: nothing joins it to what the scene asks for"
         return f"pruned, downstream: it reads {', '.join(self.reads)}, and nothing that the scene asks for reads it"

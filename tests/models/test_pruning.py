@@ -357,3 +357,31 @@ scene one of two { time 0 s to 2 s; trace x, th, v }
     for name in ("x", "th", "v"):
         scale = np.abs(whole[name].values).max()
         assert np.abs(kept[name].values[-1] - whole[name].values[-1]) < 1e-4 * scale
+
+
+BRIDGE = """
+model m {
+  node a, b, n, p, m: electrical
+  V: effort(e = 10 V*sin(314 rad/s*t)) a -> n
+  L: kinetic(p = 10 uH*f) a -> b
+  D1: diode() b -> p
+  D2: diode() n -> p
+  D3: diode() m -> b
+  D4: diode() m -> n
+  C: potential(q = 1 mF*e) p -> m
+  R: dissipator(e = 20 ohm*f) p -> m
+  tie: dissipator(e = 1 Gohm*f) n -> ground
+  init C.e = 0 V
+}
+component diode { branch: electrical; law f = e/(if e > 0 V then 20 mohm else 1 Mohm) }
+scene s of m { time 0 s to 20 ms; trace C.e as v; accuracy 1e-5 }
+"""
+"""A source that only a resistor ties to the ground."""
+
+
+def test_a_part_that_one_resistor_ties_to_the_ground_runs_as_if_it_floated(tmp_path):
+    """The resistor stood beside the diodes with 1e-9 of their conductance (E516, E930)."""
+    assert [n for p in _pruned(BRIDGE)[1] for _, n in p.names] == ["tie"]
+    ends = [trace_of(tmp_path, BRIDGE, formulation=f)["v"].values[-1] for f in ("lagrangian", "co_lagrangian")]
+    assert ends[0] == pytest.approx(ends[1], abs=2e-4)
+    assert ends[0] > 5.0

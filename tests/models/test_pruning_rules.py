@@ -57,6 +57,22 @@ TEXTS = {
         "R3: resistor(R = 1 ohm) c -> d", "R3: gyrator(e1 = 1 ohm*f2) c -> d, b -> ground"
     ),
 }
+WINDING = OPEN.replace(
+    "R3: resistor(R = 1 ohm) c -> d",
+    "T: transformer(e1 = 2*e2) c -> ground, d -> g\n  node g: electrical\n"
+    "  R3: resistor(R = 1 ohm) d -> g\n  R4: resistor(R = 1 Gohm) g -> ground",
+).replace("  state w: V = 0 V\n  dynamic w' = (d.e - w)/(1 s)\n", "")
+TIED = {
+    "tied": "",
+    "twice": "  R5: resistor(R = 1 Gohm) d -> ground\n",
+    "read by a law": "  node h: electrical\n  E: voltage(v = d.e) h -> b\n  R5: resistor(R = 1 ohm) h -> b\n",
+    "told": "  init g.e = 0 V\n",
+    "of common flow": "  node x, y: translation\n  K: potential(e = 1 N/m*q) x -> ground\n"
+    "  S: potential(e = 1 N/m*q) x -> y\n  D: dissipator(e = 1 N.s/m*f) x -> y\n"
+    "  G: effort(e = 1 V/m*S.q) h -> b\n  node h: electrical\n  R5: resistor(R = 1 ohm) h -> b\n",
+}
+TEXTS |= {f"tied: {name}": WINDING.replace("}\nscene s", f"{lines}}}\nscene s", 1) for name, lines in TIED.items()}
+TEXTS["tied: asked"] = WINDING.replace("as e }", "as e, g.e as g }", 1)
 MUTANTS = {
     "influence": [
         ('MECHANICAL = frozenset("xnb")', 'MECHANICAL = frozenset("xn")'),
@@ -106,7 +122,13 @@ MUTANTS = {
         ("q not in read}", '(q not in read or q[0] == "n")}'),
         ("n.name in grounded and ", ""),
         ('{"effort", "flow"} - {balanced}', '{"effort", "flow"}'),
-        ("b.kind not in allowed or ", ""),
+        (' and b.kind in STORES | {"effort", "flow"} - {balanced}', ""),
+        ("joins == 1", "joins > 0"),
+        ("not part & told", "part"),
+        ("told = set(asked)", "told = set()"),
+        ("link.reads if plain else link.reads | link.joined", "link.reads"),
+        ("link.reads if plain else link.reads | link.joined", "set() if plain else link.reads | link.joined"),
+        ('b.domain.common == "effort" and None in', "None in"),
         ('balanced = "flow" if b.domain.common == "effort" else "effort"', 'balanced = "effort"'),
     ],
     "pruning": [
