@@ -136,6 +136,17 @@ def _along(dot: Node, scaled: Callable[[Node], Node]) -> Node:
     return done[dot]
 
 
+def _joined(terms: Sequence[tuple[float, Node]]) -> Node:
+    """A sum of differentials; of some that one condition makes zero, within it: r - r^2 is flat where max(x, 1) = r
+    is, under a root too.
+    """
+    first = terms[0][1] if len(terms) > 1 else const(0.0)
+    if first.op != "cond" or any(d.op != "cond" or d.args[0] is not first.args[0] for _, d in terms):
+        return linear(0.0, terms)
+    sides = (_joined([(w, d.args[k]) for w, d in terms]) for k in (1, 2))
+    return conditional(first.args[0], *sides)
+
+
 def _chain(node: Node, dots: Sequence[Node]) -> Node:
     """The differential of a node from those of its arguments (some are zero)."""
     zero = const(0.0)
@@ -144,7 +155,7 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
             moving = [(w, d) for w, d in zip(node.data[1], dots, strict=True) if d is not zero]
             if len(moving) == 1:
                 return _along(moving[0][1], lambda d: linear(0.0, ((moving[0][0], d),)))
-            return linear(0.0, moving)
+            return _joined(moving)
         case "mul":
             parts: list[tuple[float, Node]] = []
             for k, dot in enumerate(dots):
@@ -152,7 +163,7 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
                     others = [(e, a) for j, (e, a) in enumerate(zip(node.data, node.args, strict=True)) if j != k]
                     lower = partial(_lowered, others, node.data[k], node.args[k])
                     parts.append((node.data[k], _along(dot, lower)))
-            return linear(0.0, parts)
+            return _joined(parts)
         case "pow":
             base, exponent = node.args
             slope = mul(exponent, power(base, linear(-1.0, ((1.0, exponent),))))
