@@ -16,6 +16,8 @@ from sysdyn.runtime.start.held import CLOSED, astray, following, least_change, n
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
 
+EPS, RESOLVED = 2.3e-16, 1e-3
+"""Round-off; of contents: what it may be."""
 BACK = 1e-10
 """Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
 
@@ -67,6 +69,8 @@ def sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | 
     """
     if best.x.size > SINGULAR_VALUES:
         return best
+    if not _resolved(starter, t, best.x):
+        return None
     follows, steep = free & starter.following(t, best.x), bool(starter.system.form.scales)
     at = rested(starter, t, best.x, follows)
     for x, rests in ((at, at_rest(starter, t, at, follows)), (best.x, resting(starter, t, best.x, follows))):
@@ -84,6 +88,17 @@ def sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | 
     if found and np.isfinite(starter.jacobian(t, x)).all():
         return solve(problem_of(starter, t, x, x, rows=starter.every, free=rest), x, 1)
     return best
+
+
+def _resolved(starter: Starter, t: float, x: Floats) -> bool:
+    """Whether contents that are guessed or said are more than round-off of the terms that make them: beside potentials
+    of 1e16 V any volt holds.
+    """
+    of = starter.groups("initial")[starter.rows]
+    said = np.abs(starter.residual(t, np.zeros_like(x)))
+    terms = np.zeros_like(said)
+    np.maximum.at(terms, starter.rows[of], np.abs(starter.jacobian(t, x) * x[starter.columns])[of])
+    return bool((EPS * terms <= RESOLVED * said)[starter.groups("initial") & (said > 0.0)].all())
 
 
 def _of_y(starter: Starter) -> Mask:

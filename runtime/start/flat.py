@@ -1,6 +1,7 @@
 """Laws without a slope where they are asked (a turbulent valve at rest): where to begin beside them, what is at rest.
 
-They say nothing there of what they pass, and where they hold so its rate is none: it grows as a root of time.
+They say nothing there of what they pass, and where they hold so its rate is none: it grows as a root of time.  In the
+complementary forms the same law is infinitely steep: what is zero there is so by other rows, and is left alone.
 """
 
 from __future__ import annotations
