@@ -80,6 +80,7 @@ class Request:
     audited: bool = False
     apart: float = 0.0
     condense: bool = True
+    valued: bool = True
     stages: tuple[int, int] | None = None
     begins: float = 0.0
     unstrained: int = 0

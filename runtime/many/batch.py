@@ -149,6 +149,7 @@ class Batch:
             draft=not number,
             apart=APART if runs.instants.common is not None and not number else 0.0,
             condense=False,
+            valued=False,
             extrema=options.extrema and bool(number),
             max_wall=None,
         )

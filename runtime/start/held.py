@@ -98,12 +98,12 @@ def following(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, 
     """What follows from the state at x, beside flat laws first in a small model; whether all rows nearly hold.  Where a
     law passes but a root of round-off, whose rate is of any size, rather than that without such a rate, if there is.
     """
-    best: tuple[Solution, bool] | None = None
+    best = Solution(x, np.inf), False
     for way, near in _ways(starter, t, x, free, follows):
         found, nearly = way(starter, t, near, guess, follows)
         if nearly and (x.size > DENSE or way is _at_rest or (rested(starter, t, found.x, follows) == found.x).all()):
             return found, True
-        if best is None or nearly > best[1]:
+        if not best[1]:
             best = found, nearly
     return best
 

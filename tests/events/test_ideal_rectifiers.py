@@ -138,7 +138,8 @@ def test_rates_of_a_step_of_no_time_are_no_sizes(rtol, tmp_path):
     file.write_text(Circuit(40).text)
     other = simulate(file, output=tmp_path / "b.h5", method="bdf", rtol=1e-8)
     found = simulate(file, output=tmp_path / "a.h5", method="radau", rtol=rtol)
-    assert [e.name for e in found.events] == [e.name for e in other.events]
+    # which of two diodes in a row turns at the begin is a matter of round-off
+    assert [e.time for e in found.events] == pytest.approx([e.time for e in other.events], abs=1e-8)
     assert found.met
     assert np.abs(voltage(found) - voltage(other)).max() < 2e-6 * np.abs(voltage(other)).max()
 

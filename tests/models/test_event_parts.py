@@ -115,7 +115,11 @@ def test_impulses_of_a_row_of_bodies_solve_their_complementarity_problem(seed, f
             given |= {f"{n}.p": m * v for n, m, v in zip("abcde", masses, speeds, strict=False)}
         found = model.struck(**given)
         at = [model.system.unknown_names.index(name) for name in flows]
-        assert found[at] == pytest.approx(newton(masses, speeds, 0.5), abs=1e-10)
+        struck = newton(masses, speeds, 0.5)
+        if masses @ struck**2 > masses @ speeds**2:  # Newton's law of several gaps may make energy: they close then
+            struck = newton(masses, speeds, 0.0)
+        assert found[at] == pytest.approx(struck, abs=1e-10)
+        assert masses @ found[at] ** 2 <= masses @ speeds**2 * (1.0 + 1e-12)
         assert found[at] @ masses == pytest.approx(speeds @ masses, abs=1e-10)
 
 

@@ -73,12 +73,13 @@ class Settlers:
     def _values_do(self) -> bool:
         """Whether no row shows a rate that hidden rows alone tell."""
         system, request = self.system, self._request
-        if self._forms is not None or request.events or request.least_norm or self._point is None:
+        if not request.valued or request.events or request.least_norm or self._point is None:
             return False
-        if self.whole_form != "settled":
+        if self._forms is not None or self.whole_form != "settled":
             return False
-        read = [kernel.rates for block in SHOWN for kernel in system.description.blocks.get(block, ())]
-        if None in read:
+        shown = [kernel.rates for block in SHOWN for kernel in system.description.blocks.get(block, ())]
+        read = [rates for rates in shown if rates is not None]
+        if len(read) < len(shown):
             return False
         valued, settled = system.another("valued"), system.another("settled")
         return values_told(valued, settled, self._point, self.keeps, frozenset[int]().union(*read))
