@@ -16,6 +16,8 @@ LARGEST = 120
 """Operations of a coefficient up to which shorter forms are looked for."""
 TURNING = 40
 """The same of trigonometric ones."""
+TURNS = 8
+"""Times an angle up to which sines of it are those of the angle in powers."""
 GRANTED = 1500
 """Operations of all coefficients of one model for which shorter forms are looked for: some seconds."""
 
@@ -131,10 +133,15 @@ def shortest(algebra: Algebra, coefficient: Any) -> Any:
 
 
 def _closed(sympy: Any, whole: Any) -> tuple[Any, dict[Any, Any]]:
-    """Exponentials and broken powers as symbols, and what these are: in polynomials exp(99 t) is of degree 99."""
+    """Exponentials and broken powers as symbols, sines of many times an angle as those of one, and what these are: in
+    polynomials exp(99 t) is of degree 99, and sin(64 t) becomes one in those of t.
+    """
     broken = (p for p in whole.atoms(sympy.Pow) if not (2 * p.exp).is_Integer)
     held = {p: sympy.Dummy() for p in (*whole.atoms(sympy.exp), *broken)}
-    return (whole.xreplace(held), {symbol: p for p, symbol in held.items()}) if held else (whole, {})
+    waves = [w for w in whole.atoms(sympy.sin, sympy.cos) if abs(w.args[0].as_coeff_Mul()[0]) > TURNS]
+    angles = {w.args[0]: sympy.Dummy() for w in waves}
+    closed = whole.xreplace(held).xreplace({w.xreplace(held): w.func(angles[w.args[0]]) for w in waves})
+    return closed, {symbol: p for p, symbol in {**held, **angles}.items()}
 
 
 def turned_factors(sympy: Any, form: Any) -> Any:

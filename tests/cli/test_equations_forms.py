@@ -122,6 +122,24 @@ def test_a_sine_inside_a_sine_is_left_where_it_is():
     assert matrices._turned(sympy, value) == inner
 
 
+FAST = """\
+model fast {
+  param C = 1e-18 F
+  node a, c: electrical
+  E: effort(e = 1 mV*sin(2e13 rad/s*t)) a -> ground
+  l: kinetic(p = 1 fH*f) a -> c
+  k: potential(q = C*e) c -> ground
+}
+"""
+
+
+@pytest.mark.parametrize("form", ["canonical", "matrices", "underlying"])
+def test_a_fast_sine_is_not_sought_in_powers_of_a_slow_one(form, tmp_path, capsys):
+    """The sine of 2e13 times an angle was, for more than a minute."""
+    assert run(["equations", str(write(tmp_path, FAST)), "--form", form, "--quiet"]) == 0
+    assert "sin(2e+13 t)" in capsys.readouterr().out
+
+
 def test_a_circuit_has_no_underlying_equation(capsys):
     code, found = run_json(capsys, "equations", str(SEED / "lead_filter.sd"), "--form", "underlying")
     assert code == 1
