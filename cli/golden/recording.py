@@ -52,7 +52,7 @@ BOUND = 10.0
 of what went round, of constraints LEAST.
 """
 LEAST = 1e-12
-"""Smallest bound of a meter (J; scaled residual): below it is rounding."""
+"""Smallest bound of constraints (scaled residual): below it is rounding."""
 FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane")
 
 Say = Callable[[str], None]

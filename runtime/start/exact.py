@@ -11,7 +11,7 @@ from sysdyn.runtime.numerics.gauss_newton import Solution, solve
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.corrections import EXACT, Corrected, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
-from sysdyn.runtime.start.flat import at_rest, rested, resting, without_rates
+from sysdyn.runtime.start.flat import at_rest, rested, without_flow, without_rates
 from sysdyn.runtime.start.held import CLOSED, astray, following, least_change, nearest, own_residual
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
@@ -40,7 +40,7 @@ def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, f
         last = nearest(starter, t, near, near, starter.every, free)
     for moved in (back, near, last):
         begun = np.where(state, moved, x)
-        follows = free & ~state & ~resting(starter, t, begun, free & ~state)
+        follows = free & ~state & ~without_flow(starter, t, begun, free & ~state)
         with starter.granted():
             found, holds = following(starter, t, begun, guess, free, follows)
         held = holds and found.residual <= max(CLOSED, best.residual)
@@ -73,7 +73,8 @@ def sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | 
         return None
     follows, steep = free & starter.following(t, best.x), bool(starter.system.form.scales)
     at = rested(starter, t, best.x, follows)
-    for x, rests in ((at, at_rest(starter, t, at, follows)), (best.x, resting(starter, t, best.x, follows))):
+    for x, still in ((at, at_rest), (best.x, without_flow)):
+        rests = still(starter, t, x, follows)
         values = _values(starter, t, x, follows, rests)
         if values.holds:
             break
@@ -115,16 +116,9 @@ def _values(starter: Starter, t: float, x: Floats, follows: Mask, rests: Mask) -
     written = rows = starter.every & ~starter.groups(*HIDDEN) & starter.reading(follows & of_y)
     follows = follows & ~rests
     for _ in range(2):  # rates of momenta read those of flows
-        rates = follows & ~of_y & _read(starter, rows)
+        rates = follows & ~of_y & starter.read(rows)
         rows = rows | (starter.every & starter.groups("momentum_rate") & starter.reading(rates))
-    found = by_corrections(starter, t, np.where(rates, 0.0, x), rows, follows & (of_y | _read(starter, rows)))
+    found = by_corrections(starter, t, np.where(rates, 0.0, x), rows, follows & (of_y | starter.read(rows)))
     if found.known.any() or not found.holds:
         return found
     return by_corrections(starter, t, x, written, follows & of_y)
-
-
-def _read(starter: Starter, rows: Mask) -> Mask:
-    """Unknowns that some of these rows read."""
-    found = np.zeros_like(starter.free)
-    found[starter.columns[rows[starter.rows]]] = True
-    return found

@@ -47,14 +47,13 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
     flat = flat_at(starter, t, x, follows)
     if not flat.any():
         return
-    flat_rows = np.bincount(starter.rows, flat, starter.settled.rows) > 0.0
-    flat_here = np.bincount(starter.columns, flat, x.size) > 0.0
-    rows = without_rates(starter) & ~flat_rows
+    flat_here = starter.columns_of(flat)
+    rows = without_rates(starter) & ~starter.rows_of(flat)
     at = solve(problem_of(starter, t, x, x, rows=rows, free=follows & ~flat_here), x).x
     at = starter.without_noise(at, starter.scale(t, x))
     with np.errstate(invalid="ignore"):  # infinite rows are missed
         missed = ~(np.abs(starter.residual(t, at)) * starter.row_scale(t, at, starter.scale(t, at)) <= OWN)
-    some = np.bincount(starter.columns, flat & missed[starter.rows], x.size) > 0.0
+    some = starter.columns_of(flat & missed[starter.rows])
     yield np.where(some, beside, x) if some.any() else x, follows & (some | ~flat_here)
     if some.any() and (some != flat_here).any():
         yield np.where(flat_here, beside, x), follows
@@ -62,45 +61,55 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
 
 def _steep_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Entries [entries] of rows whose slope is beyond all bounds in what follows from the state, where that is zero."""
+    at_zero: Mask = (follows & (x == 0.0))[starter.columns]
+    if not at_zero.any():
+        return at_zero
     here, beside = (np.abs(starter.jacobian(t, at)) for at in (x, _beside(starter, t, x, follows)))
-    at_zero = (follows & (x == 0.0))[starter.columns]
     return np.asarray(at_zero & (beside < FALLS * here) & ~starter.groups(*HIDDEN)[starter.rows])
 
 
-def resting(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
+def without_flow(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Of what follows the flows of laws without a slope at x whose rates are not asked for."""
-    flat = flat_at(starter, t, x, follows) & starter.resting[starter.rows]
-    return np.asarray(np.bincount(starter.columns, flat, x.size) > 0.0)
+    if not starter.resting.any():
+        return np.zeros_like(follows)
+    return starter.columns_of(flat_at(starter, t, x, follows) & starter.resting[starter.rows])
 
 
 def at_rest(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Of what follows what stays as it is at x: these, and what is zero where slopes by it are beyond all bounds, and
     these rows hold.
     """
-    steep = _steep_at(starter, t, x, follows)
-    steep &= (_missed(starter, t, x) <= STEEPLY)[starter.rows]
-    return resting(starter, t, x, follows) | np.asarray(np.bincount(starter.columns, steep, x.size) > 0.0)
+    steep, still = _steep_at(starter, t, x, follows), without_flow(starter, t, x, follows)
+    if not steep.any():
+        return still
+    return still | starter.columns_of(steep & (_missed(starter, t, x) <= STEEPLY)[starter.rows])
 
 
 def rested(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats:
     """X with nothing where flat laws pass next to nothing, and laws that are steep at nothing have next to nothing
     across them, and hold so to round-off.
     """
-    size = starter.largest_alike(np.maximum(starter.scale(t, starter.guess), np.abs(x)))
+    size = _largest(starter, t, x)
     for bent, most in ((flat_at, HOLDS), (_steep_at, STEEPLY)):
         near = np.where(follows & (np.abs(x) <= NEXT_TO_NOTHING * size), 0.0, x)
+        if (near == x).all():
+            break
         entries = bent(starter, t, near, follows)
-        at = np.where(np.bincount(starter.columns, entries, x.size) > 0.0, near, x)
-        laws = starter.reading(at != x) & (np.bincount(starter.rows, entries, starter.settled.rows) > 0.0)
+        at = np.where(starter.columns_of(entries), near, x)
+        laws = starter.reading(at != x) & starter.rows_of(entries)
         x = at if (_missed(starter, t, at)[laws] <= most).all() else x
     return x
 
 
+def _largest(starter: Starter, t: float, x: Floats) -> Floats:
+    """The largest magnitudes alike [unknowns], at the guess or at x."""
+    return starter.largest_alike(np.maximum(starter.scale(t, starter.guess), np.abs(x)))
+
+
 def _missed(starter: Starter, t: float, x: Floats) -> Floats:
     """Misses of rows [rows], of their terms in the largest magnitudes alike."""
-    size = starter.largest_alike(np.maximum(starter.scale(t, starter.guess), np.abs(x)))
     with np.errstate(invalid="ignore"):
-        return np.abs(starter.residual(t, x)) * starter.row_scale(t, x, size)
+        return np.abs(starter.residual(t, x)) * starter.row_scale(t, x, _largest(starter, t, x))
 
 
 def unasked(starter: Starter, flat: Ints) -> bool:
@@ -143,7 +152,7 @@ def unrated(starter: Starter, t: float, x: Floats) -> bool:
     nothing = starter.every & ~np.isfinite(starter.residual(t, x)) & starter.groups(*HIDDEN)
     fewer = _let_go(starter, nothing)
     y, yd = starter.expand(x)
-    size = starter.largest_alike(np.maximum(starter.scale(t, starter.guess), np.abs(x)))[: y.size]
+    size = _largest(starter, t, x)[: y.size]
     return unasked(starter, rows_without_slope(starter.system, t, y, yd, size, steep=True)) or fewer
 
 

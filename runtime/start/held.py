@@ -13,7 +13,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.start.corrections import EXACT
-from sysdyn.runtime.start.flat import OWN, at_rest, off_the_flat, rested, resting, unrated, without_rates
+from sysdyn.runtime.start.flat import OWN, at_rest, off_the_flat, rested, unrated, without_flow, without_rates
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
@@ -86,8 +86,8 @@ def nearest(starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, fr
 
 
 def astray(starter: Starter, t: float, x: Floats, near: Floats, guess: Floats, state: Mask) -> bool:
-    """Whether the state at x has moved farther than to this nearest point, of the largest state alike.  What scales say
-    is of no size here: slopes beyond all bounds make them so too.
+    """Whether the state at x has moved farther than to this nearest point, of the largest state alike; of scales, which
+    slopes beyond all bounds make as large as they like, no more counts than what a search leaves.
     """
     size = starter.largest_alike(np.where(state, np.maximum(np.abs(near), np.abs(x)), 0.0))
     left = SETTLED * np.minimum(starter.scale(t, guess), starter.scale(t, x))
@@ -141,7 +141,7 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
         return found, False
     before, scale = (starter.every.copy(), starter.resting.copy()), starter.scale(t, guess)
     begun = starter.without_noise(found.x, scale)  # what round-off left is no magnitude
-    for still in (at_rest, resting):
+    for still in (at_rest, without_flow):
         near, fewer = begun, True
         while fewer:
             near = rested(starter, t, near, free)

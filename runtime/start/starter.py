@@ -251,6 +251,18 @@ class Starter:
         """Rows [rows] that read some of these unknowns."""
         return linked(unknowns, self.columns, self.rows, self.settled.rows)
 
+    def read(self, rows: Mask) -> Mask:
+        """Unknowns that some of these rows [rows] read."""
+        return linked(rows, self.rows, self.columns, self.free.size)
+
+    def rows_of(self, entries: Mask) -> Mask:
+        """Rows [rows] of these entries."""
+        return _marked(self.rows[entries], self.settled.rows)
+
+    def columns_of(self, entries: Mask) -> Mask:
+        """Unknowns of these entries."""
+        return _marked(self.columns[entries], self.free.size)
+
     def groups(self, *names: str) -> Mask:
         """Rows of the named groups; read-only."""
         return self.settled.of_groups(*names)
@@ -371,3 +383,10 @@ class Starter:
             found[missed] = self.largest_alike(found)[missed]
             found = np.where(found > 1e-280, found, 1.0)
         return found
+
+
+def _marked(places: Ints, size: int) -> Mask:
+    """These places among so many."""
+    found = np.zeros(size, dtype=bool)
+    found[places] = True
+    return found

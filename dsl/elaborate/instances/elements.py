@@ -126,9 +126,10 @@ class Elements(Connections):
         def part() -> None:
             """Of the loops in sight: of all, or where the law reads several statements of a label, of a part."""
             law, loops = law_of(self.resolver, symbol, whole, side, value, kind, span), self.resolver.loops
-            unit = si(own_variables(symbol, whole)[law.side].dimension or NONE)
-            node = friction.of_law(self, law, symbol.family.name, whole, loops, self.place(s.span), unit)
-            law = replace(law, law=node)
+            if ex.calls(law.law, "setsign"):
+                unit = si(own_variables(symbol, whole)[law.side].dimension or NONE)
+                node = friction.of_law(self, law, symbol.family.name, whole, loops, self.place(s.span), unit)
+                law = replace(law, law=node)
             self.resolver.laws[symbol.family.name] = law
             said = law.kind, law.side, law.law
             branch = self.branch(symbol.family.name, symbol.domain, whole, loops, said, ends, self.place(s.span))
