@@ -91,7 +91,28 @@ def relation(
     negative.  A c that a reaction tells is watched (aim).  Where u moves at finite rates alone it is a sign, which may
     slide (forms/corners).
     """
-    at, shape = loop_indices(loops), loop_ranges(loops)
+    at = loop_indices(loops)
+    text, made = _told_apart(frame, text, label, loops)
+    root = ex.sub(given, text)
+    factors = {s: derivative(root, s) for s, _ in made}
+    read = frozenset().union(*(ex.variables(n) for n in (*factors.values(), *(u for _, u in made))))
+    whole = {s for s, _ in made if s not in read and ex.variables(factors[s]).isdisjoint(factors)}
+    senses = {s: _sense(frame, f"{s.data[0]} sense", at, loops, place) for s, _ in made}
+    slipping = {s: ex.sub(ex.mul(factors[s], senses[s]), s) for s in factors if s in whole}
+    for s, u in made:
+        _check(frame, s, u, factors[s], label, at, place)
+        frame.parts.unknowns.append(Unknown(s.data[0], loop_ranges(loops), unit if s in whole else si(NONE), place))
+        rest = ex.substitute(root, dict.fromkeys((s, *slipping), ex.const(0.0)))
+        rest = ex.add(rest, *(term for o, term in slipping.items() if o is not s))
+        slips = s if s in whole else ex.sub(s, senses[s])
+        _close(frame, (s, u, senses[s]), slips, (factors[s], rest), label, loops, place, absorbs=u is absorbs)
+    return ex.add(ex.substitute(text, {s: senses[s] for s in slipping}), *slipping)
+
+
+def _told_apart(
+    frame: ElaborationContext, text: Node, label: str, loops: tuple[Loop, ...]
+) -> tuple[Node, list[tuple[Node, Node]]]:
+    """The text with an unknown in place of each setsign(u), and these unknowns with their u; signs of what is known."""
     change: dict[Node, Node] = {}
     made: list[tuple[Node, Node]] = []
     again = _said_before(frame, label)
@@ -101,37 +122,47 @@ def relation(
             change[node] = ex.call("sign", u)
             continue
         name = f"{label} set" + (f" {again + len(made) + 1}" if again + len(made) else "")
-        change[node] = ex.var(name, "e", *at)
+        change[node] = ex.var(name, "e", *loop_indices(loops))
         made.append((change[node], u))
-    text = ex.substitute(text, change)
-    root = ex.sub(given, text)
-    factors = {s: derivative(root, s) for s, _ in made}
-    read = frozenset().union(*(ex.variables(n) for n in (*factors.values(), *(u for _, u in made))))
-    whole = [s for s, _ in made if s not in read and ex.variables(factors[s]).isdisjoint(factors)]
-    senses = {s: _sense(frame, f"{s.data[0]} sense", at, loops, place) for s, _ in made}
-    said = ex.add(ex.substitute(text, {s: senses[s] for s in whole}), *whole)
-    for s, u in made:
-        factor, name = factors[s], s.data[0]
-        frame.parts.unknowns.append(Unknown(name, shape, unit if s in whole else si(NONE), place))
-        inside = {n for n in ex.topological([u, factor]) if n.op == "index"} - set(at)
-        if s in ex.variables(factor) or ex.is_const(factor, 0.0) or inside:
-            why = f"setsign enters {label} in another way than c*setsign(u)"
-            frame.report.error("E705", why, place, help="implicit s: 1, closed by gamma set: s = setsign(u)")
-            raise Failed
-        sense, holds = senses[s], _sense(frame, f"{name} holds", at, loops, place)
-        slips = s if s in whole else ex.sub(s, sense)
-        row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, slips)
-        frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
-        others = [o for o in whole if o is not s]
-        rest = ex.substitute(root, dict.fromkeys((s, *others), ex.const(0.0)))
-        rest = ex.add(rest, *(ex.sub(ex.mul(factors[o], senses[o]), o) for o in others))
-        left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
-        bound = ex.neg(factor) if u is absorbs else ex.call("abs", factor)
-        aimed = u is not absorbs and any(n.data[1] in ("kappa", "mu") for n in ex.variables(factor) if n.op == "var")
-        aim = (factor,) if aimed else ()
-        draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, aim=aim, holds=holds)
-        frame.parts.drafts.append(draft)
-    return said
+    return ex.substitute(text, change), made
+
+
+def _check(
+    frame: ElaborationContext, s: Node, u: Node, factor: Node, label: str, at: tuple[Node, ...], place: Place
+) -> None:
+    """Whether s enters as factor*s alone, by no sum of its own indices."""
+    inside = {n for n in ex.topological([u, factor]) if n.op == "index"} - set(at)
+    if s in ex.variables(factor) or ex.is_const(factor, 0.0) or inside:
+        why = f"setsign enters {label} in another way than c*setsign(u)"
+        frame.report.error("E705", why, place, help="implicit s: 1, closed by gamma set: s = setsign(u)")
+        raise Failed
+
+
+def _close(
+    frame: ElaborationContext,
+    unknown: tuple[Node, Node, Node],
+    slips: Node,
+    terms: tuple[Node, Node],
+    label: str,
+    loops: tuple[Loop, ...],
+    place: Place,
+    *,
+    absorbs: bool,
+) -> None:
+    """The gamma of an unknown s, of its u and sense: u = 0 while it holds, else `slips` = 0; and the draft of its
+    switches, of a row factor*s + rest.
+    """
+    (s, u, sense), (factor, rest) = unknown, terms
+    name, at = s.data[0], loop_indices(loops)
+    holds = _sense(frame, f"{name} holds", at, loops, place)
+    row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, slips)
+    frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
+    left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
+    bound = ex.neg(factor) if absorbs else ex.call("abs", factor)
+    aimed = not absorbs and any(n.data[1] in ("kappa", "mu") for n in ex.variables(factor) if n.op == "var")
+    aim = (factor,) if aimed else ()
+    draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, aim=aim, holds=holds)
+    frame.parts.drafts.append(draft)
 
 
 def _said_before(frame: ElaborationContext, label: str) -> int:
