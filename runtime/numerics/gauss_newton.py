@@ -68,6 +68,11 @@ class Problem:
     check: Callable[[], None] | None = None
     spare: Callable[[], None] = lambda: None
 
+    def distances(self, x: Floats) -> tuple[float, ...]:
+        """How far x is from the guess in each level, in units of its moves; those nearest to it first."""
+        moved = np.abs(x - self.guess) * self.weight / self.scale
+        return tuple(float(np.linalg.norm(moved[level])) for level in self.levels)
+
 
 @dataclass(frozen=True, slots=True)
 class Solution:

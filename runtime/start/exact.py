@@ -11,8 +11,8 @@ from sysdyn.runtime.numerics.gauss_newton import Solution, solve
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.corrections import EXACT, Corrected, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
-from sysdyn.runtime.start.flat import at_rest, rested, without_flow, without_rates
-from sysdyn.runtime.start.held import CLOSED, astray, following, least_change, nearest, own_residual
+from sysdyn.runtime.start.flat import at_rest, bends, rested, without_flow, without_rates
+from sysdyn.runtime.start.held import CLOSED, astray, farther, following, least_change, nearest, own_residual, tidied
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
 
@@ -27,10 +27,31 @@ def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, f
     moves: neither depends on the way here; whether that holds.  What is too large for full matrices is left alone.
     None that holds where its state has moved farther than its rows ask for.
     """
+    state = free & ~starter.following(t, best.x)
+    if best.residual >= EXACT or best.x.size > DENSE or not (best.x != guess)[state].any():
+        return best, False
+    found, sure = _renewed(starter, t, best, x, guess, free)
+    if found.residual == np.inf or not bends(starter, t, found.x, free & ~state):
+        return found, sure
+    # what a law without a slope, or one beyond all bounds, asks of rates says nothing of the state
+    with starter.granted():
+        nearer = (least_change(starter, t, at, guess, without_rates(starter), free, state) for at in (found.x, best.x))
+        settled = next((at for at in nearer if at is not None), None)
+    if settled is None or not farther(starter, t, found.x, settled, guess, free):
+        return found, sure
+    clean = tidied(starter, t, settled, guess, state)
+    for begun in (np.where(state, clean, x), clean):
+        with starter.granted():
+            again, holds = following(starter, t, begun, guess, free, free & ~state)
+        if holds:
+            return again, True
+    return Solution(best.x, np.inf), False
+
+
+def _renewed(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
+    """The same, by what all rows say of the state."""
     there = best.x
     state = free & ~starter.following(t, there)
-    if best.residual >= EXACT or there.size > DENSE or not (there != guess)[state].any():
-        return best, False
     near = nearest(starter, t, there, guess, starter.every, free)
     largest = starter.largest_alike(np.maximum(starter.scale(t, guess), np.abs(near)))
     near = np.where(np.abs(near - there) <= NOISE * largest, there, near)
@@ -118,7 +139,9 @@ def _values(starter: Starter, t: float, x: Floats, follows: Mask, rests: Mask) -
     for _ in range(2):  # rates of momenta read those of flows
         rates = follows & ~of_y & starter.read(rows)
         rows = rows | (starter.every & starter.groups("momentum_rate") & starter.reading(rates))
-    found = by_corrections(starter, t, np.where(rates, 0.0, x), rows, follows & (of_y | starter.read(rows)))
+    begun, free = np.where(rates, 0.0, x), follows & (of_y | starter.read(rows))
+    found = by_corrections(starter, t, begun, rows, free)
     if found.known.any() or not found.holds:
         return found
-    return by_corrections(starter, t, x, written, follows & of_y)
+    found = by_corrections(starter, t, x, written, follows & of_y)
+    return found if found.holds else by_corrections(starter, t, begun, rows, free, partly=True)

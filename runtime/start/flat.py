@@ -16,8 +16,12 @@ from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import Mask, Starter
 
-NEXT_TO_NOTHING, HOLDS, STEEPLY = 1e-7, 1e-15, 1e-13
-"""Of the largest alike: roots of round-off; scaled residual of rows that hold to it, that such roots of it make."""
+NEXT_TO_NOTHING, NEARLY, HOLDS, STEEPLY = 1e-7, 1e-4, 1e-15, 1e-13
+"""Of the largest alike: roots of round-off; what a search leaves, which comes nearer by halves alone.  Scaled residual
+of rows that hold to round-off; that roots of it make.
+"""
+ROOT = 1e-3
+"""Of magnitudes: beside a root slopes are others even so near, those of an exponential are not."""
 NO_SLOPE = 1e-10
 """Of the slope beside: what is less is none (slopes are those next to a root where others are no numbers at it)."""
 OWN = 1e-6
@@ -31,9 +35,19 @@ def _beside(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats:
 
 def flat_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Entries [entries] of rows that have no slope in what follows from the state at x, but beside it."""
-    beside = _beside(starter, t, x, follows)
+    return _flat(starter, t, x, _beside(starter, t, x, follows), follows)
+
+
+def rooted_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
+    """Those of them whose slopes are others so near x that they have a root there."""
+    beside = x + np.where(follows, ROOT * _largest(starter, t, x), 0.0)
+    return _flat(starter, t, x, beside, follows, NO_SLOPE / ROOT)
+
+
+def _flat(starter: Starter, t: float, x: Floats, beside: Floats, follows: Mask, least: float = NO_SLOPE) -> Mask:
+    """Entries of rows that have less than this part of the slopes beside."""
     here, there = np.abs(starter.jacobian(t, x)), np.abs(starter.jacobian(t, beside))
-    flat = (here <= NO_SLOPE * there) & (there > 0.0) & follows[starter.columns]
+    flat = (here <= least * there) & (there > 0.0) & follows[starter.columns]
     return np.asarray(flat & ~starter.groups(*HIDDEN)[starter.rows])
 
 
@@ -59,6 +73,25 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
         yield np.where(flat_here, beside, x), follows
 
 
+def beside_the_flat(starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask) -> Floats | None:
+    """The point nearest to the guess on these rows but those without a slope at x in what follows from the state; what
+    follows is beside it where these are missed; None where none is flat, or the others do not hold.
+    """
+    follows = free & starter.following(t, x)
+    x = rested(starter, t, x, follows)
+    flat = rooted_at(starter, t, x, follows)
+    flat &= rows[starter.rows]
+    if not flat.any():
+        return None
+    others = problem_of(starter, t, x, guess, rows=rows & ~starter.rows_of(flat), free=free, least=True)
+    found = solve(others, guess)
+    if found.residual >= OWN:
+        return None
+    near = starter.without_noise(found.x, starter.scale(t, x))  # what round-off left is no magnitude
+    some = starter.columns_of(flat & ~(_missed(starter, t, near) <= OWN)[starter.rows])
+    return np.where(some, _beside(starter, t, x, follows), near)
+
+
 def _steep_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Entries [entries] of rows whose slope is beyond all bounds in what follows from the state, where that is zero."""
     at_zero: Mask = (follows & (x == 0.0))[starter.columns]
@@ -66,6 +99,12 @@ def _steep_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
         return at_zero
     here, beside = (np.abs(starter.jacobian(t, at)) for at in (x, _beside(starter, t, x, follows)))
     return np.asarray(at_zero & (beside < FALLS * here) & ~starter.groups(*HIDDEN)[starter.rows])
+
+
+def bends(starter: Starter, t: float, x: Floats, follows: Mask) -> bool:
+    """Whether some law has no slope near x in what follows from the state, or one beyond all bounds."""
+    near = np.where(follows & (np.abs(x) <= NEARLY * _largest(starter, t, x)), 0.0, x)
+    return bool(rooted_at(starter, t, near, follows).any() or _steep_at(starter, t, near, follows).any())
 
 
 def without_flow(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
@@ -76,13 +115,14 @@ def without_flow(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
 
 
 def at_rest(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
-    """Of what follows what stays as it is at x: these, and what is zero where slopes by it are beyond all bounds, and
-    these rows hold.
+    """Of what follows what stays as it is at x: these, and what is zero where laws have no slope in it, or one beyond
+    all bounds, and hold.
     """
-    steep, still = _steep_at(starter, t, x, follows), without_flow(starter, t, x, follows)
-    if not steep.any():
+    still, at_zero = without_flow(starter, t, x, follows), follows & (x == 0.0)
+    bent = rooted_at(starter, t, x, at_zero) | _steep_at(starter, t, x, at_zero)
+    if not bent.any():
         return still
-    return still | starter.columns_of(steep & (_missed(starter, t, x) <= STEEPLY)[starter.rows])
+    return still | starter.columns_of(bent & (_missed(starter, t, x) <= STEEPLY)[starter.rows])
 
 
 def rested(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats:

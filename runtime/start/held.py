@@ -13,7 +13,16 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.start.corrections import EXACT
-from sysdyn.runtime.start.flat import OWN, at_rest, off_the_flat, rested, unrated, without_flow, without_rates
+from sysdyn.runtime.start.flat import (
+    OWN,
+    at_rest,
+    beside_the_flat,
+    off_the_flat,
+    rested,
+    unrated,
+    without_flow,
+    without_rates,
+)
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import no_start
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
@@ -24,9 +33,10 @@ sets, which may contradict it.
 """
 CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
-ASTRAY, SETTLED, _SETTLING = 1e-5, 1e-10, 20
+ASTRAY, SETTLED, FARTHER, _SETTLING = 1e-5, 1e-10, 1e-9, 20
 """Of the largest alike: a state farther from the least change has moved for nothing; of its scale: what searches
-leave; steps along what bends.
+leave; in units of moves, where what nothing is said of weighs a thousandth: one is farther than another; steps along
+what bends.
 """
 
 
@@ -69,7 +79,33 @@ def own_residual(starter: Starter, t: float, magnitudes: Floats, x: Floats) -> f
 def least_change(
     starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask, state: Mask
 ) -> Floats | None:
-    """From x where these rows hold and the state cannot be nearer to the guess; None where none was found."""
+    """From x where these rows hold and the state cannot be nearer to the guess; None where none was found.  Where laws
+    have no slope no step along the others shows what is nearer: that from beside them too, and the nearer of both.
+    """
+    found = _settled(starter, t, x, guess, rows, free, state)
+    at = x if found is None else found
+    beside = beside_the_flat(starter, t, at, guess, rows, free) if x.size <= DENSE else None
+    if beside is None:
+        return found
+    held = solve(problem_of(starter, t, beside, guess, rows=rows, free=free & ~state), beside)
+    begun = held.x if held.residual < EXACT else beside  # else it may fall back to where laws are flat
+    other = _settled(starter, t, begun, guess, rows, free, state)
+    if found is None or (other is not None and not farther(starter, t, other, found, guess, free)):
+        return other
+    return found
+
+
+def farther(starter: Starter, t: float, x: Floats, near: Floats, guess: Floats, free: Mask) -> bool:
+    """Whether x is farther from the guess than this point, by what moves least."""
+    problem = problem_of(starter, t, guess, guess, rows=starter.every, free=free, least=True)
+    apart = (a - b for a, b in zip(problem.distances(x), problem.distances(near), strict=True))
+    return next((d for d in apart if abs(d) > FARTHER), 0.0) > 0.0
+
+
+def _settled(
+    starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask, state: Mask
+) -> Floats | None:
+    """The same by steps along the rows as they are linear."""
     for _ in range(_SETTLING):
         found = solve(problem_of(starter, t, x, guess, rows=rows, free=free, least=True), x)
         if found.residual >= EXACT:
@@ -78,6 +114,12 @@ def least_change(
         if not astray(starter, t, found.x, x, guess, state):
             return found.x
     return None
+
+
+def tidied(starter: Starter, t: float, x: Floats, guess: Floats, state: Mask) -> Floats:
+    """X without round-off: of the state beside the largest state alike, whatever searches left of what follows."""
+    scale = starter.scale(t, guess)
+    return np.where(state, starter.without_noise(np.where(state, x, 0.0), scale), starter.without_noise(x, scale))
 
 
 def nearest(starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask) -> Floats:

@@ -17,7 +17,7 @@ from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.start.corrections import EXACT, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.flat import OWN, off_the_flat, without_rates
-from sysdyn.runtime.start.held import CLOSED, RESCALINGS, following, least_change, own_residual, rescaled
+from sysdyn.runtime.start.held import CLOSED, RESCALINGS, following, least_change, own_residual, rescaled, tidied
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import contradicting
 from sysdyn.runtime.start.starter import Mask, Starter
@@ -116,7 +116,9 @@ def _states(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, fo
         with starter.granted():
             held = least_change(starter, t, near, guess, without_rates(starter), free, free & ~follows)
         if held is not None:
-            yield np.where(follows, x, starter.without_noise(held, starter.scale(t, guess)))
+            clean = tidied(starter, t, held, guess, free & ~follows)
+            yield np.where(follows, x, clean)
+            yield clean
 
 
 def _by_corrections(starter: Starter, t: float, found: Solution, free: Mask) -> Solution | None:
