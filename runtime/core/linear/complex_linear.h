@@ -17,6 +17,8 @@ void sd_linear_z_free(sd_linear_z *linear);
 int32_t *sd_linear_z_pivoted(sd_linear_z *linear);
 /* as sd_linear_replayed */
 void sd_linear_z_replayed(sd_linear_z *linear);
+/* as sd_linear_often */
+void sd_linear_z_often(sd_linear_z *linear);
 /* as sd_linear_again */
 void sd_linear_z_again(sd_linear_z *linear);
 /* as sd_linear_factor; values may stand in sd_linear_z_values [entries], where they are scaled in place */

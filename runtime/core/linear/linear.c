@@ -1,5 +1,6 @@
 /* Scaling, and the choice between dense, sparse and replayed factors: see linear.h. */
 #include "linear/linear.h"
+#include "linear/dense/little_lu.h"
 #include "linear/lanes.h"
 #include "linear/null_space.h"
 #include "linear/sparse/sparse.h"
@@ -18,6 +19,7 @@ void sd_linear_free(sd_linear *linear)
     free(linear->sum);
     sd_sparse_free(linear->sparse);
     sd_elimination_free(linear->elimination);
+    free(linear->little);
     free(linear->null);
     if (linear->own_rows)
         free(linear->row_scale);
@@ -145,6 +147,15 @@ int sd_linear_in_cells(sd_linear *linear)
     linear->factorisations++;
     e->served = ++e->tries;
     return serve_replayed(linear);
+}
+
+/* by dense factors of little ones, where they are wanted and serve; 0: not */
+static int by_little(sd_linear *linear, const sd_number *values, const double *scale)
+{
+    if (!linear->little || linear->null_pivot > SD_LEAST_PIVOT || !little_factor(linear, values, scale))
+        return 0;
+    serve_replayed(linear);
+    return linear->replayed = 2;
 }
 
 /* which columns the sparse factors may leave */
@@ -291,7 +302,7 @@ int sd_linear_factor(sd_linear *linear, const sd_number *values, const double *s
     linear->factorisations++;
     if (!linear->pivoted)
         forget(linear);
-    return replay(linear, values, scale) ? 0 : pivot(linear, values, scale);
+    return by_little(linear, values, scale) || replay(linear, values, scale) ? 0 : pivot(linear, values, scale);
 }
 
 int32_t *sd_linear_pivoted(sd_linear *linear)
@@ -303,6 +314,13 @@ void sd_linear_replayed(sd_linear *linear)
 {
     if (linear->n <= SD_REPLAYED && !linear->elimination)
         linear->elimination = sd_elimination_new(linear->n, linear->column, linear->row);
+}
+
+void sd_linear_often(sd_linear *linear)
+{
+    sd_linear_replayed(linear);
+    if (linear->n <= SD_LITTLE && !linear->little)
+        linear->little = calloc(1, sizeof *linear->little);
 }
 
 void sd_linear_again(sd_linear *linear)
@@ -357,7 +375,9 @@ static SD_APART void solve_pivoted(sd_linear *linear, sd_number *x)
 
 void sd_linear_solve(sd_linear *linear, sd_number *x)
 {
-    if (linear->replayed)
+    if (linear->replayed == 2)
+        little_solve(linear->little, linear->n, x);
+    else if (linear->replayed)
         sd_elimination_solve(linear->elimination, x);
     else
         solve_pivoted(linear, x);

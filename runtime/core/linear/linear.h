@@ -18,6 +18,9 @@
 
 typedef struct sd_sparse sd_sparse;
 typedef struct sd_matrix sd_matrix;
+typedef struct sd_little sd_little;
+
+#define SD_LITTLE 5 /* unknowns up to which dense factors are the cheapest (dense/little_lu.h) */
 
 /* An order of elimination: columns [n], NULL: dense; paired: row own[c] (NULL: c) pivots in column c wherever its entry will do,
  * (position [n]: the place of each column in the order, NULL: not known)
@@ -53,12 +56,13 @@ typedef struct sd_linear {
     size_t null_room;
     int32_t nulls;               /* n - rank, or 0 where those would be too many */
     int32_t pivoted;             /* 0: pivots are chosen anew */
-    int32_t replayed;            /* the last factors are those of `elimination` */
+    int32_t replayed;            /* 1: the last factors are those of `elimination`; 2: of `little` */
     sd_elimination *elimination; /* NULL: every matrix is pivoted */
     const int32_t *otherwise;    /* of sd_order; NULL: the order stays */
     sd_matrix *sum;              /* R (A + c B) C instead of `scaled`, of which there is none; NULL: there is */
     sd_number *lent;             /* [n + 1] work of sparse factors that is the caller's; NULL: it is theirs */
     int32_t own_scale, own_rows; /* 1: column_scale, row_scale are not the caller's */
+    sd_little *little;           /* NULL: little matrices are factorised as all others */
 } sd_linear;
 
 /* order: column order for the sparse factorisation, NULL for dense.  NULL without memory. */
@@ -90,6 +94,8 @@ int32_t *sd_linear_pivoted(sd_linear *linear);
 /* small matrices, of which there will be many, are eliminated by a list of operations (elimination/elimination.h) where it serves; the
  * pivots of others are chosen as before */
 void sd_linear_replayed(sd_linear *linear);
+/* the same, but for little ones, whose dense factors are unrolled */
+void sd_linear_often(sd_linear *linear);
 /* The cells of `elimination` (which keeps one order) hold new factors, made by who runs its lists himself.  1: they are healthy, and
  * serve; 0: nothing changes. */
 int sd_linear_in_cells(sd_linear *linear);

@@ -53,6 +53,7 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_linear_pivoted sd_linear_z_pivoted
 #define sd_linear_ordered sd_linear_z_ordered
 #define sd_linear_replayed sd_linear_z_replayed
+#define sd_linear_often sd_linear_z_often
 #define sd_linear_in_cells sd_linear_z_in_cells
 #define sd_linear_again sd_linear_z_again
 #define sd_linear_left sd_linear_z_left

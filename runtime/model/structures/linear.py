@@ -49,4 +49,6 @@ class Linear(c.Structure):
         ("sum", P),
         ("lent", P),
         ("own_scale", I),
+        ("own_rows", I),
+        ("little", P),
     ]

@@ -65,7 +65,7 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     bdf->g = steep ? bdf->jyd + nnz : linear->scaled;
     bdf->ivp.system = system;
     bdf->linear = linear;
-    sd_linear_replayed(linear);
+    sd_linear_often(linear);
     bdf->ivp.n = system->unknowns;
     bdf->max_order = SD_MAX_ORDER;
     bdf->ivp.stepper = (sd_stepper){.self = bdf, .ivp = &bdf->ivp, .n = bdf->ivp.n, .y = bdf->phi[0], .yd = bdf->yd,

@@ -187,9 +187,9 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
     for (int32_t k = 0; k < (stages - 1) / 2; k++) {
         radau->complex_linear[k] = complex_linear[k];
         if (complex_linear[k])
-            sd_linear_z_replayed(complex_linear[k]);
+            sd_linear_z_often(complex_linear[k]);
     }
-    sd_linear_replayed(linear);
+    sd_linear_often(linear);
     radau->phi = calloc(2 * m, sizeof(double));
     radau->gap = calloc(SD_METHODS, sizeof *radau->gap);
     if (!radau->phi || !radau->gap || sd_radau_provide(radau)) {

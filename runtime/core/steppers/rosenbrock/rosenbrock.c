@@ -75,7 +75,7 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
     rosenbrock->jyd_end = rosenbrock->jy_end + nnz;
     rosenbrock->ivp.system = system;
     rosenbrock->linear = linear;
-    sd_linear_replayed(linear);
+    sd_linear_often(linear);
     if (linear->elimination)
         linear->elimination->orders = 1; /* nothing corrects what its stages solve for */
     rosenbrock->ivp.n = system->unknowns;
