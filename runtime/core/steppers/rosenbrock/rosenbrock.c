@@ -20,6 +20,33 @@
 #define SHRUNK 1e-3        /* of the step that was tried first, below which the point that it begins at is settled */
 #define AFRESH 0.1         /* of it: what is tried from there */
 #define FAILS 12           /* matrices and stages of a step that may fail */
+#define OWN_RATES 64       /* unknowns of a system whose rows are looked at for rates of their own */
+
+/* yd [n] at the last accepted point.  Where each row has the rate of one unknown and no two the same, and what rows leave there is
+ * known, they are solved for these: the last stage's are those of an embedded method, which rows of a trace would have to settle */
+static void end_rates(const sd_rosenbrock *rosenbrock, double *yd)
+{
+    const sd_system *system = rosenbrock->ivp.system;
+    const int32_t n = rosenbrock->ivp.n;
+    const size_t size = (size_t)n * sizeof *yd;
+    uint64_t solved = 0;
+    memcpy(yd, rosenbrock->yd, size);
+    for (int32_t j = 0; j < n && rosenbrock->sloped && rosenbrock->rates == n && n <= OWN_RATES; j++) {
+        int32_t own = -1, others = 0;
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            if (rosenbrock->jyd[e] != 0.0) {
+                others += own >= 0;
+                own = e;
+            }
+        const uint64_t row = own >= 0 ? UINT64_C(1) << system->row[own] : solved;
+        if (others || row & solved || own < 0) {
+            memcpy(yd, rosenbrock->yd, size);
+            return;
+        }
+        solved |= row;
+        yd[j] -= rosenbrock->begin[system->row[own]] / rosenbrock->jyd[own];
+    }
+}
 
 static void within(const void *self, double t, double *y, double *yd)
 {
@@ -28,7 +55,7 @@ static void within(const void *self, double t, double *y, double *yd)
     if (rosenbrock->ivp.taken == 0 || t >= rosenbrock->ivp.t) {
         memcpy(y, rosenbrock->phi, size);
         if (yd)
-            memcpy(yd, rosenbrock->yd, size);
+            end_rates(rosenbrock, yd);
         return;
     }
     double h = rosenbrock->ivp.h_used;
