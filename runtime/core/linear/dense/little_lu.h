@@ -69,6 +69,7 @@ static inline __attribute__((always_inline)) int little_pivot(const sd_little *l
 {
     int best = k;
     *most = sd_size(lu->upper[k][k]) * of_row[k];
+#pragma GCC unroll 5
     for (int i = k + 1; i < n; i++) {
         const double size = sd_size(lu->upper[i][k]) * of_row[i];
         best = size > *most ? i : best;
@@ -97,6 +98,7 @@ static inline __attribute__((always_inline)) int little_factor_of(const sd_linea
     double of_row[SD_LITTLE];
     if (!little_take(linear, n, values, scale, of_row))
         return 0;
+#pragma GCC unroll 5
     for (int k = 0; k < n; k++) {
         double most;
         const int best = little_pivot(lu, n, k, of_row, &most);
@@ -106,8 +108,10 @@ static inline __attribute__((always_inline)) int little_factor_of(const sd_linea
         if (best != k)
             little_exchange(lu, n, best, k, of_row);
         const sd_number inverse = lu->inverse[k] = sd_inverse(lu->upper[k][k]);
+#pragma GCC unroll 5
         for (int i = k + 1; i < n; i++) {
             const sd_number by = lu->lower[i][k] = lu->upper[i][k] * inverse;
+#pragma GCC unroll 5
             for (int j = k + 1; j < n; j++)
                 lu->upper[i][j] -= by * lu->upper[k][j];
         }
