@@ -1,4 +1,4 @@
-"""Dense factors of matrices of up to five rows, real and complex: as exact as LAPACK's, and left where a pivot is weak."""
+"""Dense factors of up to five rows, real and complex: as exact as LAPACK's, and left where a pivot is weak."""
 
 import numpy as np
 import pytest
