@@ -30,6 +30,8 @@ from sysdyn.runtime.numerics.stretches import Ascents, Stretches, whole_of
 AUDITED = ("audit", "ledger")
 """Blocks that are read where a step's energies are balanced."""
 OBSERVING = ("observe", "observe_rate", "audit", "ledger")
+SHOWING = (*OBSERVING, "observe_scale")
+"""Blocks that a row reads."""
 
 
 def _spans(full: NDArray[np.integer], number: NDArray[np.integer]) -> tuple[NDArray[np.integer], ...]:
@@ -225,7 +227,17 @@ class Condensed:
         if None in kernels:
             return
         read = np.isin(families, sorted(frozenset[int]().union(*(reads or () for reads in kernels))))
-        self._straights.mark(read)
+        self._straights.mark("audited", read)
+
+    def _mark_rated(self) -> None:
+        """The same of those whose rates rows show, or what is a sum of these: no others have one there."""
+        blocks = self.whole.description.blocks
+        rates = [kernel.rates for name in SHOWING for kernel in blocks.get(name, ())]
+        if None in rates:
+            self._straights.mark("rated", np.ones(self.whole.unknowns, dtype=bool))
+            return
+        read = frozenset[int]().union(*(families or () for families in rates))
+        self._straights.mark("rated", np.isin(self.whole.family_of, sorted(read)))
 
     def _own_rows(self) -> Ints:
         """Kept rows q' - f as stretches (core/system/condensed.h), where no block adds to any and none is held."""
@@ -289,6 +301,7 @@ class Condensed:
         """The core's structures, of entries that are numbered: once."""
         whole = self.whole
         self._mark_audited()
+        self._mark_rated()
         self._own = self._own_rows()
         self._trim = self._trimmed()
         del self._number

@@ -103,7 +103,7 @@ class Straights:
         self._sources = first
         for k, (low, high, source) in enumerate(zip(begin.tolist(), ends.tolist(), offset.tolist(), strict=True)):
             place, entry = int(found.place[low]), int(found.start[low])
-            made[k] = lib.Straight(place, high - low, int(count[low]), 0, 1, first + 4 * source, at + 8 * entry, None)
+            made[k] = lib.Straight(place, high - low, int(count[low]), 0, 1, 1, first + 4 * source, at + 8 * entry, None)
         self.array, self.number = made, int(begin.size)
         long = np.flatnonzero((ends - begin >= LONG) & (terms_of > 0) & (terms_of <= MOST_ALIKE))
         sizes = (ends - begin)[long] * terms_of[long]
@@ -133,13 +133,14 @@ class Straights:
             factor = self._factors[entry : entry + size].reshape(self.array[number].terms, -1)
             self.array[number].alike = factor.shape[1] if (factor == factor[:, :1]).all() else 0
 
-    def mark(self, read: Mask) -> None:
-        """Says which stretches hold an unknown that is read [unknowns], or that such a one is a sum of."""
+    def mark(self, name: str, read: Mask) -> None:
+        """Says by the field of that name which stretches hold an unknown that is read [unknowns], or that such a one is a sum of."""
         wanted = read.copy()
         for k in range(self.number - 1, -1, -1):  # sums come behind what they read
             own = self.array[k]
-            own.audited = int(wanted[own.place : own.place + own.number].any())
-            if own.audited:
+            here = bool(wanted[own.place : own.place + own.number].any())
+            setattr(own, name, int(here))
+            if here:
                 first = (own.source - self._sources) // 4
                 for source in self._source[first : first + own.terms].tolist():
                     wanted[source : source + own.number] = True

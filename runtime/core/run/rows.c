@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "run/meters/quadratures.h"
+#include "run/spanned.h"
 
 #define FAILS 4 /* rows that meet their sums for each that does not: fewer are not worth looking */
 #define CRESTS 32 /* rows of what is watched that a step may have beside those at its parts */
@@ -238,10 +239,19 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     const int unsummed = run->unsummed > 1 || (run->unsummed && alone);
     const int compared = !at_step && (int32_t)kind & SD_COMPARED && run->observe_rate;
     const int begun = compared && run->t_from == run->t_begun;
-    find_point(run, t, !at_step && !unsummed, sum);
+    const int spans = !at_step && !compared && !run->told && !stays(run, (int32_t)kind) && sd_run_spans(run, (int32_t)kind);
+    int settled = 0;
+    if (spans) {
+        if (!unsummed)
+            sd_run_sum(run, t, sum);
+        settled = sd_run_span(run, t);
+    } else {
+        find_point(run, t, !at_step && !unsummed, sum);
+    }
     if (compared)
         find_slopes(run, t);
-    settle_row(run, t, (int32_t)kind, begun);
+    if (!settled)
+        settle_row(run, t, (int32_t)kind, begun);
     if (run->magnitude && !at_step)
         note_beyond(run);
     if (run->unsummed && alone)

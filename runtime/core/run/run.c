@@ -10,6 +10,8 @@
 #include "run/events/corners.h"
 #include "run/meters/quadratures.h"
 #include "run/events/watched.h"
+#include "run/spanned.h"
+#include "linear/lanes.h"
 #include "system/condensed.h"
 
 #define POLL 4  /* steps between two looks at the clock */
@@ -30,6 +32,8 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
         free(run);
         return NULL;
     }
+    if (settle && settle->unknowns <= SD_SPANNED_MOST) /* without the room rows are settled one by one */
+        run->spanning = calloc((size_t)(SD_SPANNING + 3) * 2 * (size_t)sd_whole_lanes(settle->unknowns) + 1, sizeof(double));
     run->stepper = stepper;
     run->settle = settle;
     run->written = written;
@@ -57,6 +61,7 @@ void sd_run_free(sd_run *run)
     if (!run)
         return;
     free(run->memory);
+    free(run->spanning);
     free(run->looked);
     free(run);
 }
@@ -142,7 +147,7 @@ static void measure(sd_run *run, double from, double t)
 {
     run->t_from = from;
     run->t_to = t;
-    run->sampled = run->noded = 0;
+    run->sampled = run->noded = run->divided = run->spanned = 0;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
     if (run->unsummed > 1)

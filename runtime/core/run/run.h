@@ -97,6 +97,11 @@ typedef struct sd_run {
     double *looked;                   /* [SD_PARTS + 2][observed] values at the ends of parts, and within one */
     int32_t noded;                    /* powers at so many nodes of the last step are known; -1: at none; 0: nobody asked yet */
     double node_power[SD_NODES][2];   /* dissipated, supplied */
+    double difference[SD_NODES + 1][2]; /* of the powers from the start on, divided, if `divided` (Newton) */
+    double *spanning;                 /* settled points at nodes of the last step (spanned.h); NULL: none are kept */
+    int32_t spanned;                  /* so many nodes tell its rows; -1: none do; 0: nobody asked yet */
+    int32_t divided;                  /* differences are of the last step */
+    int32_t strayed, skipped;         /* steps of late that no nodes told; since then not tried */
 } sd_run;
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,

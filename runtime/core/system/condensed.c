@@ -149,12 +149,18 @@ void sd_condensed_audited(const sd_condensed *condensed, const double *z, double
             evaluate_straight(&condensed->straight[s], x, 0);
 }
 
+void sd_condensed_shown_rates(const sd_condensed *condensed, double *yd)
+{
+    for (int32_t s = 0; s < condensed->straights && condensed->observed_rates; s++)
+        if (condensed->straight[s].rated)
+            evaluate_straight(&condensed->straight[s], yd, 1);
+}
+
 void sd_condensed_show(const sd_condensed *condensed, const double *z, const double *zd, double *y, double *yd)
 {
     sd_condensed_expand(condensed, z, y, 0);
     sd_condensed_put(condensed, zd, yd);
-    if (condensed->observed_rates)
-        sd_condensed_complete(condensed, yd, 1);
+    sd_condensed_shown_rates(condensed, yd);
 }
 
 void sd_condensed_gather(const sd_condensed *condensed, const double *x, double *z)

@@ -25,9 +25,10 @@ typedef struct sd_span {
 } sd_span;
 
 /* y[place + i] = constant[i] + sum over k of factor[k * number + i] * y[source[k] + i]; alike, where each term has one
- * factor: how far those of its terms stand apart, else 0; audited: powers and energies read these, or what does */
+ * factor: how far those of its terms stand apart, else 0; audited: powers and energies read these, or what does; rated: rows show
+ * rates of these, or of what is a sum of these */
 typedef struct sd_straight {
-    int32_t place, number, terms, alike, audited;
+    int32_t place, number, terms, alike, audited, rated;
     const int32_t *source;  /* [terms] */
     const double *factor;   /* [terms][number], or [terms][alike] */
     const double *constant; /* [number], NULL: zeros */
@@ -97,6 +98,8 @@ void sd_condensed_expand(const sd_condensed *condensed, const double *z, double 
 void sd_condensed_audited(const sd_condensed *condensed, const double *z, double *x);
 /* y, yd of a point that is observed but not settled: rates only as far as they are read */
 void sd_condensed_show(const sd_condensed *condensed, const double *z, const double *zd, double *y, double *yd);
+/* of rates yd, whose kept ones stand there, those that rows show */
+void sd_condensed_shown_rates(const sd_condensed *condensed, double *yd);
 /* the eliminated ones of x from its kept ones */
 void sd_condensed_complete(const sd_condensed *condensed, double *x, int rate);
 void sd_condensed_gather(const sd_condensed *condensed, const double *x, double *z);

@@ -389,6 +389,38 @@ int sd_settle_meets(sd_settle *settle, double t, double *y, double *yd)
     return meets;
 }
 
+void sd_settle_take_point(const sd_settle *settle, const double *y, const double *yd, double *z, double *zd)
+{
+    const sd_condensed *left = (const sd_condensed *)settle->system->left;
+    if (left) {
+        sd_condensed_gather(left, y, z);
+        sd_condensed_gather(left, yd, zd);
+    } else {
+        memcpy(z, y, (size_t)settle->unknowns * sizeof *z);
+        memcpy(zd, yd, (size_t)settle->unknowns * sizeof *zd);
+    }
+}
+
+int sd_settle_between(sd_settle *settle, double t, const double *z, const double *zd, double *y, double *yd)
+{
+    const sd_condensed *left = (const sd_condensed *)settle->system->left;
+    if (!sd_settle_provide_point(settle))
+        return 0;
+    measure(settle, t, z, zd);
+    settle->drift = settle->constraints;
+    if (left) {
+        if (y != left->y) /* where the rows were evaluated all is there */
+            sd_condensed_expand(left, z, y, 0);
+        sd_condensed_put(left, zd, yd);
+        sd_follow_flows(settle->k_span, settle->k_spans, y, yd);
+        sd_condensed_shown_rates(left, yd);
+    } else {
+        memcpy(y, z, (size_t)settle->unknowns * sizeof *y);
+        memcpy(yd, zd, (size_t)settle->unknowns * sizeof *yd);
+    }
+    return settle->residual <= fmax(COARSE, settle->enough);
+}
+
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)
 {
     if (!settle->seen)

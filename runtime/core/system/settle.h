@@ -95,5 +95,9 @@ int sd_settle_point(sd_settle *settle, double t, double *y, double *yd);
 int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd);
 /* 1: y, yd meet constraints and `told` rows as they come, in the scales of the last point that was moved (none yet: 0) */
 int sd_settle_meets(sd_settle *settle, double t, double *y, double *yd);
+/* z, zd [unknowns of the system] := those of y, yd, of a condensed system the kept ones */
+void sd_settle_take_point(const sd_settle *settle, const double *y, const double *yd, double *z, double *zd);
+/* y, yd := the point of z, zd, which settled ones on both sides tell.  1: it holds as far as round-off lets it */
+int sd_settle_between(sd_settle *settle, double t, const double *z, const double *zd, double *y, double *yd);
 
 #endif

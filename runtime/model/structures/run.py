@@ -260,6 +260,9 @@ class Run(c.Structure):
         ("looked", P),
         ("noded", I),
         ("node_power", D * (2 * NODES)),
+        ("difference", D * (2 * NODES + 2)),
+        ("spanning", P),
+        *[(name, I) for name in ["spanned", "divided", "strayed", "skipped"]],
     ]
 
 

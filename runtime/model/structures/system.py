@@ -102,7 +102,7 @@ class Straight(c.Structure):
     """sd_straight."""
 
     _fields_ = [
-        *[(name, I) for name in ["place", "number", "terms", "alike", "audited"]],
+        *[(name, I) for name in ["place", "number", "terms", "alike", "audited", "rated"]],
         *[(name, P) for name in ["source", "factor", "constant"]],
     ]
 

@@ -57,23 +57,24 @@ static void look_at_end(sd_run *run, double to)
         run->stepper->dense(run->stepper->self, to, run->point, run->point_d);
 }
 
+/* Gauss's rules on -1/2 .. 1/2, of two and of four points: polynomials of degree 3 and 7 are integrated exactly */
+static const double gauss[2][4] = {{-0.28867513459481288225, 0.28867513459481288225},
+                                   {-0.43056815579702628761, -0.16999052179242812840, 0.16999052179242812840, 0.43056815579702628761}};
+static const double gauss_weight[2][4] = {{0.5, 0.5},
+                                          {0.17392742256872692869, 0.32607257743127307131, 0.32607257743127307131,
+                                           0.17392742256872692869}};
+
 /* share [nodes + 1]: int_0^to of the polynomials of degree `nodes` that are 1 at the step's start, at each node place
  * [nodes], and 0 at the others, by Gauss's rule of degree 3 or 7 */
 static void shares(int32_t nodes, const double *place, double to, double *share)
 {
-    static const double gauss[2][4] = {{-0.28867513459481288225, 0.28867513459481288225},
-                                       {-0.43056815579702628761, -0.16999052179242812840, 0.16999052179242812840,
-                                        0.43056815579702628761}};
-    static const double weight[2][4] = {{0.5, 0.5},
-                                        {0.17392742256872692869, 0.32607257743127307131, 0.32607257743127307131,
-                                         0.17392742256872692869}};
     int high = nodes > 3, points = nodes + 1;
     double node[SD_NODES + 1] = {0.0};
     memcpy(node + 1, place, (size_t)nodes * sizeof *node);
     for (int k = 0; k < points; k++)
         share[k] = 0.0;
     for (int p = 0; p < (high ? 4 : 2); p++) {
-        double s = to * (0.5 + gauss[high][p]), before = weight[high][p], behind[SD_NODES + 2];
+        double s = to * (0.5 + gauss[high][p]), before = gauss_weight[high][p], behind[SD_NODES + 2];
         behind[points] = 1.0;
         for (int k = points - 1; k > 0; k--)
             behind[k] = behind[k + 1] * (s - node[k]);
@@ -259,25 +260,56 @@ static int look_within(sd_run *run)
     return fabs(missed[0]) + fabs(missed[1]) <= LITTLE * run->stepper->ivp->rtol * (size[0] + size[1]);
 }
 
+/* where the powers are known: parts of the step behind its start */
+static const double *nodes_of(const sd_run *run)
+{
+    return run->stepper->collocated ? run->stepper->node : lobatto;
+}
+
+/* the divided differences of the powers at the start and the nodes */
+static void divide(sd_run *run)
+{
+    const double *node = nodes_of(run);
+    memcpy(run->difference[0], run->power + 2, sizeof run->difference[0]);
+    memcpy(run->difference[1], run->node_power[0], (size_t)run->noded * sizeof run->difference[0]);
+    for (int32_t order = 1; order <= run->noded; order++)
+        for (int32_t k = run->noded; k >= order; k--) {
+            const double apart = node[k - 1] - (k > order ? node[k - order - 1] : 0.0);
+            for (int i = 0; i < 2; i++)
+                run->difference[k][i] = (run->difference[k][i] - run->difference[k - 1][i]) / apart;
+        }
+    run->divided = 1;
+}
+
 int sd_run_sum(sd_run *run, double to, double sum[2])
 {
     const sd_stepper *stepper = run->stepper;
     if (!run->noded)
         run->noded = is_crowded(run) && look_within(run) ? SD_NODES : -1;
+    if (run->noded > 0 && !run->divided)
+        divide(run);
     if (run->noded < 0) {
         int there = sd_run_integrate(run, to);
         memcpy(sum, run->integral + 2, 2 * sizeof *sum);
         return there;
     }
-    double share[SD_NODES + 1], h = length_of(run);
-    const double *node = stepper->collocated ? stepper->node : lobatto, *moves = stepper->collocated ? stepper->moves : NULL;
-    shares(run->noded, node, (to - run->t_from) / (stepper->ivp->t - run->t_from), share);
-    for (int i = 0; i < 2; i++) {
-        sum[i] = share[0] * run->power[2 + i];
-        for (int32_t k = 0; k < run->noded; k++)
-            sum[i] += share[k + 1] * run->node_power[k][i];
-        sum[i] = h * sum[i] + (moves ? moves[2 + i] : 0.0);
+    const double *node = nodes_of(run), *moves = stepper->collocated ? stepper->moves : NULL;
+    const double part = (to - run->t_from) / (stepper->ivp->t - run->t_from);
+    const int high = run->noded > 3;
+    sum[0] = sum[1] = 0.0;
+    for (int p = 0; p < (high ? 4 : 2); p++) {
+        const double s = part * (0.5 + gauss[high][p]);
+        double power[2] = {run->difference[run->noded][0], run->difference[run->noded][1]};
+        for (int32_t k = run->noded - 1; k >= 0; k--) { /* each is that from node k on */
+            const double apart = k > 0 ? s - node[k - 1] : s;
+            power[0] = power[0] * apart + run->difference[k][0];
+            power[1] = power[1] * apart + run->difference[k][1];
+        }
+        sum[0] += gauss_weight[high][p] * power[0];
+        sum[1] += gauss_weight[high][p] * power[1];
     }
+    for (int i = 0; i < 2; i++)
+        sum[i] = part * length_of(run) * sum[i] + (moves ? moves[2 + i] : 0.0);
     return 0;
 }
 
