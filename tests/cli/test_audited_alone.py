@@ -37,9 +37,9 @@ def test_energies_are_those_of_all_unknowns_bit_by_bit(tmp_path, monkeypatch):
     def ran(how):
         seen = []
 
-        def marked(own, read):
+        def marked(own, name, read):
             if how == "marked":
-                mark(own, read)
+                mark(own, name, read)
             seen.extend(own.array[k].number for k in range(own.number) if own.array[k].audited)
 
         monkeypatch.setattr(Straights, "mark", marked)

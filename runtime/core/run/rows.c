@@ -4,8 +4,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "run/compared.h"
 #include "run/meters/quadratures.h"
 #include "run/spanned.h"
+#include "system/settle_shown.h"
 
 #define FAILS 4 /* rows that meet their sums for each that does not: fewer are not worth looking */
 #define CRESTS 32 /* rows of what is watched that a step may have beside those at its parts */
@@ -41,53 +43,23 @@ static void note_beyond(sd_run *run)
 {
     const double *end = run->stepper->y;
     for (int32_t j = 0; j < run->stepper->n && j < run->written; j++) {
-        const double size = fmax(run->magnitude[j], fabs(end[j]));
-        if (fabs(run->point[j]) > run->beyond * size && run->magnitude[j] > 0.0)
+        const double usual = run->magnitude[j], last = fabs(end[j]), size = last > usual ? last : usual;
+        if (fabs(run->point[j]) > run->beyond * size && usual > 0.0)
             run->beyond = fabs(run->point[j]) / size;
     }
 }
 
-/* Whether something observed relaxes at t within a small part of the last step, which began with it: by the equations,
- * whose rates `row` has, it is under way to where the dense output is not.  Then the row is for the comparison alone, and
- * has in the place of its energies how many times as long the step is, and the largest part of its largest that something
- * moves by since then as fast as the equations and the dense output differ. */
-static int relaxes(const sd_run *run, double t, double *row)
-{
-    const double *rate = row + SD_ROW_HEAD + run->observed;
-    double h = run->t_to - run->t_from, since = t - run->t_from, most = 0.0;
-    for (int32_t i = 0; i < run->observed; i++) {
-        const double apart = fabs(rate[i] - run->slope[i]);
-        if (run->largest[i] > run->nothing[i] && isfinite(apart)) /* what is no number is said elsewhere */
-            most = fmax(most, apart / run->largest[i]);
-    }
-    if (!(most * h > run->swift))
-        return 0;
-    row[2] = h / since;
-    row[3] = most * since;
-    return 1;
-}
-
-/* The row just written once more for the comparison alone, with the slopes of the dense output.  The rates of a settled
- * point are those of the equations: a motion that relaxes at once makes of any error a rate without bound. */
-static void emit_compared(sd_run *run, double t, double *row, int begun)
-{
-    size_t width = (size_t)(SD_ROW_HEAD + 2 * run->observed);
-    int32_t others = (int32_t)row[1] & ~SD_COMPARED;
-    if (others) {
-        memcpy(row + width, row, width * sizeof *row);
-        row[1] = (double)others;
-        row += width;
-        run->rows++;
-    }
-    row[1] = SD_COMPARED | (begun && relaxes(run, t, row) ? SD_RELAXING : 0);
-    memcpy(row + SD_ROW_HEAD + run->observed, run->slope, (size_t)run->observed * sizeof *row);
-}
-
-/* whether a row shows what it shall as its point comes: for ever not once the first ones did not */
+/* Whether a row shows what it shall as its point comes: for ever not once the first ones did not.  Where one output within a
+ * step meets constant sums alone, so do the others there, which are combinations of the same points (of radau they are not). */
 static int meets(sd_run *run, double t)
 {
+    if (run->told && run->told_here) {
+        sd_settle_as_met(run->settle, run->point, run->point_d);
+        return 1;
+    }
     if (run->told && sd_settle_meets(run->settle, t, run->point, run->point_d)) {
         run->told++;
+        run->told_here = !run->fresh && !run->stepper->collocated && sd_settle_sums_alone(run->settle);
         return 1;
     }
     run->told = run->told > FAILS ? run->told - FAILS : 0;
@@ -146,8 +118,10 @@ static void find_sizes(sd_run *run, double t, const double *observed)
     memset(run->values, 0, (size_t)run->observed * sizeof(double));
     if (run->observe_scale)
         run->observe_scale->rows(&run->observe_scale->frame, t, run->point, run->point_d, run->values);
-    for (int32_t i = 0; i < run->observed; i++)
-        run->values[i] = fmax(fabs(observed[i]), fabs(run->values[i]));
+    for (int32_t i = 0; i < run->observed; i++) {
+        const double size = fabs(observed[i]), terms = fabs(run->values[i]);
+        run->values[i] = terms > size || isnan(size) ? terms : size;
+    }
 }
 
 /* the same of a point without a row */
@@ -230,6 +204,15 @@ static void write_quantities(sd_run *run, double t, int rates, double *row)
     note_sizes(run);
 }
 
+/* the point of a row among many of its step, settled, and the sum of the powers */
+static void span_row(sd_run *run, double t, int32_t kind, int summed, double sum[2])
+{
+    if (summed)
+        sd_run_sum(run, t, sum); /* before: it takes the room of the point */
+    if (!sd_run_span(run, t))
+        settle_row(run, t, kind, 0);
+}
+
 /* one output row at an instant of the last step, written as of `label`; two where it is compared too */
 static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
@@ -239,19 +222,15 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     const int unsummed = run->unsummed > 1 || (run->unsummed && alone);
     const int compared = !at_step && (int32_t)kind & SD_COMPARED && run->observe_rate;
     const int begun = compared && run->t_from == run->t_begun;
-    const int spans = !at_step && !compared && !run->told && !stays(run, (int32_t)kind) && sd_run_spans(run, (int32_t)kind);
-    int settled = 0;
-    if (spans) {
-        if (!unsummed)
-            sd_run_sum(run, t, sum);
-        settled = sd_run_span(run, t);
+    const int many = !at_step && !compared && !run->told && !stays(run, (int32_t)kind) && sd_run_spans(run, (int32_t)kind);
+    if (many) {
+        span_row(run, t, (int32_t)kind, !unsummed, sum);
     } else {
         find_point(run, t, !at_step && !unsummed, sum);
-    }
-    if (compared)
-        find_slopes(run, t);
-    if (!settled)
+        if (compared)
+            find_slopes(run, t);
         settle_row(run, t, (int32_t)kind, begun);
+    }
     if (run->magnitude && !at_step)
         note_beyond(run);
     if (run->unsummed && alone)
@@ -269,7 +248,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     run->rows++;
     run->rows_written++;
     if (compared)
-        emit_compared(run, t, row, begun);
+        sd_run_compare(run, t, row, begun);
     for (int k = 0; k < 7; k++) /* what is watched at other points does not see this row's */
         if (run->audit_at[k] >= 0)
             run->point[run->audit_at[k]] = 0.0;

@@ -147,7 +147,7 @@ static void measure(sd_run *run, double from, double t)
 {
     run->t_from = from;
     run->t_to = t;
-    run->sampled = run->noded = run->divided = run->spanned = 0;
+    run->sampled = run->noded = run->divided = run->spanned = run->told_here = 0;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
     if (run->unsummed > 1)
@@ -210,6 +210,7 @@ static int advance(sd_run *run)
     if (run->stepper->step(run->stepper->self))
         return SD_FAILED;
     run->t_from = from;
+    run->told_here = run->spanned = 0; /* before events are looked for, which have rows too */
     if (run->settle)
         run->settle->within = from > run->t_begun ? run->stepper->ivp->t - from : 0.0;
     if (run->modes)

@@ -100,6 +100,7 @@ typedef struct sd_run {
     double difference[SD_NODES + 1][2]; /* of the powers from the start on, divided, if `divided` (Newton) */
     double *spanning;                 /* settled points at nodes of the last step (spanned.h); NULL: none are kept */
     int32_t spanned;                  /* so many nodes tell its rows; -1: none do; 0: nobody asked yet */
+    int32_t told_here;                /* a row within the last step met its sums, and so do all there */
     int32_t divided;                  /* differences are of the last step */
     int32_t strayed, skipped;         /* steps of late that no nodes told; since then not tried */
 } sd_run;

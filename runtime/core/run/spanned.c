@@ -1,6 +1,7 @@
 /* Points of the polynomial through settled ones: see spanned.h. */
 #include "run/spanned.h"
 #include "linear/lanes.h"
+#include "system/settle_shown.h"
 
 #include <math.h>
 #include <string.h>
@@ -46,18 +47,29 @@ static int32_t width(const sd_run *run)
     return 2 * sd_whole_lanes(run->settle->unknowns);
 }
 
+/* point [n] := the sum of so many nodes [n], `step` numbers from one to the next, each times its share */
+static inline __attribute__((always_inline)) void sum_up(const double *first, const int32_t nodes, size_t step, const double *share,
+                                                         int32_t n, double *point)
+{
+    for (int32_t i = 0; i < n; i += SD_LANES) {
+        const double *from = first + i;
+        sd_lanes sum = {0.0};
+        for (int32_t k = 0; k < nodes; k++)
+            sum += share[k] * SD_FROM(from, (size_t)k * step);
+        SD_AT(point, i) = sum;
+    }
+}
+
 /* point [width] := that of the polynomial at the part x of the step */
 SD_WIDE static void interpolate(const sd_run *run, double x, double *point)
 {
-    const int32_t nodes = run->spanned, stride = (SD_SPANNING - 1) / (nodes - 1), n = width(run);
+    const int32_t n = width(run);
     double share[SD_SPANNING];
-    shares(nodes, x, share);
-    for (int32_t i = 0; i < n; i += SD_LANES) {
-        sd_lanes sum = {0.0};
-        for (int32_t k = 0; k < nodes; k++)
-            sum += share[k] * SD_FROM(run->spanning + (size_t)(k * stride) * (size_t)n, i);
-        SD_AT(point, i) = sum;
-    }
+    shares(run->spanned, x, share);
+    if (run->spanned == SD_SPANNING)
+        sum_up(run->spanning, SD_SPANNING, (size_t)n, share, n, point);
+    else
+        sum_up(run->spanning, SD_SPANNING / 2 + 1, 2 * (size_t)n, share, n, point);
 }
 
 /* point [width] := the settled one at the part x of the step; 1: it does not settle */
@@ -66,11 +78,15 @@ static int settle(sd_run *run, double x, double *point)
     sd_settle *settle = run->settle;
     const double t = x < 1.0 ? run->t_from + x * (run->t_to - run->t_from) : run->t_to, enough = settle->enough;
     const int64_t failures = settle->failures;
+    double *rate = point + width(run) / 2;
     run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
     settle->enough = 0.0; /* of a draft too: what is left open of nodes is in all rows */
-    sd_run_settle(run, t);
+    if (!settle->system->left)
+        sd_run_settle(run, t);
+    sd_settle_take_point(settle, run->point, run->point_d, point, rate);
+    if (settle->system->left)
+        sd_settle_kept(settle, t, point, rate);
     settle->enough = enough;
-    sd_settle_take_point(settle, run->point, run->point_d, point, point + width(run) / 2);
     return settle->failures > failures;
 }
 

@@ -16,7 +16,6 @@
 #define CLOSE 1e-9      /* scaled residual with which one may live */
 #define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
 #define CALM 1e-9       /* the same of a point whose rows are FINE, behind which the next move is none */
-#define TOLD 1e-10      /* scaled residual of a row that points between steps keep */
 #define HELD 1e8        /* weight of the state in a second attempt */
 #define STILL 1e-12     /* move of the state, in magnitudes, that is none */
 #define REFUSALS 3      /* of the basis in a row, behind which it is tried once in AGAIN points alone, and */
@@ -24,16 +23,14 @@
 #define BEYOND 1e3      /* times the point that was found, from which a magnitude was that of an iterate */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
 
-/* largest scaled residual at (t, x) */
-static double measure(sd_settle *settle, double t, const double *y, const double *yd)
+double sd_settle_measure(sd_settle *settle, double t, const double *y, const double *yd)
 {
     double worst = 0.0, own = 0.0, sum = 0.0;
     sd_residual(settle->system, t, y, yd, settle->r);
     for (int32_t i = 0; i < settle->rows; i++) {
         double v = fabs(settle->r[i] * settle->row_scale[i]);
-        v = isnan(v) ? INFINITY : v; /* else the next row would be larger */
-        if (v > worst)
-            worst = v;
+        v = v < INFINITY ? v : INFINITY; /* of what is no number the next row would be larger */
+        worst = v > worst ? v : worst;
         if (settle->sort[i] == SD_CONSTRAINT)
             sum += v * v;
         if (settle->sort[i] != SD_RATE && v > own)
@@ -76,7 +73,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
     const int steep = settle->system->scales > 0;
     double bound = steep ? FINE : CLOSE;
     int fresh = settle->ready != SD_BY_BASIS, failed = fresh && !sd_settle_slopes(settle, t, y, yd, 1);
-    double before = failed ? INFINITY : measure(settle, t, y, yd);
+    double before = failed ? INFINITY : sd_settle_measure(settle, t, y, yd);
     settle->drift = settle->constraints;
     if (fresh && !failed) {
         /* a point that holds as it comes asks for none, but of a large one the next shall: within a step room is scarce */
@@ -89,7 +86,7 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
         double pulled = 0.0;
         moved = sd_settle_move_basic(settle, y, yd, &pulled);
         state += pulled;
-        double now = measure(settle, t, y, yd);
+        double now = sd_settle_measure(settle, t, y, yd);
         failed = !isfinite(now) || state > still;
         const int stays = moved < SMALL && now > 0.5 * before && now <= (fresh ? bound : FINE);
         if (!failed && (stays || (moved < CALM && now <= FINE && !settle->determined))) {
@@ -133,7 +130,7 @@ static void put(const sd_settle *settle, const double *x, double *y, double *yd)
 static void iterate(sd_settle *settle, double t, double *y, double *yd, int most, double *best)
 {
     int fresh = settle->ready != SD_BY_MATRIX, failed = fresh && sd_settle_factorise(settle, t, y, yd);
-    double moved = 0.0, pulled = 0.0, drag = 0.0, before = failed ? INFINITY : measure(settle, t, y, yd);
+    double moved = 0.0, pulled = 0.0, drag = 0.0, before = failed ? INFINITY : sd_settle_measure(settle, t, y, yd);
     double still = settle->hold == 1.0 ? settle->still : 0.0; /* one that is held stays where it is */
     *best = before;
     settle->drift = settle->constraints;
@@ -142,7 +139,7 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
         if ((moved < SMALL || pulled < still) && before <= fmax(EXACT, settle->enough))
             break;
         moved = sd_settle_move(settle, y, yd, &pulled);
-        double now = measure(settle, t, y, yd);
+        double now = sd_settle_measure(settle, t, y, yd);
         if (!(now <= CLOSE))
             settle->contracted = fmax(settle->contracted, before > 0.0 && isfinite(now) ? now / before : INFINITY);
         /* between residuals of round-off the later point is the better one: the state is back where it came from */
@@ -170,12 +167,15 @@ static void iterate(sd_settle *settle, double t, double *y, double *yd, int most
 static void note_met(const sd_settle *settle, const double *y, const double *yd)
 {
     const char *state = settle->state, *end = state + settle->unknowns;
-    double *next = settle->met;
-    for (const char *at = state; (at = memchr(at, 0, (size_t)(end - at))); at++)
-        *next++ = y[at - state];
-    for (int32_t k = 0; k < settle->rates; k++)
-        if (!end[k])
-            *next++ = yd[settle->rate[k]];
+    double *next = settle->met; /* without a branch: either is as often */
+    for (int32_t j = 0; j < settle->unknowns; j++) {
+        *next = y[j];
+        next += !state[j];
+    }
+    for (int32_t k = 0; k < settle->rates; k++) {
+        *next = yd[settle->rate[k]];
+        next += !end[k];
+    }
 }
 
 /* (y, chosen yd): the state as in x0, what follows from it as at the last point that settled */
@@ -207,7 +207,7 @@ static int finish(sd_settle *settle, double t, double *y, double *yd, int done, 
     if (!settle->system->left)
         sd_follow_flows(settle->k_span, settle->k_spans, y, yd);
     if (!stays)
-        measure(settle, t, y, yd);
+        sd_settle_measure(settle, t, y, yd);
     return 0;
 }
 
@@ -218,7 +218,7 @@ static int shrunk(sd_settle *settle, const double *y, const double *yd)
     const int32_t n = settle->unknowns, number = settle->system->scales > 0 ? n : 0;
     int found = 0;
     for (int32_t j = 0; j < number; j++) {
-        double size = fmax(settle->usual[j], fabs(y[j]));
+        const double now = fabs(y[j]), size = now > settle->usual[j] ? now : settle->usual[j];
         if (settle->scale[j] > BEYOND * size && size > 0.0) {
             settle->scale[j] = size;
             found = 1;
@@ -242,9 +242,9 @@ static int holds(sd_settle *settle, double t, const double *y, const double *yd,
         if (!sd_settle_slopes(settle, t, y, yd, 0))
             return 0;
         sd_settle_leave_slopes(settle);
-        best = measure(settle, t, y, yd);
+        best = sd_settle_measure(settle, t, y, yd);
     }
-    return best <= limit || (measure(settle, t, y, yd), settle->own <= limit);
+    return best <= limit || (sd_settle_measure(settle, t, y, yd), settle->own <= limit);
 }
 
 /* whether the state is further from where it was than it may be */
@@ -264,7 +264,7 @@ static int strays(const sd_settle *settle)
 /* Whether the point holds as it comes, by the scales of the last slopes. */
 static int holds_by_old(sd_settle *settle, double t, double *y, double *yd, double limit)
 {
-    if (!(measure(settle, t, y, yd) <= fmax(limit, settle->enough)))
+    if (!(sd_settle_measure(settle, t, y, yd) <= fmax(limit, settle->enough)))
         return 0;
     settle->drift = settle->constraints;
     finish(settle, t, y, yd, 1, 1);
@@ -366,59 +366,16 @@ static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
     return failed;
 }
 
+int sd_settle_kept(sd_settle *settle, double t, double *z, double *zd)
+{
+    return !sd_settle_provide_point(settle) || settle_unknowns(settle, t, z, zd);
+}
+
 int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd)
 {
     if (settle->calls == settle->failures || settle->seen || settle->system->left || !sd_settle_provide_point(settle))
         return 0;
     return holds_by_old(settle, t, y, yd, FINE);
-}
-
-int sd_settle_meets(sd_settle *settle, double t, double *y, double *yd)
-{
-    if (settle->calls == settle->failures || settle->seen || !sd_settle_provide_point(settle))
-        return 0;
-    const int condensed = settle->system->left != NULL;
-    double *zd = yd, *z = condensed ? gather_kept(settle, y, yd, &zd) : y;
-    measure(settle, t, z, zd);
-    settle->drift = settle->constraints;
-    int meets = 1;
-    for (int32_t i = 0; i < settle->rows && meets; i++)
-        meets = !(settle->told[i] || settle->sort[i] == SD_CONSTRAINT) || fabs(settle->r[i] * settle->row_scale[i]) <= TOLD;
-    if (condensed)
-        follow_kept(settle, z, zd, y, yd);
-    return meets;
-}
-
-void sd_settle_take_point(const sd_settle *settle, const double *y, const double *yd, double *z, double *zd)
-{
-    const sd_condensed *left = (const sd_condensed *)settle->system->left;
-    if (left) {
-        sd_condensed_gather(left, y, z);
-        sd_condensed_gather(left, yd, zd);
-    } else {
-        memcpy(z, y, (size_t)settle->unknowns * sizeof *z);
-        memcpy(zd, yd, (size_t)settle->unknowns * sizeof *zd);
-    }
-}
-
-int sd_settle_between(sd_settle *settle, double t, const double *z, const double *zd, double *y, double *yd)
-{
-    const sd_condensed *left = (const sd_condensed *)settle->system->left;
-    if (!sd_settle_provide_point(settle))
-        return 0;
-    measure(settle, t, z, zd);
-    settle->drift = settle->constraints;
-    if (left) {
-        if (y != left->y) /* where the rows were evaluated all is there */
-            sd_condensed_expand(left, z, y, 0);
-        sd_condensed_put(left, zd, yd);
-        sd_follow_flows(settle->k_span, settle->k_spans, y, yd);
-        sd_condensed_shown_rates(left, yd);
-    } else {
-        memcpy(y, z, (size_t)settle->unknowns * sizeof *y);
-        memcpy(yd, zd, (size_t)settle->unknowns * sizeof *yd);
-    }
-    return settle->residual <= fmax(COARSE, settle->enough);
 }
 
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd)

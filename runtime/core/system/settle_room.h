@@ -10,6 +10,8 @@ int sd_settle_provide_point(sd_settle *settle);
 int sd_settle_provide_best(sd_settle *settle);
 /* room for slopes, and for what a basis takes of them; 0: no memory */
 int sd_settle_provide_slopes(sd_settle *settle);
+/* largest scaled residual at (t, y, yd) [unknowns of the system], in that room; settle->own, constraints too (settle.c) */
+double sd_settle_measure(sd_settle *settle, double t, const double *y, const double *yd);
 /* whether room counts more than time */
 int sd_settle_large(const sd_settle *settle);
 /* of a large one lets go of it: rows of linear laws take new slopes once in many steps */

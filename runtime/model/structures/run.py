@@ -262,7 +262,7 @@ class Run(c.Structure):
         ("node_power", D * (2 * NODES)),
         ("difference", D * (2 * NODES + 2)),
         ("spanning", P),
-        *[(name, I) for name in ["spanned", "divided", "strayed", "skipped"]],
+        *[(name, I) for name in ["spanned", "told_here", "divided", "strayed", "skipped"]],
     ]
 
 

@@ -226,12 +226,18 @@ int sd_run_integrate(sd_run *run, double to)
     return !run->sampled;
 }
 
+/* whether the nodes of the method are those of the powers within the last step (of none it has slopes there: radau_dense.c) */
+static int has_own(const sd_stepper *stepper)
+{
+    return stepper->collocated && stepper->nodes;
+}
+
 /* whether as many rows stand within the last step, all of which counts, of a method that has no polynomial of its own */
 static int is_crowded(const sd_run *run)
 {
     const sd_stepper *stepper = run->stepper;
     int32_t last = run->next + MANY - 2; /* the first of them is being written */
-    return run->audit && !stepper->collocated && !stepper->part_y && run->t_to == stepper->ivp->t && last < run->instants
+    return run->audit && !has_own(stepper) && !stepper->part_y && run->t_to == stepper->ivp->t && last < run->instants
         && run->instant[last] < run->t_to;
 }
 
@@ -263,7 +269,7 @@ static int look_within(sd_run *run)
 /* where the powers are known: parts of the step behind its start */
 static const double *nodes_of(const sd_run *run)
 {
-    return run->stepper->collocated ? run->stepper->node : lobatto;
+    return has_own(run->stepper) ? run->stepper->node : lobatto;
 }
 
 /* the divided differences of the powers at the start and the nodes */
@@ -293,7 +299,7 @@ int sd_run_sum(sd_run *run, double to, double sum[2])
         memcpy(sum, run->integral + 2, 2 * sizeof *sum);
         return there;
     }
-    const double *node = nodes_of(run), *moves = stepper->collocated ? stepper->moves : NULL;
+    const double *node = nodes_of(run), *moves = has_own(stepper) ? stepper->moves : NULL;
     const double part = (to - run->t_from) / (stepper->ivp->t - run->t_from);
     const int high = run->noded > 3;
     sum[0] = sum[1] = 0.0;
