@@ -103,7 +103,9 @@ class Straights:
         self._sources = first
         for k, (low, high, source) in enumerate(zip(begin.tolist(), ends.tolist(), offset.tolist(), strict=True)):
             place, entry = int(found.place[low]), int(found.start[low])
-            made[k] = lib.Straight(place, high - low, int(count[low]), 0, 1, 1, first + 4 * source, at + 8 * entry, None)
+            made[k] = lib.Straight(
+                place, high - low, int(count[low]), 0, 1, 1, first + 4 * source, at + 8 * entry, None
+            )
         self.array, self.number = made, int(begin.size)
         long = np.flatnonzero((ends - begin >= LONG) & (terms_of > 0) & (terms_of <= MOST_ALIKE))
         sizes = (ends - begin)[long] * terms_of[long]
@@ -134,7 +136,9 @@ class Straights:
             self.array[number].alike = factor.shape[1] if (factor == factor[:, :1]).all() else 0
 
     def mark(self, name: str, read: Mask) -> None:
-        """Says by the field of that name which stretches hold an unknown that is read [unknowns], or that such a one is a sum of."""
+        """Says by the field of that name which stretches hold an unknown that is read [unknowns], or that such a one is
+        a sum of.
+        """
         wanted = read.copy()
         for k in range(self.number - 1, -1, -1):  # sums come behind what they read
             own = self.array[k]

@@ -1,4 +1,4 @@
-"""Rows of a step that holds many of them: settled ones at its nodes tell the others, as exactly as if each was settled."""
+"""Rows of a step that holds many: settled ones at its nodes tell the others, as exactly as if each was settled."""
 
 from pathlib import Path
 
@@ -50,9 +50,7 @@ def test_many_rows_are_where_single_ones_are(branch, method, tmp_path):
 
 @pytest.mark.parametrize("method", ["radau", "bdf"])
 def test_a_pulse_between_nodes_is_seen_by_its_rows(method, tmp_path):
-    """What follows from the time alone is exact at each row, however narrow: 20 V for 0.03 ms beside a quiet filter.  The
-    potential behind it too, which is what its capacitor holds.
-    """
+    """What follows from the time alone is exact at each row, however narrow: 20 V for 0.03 ms beside a quiet filter."""
     source = "1 V + 20 V*exp(-((t - 13.37 ms)/(30 us))^2)"
     trace = rows(tmp_path, source, "linear", method, "every 0.01 ms")
     exact = 1.0 + 20.0 * np.exp(-(((trace.time - 13.37e-3) / 30e-6) ** 2))

@@ -21,8 +21,8 @@ static const double node[SD_SPANNING] = {
 /* parts of a step between nodes of either kind: of angles 4.5 and 10.5 */
 static const double look[LOOKS] = {0.1828033579181773, 0.7356983684129988};
 
-/* share [nodes]: of each node in the polynomial at the part x of the step (Berrut & Trefethen, Barycentric Lagrange interpolation,
- * 5.4: of these points 1/2, -1, 1, ..., 1/2) */
+/* share [nodes]: of each node in the polynomial at the part x of the step (Berrut & Trefethen, Barycentric Lagrange
+ * interpolation, 5.4: of these points 1/2, -1, 1, ..., 1/2) */
 static void shares(int32_t nodes, double x, double *share)
 {
     const int32_t last = nodes - 1, stride = (SD_SPANNING - 1) / last;
@@ -48,8 +48,8 @@ static int32_t width(const sd_run *run)
 }
 
 /* point [n] := the sum of so many nodes [n], `step` numbers from one to the next, each times its share */
-static inline __attribute__((always_inline)) void sum_up(const double *first, const int32_t nodes, size_t step, const double *share,
-                                                         int32_t n, double *point)
+static inline __attribute__((always_inline)) void sum_up(const double *first, const int32_t nodes, size_t step,
+                                                         const double *share, int32_t n, double *point)
 {
     for (int32_t i = 0; i < n; i += SD_LANES) {
         const double *from = first + i;

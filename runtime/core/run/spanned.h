@@ -1,12 +1,13 @@
 /* Rows of a step that holds many: points of the polynomial through settled ones.
  *
- * A point of a row is the method's polynomial, settled.  Where neither the equations nor their sources have a corner within the
- * step, it is smooth there, and the polynomial through settled points at Chebyshev's nodes tells it as far as round-off (Trefethen,
- * Approximation Theory and Practice: its error falls by a constant factor with each node).  Nothing is taken on trust:
+ * A point of a row is the method's polynomial, settled.  Where neither the equations nor their sources have a corner within
+ * the step, it is smooth there, and the polynomial through settled points at Chebyshev's nodes tells it as far as round-off
+ * (Trefethen, Approximation Theory and Practice: its error falls by a constant factor with each node).  Nothing is taken on
+ * trust:
  * - at two points between the nodes, settled by themselves, it is there as far as a small part of the tolerance, in magnitudes:
  *   this is about what rows hardly tell, as of potentials that float;
- * - each row's own residual is what round-off leaves, as that of a settled point: this is about what happens between these points,
- *   as where a source has a pulse.  A row of which it is more is settled from there.
+ * - each row's own residual is what round-off leaves, as that of a settled point: this is about what happens between these
+ *   points, as where a source has a pulse.  A row of which it is more is settled from there.
  */
 #ifndef SYSDYN_SPANNED_H
 #define SYSDYN_SPANNED_H

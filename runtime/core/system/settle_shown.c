@@ -7,7 +7,7 @@
 #include <string.h>
 
 #define TOLD 1e-10    /* scaled residual of a row that points between steps keep */
-#define BETWEEN 1e-11 /* ... of all rows of a point between settled ones: what is taken of these too where no move takes it away */
+#define BETWEEN 1e-11 /* ... of all rows of a point between settled ones: of these too where no move takes it away */
 
 /* y, yd := what the kept unknowns z, zd make of all, as far as rows show them: their rows were just evaluated */
 static void show(const sd_settle *settle, const double *z, const double *zd, double *y, double *yd)

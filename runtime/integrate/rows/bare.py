@@ -2,8 +2,8 @@
 
 A dense output that is the same combination of points for every unknown keeps each constant sum that the points keep
 (the voltage of a linear capacitor from its charge); laws that bend it does not keep, and a row that shows none of what
-follows from these asks for no iteration.  The core looks at each such row whether its sums and constraints do hold
-(sd_settle_meets): a method that interpolates unknowns apart (radau) settles as ever.
+follows from these asks for no iteration.  The core looks at one such row a step whether its sums and constraints do
+hold (sd_settle_meets): a method that interpolates unknowns apart (radau) settles as ever.
 """
 
 from __future__ import annotations
