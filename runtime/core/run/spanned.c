@@ -103,8 +103,9 @@ static double apart(const sd_settle *settle, const double *a, const double *b, i
     return most;
 }
 
-/* whether the polynomial through so many nodes is where it should be at points between them, `looked` */
-static int serves(sd_run *run, int32_t nodes, const double *looked)
+/* whether the polynomial through so many nodes is where it should be at points between them, `looked`; more: there might be
+ * more of them, and its rows are to hold there too */
+static int serves(sd_run *run, int32_t nodes, const double *looked, int more)
 {
     const int32_t n = width(run);
     const double enough = fmin(CLOSE, APART * run->stepper->ivp->rtol);
@@ -113,6 +114,9 @@ static int serves(sd_run *run, int32_t nodes, const double *looked)
     for (int32_t k = 0; k < LOOKS; k++) {
         interpolate(run, look[k], point);
         if (!(apart(run->settle, point, looked + (size_t)k * (size_t)n, n / 2) <= enough))
+            return 0;
+        const double t = run->t_from + look[k] * (run->t_to - run->t_from);
+        if (more && !sd_settle_between(run->settle, t, point, point + n / 2, run->point, run->point_d))
             return 0;
     }
     return 1;
@@ -129,12 +133,12 @@ static int32_t find_nodes(sd_run *run, int32_t rows)
     for (int32_t k = 0; k < LOOKS; k++)
         if (settle(run, look[k], looked + (size_t)k * (size_t)n))
             return 0;
-    if (serves(run, SD_SPANNING / 2 + 1, looked))
+    if (serves(run, SD_SPANNING / 2 + 1, looked, rows >= DOUBLED))
         return SD_SPANNING / 2 + 1;
     for (int32_t k = 1; k < last && rows >= DOUBLED; k += 2)
         if (settle(run, node[k], run->spanning + (size_t)k * (size_t)n))
             return 0;
-    return rows >= DOUBLED && serves(run, SD_SPANNING, looked) ? SD_SPANNING : 0;
+    return rows >= DOUBLED && serves(run, SD_SPANNING, looked, 0) ? SD_SPANNING : 0;
 }
 
 /* rows of the trace within the last step that are still to be written */

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define TOLD 1e-10    /* scaled residual of a row that points between steps keep */
+#define DRIFT 3e-13   /* norm of constraints of a point between settled ones: a trace is to keep them within 1e-12 */
 #define BETWEEN 1e-11 /* ... of all rows of a point between settled ones: of these too where no move takes it away */
 
 /* y, yd := what the kept unknowns z, zd make of all, as far as rows show them: their rows were just evaluated */
@@ -79,5 +80,5 @@ int sd_settle_between(sd_settle *settle, double t, const double *z, const double
         memcpy(y, z, (size_t)settle->unknowns * sizeof *y);
         memcpy(yd, zd, (size_t)settle->unknowns * sizeof *yd);
     }
-    return settle->residual <= fmax(BETWEEN, settle->enough);
+    return settle->residual <= fmax(BETWEEN, settle->enough) && settle->constraints <= fmax(DRIFT, settle->enough);
 }
