@@ -37,6 +37,8 @@ PER_PIECE = 8
 """Samples at least between two instants of what stands inside an argument."""
 ROUND_OFF = 1e-14
 """Of the span: what begins nearer to t0 began at t0."""
+LAST = 1e-12
+"""Of the span: what is looked at for an event at its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +61,12 @@ def instants(
     tables: Sequence[Table] = (),
     read: Sequence[Node] = (),
     crossed: Sequence[Node] = (),
+    closed: Sequence[Node] = (),
 ) -> Instants:
     """All instants in (t0, t1], and t0 where the text jumps behind it; tables: of the network; read: what events read;
-    crossed: whose zeros are events, which no step may pass over twice.  None of them, with a note, where they are more
-    than MOST.
+    crossed: whose zeros are events, which no step may pass over twice; closed: those of them that happen at the zero
+    itself (`t >= T`), so that one at t1, which no step crosses, is an instant.  None of them, with a note, where they
+    are more than MOST.
     """
     search = _Search(binding.parameters, t0, t1)
     try:
@@ -72,6 +76,8 @@ def instants(
             if _in_time_alone(node) and _degree((node,)) > 1:
                 search.add(_zeros(node, (node,)))
         times = search.times()
+        if _ends(binding.parameters, t0, t1, closed):
+            times = distinct(times, np.array([t1]))
     except _TooManyError:
         text = f"the text jumps or has kinks at more than {MOST} instants: they are integrated through"
         return Instants(np.zeros(0), text)
@@ -100,6 +106,15 @@ def changes(
         return search.times()
     except _TooManyError:
         return np.zeros(0)
+
+
+def _ends(parameters: Parameters, t0: float, t1: float, closed: Sequence[Node]) -> bool:
+    """Whether one of some expressions, of time alone, passes zero at t1, but for round-off."""
+    search = _Search(parameters, t1 - LAST * (t1 - t0), t1 + ROUND_OFF * max(abs(t0), abs(t1)))
+    for node in closed:
+        if _in_time_alone(node):
+            search.add(_zeros(node, (node,)))
+    return bool(search.times().size)
 
 
 def _zeros(node: Node, arguments: tuple[Node, ...]) -> Watched:

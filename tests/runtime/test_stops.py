@@ -284,3 +284,27 @@ def test_round_off_about_an_instant_is_on_neither_side_of_it(tmp_path):
         flux = 20.0 * np.sum(np.diff(pieces) * np.sign(above(0.5 * (pieces[1:] + pieces[:-1]))))
         current = coil.run({"fs": fs, "fr": fr, "am": am, "ph": ph})["i"].values
         assert current[-1] == pytest.approx(flux / 1e-4, abs=1e-6 * np.abs(current).max())
+
+WHEN = """
+model m {{
+  param T = 0.1 s
+  coord x: translation = 0 m
+  energy T* = 1/2*(1 kg)*x'^2
+  when t {asked} {{ x' := 3 m/s }}
+  init x' = 1 m/s
+}}
+scene s of m {{ time 0 s to {end}; trace x, x' as v }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("asked", "end", "speed"),
+    [(">= T", "T", 3.0), (">= 3*T", "0.3 s", 3.0), ("> T", "T", 1.0), (">= T + 1 ps", "T", 1.0), (">= T", "0.2 s", 3.0)],
+)
+def test_an_event_at_the_last_instant_happens(asked, end, speed, tmp_path):
+    """No step crosses the end of the scene: `when t >= T` there was left out, as if it were strict."""
+    path = tmp_path / "m.sd"
+    path.write_text(WHEN.format(asked=asked, end=end), encoding="utf-8")
+    trace = api.simulate(path, output=tmp_path / "m.h5")
+    assert trace["v"].values[-1] == speed
+    assert len(trace.events) == (speed == 3.0)

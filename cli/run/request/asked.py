@@ -213,11 +213,19 @@ def _stops(prepared: Prepared, t0: float, t1: float) -> tuple[np.ndarray, str | 
     conditions = {n.data[0] for e in network.events if e.condition is not None for n in ex.variables(e.condition)}
     unseen = [o.expression for o in network.observations if not o.stored]
     crossed = [o.expression for o in network.observations if not o.stored and o.name in conditions]
-    found = instants(*text, unseen, crossed)
+    found = instants(*text, unseen, crossed, _closed(network))
     answer = distinct(found.times, pulses(*text, crossed, found.times)), found.note
     kept.clear()
     kept[t0, t1] = answer, {name: value_of(binding, name) for name in read.read}
     return answer
+
+
+def _closed(network: Network) -> list[ex.Node]:
+    """What conditions of events compare with zero, where they hold at the zero itself."""
+    asked = {o.name: o.expression for o in network.observations if not o.stored}
+    compared = [n for e in network.events if e.condition is not None for n in ex.topological([e.condition])]
+    names = {v.data[0] for n in compared if n.op == "cmp" and n.data in ("<=", ">=", "==") for v in ex.variables(n)}
+    return [asked[name] for name in asked if name in names]
 
 
 def _timeless(prepared: Prepared) -> bool:
