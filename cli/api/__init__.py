@@ -26,6 +26,7 @@ from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import Ran, run
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.cli.sweep.opened import Sweep
+from sysdyn.dsl import alone
 from sysdyn.dsl import load as load_
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
@@ -218,12 +219,14 @@ def equilibria(path: str | Path, *, tries: int = 40, **options: Any) -> tuple[Eq
 
 
 def check(text: str, name: str = "<text>") -> list[Diagnostic]:
-    """What `sysdyn check` finds in a text: every finding, of every model and scene; [] where it is clean."""
+    """What `sysdyn check` finds in a text: every finding, of every model, scene and component; [] where it is clean."""
     report = Report()
     document = load_.document(SourceText(name, text), report)
     for target in targets.all_targets(document, report):
         with ex.fresh():
             checked(target, report)
+    for part in alone.unused(document.file):
+        report.extend(alone.judged(document, part))
     return list(report.diagnostics)
 
 

@@ -285,6 +285,7 @@ def test_round_off_about_an_instant_is_on_neither_side_of_it(tmp_path):
         current = coil.run({"fs": fs, "fr": fr, "am": am, "ph": ph})["i"].values
         assert current[-1] == pytest.approx(flux / 1e-4, abs=1e-6 * np.abs(current).max())
 
+
 WHEN = """
 model m {{
   param T = 0.1 s
@@ -299,7 +300,13 @@ scene s of m {{ time 0 s to {end}; trace x, x' as v }}
 
 @pytest.mark.parametrize(
     ("asked", "end", "speed"),
-    [(">= T", "T", 3.0), (">= 3*T", "0.3 s", 3.0), ("> T", "T", 1.0), (">= T + 1 ps", "T", 1.0), (">= T", "0.2 s", 3.0)],
+    [
+        (">= T", "T", 3.0),
+        (">= 3*T", "0.3 s", 3.0),
+        ("> T", "T", 1.0),
+        (">= T + 1 ps", "T", 1.0),
+        (">= T", "0.2 s", 3.0),
+    ],
 )
 def test_an_event_at_the_last_instant_happens(asked, end, speed, tmp_path):
     """No step crosses the end of the scene: `when t >= T` there was left out, as if it were strict."""

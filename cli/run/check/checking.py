@@ -6,7 +6,7 @@ from typing import Any
 
 from sysdyn.cli.failures import classify
 from sysdyn.cli.run.request import targets
-from sysdyn.dsl import load
+from sysdyn.dsl import alone, load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
@@ -43,13 +43,22 @@ def file_checked(asked: tuple[str, bool, bool]) -> Checked:
                 said.append(("say", f"{path}: {target.name}: {_line(summary)}"))
                 if explain:
                     said.append(("data", f"{path}: {target.name}: " + _passivity(summary)))
+        parts = dict[str, bool]()
+        for part in alone.unused(document.file):
+            own = alone.judged(document, part)
+            report.extend(own)
+            parts[part.name.name] = not own.failed and not wrong
+            if parts[part.name.name]:
+                said.append(("say", f"{path}: component {part.name.name}: ok"))
     except OSError as error:
         return Checked(tuple(report), tuple(said), unread=classify(error)[1])
     except ModelError as error:  # a file that is no text does not hide the others
         return Checked((*report, *error.diagnostics), tuple(said))
-    if not document.models and not document.scenes and not report.failed:
+    if not document.models and not document.scenes and not parts and not report.failed:
         said.append(("say", f"{path}: no model"))
-    return Checked(tuple(report), tuple(said), {"file": path, "models": list(document.models), "targets": found})
+    result = {"file": path, "models": list(document.models), "targets": found}
+    result["components"] = [{"name": name, "ok": ok} for name, ok in parts.items()]
+    return Checked(tuple(report), tuple(said), result)
 
 
 def checked(target: targets.Target, report: Report, refused: bool = False) -> dict[str, object]:

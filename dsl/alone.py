@@ -1,0 +1,154 @@
+"""Components that no model of their file uses: each judged in a model of its own, which gives it what it asks for.
+
+The model has a node for each port and both ends of each branch, and a parameter or input without a value for each that
+the component wants; unit variables are pure numbers there.  What is told is the component's own: its names, units, laws
+and connections, nothing of what only a user decides (where its ports lead, what its parameters are).
+
+Received: a parsed file; returned: components and their findings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from sysdyn.dsl.elaborate.parts import declared
+from sysdyn.dsl.load import Document, network
+from sysdyn.dsl.model.expression import fresh
+from sysdyn.dsl.text.diagnostics import Diagnostic, Report
+from sysdyn.dsl.text.source import Span
+from sysdyn.dsl.tree import syntax
+from sysdyn.dsl.tree.walking import children
+
+_ITS_USERS = {"E409", "E411", "E412", "E413", "W705", "E322", "E805", "E807"}
+"""What is said of a network, whose other part is missing here, and of numbers, which a user gives."""
+_Port = syntax.Port | syntax.Branch | syntax.Input
+_SIZE = 3
+"""Of arrays whose size a user gives."""
+
+
+def unused(file: syntax.File) -> list[syntax.Component]:
+    """The components of a file that no model in it has inside, whichever level is chosen."""
+    components = {item.name.name: item for item in file.items if isinstance(item, syntax.Component)}
+    used, stack = set[str](), [item for item in file.items if isinstance(item, syntax.Model)]
+    found: list[object] = list(stack)
+    while found:
+        node = found.pop()
+        if isinstance(node, syntax.Instance):
+            name = node.component.names[0]
+            if name in components and name not in used:
+                used.add(name)
+                found.append(components[name])
+        found += children(node)
+    return [component for name, component in components.items() if name not in used]
+
+
+def judged(document: Document, component: syntax.Component) -> Report:
+    """What is wrong with a component, and with what stands outside of all models and components of its file."""
+    report, source = Report(), document.file.source
+    whole = [i for i in document.file.items if isinstance(i, (syntax.Component, syntax.Model, syntax.Scene))]
+    others = [item.span for item in whole if item is not component]
+    for model in _models(component):
+        inner = Report()
+        with fresh():
+            network(document, model, None, inner, required=False)
+        report.extend(d for d in inner if _own(d, others) and d.place is not None and d.place.source is source)
+    return report
+
+
+def _own(finding: Diagnostic, others: Iterable[Span]) -> bool:
+    if finding.severity == "note" or finding.code in _ITS_USERS or finding.place is None:
+        return False
+    return not any(span.start <= finding.place.span.start < span.end for span in others)
+
+
+def _models(component: syntax.Component) -> Iterator[syntax.Model]:
+    """One for each level of a component."""
+    levels = [s for s in component.body if isinstance(s, syntax.Level)]
+    base = tuple(s for s in component.body if not isinstance(s, syntax.Level))
+    for level in levels or [None]:
+        said = [*base, *(() if level is None else _inside(level, levels))]
+        yield _model(component, said, () if level is None else (level.name.name,))
+
+
+def _inside(level: syntax.Level, levels: Iterable[syntax.Level]) -> Iterator[syntax.Statement]:
+    """The statements of a level and of those that it extends."""
+    known, seen, at = {one.name.name: one for one in levels}, set[str](), level
+    while at is not None and at.name.name not in seen:
+        yield from at.body
+        seen.add(at.name.name)
+        at = known.get(at.extends.name) if at.extends else None
+
+
+def _model(component: syntax.Component, said: Sequence[syntax.Statement], level: tuple[str, ...]) -> syntax.Model:
+    """A model of one instance of a component."""
+    ports = [s for s in said if isinstance(s, (syntax.Port, syntax.Branch, syntax.Input))]
+    sizes = {n.name for s in said for n in _below(bound for d in declared(s) for bound in d.indices)}
+    if any(d.indices for s in ports for d in declared(s)):  # of a size that the component says
+        around, args = _parameters(said, sizes, every=True)
+    else:
+        around, args = _parameters(said, sizes)
+    span, connections = component.span, list[syntax.Connection]()
+    for port in ports:
+        node, ends = _around(port)
+        around.append(node)
+        connections += ends
+    label, taken = component.name.name, {d.name for s in around for d in declared(s)}
+    while label in taken:
+        label += "_"
+    kind = syntax.Dotted((component.name.name, *level), component.name.span)
+    instance = syntax.Instance(syntax.Decl(label, (), component.name.span), kind, tuple(args), tuple(connections), span)
+    return syntax.Model(syntax.Word(f"a user of {component.name.name}", span), (*around, instance), span)
+
+
+def _parameters(
+    said: Iterable[syntax.Statement], sizes: Collection[str], *, every: bool = False
+) -> tuple[list[syntax.Statement], list[syntax.Arg]]:
+    """Parameters of the model, one for each that must be given, or for every one; how they are given."""
+    own = [s for s in said if isinstance(s, syntax.Param) and (every or s.value is None)]
+    found = list[syntax.Statement]()
+    for s in own:
+        size = s.value is None and s.decl.name in sizes
+        value = syntax.Number(float(_SIZE), str(_SIZE), s.span) if size else s.value
+        found.append(replace(s, unit=_plain(s.unit), value=value))
+    return found, [syntax.Arg(s.decl.name, _name(s.decl), s.decl.span) for s in own]
+
+
+def _around(port: _Port) -> tuple[syntax.Statement, list[syntax.Connection]]:
+    """What stands at a port, the branches of a statement, or an input, and how it is connected."""
+    match port:
+        case syntax.Input():
+            inner = replace(port, unit=_plain(port.unit), value=None)
+            return inner, [syntax.Bind(syntax.Word(port.decl.name, port.span), _name(port.decl), port.span)]
+        case syntax.Port():
+            ends = [syntax.Bind(syntax.Word(d.name, d.span), _name(d), d.span) for d in port.decls]
+            return syntax.Node(port.decls, port.domain, None, port.span), [*ends]
+    nodes, found = list[syntax.Decl](), list[syntax.Connection]()
+    for d in port.decls or (syntax.Decl("", (), port.span),):
+        plus, minus = (syntax.Decl(f"{d.name}{end}", d.indices, d.span) for end in ("+", "-"))
+        nodes += [plus, minus]
+        between = _name(plus), _name(minus), d.span
+        found.append(syntax.BindAcross(syntax.Word(d.name, d.span), *between) if d.name else syntax.Across(*between))
+    return syntax.Node(tuple(nodes), port.domain, None, port.span), found
+
+
+def _below(found: Iterable[object]) -> Iterator[syntax.Name]:
+    """The names in some expressions."""
+    stack = list(found)
+    while stack:
+        node = stack.pop()
+        if isinstance(node, syntax.Name):
+            yield node
+        stack += children(node)
+
+
+def _name(decl: syntax.Decl) -> syntax.Name:
+    return syntax.Name(decl.name, decl.span)
+
+
+def _plain(unit: syntax.Unit | None) -> syntax.Unit | None:
+    """A unit without its variables."""
+    if unit is None:
+        return None
+    factors = tuple(f for f in unit.factors if not f.name.startswith("$"))
+    return replace(unit, factors=factors)
