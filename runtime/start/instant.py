@@ -30,6 +30,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import least_measured
 from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.numerics.tall import free_unknowns
+from sysdyn.runtime.start.hidden import Hidden, hidden
 from sysdyn.runtime.start.integrated import BROKEN, integrated, missed
 from sysdyn.runtime.start.settled import inertial_rows
 from sysdyn.values import dataclass
@@ -69,7 +70,7 @@ class UnbalancedError(Exception):
 class Asked:
     """What a jump is asked for.  behind [rows]: what holds behind the instant, in what moves [unknowns]; met [rows]:
     whose integrals must be met; integrals: entries linear in moves and integrals, from dF/dy, dF/dyd and y; ease
-    [unknowns]: times their magnitudes, how far these may move.
+    [unknowns]: times their magnitudes, how far these may move; sums: of rows that hold behind the instant too.
     """
 
     behind: Mask
@@ -77,6 +78,7 @@ class Asked:
     met: Mask
     integrals: Callable[[Floats, Floats, Floats], Entries]
     ease: Floats | float
+    sums: Hidden | None = None
 
 
 class Instant:
@@ -193,10 +195,16 @@ class Instant:
         behind[self.system.held[0]] = True  # they read "multiplier = 0"
         # other dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
         moves = (self.system.kinds != "s") | jumps
-        asked = Asked(behind, moves, met, lambda *_: (i, j, v, v), ease)
+        asked = Asked(behind, moves, met, lambda *_: (i, j, v, v), ease, self._hidden(slope, jumps))
         found, impulse = self._jump((t, y, yd), magnitude, asked)
         found = np.where(jumps, found, y)
         return found, self._pushed(slope, found - y, impulse, inertia * magnitude[self._column])
+
+    def _hidden(self, slope: Floats, jumps: Mask) -> Hidden | None:
+        """What rows without inertia say together of what jumps [unknowns] behind the instant."""
+        light = self._now(self._light | self.system.of_groups("phi_rate"))
+        answers = (self.system.kinds == "f") | self._acting()
+        return hidden((self._row, self._column, slope), light, answers, jumps)
 
     def _slopes(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
         """dF/dy [entries] at flows as large as those of an impulse (at those of y where that is no number), dF/dyd."""
@@ -284,6 +292,15 @@ class Instant:
         np.maximum.at(steepest, self._column[mine], np.abs(jy[mine]))
         return np.where((self.system.kinds == "e") & ~self._struck & (steepest == 0.0), y + magnitude, y)
 
+    def _with(self, here: Any, integrals: Any, jy: Floats, asked: Asked) -> tuple[Any, Any, Floats]:
+        """Entries of what holds behind the instant, of single rows (here) and of sums, and of integrals."""
+        parts = [here]
+        if asked.sums is not None:
+            moves = np.flatnonzero((asked.moves & (self.system.kinds != "f") & ~self._over.force)[self._column])
+            parts.append(asked.sums.entries(self._row[moves], self._column[moves], jy[moves]))
+        i, j, v = (np.concatenate([part[k] for part in parts]) for k in range(3))
+        return np.append(2 * i, integrals[0]), np.append(2 * j, integrals[1]), np.append(v, integrals[2])
+
     def _jump(
         self,
         before: tuple[float, Floats, Floats],
@@ -308,21 +325,24 @@ class Instant:
             jy, jyd = (np.where(np.isfinite(item), item, 0.0) for item in self.system.jacobian(t, y, yd))
             i, j, v, mean = asked.integrals(jy, jyd, y)
             aim = np.zeros((self.system.rows, 2)) + aims
-            aim[asked.behind, 0] -= self.system.residual(t, y, yd)[asked.behind]
+            left = self.system.residual(t, y, yd)
+            aim[asked.behind, 0] -= left[asked.behind]
+            if asked.sums is not None:
+                aim = np.append(aim, np.outer(-asked.sums.of(left), (1.0, 0.0)), axis=0)
             change, aim = np.stack([y - start, integral], axis=1).ravel(), aim.ravel()
             np.add.at(aim, i, -mean * change[j])
             if step <= CONVERGED:
                 break
-            entries = np.append(2 * self._row[here], i), np.append(2 * self._column[here], j), np.append(jy[here], v)
+            entries = self._row[here], self._column[here], jy[here]
             try:
-                move = least_measured(entries, aim, scale)
+                move = least_measured(self._with(entries, (i, j, v), jy, asked), aim, scale)
             except NotFiniteError:
                 if sure:
                     raise
                 return start, np.zeros(start.size)
             y, integral = y + move[::2], integral + move[1::2]
             step = float((np.abs(move[::2]) / np.maximum(magnitude, np.abs(y))).max(initial=0.0))
-        wanted = (np.zeros((self.system.rows, 2)) + aims).ravel()
+        wanted, aim = (np.zeros((self.system.rows, 2)) + aims).ravel(), aim[: 2 * self.system.rows]
         size = np.fmax(scale, np.stack([np.maximum(np.abs(y), np.abs(start)), 0.0 * y], axis=1).ravel())
         off = np.where(asked.met, missed((i, j, mean), size, (aim, wanted))[1::2], 0.0)
         if off.any():
