@@ -112,6 +112,8 @@ def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | Non
     else:
         assert refused is not None
         raise refused
+    for claim in base.claims:
+        say(f"{claim}; a golden holds what is, right or wrong")
     meters = [base, *runs, *found, *_others(request, base, checked)]
     return Recorded(
         golden,

@@ -35,7 +35,7 @@ def between(time: Floats) -> Floats:
 @dataclass(frozen=True, slots=True)
 class Run:
     """trace: its curves; structure: of this formulation; energy [J], constraints: largest of the meters;
-    turnover [J]: the energy that went round; parameters: name to value in SI.
+    turnover [J]: the energy that went round; parameters: name to value in SI; claims: what it fails of them.
     """
 
     trace: Arrays
@@ -46,6 +46,7 @@ class Run:
     formulation: str
     method: str
     parameters: dict[str, float]
+    claims: tuple[str, ...] = ()
 
 
 class Stopped(Exception):  # noqa: N818 (no fault of the program)
@@ -84,7 +85,9 @@ def run(request: Request, also: Floats | None = None) -> Run:
     source = arrays_of(trace)
     formulation, method = ran.prepared.formulation, ran.outcome.method
     turnover = ran.outcome.judgement.turnover if ran.outcome.judgement else 0.0
-    return Run(source, _structure(ran, source), energy, constraints, turnover, formulation, method, parameters)
+    claims = tuple(d.message for d in report.diagnostics if d.code == "E909")
+    structure = _structure(ran, source)
+    return Run(source, structure, energy, constraints, turnover, formulation, method, parameters, claims)
 
 
 def _largest(values: Floats) -> float:

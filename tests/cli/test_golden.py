@@ -397,3 +397,12 @@ def test_a_golden_of_a_scene_that_needs_a_part_holds_the_structure_of_the_whole(
     structure = json.loads(Path("golden/spring/ring.json").read_text())
     assert "store" in json.dumps(structure)
     assert run(["golden", "check"]) == 0
+
+
+def test_what_the_scene_expects_and_does_not_find_is_said(tmp_path, monkeypatch, capsys):
+    """It was recorded without a word: a golden of a scene whose expect fails."""
+    text = SPRING.replace("  trace x", "  expect finally: x == 3 m within 1 mm\n  trace x")
+    (tmp_path / "spring.sd").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    assert run(["golden", "record", "spring.sd"]) == 0
+    assert "expected 3 m within 0.001 m" in capsys.readouterr().err
