@@ -120,8 +120,14 @@ def _combined(found: Reactions, weights: Floats) -> Floats:
 
 
 def _moves(system: System, state: ConsistentState) -> tuple[Floats, Floats]:
-    """How large displacements are [unknowns as written], 0 for all else; seeded moves of them [POINTS, unknowns]."""
-    size = balanced(system, state.y, system.slopes(state.t, state.y, state.yd, rate=False)) * system.are("q")
+    """How large displacements are [unknowns as written], 0 for all else; seeded moves of them [POINTS, unknowns].
+
+    Their geometry alone tells: beside forces that are round-off a balance would make an angle 1e13 rad.
+    """
+    slope = np.where(
+        system.of_groups("phi")[system.pattern.row], system.slopes(state.t, state.y, state.yd, rate=False), 0.0
+    )
+    size = balanced(system, state.y, slope) * system.are("q")
     return size, size * system.once_if_small(("directions", size.size), lambda: normal(POINTS, size.size))
 
 

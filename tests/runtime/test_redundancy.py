@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import small_models as models
+from scipy.integrate import solve_ivp
+from sysdyn import api
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import WrongOption
@@ -135,3 +137,31 @@ def test_what_does_not_hold_now_counts_for_no_rank():
 def test_what_is_no_policy(tmp_path):
     with pytest.raises(WrongOption, match="redundancy"):
         run(pendulum(), tmp_path / "t.h5", "maybe")
+
+
+RODS = """
+model rods {
+  coord x: translation = 1.2 m
+  coord y: translation ~ -1.7 m
+  coord th: rotation ~ 0.01
+  energy T* = 1/2*(3 kg)*(x'^2 + y'^2) + 1/2*(1 kg.m^2)*th'^2
+  energy V = (3 kg)*g0*y
+  phi left: (x - (1 m)*cos(th) + 1 m)^2 + (y - (1 m)*sin(th))^2 = (2 m)^2
+  phi right: (x + (1 m)*cos(th) - 1 m)^2 + (y + (1 m)*sin(th))^2 = (2 m)^2
+  phi mid: x^2 + y^2 = (2 m)^2
+  init x' = 0 m/s
+}
+scene s of rods { time 0 s to 1 s; redundancy minimum_norm; trace x }
+"""
+
+
+@pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+def test_three_parallel_rods_are_one_too_many_in_every_formulation(formulation, tmp_path):
+    """Points nearby were 1e11 rad away in Hamilton's form, where the balance of a turning that is nothing made the size
+    of its angle (E512): the beam swings as a pendulum does.
+    """
+    path = tmp_path / "rods.sd"
+    path.write_text(RODS, encoding="utf-8")
+    trace = api.simulate(path, formulation=formulation, accuracy=1e-6, output=tmp_path / "rods.h5")
+    swing = solve_ivp(lambda _, y: [y[1], -9.80665 / 2 * np.sin(y[0])], (0, 1), [np.arcsin(0.6), 0], rtol=1e-11)
+    assert trace["x"].values[-1] == pytest.approx(2 * np.sin(swing.y[0, -1]), abs=1e-5)
