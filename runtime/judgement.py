@@ -41,7 +41,7 @@ class NotMet:
     what: accuracy, energy or invariants; value beyond limit: relative for accuracy (value None: no estimate), in `unit`
     for a ledger; element: the quantity, or whose content changed most in the step that spoiled the balance most; time
     [s]: of the first instant beyond the limit; row: where the element stands in the text; undefined: the quantity is no
-    number from then on.
+    number from then on; blurred: round-off of the unknowns alone does that.
     """
 
     what: str
@@ -52,6 +52,7 @@ class NotMet:
     unit: str = "1"
     row: RowLabel | None = None
     undefined: bool = False
+    blurred: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """The object of CONTRACT's `not_met` list."""
@@ -91,7 +92,7 @@ UNJUDGED: dict[str, str | int] = {"met": 0, "judged": ""}
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """The accuracy control's verdict on one quantity.  error: relative (None: there is none); time [s] of the first
-    instant at which two runs differ by more than asked; undefined: it is no number there.
+    instant at which two runs differ by more than asked; undefined: it is no number there; blurred: by round-off alone.
     """
 
     quantity: str
@@ -99,6 +100,7 @@ class Estimate:
     asked: float
     time: float | None
     undefined: bool = False
+    blurred: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +157,10 @@ def judge(
     conserved = tuple(b for b in balances if b.conserved)
     asked = accurate and method != "euler"  # what is no number is missed whatever was asked
     misses = [e for e in missed if asked or e.undefined]
-    found = [NotMet("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined) for e in misses]
+    found = [
+        NotMet("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined, blurred=e.blurred)
+        for e in misses
+    ]
     if method == "euler":
         return Judgement((), tuple(found), conserved, turned_over(balances))
     judged = ["accuracy"] if accurate else []

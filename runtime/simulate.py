@@ -15,6 +15,7 @@ from sysdyn.runtime.accuracy.alternatives import alternatives
 from sysdyn.runtime.accuracy.by_steps import by_steps
 from sysdyn.runtime.accuracy.control import Achieved, Lighter, control
 from sysdyn.runtime.accuracy.options import Options, choose_index, choose_method, own_tolerances
+from sysdyn.runtime.accuracy.round_off import blurred
 from sysdyn.runtime.accuracy.runs import Runs, Samples
 from sysdyn.runtime.accuracy.second_opinion import confirmed
 from sysdyn.runtime.accuracy.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
@@ -367,6 +368,8 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
         raise
     assert runs.done is not None
     missed = _missed(runs, options, achieved) or undefined(runs.done[2].undefined())
+    if achieved is not None and not missed:
+        missed = blurred(runs, options.t_end, _targets(runs, options))
     judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, missed, runs.open_balances)
     close(runs, achieved, judgement)
     finished, _, writer = runs.done

@@ -262,6 +262,12 @@ def _inaccurate(prepared: Prepared, missed: NotMet, place: Place, flat: tuple[Ro
         text = f"{missed.element} is no number from t = {missed.time:.9g} s on: a function is outside its domain"
         report.error("E920", text, where, help=_REMEDIES["E933"])
         return
+    if missed.blurred:
+        text = f"round-off of the unknowns that tell {missed.element} is {missed.value:.1e} of it"
+        text += f", asked {missed.limit:.1e}"
+        help_ = "elements that are not as small beside the others, or a formulation that has it as an unknown"
+        report.error("E920", text, where, help=help_)
+        return
     estimate = "nothing estimates its error" if missed.value is None else f"estimated error {missed.value:.1e}"
     since = "" if missed.time is None else f", beyond it from t = {missed.time:.9g} s on"
     text = f"the accuracy asked was not reached: {missed.element}, {estimate}, asked {missed.limit:.1e}{since}"

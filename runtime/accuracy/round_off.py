@@ -1,0 +1,68 @@
+"""What round-off of the unknowns leaves open of traced quantities, which no estimate by two runs sees.
+
+A current told by the difference of two potentials over 1e-15 ohm is round-off: both runs have the same.  Unknowns are
+doubles, so that a quantity is known to eps/4*|dq/dx x| at best.  The slope is taken over two steps, the smaller result
+counts: what jumps within one (a rounded number, a relation) is no slope.
+
+Received: runs of which the last has ended; returned: an `Estimate` of the quantity that is worst off, if one is.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from sysdyn.runtime.judgement import EPS, Estimate
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.numerics.points import uniform
+
+if TYPE_CHECKING:
+    from sysdyn.runtime.accuracy.runs import Runs
+
+Point = tuple[float, Floats, Floats]
+STEPS = (2.0**-26, 2.0**-12)
+"""Of the unknowns: what slopes are taken over."""
+TRIES = 3
+ROUNDED = EPS / 4.0
+"""Of a number: what rounding it mostly leaves out."""
+
+
+def blur(system: System, point: Point) -> Floats:
+    """What round-off of the unknowns makes of the observed quantities [observed] at t (s), y, yd; 0 where there is no
+    number.
+    """
+    t, y, yd = point
+    found = np.zeros(0)
+    with np.errstate(all="ignore"):
+        here = system.observe(t, y, yd)
+        for k in range(TRIES):
+            signs = np.where(uniform(y.size, 0, k * y.size) < 0.5, -1.0, 1.0)
+            moved = [np.abs(system.observe(t, *(x * (1.0 + h * signs) for x in (y, yd))) - here) / h for h in STEPS]
+            least = ROUNDED * np.min(moved, axis=0)
+            found = np.maximum(found, least) if found.size else least
+    return np.where(np.isnan(found), 0.0, found)
+
+
+def blurred(runs: Runs, t: float, asked: Floats) -> tuple[Estimate, ...]:
+    """The quantity that round-off leaves farthest from what was asked [compared] at the end t (s) of the last run, as
+    one that misses it; none where all are known, or the model is large.
+    """
+    assert runs.done is not None
+    (finished, _, writer), told, system = runs.done, runs.quantities, runs.system
+    if not told.names or finished.last is None or system.unknowns > LARGE:
+        return ()
+    y, yd = (x[: system.form.written] for x in finished.last[0]())
+    try:
+        left = blur(system, (t, y, yd))[told.places]
+    except SolverFailure:  # beside the point a function is none
+        return ()
+    seen = writer.seen()
+    size = np.maximum(told.beside(finished.largest, finished.magnitude), [seen[name] for name in told.names])
+    wanted = asked[: size.size] * size
+    over = np.divide(left, wanted, out=np.zeros(size.size), where=wanted > 0.0)
+    worst = int(np.argmax(over))
+    if not over[worst] > 1.0:
+        return ()
+    return (Estimate(told.names[worst], float(left[worst] / size[worst]), float(asked[worst]), None, blurred=True),)
