@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -178,8 +179,11 @@ class Instant:
         unknown, integral = np.divmod(pulses.column, 2)
         return np.flatnonzero(rows[pulses.row] & np.where(integral == 1, acts[unknown], moves[unknown]))
 
-    def displacements(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
-        """Y with the displacements behind the jump at t; the impulses of effort on balances with inertia [rows].
+    def displacements(
+        self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, sums: bool = False
+    ) -> tuple[Floats, Floats]:
+        """Y with the displacements behind the jump at t; the impulses of effort on balances with inertia [rows]; sums:
+        what rows say together holds behind it too.
 
         Where nothing resists an impulse of flow the rows of displacements alone say where they are.
         """
@@ -195,8 +199,11 @@ class Instant:
         behind[self.system.held[0]] = True  # they read "multiplier = 0"
         # other dynamic variables have finite rates: what they hold, contents of stores in series among it, stays
         moves = (self.system.kinds != "s") | jumps
-        asked = Asked(behind, moves, met, lambda *_: (i, j, v, v), ease, self._hidden(slope, jumps))
+        asked = Asked(behind, moves, met, lambda *_: (i, j, v, v), ease)
         found, impulse = self._jump((t, y, yd), magnitude, asked)
+        together = self._hidden(slope, jumps) if sums else None
+        if together is not None and self._unmet(together, t, found, yd, magnitude):
+            found, impulse = self._jump((t, y, yd), magnitude, replace(asked, sums=together))
         found = np.where(jumps, found, y)
         return found, self._pushed(slope, found - y, impulse, inertia * magnitude[self._column])
 
@@ -205,6 +212,13 @@ class Instant:
         light = self._now(self._light | self.system.of_groups("phi_rate"))
         answers = (self.system.kinds == "f") | self._acting()
         return hidden((self._row, self._column, slope), light, answers, jumps)
+
+    def _unmet(self, sums: Hidden, t: float, y: Floats, yd: Floats, magnitude: Floats) -> bool:
+        """Whether a sum of rows is not met at the point by more than round-off of its terms."""
+        jy = self.system.jacobian(t, y, yd)[0]
+        terms = np.abs(jy) * np.maximum(np.abs(y), magnitude)[self._column]
+        size = np.abs(sums.weights) @ np.bincount(self._row, terms, self.system.rows)
+        return bool((np.abs(sums.of(self.system.residual(t, y, yd))) > BROKEN * size).any())
 
     def _slopes(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
         """dF/dy [entries] at flows as large as those of an impulse (at those of y where that is no number), dF/dyd."""

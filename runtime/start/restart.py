@@ -47,10 +47,12 @@ def _held(
 
 
 class Restart:
-    """state [unknowns as written]: the unknowns that keep their values."""
+    """state [unknowns as written]: the unknowns that keep their values; sums: whether what rows say together may empty
+    a store.  Where something opens for what drives it (a freewheel) no store is emptied.
+    """
 
     def __init__(self, settler: Settler, state: NDArray[np.bool_]) -> None:
-        self.settler, self.state = settler, state
+        self.settler, self.state, self.sums = settler, state, True
         self.instant = Instant(settler.system)
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
@@ -99,7 +101,7 @@ class Restart:
             return *same, np.zeros(y.size), self._lives
         push = None
         if same is None or moved[self.settler.system.kinds == "q"].any():
-            y, push = self.instant.displacements(t, y, yd, magnitude)
+            y, push = self.instant.displacements(t, y, yd, magnitude, sums=self.sums)
         y, impulse = self.instant.flows(t, y, yd, magnitude, push=push)
         kept = self._kept(t, y, yd, magnitude)
         if kept is not None:

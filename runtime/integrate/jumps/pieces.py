@@ -58,6 +58,7 @@ class Pieces:
         assert run.request.begin is not None
         self.handler = Handler(plan, run.system, (start.t, run.request.t_end), run.request.begin)
         self.handler.restart = run.settlers.restart
+        run.settlers.restart.sums = all(contact.kind == "guarded" for contact in plan.contacts)
         self.handler.contacts.size(run.sizes.magnitude, run.sizes.time)
         method = run.method.contents
         if np.isfinite(plan.turns):
