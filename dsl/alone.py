@@ -66,14 +66,16 @@ def _models(component: syntax.Component) -> Iterator[syntax.Model]:
     """One for each level of a component."""
     levels = [s for s in component.body if isinstance(s, syntax.Level)]
     base = tuple(s for s in component.body if not isinstance(s, syntax.Level))
-    for level in levels or [None]:
-        said = [*base, *(() if level is None else _inside(level, levels))]
-        yield _model(component, said, () if level is None else (level.name.name,))
+    if not levels:
+        yield _model(component, base, ())
+    for level in levels:
+        yield _model(component, [*base, *_inside(level, levels)], (level.name.name,))
 
 
 def _inside(level: syntax.Level, levels: Iterable[syntax.Level]) -> Iterator[syntax.Statement]:
     """The statements of a level and of those that it extends."""
-    known, seen, at = {one.name.name: one for one in levels}, set[str](), level
+    known, seen = {one.name.name: one for one in levels}, set[str]()
+    at: syntax.Level | None = level
     while at is not None and at.name.name not in seen:
         yield from at.body
         seen.add(at.name.name)
@@ -110,7 +112,7 @@ def _parameters(
     for s in own:
         size = s.value is None and s.decl.name in sizes
         value = syntax.Number(float(_SIZE), str(_SIZE), s.span) if size else s.value
-        found.append(replace(s, unit=_plain(s.unit), value=value))
+        found.append(replace(s, unit=s.unit and _plain(s.unit), value=value))
     return found, [syntax.Arg(s.decl.name, _name(s.decl), s.decl.span) for s in own]
 
 
@@ -146,9 +148,7 @@ def _name(decl: syntax.Decl) -> syntax.Name:
     return syntax.Name(decl.name, decl.span)
 
 
-def _plain(unit: syntax.Unit | None) -> syntax.Unit | None:
+def _plain(unit: syntax.Unit) -> syntax.Unit:
     """A unit without its variables."""
-    if unit is None:
-        return None
     factors = tuple(f for f in unit.factors if not f.name.startswith("$"))
     return replace(unit, factors=factors)

@@ -39,7 +39,8 @@ def blur(system: System, point: Point) -> Floats:
         here = system.observe(t, y, yd)
         for k in range(TRIES):
             signs = np.where(uniform(y.size, 0, k * y.size) < 0.5, -1.0, 1.0)
-            moved = [np.abs(system.observe(t, *(x * (1.0 + h * signs) for x in (y, yd))) - here) / h for h in STEPS]
+            beside = [(y * (1.0 + h * signs), yd * (1.0 + h * signs), h) for h in STEPS]
+            moved = [np.abs(system.observe(t, a, b) - here) / h for a, b, h in beside]
             least = ROUNDED * np.min(moved, axis=0)
             found = np.maximum(found, least) if found.size else least
     return np.where(np.isnan(found), 0.0, found)

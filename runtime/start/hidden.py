@@ -9,6 +9,8 @@ Received: rows, columns and values of dF/dy of settled rows; returned: `Hidden`.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
@@ -18,7 +20,7 @@ from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.integrated import BROKEN
 from sysdyn.values import dataclass
 
-Places = NDArray[np.int64]
+Places = NDArray[np.signedinteger[Any]]
 MOST = 400
 """Rows or unknowns of which no full matrix is decomposed."""
 
