@@ -22,7 +22,7 @@ from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
 from sysdyn.runtime.numerics.work import Work
 from sysdyn.values import dataclass
 
-SMALL = 32
+SMALL = 64
 """Rows and unknowns up to which a problem that the core knows is solved there."""
 CORRECTED = 240
 """The same up to which rows are corrected: a few eliminations in which each entry has its round-off."""

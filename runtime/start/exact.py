@@ -31,7 +31,7 @@ def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, f
     if best.residual >= EXACT or best.x.size > DENSE or not (best.x != guess)[state].any():
         return best, False
     found, sure = _renewed(starter, t, best, x, guess, free)
-    if found.residual == np.inf or not bends(starter, t, found.x, free & ~state):
+    if found.residual == np.inf or not any(bends(starter, t, at, free & ~state) for at in (found.x, guess)):
         return found, sure
     # what a law without a slope, or one beyond all bounds, asks of rates says nothing of the state
     with starter.granted():

@@ -119,7 +119,7 @@ def at_rest(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     all bounds, and hold.
     """
     still, at_zero = without_flow(starter, t, x, follows), follows & (x == 0.0)
-    bent = rooted_at(starter, t, x, at_zero) | _steep_at(starter, t, x, at_zero)
+    bent = (rooted_at(starter, t, x, follows) & at_zero[starter.columns]) | _steep_at(starter, t, x, follows)
     if not bent.any():
         return still
     return still | starter.columns_of(bent & (_missed(starter, t, x) <= STEEPLY)[starter.rows])
@@ -130,7 +130,7 @@ def rested(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats:
     across them, and hold so to round-off.
     """
     size = _largest(starter, t, x)
-    for bent, most in ((flat_at, HOLDS), (_steep_at, STEEPLY)):
+    for bent, most in ((rooted_at, HOLDS), (_steep_at, STEEPLY)):
         near = np.where(follows & (np.abs(x) <= NEXT_TO_NOTHING * size), 0.0, x)
         if (near == x).all():
             break

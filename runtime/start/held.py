@@ -5,7 +5,7 @@ Where a law has no slope (a turbulent valve at rest) there is no rate of what it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +31,8 @@ RESCALINGS, _DOUBTED = 6, 3
 """Times that magnitudes are taken anew; after which of them a state that is held is asked whether it can be, of active
 sets, which may contradict it.
 """
+IDLE, SAME = 2, 1e-2
+"""Times that magnitudes taken anew change nothing, behind which they never will; of misses: what is no change."""
 CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
 ASTRAY, SETTLED, FARTHER, _SETTLING = 1e-5, 1e-10, 1e-9, 20
@@ -48,14 +50,15 @@ def rescaled(
     Magnitudes that proved wrong (currents of 1e-12 A at the guess, a diode at 2 V) are taken anew: the rows must hold
     in the magnitudes of the solution too.
     """
-    at, best = x if sized is None else sized, Solution(x, np.inf)
+    at, best, idle = x if sized is None else sized, Solution(x, np.inf), 0
     for k in range(RESCALINGS):
-        if k and starter.work.done:
+        if k and (starter.work.done or idle == IDLE):
             break
         if k == _DOUBTED and not least and starter.system.description.switches.places and no_start(starter, t, x, free):
             break
         problem = problem_of(starter, t, at, guess, rows=starter.every, free=free, least=least)
-        best = solve(problem, best.x)
+        before, best = best.residual, solve(problem, best.x)
+        idle = idle + 1 if abs(best.residual - before) <= SAME * before else 0
         if not np.isfinite(best.residual):
             break
         at = starter.without_noise(best.x, problem.scale)
@@ -141,24 +144,31 @@ def following(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, 
     law passes but a root of round-off, whose rate is of any size, rather than that without such a rate, if there is.
     """
     best = Solution(x, np.inf), False
-    for way, near in _ways(starter, t, x, free, follows):
+    ways: Iterable[tuple[int, Way]] = enumerate(_ways(starter, t, x, free, follows))
+    if x.size <= DENSE:  # that which led there last first
+        ways = sorted(ways, key=lambda item: item[0] != starter.led)
+    for k, (way, near) in ways:
         found, nearly = way(starter, t, near, guess, follows)
         if nearly and (x.size > DENSE or way is _at_rest or (rested(starter, t, found.x, follows) == found.x).all()):
+            starter.led = k
             return found, True
         if not best[1]:
             best = found, nearly
     return best
 
 
-def _ways(
-    starter: Starter, t: float, x: Floats, free: Mask, follows: Mask
-) -> Iterator[tuple[Callable[..., tuple[Solution, bool]], Floats]]:
+Way = tuple[Callable[..., tuple[Solution, bool]], Floats]
+"""How what follows is sought, and from where."""
+
+
+def _ways(starter: Starter, t: float, x: Floats, free: Mask, follows: Mask) -> Iterator[Way]:
     """How what follows is sought, and from where."""
     if x.size > DENSE:
         yield _at_once, x
         yield from ((_at_once, near) for near, _ in off_the_flat(starter, t, x, follows))
         return
-    points = [x, *(near for near, _ in off_the_flat(starter, t, x, follows))][::-1]
+    beside = (near for near, _ in off_the_flat(starter, t, x, follows))
+    points = [x, *(near for near in beside if (near != x).any())][::-1]
     rated = np.isfinite(starter.residual(t, x)[starter.every]).all()
     # where no state can move what is all but at rest has rates
     resting = not rated or (free & ~follows & ~starter.hollow).any()

@@ -75,6 +75,7 @@ class Starter:
         self.system = system
         self.here, self.known = (0.0, False, b""), dict[str, NDArray[Any]]()
         self.work, self._residue = Work(), Residue()  # of one search for a start
+        self.led = 0  # of the ways to what follows from a state the one that led there last (held.following)
         self.jumping = False  # what is free of the state is what jumps, and no more (`jump_alone`)
         self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")

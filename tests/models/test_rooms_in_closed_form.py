@@ -20,7 +20,7 @@ from sysdyn.runtime.numerics.gauss_newton import Solution
 from sysdyn.runtime.one_underlying import refuse_undetermined
 from sysdyn.runtime.start.corrections import by_corrections
 from sysdyn.runtime.start.exact import anew, sharp
-from sysdyn.runtime.start.flat import at_rest, flat_at
+from sysdyn.runtime.start.flat import at_rest, flat_at, without_flow
 from sysdyn.runtime.start.integrated import integrated
 from sysdyn.runtime.start.starter import Starter
 
@@ -128,7 +128,8 @@ def test_a_turbulent_valve_at_rest_has_no_slope_there_and_one_under_pressure():
         follows = starter.free & starter.following(0.0, x)
         found = flat_at(starter, 0.0, x, follows)
         assert bool(found.any()) == bool(flat)
-        assert not at_rest(starter, 0.0, x, follows).any(), "its rate is asked for"
+        assert not without_flow(starter, 0.0, x, follows).any(), "its rate is asked for"
+        assert bool(at_rest(starter, 0.0, x, follows).any()) == bool(flat), "it passes nothing, and is left alone"
 
 
 def test_a_root_of_what_is_negative_at_the_start_is_named_with_its_argument():
