@@ -12,14 +12,22 @@ from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.runtime.start.corrections import EXACT, Corrected, by_corrections
 from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.flat import at_rest, bends, rested, without_flow, without_rates
-from sysdyn.runtime.start.held import CLOSED, astray, farther, following, least_change, nearest, own_residual, tidied
+from sysdyn.runtime.start.held import (
+    BACK,
+    CLOSED,
+    astray,
+    farther,
+    following,
+    least_change,
+    nearest,
+    own_residual,
+    tidied,
+)
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
 
 EPS, RESOLVED = 2.3e-16, 1e-3
 """Round-off; of contents: what it may be."""
-BACK = 1e-10
-"""Steps of this part of the largest alike are round-off of the linear algebra, and tried without."""
 
 
 def anew(starter: Starter, t: float, best: Solution, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:

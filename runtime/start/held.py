@@ -33,6 +33,8 @@ sets, which may contradict it.
 """
 IDLE, SAME = 2, 1e-2
 """Times that magnitudes taken anew change nothing, behind which they never will; of misses: what is no change."""
+BACK = 1e-10
+"""Steps of this part of magnitudes are round-off of the linear algebra, and tried without."""
 CLOSED = 1e-12
 """Scaled residual of rows that hold to round-off."""
 ASTRAY, SETTLED, FARTHER, _SETTLING = 1e-5, 1e-10, 1e-9, 20
@@ -67,6 +69,10 @@ def rescaled(
             clean = next((c for c in (at, best.x) if own_residual(starter, t, at, c) < OWN), None)
             if clean is not None:
                 return replace(best, x=clean), True
+            if x.size <= DENSE:
+                back = np.where(np.abs(best.x - guess) <= BACK * starter.scale(t, guess), guess, best.x)
+                if own_residual(starter, t, back, back) < OWN:
+                    return replace(best, x=back), True
     return best, False
 
 
