@@ -9,7 +9,7 @@ from sysdyn.cli.run.prepare import prepare
 from sysdyn.dsl import load as text
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
-from sysdyn.runtime import simulate as simulation
+from sysdyn.runtime.accuracy import controlled
 from sysdyn.runtime.accuracy.alternatives import NOT_STIFF, SMALL, alternatives
 from sysdyn.runtime.accuracy.options import Options, choose_index, choose_method, own_tolerances
 from sysdyn.runtime.accuracy.way import Way
@@ -297,11 +297,11 @@ def test_the_explicit_method_goes_on_once_where_radau_takes_more_steps(monkeypat
             raise SolverFailure("max_steps", 0.5, 1e-3)
         return SimpleNamespace(met=True)
 
-    monkeypatch.setattr(simulation, "_achieved", achieved)
+    monkeypatch.setattr(controlled, "_achieved", achieved)
     plain = SimpleNamespace(form=SimpleNamespace(scales=()))
     ways = [Way(method, plain, 1, "0") for method in ("dopri", "radau", "bdf")]
     runs = Taken(ways[0])
-    assert simulation._chosen(runs, AUTO, tuple(ways[1:])).met
+    assert controlled._chosen(runs, AUTO, tuple(ways[1:])).met
     expected = [("dopri", False, None), ("radau", False, 500), ("dopri", True, None), ("radau", False, None)]
     assert runs.seen == (expected if ends == "radau" else expected[:3])
 
@@ -318,11 +318,11 @@ def test_the_explicit_method_goes_on_where_a_draft_shows_that_a_start_was_no_sig
             raise SolverFailure("max_steps", 0.5, 1e-3)
         return SimpleNamespace(met=True)
 
-    monkeypatch.setattr(simulation, "_achieved", achieved)
-    monkeypatch.setattr(simulation, "_unbalanced", lambda runs, options: 0.0)
+    monkeypatch.setattr(controlled, "_achieved", achieved)
+    monkeypatch.setattr(controlled, "_unbalanced", lambda runs, options: 0.0)
     plain = SimpleNamespace(form=SimpleNamespace(scales=()))
     ways = [Way("rosenbrock", plain, 1, "1", drafted=250), *(Way(m, plain, 1, "0") for m in ("dopri", "radau", "bdf"))]
     runs = Taken(ways[0])
-    assert simulation._chosen(runs, AUTO, tuple(ways[1:])).met
+    assert controlled._chosen(runs, AUTO, tuple(ways[1:])).met
     expected = [("rosenbrock", False, 250), ("dopri", False, None), ("rosenbrock", False, None)]
     assert runs.seen == (expected if ends == "rosenbrock" else expected[:2])

@@ -1,0 +1,203 @@
+"""The runs of one simulation with accuracy control: by one method, or by each of those of `auto` until one does.
+
+Received: runs of a start, options and the ways that `auto` may take behind the first; handed on: what was achieved, the
+finest run and its samples standing in the runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from sysdyn.runtime.accuracy.by_steps import by_steps
+from sysdyn.runtime.accuracy.control import Achieved, Lighter, control
+from sysdyn.runtime.accuracy.options import Options, own_tolerances
+from sysdyn.runtime.accuracy.round_off import blurred
+from sysdyn.runtime.accuracy.runs import Runs
+from sysdyn.runtime.accuracy.second_opinion import confirmed
+from sysdyn.runtime.accuracy.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
+from sysdyn.runtime.judgement import Estimate, judge
+from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.failures import SolverFailure, WrongOption
+
+NO_FURTHER = 1.0 + 1e-6
+"""Of the instant at which a method stopped: another that stops there got no further."""
+REFINED, REFINE, HELPS = 4, 0.3, 0.5
+"""Runs with shorter steps for the sake of the ledgers, how long they are beside those before, and what of the balance
+is left of one that a step spoils."""
+LITTLE_HAPPENS = "little happens"
+"""Why method auto goes on with the bdf behind a draft of radau."""
+LIGHT = 200
+"""Steps of the bdf there, beyond which they are no cheaper than radau's."""
+PATIENCE = {"bdf": (LONG, LONG_STEEP), "rosenbrock": (BRIEF, BRIEF_STEEP)}
+"""Steps after which the next method is tried, of laws that are not steep and of those that are."""
+
+
+def _left(runs: Runs, failure: SolverFailure) -> str:
+    """Why a method was left."""
+    method = runs.method
+    if failure.cause == "stiff":
+        return f"stiff: {method} is held to steps of {failure.step:.2g} s"
+    if failure.cause == "max_steps":
+        return f"{method} needs more than {runs.most_steps} steps"
+    return f"{method} stopped at {failure.time:.6g} s"
+
+
+def _targets(runs: Runs, options: Options) -> Floats:
+    """Accuracy wanted of each compared quantity; infinite where none is."""
+    names = list(runs.quantities.compared)
+    target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)
+    for name, wanted in options.accuracy_on:
+        if name not in names:
+            raise WrongOption(f"accuracy on '{name}': it is not traced")
+        target[names.index(name)] = wanted
+    return target
+
+
+def controlled(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved | None:
+    """Runs with accuracy control; None of one run with the solver's own tolerances."""
+    if runs.method == "euler":
+        if options.euler_step is None:
+            raise WrongOption("method euler needs a step")
+        runs.run(options.rtol or 1e-6, options.atol)
+        return None
+    if own_tolerances(options):
+        runs.run(options.rtol if options.rtol is not None else 1e-6, options.atol)
+        return None
+    achieved = _chosen(runs, options, others) if options.method == "auto" else _achieved(runs, options)
+    achieved = _balanced(runs, options, achieved)
+    return confirmed(runs, achieved, _targets(runs, options)) if options.accuracy_check else achieved
+
+
+def unmet(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Estimate, ...]:
+    """The quantity that misses most what was asked, by the runs or by what round-off leaves open of it."""
+    if achieved is None:
+        return ()
+    if achieved.met:
+        return blurred(runs, options.t_end, _targets(runs, options))
+    name, asked, time, undefined = runs.compared.worst(runs.quantities.compared, _targets(runs, options))
+    return (Estimate(name, achieved.error_estimate, asked, time, undefined),)
+
+
+def _achieved(
+    runs: Runs,
+    options: Options,
+    *,
+    last: bool = True,
+    doubted: bool = False,
+    tame: bool = False,
+    lighter: Lighter | None = None,
+) -> Achieved:
+    """Runs by one method; last: no other takes over, so that it goes on where it would be left to the next."""
+    target, first = _targets(runs, options), options.first
+    relaxed = by_steps(runs, options, target) if first is None and not (doubted or tame) else None
+    if isinstance(relaxed, Achieved):
+        return relaxed
+    law = replace(runs.way.law, brief=False) if last else runs.way.law
+    return control(runs.sampled, target, law, doubted=doubted, tame=tame, first=first, lighter=lighter, draft=relaxed)
+
+
+def _lighter(runs: Runs, options: Options, others: tuple[Way, ...]) -> Lighter | None:
+    """The bdf behind a draft of radau: where so little happens that the longest step holds the steps, its steps cost a
+    third of radau's and its rows less (CPU over eleven seed models: 0.81 of two runs of radau; over ladders of 100 to
+    10 000 sections at 1e-1 to 1e-4: 0.75).
+    """
+    way = runs.way
+    bent = options.events or way.system.form.scales
+    if way.method != "radau" or bent or not others or others[0].method != "bdf":
+        return None
+    light = replace(others[0], reason=LITTLE_HAPPENS)
+    return Lighter(light.law, lambda: runs.take(light, LIGHT), lambda: runs.take_back(way))
+
+
+def _unbalanced(runs: Runs, options: Options) -> float:
+    """How many times its limit the worst ledger of the last run is off."""
+    assert runs.done is not None
+    found = judge(options, runs.method, runs.done[0].balances, False, (), runs.open_balances).not_met
+    return max((f.value / f.limit if f.value is not None and f.limit > 0.0 else np.inf for f in found), default=0.0)
+
+
+def _balanced(runs: Runs, options: Options, achieved: Achieved) -> Achieved:
+    """A ledger is a sum over the steps: where it alone is off, they are shortened while that helps."""
+    runs.patience = runs.patience_with_draft = None  # no method follows
+    off = _unbalanced(runs, options) if achieved.met else 0.0
+    for _ in range(REFINED):
+        if off <= 1.0:
+            break
+        try:
+            runs.sampled(achieved.tolerance, REFINE / max(runs.accounts.last.steps, 1))
+        except SolverFailure:  # the run before stands, with what it misses
+            break
+        before, off = off, _unbalanced(runs, options)
+        achieved = replace(achieved, runs=achieved.runs + 1)
+        if off > HELPS * before:
+            break
+    return achieved
+
+
+def _short(runs: Runs, options: Options, achieved: Achieved) -> str | None:
+    """What the method did not reach; None where it met everything."""
+    if not achieved.met:
+        return f"{runs.method} does not reach the accuracy"
+    return None if _unbalanced(runs, options) <= 1.0 else f"the energy of {runs.method} does not balance"
+
+
+def _bounded(failure: SolverFailure, runs: Runs) -> bool:
+    """The caller's own bound ended it, or the text itself ends there: another method would meet the same."""
+    limited = failure.cause == "max_steps" and runs.most_steps == runs.options.max_steps
+    return limited or failure.late or failure.cause in ("max_wall", "memory", "zeno")
+
+
+def _told(before: SolverFailure | None, last: SolverFailure) -> SolverFailure:
+    """Of two methods that stopped the one that got further; where they got equally far, the first."""
+    return before if before is not None and last.time <= NO_FURTHER * before.time else last
+
+
+def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
+    """With method auto: where one method fails, or is held back, the next begins anew.
+
+    Lightly damped oscillations hold the bdf of orders 3 to 5, which are not A-stable, to steps of the fastest of them:
+    a line of 10000 sections takes it 25 times the work of radau.  Stability holds the dopri where a model is stiff.
+    Of steep laws the next one begins, too, where the first does not reach what was asked: the bdf tests its states
+    alone, and efforts that blocked diodes leave to a source may bend between its steps.  Where the bdf is held back at
+    its highest order the motion is smooth, and radau takes all its stages (ring modulator at 1e-6: 5.3 s -> 1.3).
+    Where a draft of radau takes more steps than stability leaves the dopri, whose steps are cheaper, that goes on.
+    """
+    doubted, smooth, tame, steep = False, False, False, bool(runs.system.form.scales)
+    missed: Achieved | None = None
+    stands = runs.way
+    stopped: SolverFailure | None = None
+    explicit: tuple[Way, int] | None = None
+    if runs.way.drafted:
+        explicit, others = (others[0], runs.way.drafted), others[1:]
+    while True:
+        runs.patience = PATIENCE.get(runs.method, (None, None))[steep] if others else None
+        runs.patience_with_draft = explicit[1] if explicit is not None and others else None
+        try:
+            lighter = _lighter(runs, options, others)
+            achieved = _achieved(runs, options, last=not others, doubted=doubted, tame=tame, lighter=lighter)
+        except SolverFailure as failure:
+            if not others or _bounded(failure, runs):
+                if missed is None:
+                    raise _told(stopped, failure) from None
+                runs.take(stands)
+                return missed
+            doubted = failure.cause not in ("max_steps", "stiff") and not runs.way.law.brief
+            why = _left(runs, failure)
+            smooth = failure.smooth and failure.cause == "max_steps"
+            stopped = failure if doubted else stopped
+            if explicit is not None and failure.cause == "max_steps" and runs.done is None:
+                lasting = not runs.way.drafted  # what the start says of stability may not last
+                others = (replace(explicit[0], lasting=lasting), replace(runs.way, drafted=0), *others)
+            explicit = None
+            if failure.cause == "stiff" and not runs.way.lasting and others[0].method == "radau":
+                explicit = runs.way, int(np.ceil((options.t_end - options.t_start) / failure.step))
+        else:
+            short = _short(runs, options, achieved) if (steep or runs.way.law.brief) and others else None
+            if short is None:
+                return achieved
+            tame = achieved.lost
+            why, stands = short, runs.way
+            missed = replace(achieved, error_estimate=None, met=False)
+        runs.take(replace(others[0], reason=why, smooth=smooth and steep))
+        others = others[1:]
