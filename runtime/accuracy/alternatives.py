@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.accuracy.options import Options, own_tolerances
-from sysdyn.runtime.accuracy.stability import stable_step
 from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.underlying import rateless
 from sysdyn.runtime.model.scales import magnitudes
@@ -29,9 +28,6 @@ GROWS = 10.0
 """Relative change of a law over that of an unknown, at its magnitude, from which on it turns within a part of that: a
 step ends where it does, and the cheapest are the bdf's (diodes 30 and more; friction of turbulent flow 2)."""
 
-SLOWER = 0.5
-"""Of the steps to which stability would hold the explicit method: an implicit one that needs more is no better."""
-
 COARSE, COARSER = 1e-6, 1e-3
 """Accuracies, of small systems and of medium ones (a beam of 160 takes 0.5 of radau's CPU at 1e-2, 1.4 at 1e-4), below
 which more stages, whose orders are higher, cost less than the method without Newton's iteration.
@@ -42,8 +38,7 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     """What method auto tries, in this order; `way` among it.
 
     The explicit method on the underlying equation comes first where there is one and no law is steep: it is by far the
-    cheapest on a model that is not stiff, and gives up in a few steps on one that is.  Where the start says so already
-    it is behind the first of the others, whose draft tells whether the motion is slow.
+    cheapest on a model that is not stiff, and gives up in a few steps on one that is.
     """
     other = replace(way, method="bdf" if way.method == "radau" else "radau")
     if own_tolerances(options):
@@ -64,13 +59,7 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
         if system.unknowns > LARGE:
             system.forget()
         return _because(f"no explicit equation for {missing[0]}", (*_without_newton(way, options), way, other))
-    explicit, implicit = Way("dopri", system, 1, "0", NOT_STIFF), (*_without_newton(way, options), way, other)
-    held = stable_step(way.system, start, options.t_end) if way.index <= 1 else None
-    if held is None:
-        return explicit, *implicit
-    drafted = int(SLOWER * (options.t_end - options.t_start) / held)
-    reason = f"stiff: dopri would be held to steps of {held:.2g} s"
-    return replace(implicit[0], reason=reason, drafted=drafted), explicit, *implicit[1:]
+    return Way("dopri", system, 1, "0", NOT_STIFF), *_without_newton(way, options), way, other
 
 
 def _without_newton(way: Way, options: Options) -> tuple[Way, ...]:

@@ -168,8 +168,6 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
     stands = runs.way
     stopped: SolverFailure | None = None
     explicit: tuple[Way, int] | None = None
-    if runs.way.drafted:
-        explicit, others = (others[0], runs.way.drafted), others[1:]
     while True:
         runs.patience = PATIENCE.get(runs.method, (None, None))[steep] if others else None
         runs.patience_with_draft = explicit[1] if explicit is not None and others else None
@@ -186,9 +184,8 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
             why = _left(runs, failure)
             smooth = failure.smooth and failure.cause == "max_steps"
             stopped = failure if doubted else stopped
-            if explicit is not None and failure.cause == "max_steps" and runs.done is None:
-                lasting = not runs.way.drafted  # what the start says of stability may not last
-                others = (replace(explicit[0], lasting=lasting), replace(runs.way, drafted=0), *others)
+            if explicit is not None and failure.cause == "max_steps":
+                others = (replace(explicit[0], lasting=True), runs.way, *others)
             explicit = None
             if failure.cause == "stiff" and not runs.way.lasting and others[0].method == "radau":
                 explicit = runs.way, int(np.ceil((options.t_end - options.t_start) / failure.step))

@@ -28,8 +28,7 @@ class Way:
     """A method on a form of the model; index: of the form as the error test takes it, name: as the trace names it;
     reason: why method auto takes it; lasting: stability may hold its steps, for those of another are no longer; smooth:
     the motion is long and smooth, however steep its laws; reduced: equations of index 2 taken at index 1; stages: of
-    radau, in the first step and at most (None: chosen); drafted: steps of its draft beyond which the explicit method,
-    which stands behind it, goes on instead (0: it does not stand there).
+    radau, in the first step and at most (None: chosen).
     """
 
     method: str
@@ -41,7 +40,6 @@ class Way:
     smooth: bool = False
     reduced: bool = False
     stages: tuple[int, int] | None = None
-    drafted: int = 0
 
     @property
     def law(self) -> Law:
