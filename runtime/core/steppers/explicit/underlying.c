@@ -15,6 +15,7 @@
 #define CLOSE 1e-12     /* move with which a projection, or an iteration, that stagnates is content */
 #define FRESH 1e-9       /* the same by factors of this very point, which contract: round-off of what is nearly zero */
 #define STAGNANT 0.3
+#define SPARED 300       /* factorisations of what is factored already that are spared in a run */
 #define BORNE 1e3       /* of multipliers: slopes are solved for once, nothing corrects their digits */
 
 sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
@@ -24,7 +25,7 @@ sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
         return NULL;
     size_t nnz = (size_t)system->entries + 1;
     size_t n = (size_t)(system->rows > system->unknowns ? system->rows : system->unknowns) + 1;
-    u->memory = calloc((size_t)linear->entries + 1 + 2 * n, sizeof(double));
+    u->memory = calloc(2 * (size_t)linear->entries + 1 + 2 * n, sizeof(double));
     u->place_y = calloc(2 * nnz, sizeof(int32_t));
     if (!u->memory || !u->place_y) {
         sd_underlying_free(u);
@@ -44,6 +45,8 @@ sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
     u->step = u->memory;
     u->rest = u->step + n;
     u->values = u->rest + n;
+    u->factored = u->values + linear->entries + 1;
+    u->factored_at = -1;
     return u;
 }
 
@@ -155,6 +158,19 @@ static void evaluate_matrix(sd_underlying *u, double t, const double *y, const d
     }
 }
 
+/* Whether the factors are those of these very values, as where the inertia is constant: of short runs alone, for long ones
+ * an order of elimination is learnt from factors, and written as code. */
+static int is_factored(sd_underlying *u)
+{
+    const size_t size = (size_t)u->linear->entries * sizeof *u->values;
+    if (u->factored_at == u->linear->factorisations && u->spared < SPARED && !memcmp(u->values, u->factored, size)) {
+        u->spared++;
+        return 1;
+    }
+    memcpy(u->factored, u->values, size);
+    return 0;
+}
+
 static int factorise(sd_underlying *u, double t, const double *y, const double *yd)
 {
     u->ready = 0;
@@ -166,7 +182,10 @@ static int factorise(sd_underlying *u, double t, const double *y, const double *
         u->bad_row = u->first + u->linear->row[sd_first_bad(u->linear->entries, u->values)];
         return SD_NONFINITE;
     }
+    if (is_factored(u))
+        return u->ready = 1, SD_FINE;
     int failed = sd_linear_factor(u->linear, u->values, NULL);
+    u->factored_at = failed ? -1 : u->linear->factorisations;
     if (failed) {
         u->bad_row = u->first + u->linear->bad_row;
         u->bad_column = u->linear->bad_column >= 0 ? u->unknown[u->linear->bad_column] : 0;
@@ -232,6 +251,7 @@ static void clear(const sd_underlying *u, double *y, double *yd)
 static int straight_on(sd_underlying *u, const sd_straight *straight, double t, double *y, double *yd)
 {
     u->matrix->jacobian_evaluations++;
+    u->factored_at = -1;
     write_entries(u, t, y, yd);
     if (!*u->system->stop && sd_straight_solve(straight, u, y, yd))
         return u->ready = 1;
@@ -270,6 +290,7 @@ void sd_underlying_switched(sd_underlying *u)
     sd_straight_free(u->straight);
     u->straight = NULL;
     u->ready = 0;
+    u->factored_at = -1;
 }
 
 void sd_underlying_begin(sd_underlying *u, double tolerance, double *yd)

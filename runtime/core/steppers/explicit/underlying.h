@@ -49,6 +49,9 @@ typedef struct sd_underlying {
     int32_t lists, mores, flows; /* flows: some are solved for themselves */
     int32_t writes;              /* numbers that they write */
     int32_t ready, placed, bad_row, bad_column; /* placed: the tables above are there */
+    double *factored;            /* [entries of linear] whose factors the linear system had, */
+    int64_t factored_at;         /* when it had made so many; -1: it has others */
+    int32_t spared;              /* factorisations that were none, for they were made already */
     double drift;                /* how far the last projection moved first, in magnitudes */
 } sd_underlying;
 
