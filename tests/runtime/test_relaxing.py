@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.api import simulate
-from sysdyn.runtime import simulate as simulation
-from sysdyn.runtime.accuracy import by_steps
+from sysdyn.runtime.accuracy import by_steps, controlled
 from sysdyn.runtime.accuracy.control import Achieved
 from sysdyn.runtime.accuracy.pairs import Sampled
 from sysdyn.runtime.model.failures import SolverFailure
@@ -126,13 +125,13 @@ def test_where_too_much_happens_the_tolerance_leads(cause):
 
 def test_the_control_goes_on_from_the_last_run(tmp_path, monkeypatch):
     begun = []
-    control = simulation.control
+    control = controlled.control
 
     def noted(*about, **how):
         begun.append(how["draft"])
         return control(*about, **how)
 
-    monkeypatch.setattr(simulation, "control", noted)
+    monkeypatch.setattr(controlled, "control", noted)
     monkeypatch.setattr(by_steps, "RELAXING", replace(by_steps.RELAXING, safety=1e9))
     run = simulate(asked(tmp_path), method="radau", accuracy=1e-4, output=tmp_path / "t.h5")
     assert len(begun) == 1
