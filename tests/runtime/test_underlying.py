@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
+from sysdyn import api
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "compiler"))
 
@@ -235,3 +237,28 @@ def _pattern(dense):
     columns, rows = np.nonzero(dense.T)
     start = np.searchsorted(columns, np.arange(len(dense) + 1))
     return Pattern(len(dense), len(dense), start.astype(np.int32), rows.astype(np.int32))
+
+
+TWO_MASSES = """model m {
+  param k = 52 N/m
+  coord x: translation = 1 m
+  coord y: translation = 0 m
+  energy T* = 1/2*(1 kg)*x'^2 + 1/2*(MASS)*y'^2
+  energy V = 1/2*k*x^2 + 1/2*k*(x - y)^2
+}
+scene s of m { time 0 s to 1 s; trace x, y }
+"""
+
+
+@pytest.mark.parametrize(("mass", "constant"), [("2 kg", True), ("2 kg*(1 + (y/(1 m))^2)", False)])
+def test_a_constant_inertia_is_factorised_once_in_a_short_run(tmp_path, mass, constant):
+    """Of twelve stages a step; what varies is factorised at each."""
+    file = tmp_path / "m.sd"
+    file.write_text(TWO_MASSES.replace("MASS", mass))
+    run = api.simulate(file, method="dopri", rtol=1e-4, output=tmp_path / "t.h5")
+    assert (run.statistics["factorisations"] == 1) == constant
+    k, moves = np.array([[104.0, -52.0], [-52.0, 52.0]]), np.diag([1.0, 2.0])
+    if constant:
+        values, modes = eigh(k, moves)
+        exact = modes @ (np.cos(np.sqrt(values)[:, None] * run.time) * (modes.T @ moves @ [1.0, 0.0])[:, None])
+        assert np.abs(run["x"].values - exact[0]).max() < 1e-4
