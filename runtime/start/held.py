@@ -173,12 +173,12 @@ def _ways(starter: Starter, t: float, x: Floats, free: Mask, follows: Mask) -> I
         yield _at_once, x
         yield from ((_at_once, near) for near, _ in off_the_flat(starter, t, x, follows))
         return
-    beside = (near for near, _ in off_the_flat(starter, t, x, follows))
+    beside = [near for near, _ in off_the_flat(starter, t, x, follows)]
     points = [x, *(near for near in beside if (near != x).any())][::-1]
     rated = np.isfinite(starter.residual(t, x)[starter.every]).all()
     # where no state can move what is all but at rest has rates
     resting = not rated or (free & ~follows & ~starter.hollow).any()
-    first = resting and (len(points) > 1 or not rated)
+    first = resting and (bool(beside) or not rated)
     yield from ((_at_rest, near) for near in points if first)
     yield from ((_at_once, near) for near in points)
     if resting and not first:
