@@ -6,6 +6,7 @@ The system of core/system/condensed.h: kept unknowns z, kept rows, e = c + T z f
 from __future__ import annotations
 
 import ctypes as c
+from collections.abc import Sequence
 from functools import cached_property
 from hashlib import sha256
 from typing import Any
@@ -16,7 +17,7 @@ from sysdyn.runtime.condense.composition import Composition, places_of, ranges
 from sysdyn.runtime.condense.elimination import Mask
 from sysdyn.runtime.condense.sums import Straights, Sums, numbers_of
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.description import Floats, Ints, Kernel
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import stretches
 from sysdyn.runtime.model.lines import stretches_of, table
@@ -213,31 +214,22 @@ class Condensed:
 
     def _observed_rates(self) -> bool:
         """Whether what is observed reads rates of eliminated unknowns."""
-        blocks = self.whole.description.blocks
-        kernels = [kernel for name in OBSERVING for kernel in blocks.get(name, ())]
-        read = {family for kernel in kernels for family in kernel.rates or ()}
+        read = {family for kernel in self._kernels(OBSERVING) for family in kernel.rates or ()}
         gone = np.zeros(self.whole.unknowns, dtype=bool)
         gone[self.gone] = True
         return bool(read & self.whole.families_in(gone))
 
-    def _mark_audited(self) -> None:
-        """Says which stretches powers and energies read, or what they read: between rows no others are looked at."""
-        blocks, families = self.whole.description.blocks, self.whole.family_of
-        kernels = [kernel.reads for name in AUDITED for kernel in blocks.get(name, ())]
-        if None in kernels:
-            return
-        read = np.isin(families, sorted(frozenset[int]().union(*(reads or () for reads in kernels))))
-        self._straights.mark("audited", read)
+    def _mark(self, name: str, read: Sequence[frozenset[int] | None]) -> None:
+        """Says by that field which stretches hold families that are read, or sums of them: others are left out then;
+        all do where it is not known of some block.
+        """
+        if None not in read:
+            families = frozenset[int]().union(*(some or () for some in read))
+            self._straights.mark(name, np.isin(self.whole.family_of, sorted(families)))
 
-    def _mark_rated(self) -> None:
-        """The same of those whose rates rows show, or what is a sum of these: no others have one there."""
-        blocks = self.whole.description.blocks
-        rates = [kernel.rates for name in SHOWING for kernel in blocks.get(name, ())]
-        if None in rates:
-            self._straights.mark("rated", np.ones(self.whole.unknowns, dtype=bool))
-            return
-        read = frozenset[int]().union(*(families or () for families in rates))
-        self._straights.mark("rated", np.isin(self.whole.family_of, sorted(read)))
+    def _kernels(self, names: Sequence[str]) -> list[Kernel]:
+        """Of the blocks of these names."""
+        return [kernel for name in names for kernel in self.whole.description.blocks.get(name, ())]
 
     def _own_rows(self) -> Ints:
         """Kept rows q' - f as stretches (core/system/condensed.h), where no block adds to any and none is held."""
@@ -300,8 +292,8 @@ class Condensed:
     def make(self) -> None:
         """The core's structures, of entries that are numbered: once."""
         whole = self.whole
-        self._mark_audited()
-        self._mark_rated()
+        self._mark("audited", [kernel.reads for kernel in self._kernels(AUDITED)])
+        self._mark("rated", [kernel.rates for kernel in self._kernels(SHOWING)])
         self._own = self._own_rows()
         self._trim = self._trimmed()
         del self._number

@@ -333,14 +333,16 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     return !done;
 }
 
-/* the kept unknowns of y and, in zd, of yd */
-static double *gather_kept(const sd_settle *settle, const double *y, const double *yd, double **zd)
+void sd_settle_take_point(const sd_settle *settle, const double *y, const double *yd, double *z, double *zd)
 {
-    const sd_condensed *condensed = (const sd_condensed *)settle->system->left;
-    *zd = settle->room + settle->unknowns + 8;
-    sd_condensed_gather(condensed, y, settle->room);
-    sd_condensed_gather(condensed, yd, *zd);
-    return settle->room;
+    const sd_condensed *left = (const sd_condensed *)settle->system->left;
+    if (left) {
+        sd_condensed_gather(left, y, z);
+        sd_condensed_gather(left, yd, zd);
+    } else {
+        memcpy(z, y, (size_t)settle->unknowns * sizeof *z);
+        memcpy(zd, yd, (size_t)settle->unknowns * sizeof *zd);
+    }
 }
 
 /* y, yd := what the kept unknowns z, zd make of all */
@@ -360,7 +362,8 @@ static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
         return 1;
     if (!settle->system->left)
         return settle_unknowns(settle, t, y, yd);
-    double *zd, *z = gather_kept(settle, y, yd, &zd);
+    double *z = settle->room, *zd = z + settle->unknowns + 8;
+    sd_settle_take_point(settle, y, yd, z, zd);
     int failed = settle_unknowns(settle, t, z, zd);
     follow_kept(settle, z, zd, y, yd);
     return failed;

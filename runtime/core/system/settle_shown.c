@@ -56,18 +56,6 @@ void sd_settle_as_met(const sd_settle *settle, double *y, double *yd)
     sd_condensed_shown_rates(left, yd);
 }
 
-void sd_settle_take_point(const sd_settle *settle, const double *y, const double *yd, double *z, double *zd)
-{
-    const sd_condensed *left = (const sd_condensed *)settle->system->left;
-    if (left) {
-        sd_condensed_gather(left, y, z);
-        sd_condensed_gather(left, yd, zd);
-    } else {
-        memcpy(z, y, (size_t)settle->unknowns * sizeof *z);
-        memcpy(zd, yd, (size_t)settle->unknowns * sizeof *zd);
-    }
-}
-
 int sd_settle_between(sd_settle *settle, double t, const double *z, const double *zd, double *y, double *yd)
 {
     if (!sd_settle_provide_point(settle))
