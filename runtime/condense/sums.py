@@ -16,6 +16,8 @@ from sysdyn.values import dataclass
 
 LONG, MOST_ALIKE = 64, 2
 """Unknowns of a stretch that is asked whether each of its terms, so many at most, has one factor."""
+LINE = np.dtype(lib.Straight)
+"""lib.Straight, for all stretches at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,31 +88,31 @@ class Straights:
         unlike = np.zeros(number, dtype=bool)
         unlike[owner[inner][found.factor[inner] != found.factor[above[inner]]]] = True
         begin = self._cut(begin, unlike)
-        ends = np.append(begin[1:], number)
-        made = (lib.Straight * max(begin.size, 1))()
-        order = np.arange(found.factor.size, dtype=np.int32)
-        for low, high in zip(begin.tolist(), ends.tolist(), strict=True):
-            terms, entry = int(count[low]), int(found.start[low])
-            block = order[entry : entry + terms * (high - low)]
-            block[:] = block.reshape(high - low, terms).T.ravel()
-        self._begin, self._order, self._some = begin, order, np.zeros(begin.size, dtype=bool)
-        self._factors, self._constants = np.zeros(order.size), np.zeros(number)
-        terms_of, offset = count[begin], np.cumsum(count[begin]) - count[begin]
-        self._source = found.source[ranges(found.start[begin], terms_of)]
-        at, first = lib.pointer(self._factors), lib.pointer(self._source)
-        assert at is not None
-        assert first is not None
-        self._sources = first
-        for k, (low, high, source) in enumerate(zip(begin.tolist(), ends.tolist(), offset.tolist(), strict=True)):
-            place, entry = int(found.place[low]), int(found.start[low])
-            made[k] = lib.Straight(
-                place, high - low, int(count[low]), 0, 1, 1, first + 4 * source, at + 8 * entry, None
-            )
-        self.array, self.number = made, int(begin.size)
-        long = np.flatnonzero((ends - begin >= LONG) & (terms_of > 0) & (terms_of <= MOST_ALIKE))
-        sizes = (ends - begin)[long] * terms_of[long]
-        entries = found.start[begin[long]]
-        self._long = [tuple(map(int, line)) for line in zip(long, entries, sizes, strict=True)]
+        length = np.diff(np.append(begin, number))
+        terms, entry = count[begin], found.start[begin]
+        self._begin, self._some = begin, np.zeros(begin.size, dtype=bool)
+        self._order = self._by_terms(found.factor.size, entry, length, terms)
+        self._factors, self._constants = np.zeros(self._order.size), np.zeros(number)
+        self._source, offset = found.source[ranges(entry, terms)], np.cumsum(terms) - terms
+        self.array, self.number = (lib.Straight * max(begin.size, 1))(), int(begin.size)
+        lines = self._lines = np.frombuffer(self.array, dtype=LINE)[: begin.size]
+        lines["place"], lines["number"], lines["terms"] = found.place[begin], length, terms
+        lines["audited"] = lines["rated"] = 1
+        lines["source"] = self._source.ctypes.data + self._source.itemsize * offset
+        lines["factor"] = self._factors.ctypes.data + self._factors.itemsize * entry.astype(np.int64)
+        long = np.flatnonzero((length >= LONG) & (terms > 0) & (terms <= MOST_ALIKE))
+        sizes = length[long] * terms[long]
+        self._long = [tuple(map(int, line)) for line in zip(long, entry[long], sizes, strict=True)]
+
+    @staticmethod
+    def _by_terms(entries: int, entry: Ints, length: Ints, terms: Ints) -> Ints:
+        """Entries in the order of the core: of each stretch all first terms, then all second ones."""
+        order = np.arange(entries, dtype=np.int32)
+        turned = np.flatnonzero((length > 1) & (terms > 1))
+        for low, n, m in zip(entry[turned].tolist(), length[turned].tolist(), terms[turned].tolist(), strict=True):
+            block = order[low : low + n * m]
+            block[:] = block.reshape(n, m).T.ravel()
+        return order
 
     @staticmethod
     def _cut(begin: NDArray[np.integer], unlike: Mask) -> NDArray[np.integer]:
@@ -125,11 +127,9 @@ class Straights:
         """Takes the numbers of other sums of the same structure."""
         self._factors[:] = found.factor[self._order]
         self._constants[:] = found.constant
-        base = lib.pointer(self._constants)
-        assert base is not None
         some = np.logical_or.reduceat(found.constant != 0.0, self._begin) if self._begin.size else self._some
-        for k in np.flatnonzero(some != self._some):
-            self.array[int(k)].constant = base + 8 * int(self._begin[k]) if some[k] else None
+        there = self._constants.ctypes.data + self._constants.itemsize * self._begin
+        self._lines["constant"] = np.where(some, there, 0)
         self._some = some
         for number, entry, size in self._long:
             factor = self._factors[entry : entry + size].reshape(self.array[number].terms, -1)
@@ -139,15 +139,16 @@ class Straights:
         """Says by the field of that name which stretches hold an unknown that is read [unknowns], or that such a one is
         a sum of.
         """
-        wanted = read.copy()
-        for k in range(self.number - 1, -1, -1):  # sums come behind what they read
-            own = self.array[k]
-            here = bool(wanted[own.place : own.place + own.number].any())
-            setattr(own, name, int(here))
-            if here:
-                first = (own.source - self._sources) // 4
-                for source in self._source[first : first + own.terms].tolist():
-                    wanted[source : source + own.number] = True
+        wanted, here = bytearray(read), bytearray(self.number)
+        parts = (self._lines[part].tolist() for part in ("place", "number", "terms"))
+        source, behind = self._source.tolist(), self._source.size
+        for k, (place, number, terms) in reversed(list(enumerate(zip(*parts, strict=True)))):
+            behind -= terms  # sums come behind what they read
+            if 1 in wanted[place : place + number]:
+                here[k] = 1
+                for first in source[behind : behind + terms]:
+                    wanted[first : first + number] = bytes([1]) * number
+        self._lines[name] = np.frombuffer(here, dtype=np.uint8)
 
     def fix(self) -> None:
         """Lets go of what only other numbers would need, of factors that repeat one, of constants that are all zero."""
@@ -158,12 +159,9 @@ class Straights:
                 kept[entry : entry + size].reshape(-1, length)[:, 1:] = False
                 self.array[number].alike = 1
         place = np.append(np.int32(0), np.cumsum(kept, dtype=np.int32))
-        old = lib.pointer(self._factors)
+        size = self._factors.itemsize
+        entry = (self._lines["factor"].astype(np.int64) - self._factors.ctypes.data) // size
         self._factors = self._factors[kept]
-        new = lib.pointer(self._factors)
-        assert old is not None
-        assert new is not None
-        for k in range(self.number):
-            self.array[k].factor = new + 8 * int(place[(self.array[k].factor - old) // 8])
+        self._lines["factor"] = self._factors.ctypes.data + size * place[entry].astype(np.int64)
         if not self._some.any():
             self._constants = self._constants[:0].copy()
