@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from sysdyn.runtime.judgement import EPS, Estimate
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.points import uniform
@@ -25,24 +25,27 @@ Point = tuple[float, Floats, Floats]
 STEPS = (2.0**-26, 2.0**-12)
 """Of the unknowns: what slopes are taken over."""
 TRIES = 3
+FAR = 1e-3
+"""By chance moves of several unknowns cancel to so little of what they are in other directions hardly ever."""
 ROUNDED = EPS / 4.0
 """Of a number: what rounding it mostly leaves out."""
 
 
-def blur(system: System, point: Point) -> Floats:
-    """What round-off of the unknowns makes of the observed quantities [observed] at t (s), y, yd; 0 where there is no
-    number.
+def blur(system: System, point: Point, places: Ints, enough: Floats) -> Floats:
+    """What round-off of the unknowns makes of observed quantities [places] at t (s), y, yd; 0 where there is no number.
+    Where the first try finds all of them far below what is enough [places] it is the last.
     """
     t, y, yd = point
-    found = np.zeros(0)
+    found = np.zeros(places.size)
     with np.errstate(all="ignore"):
-        here = system.observe(t, y, yd)
+        here = system.observe(t, y, yd)[places]
         for k in range(TRIES):
             signs = np.where(uniform(y.size, 0, k * y.size) < 0.5, -1.0, 1.0)
             beside = [(y * (1.0 + h * signs), yd * (1.0 + h * signs), h) for h in STEPS]
-            moved = [np.abs(system.observe(t, a, b) - here) / h for a, b, h in beside]
-            least = ROUNDED * np.min(moved, axis=0)
-            found = np.maximum(found, least) if found.size else least
+            moved = [np.abs(system.observe(t, a, b)[places] - here) / h for a, b, h in beside]
+            found = np.maximum(found, ROUNDED * np.min(moved, axis=0))
+            if not (found > FAR * enough).any():
+                break
     return np.where(np.isnan(found), 0.0, found)
 
 
@@ -55,13 +58,13 @@ def blurred(runs: Runs, t: float, asked: Floats) -> tuple[Estimate, ...]:
     if not told.names or finished.last is None or system.unknowns > LARGE:
         return ()
     y, yd = (x[: system.form.written] for x in finished.last[0]())
-    try:
-        left = blur(system, (t, y, yd))[told.places]
-    except SolverFailure:  # beside the point a function is none
-        return ()
     seen = writer.seen()
     size = np.maximum(told.beside(finished.largest, finished.magnitude), [seen[name] for name in told.names])
     wanted = asked[: size.size] * size
+    try:
+        left = blur(system, (t, y, yd), told.places, wanted)
+    except SolverFailure:  # beside the point a function is none
+        return ()
     over = np.divide(left, wanted, out=np.zeros(size.size), where=wanted > 0.0)
     worst = int(np.argmax(over))
     if not over[worst] > 1.0:
