@@ -4,7 +4,7 @@ The model has a node for each port and both ends of each branch, and a parameter
 the component wants; unit variables are pure numbers there.  What is told is the component's own: its names, units, laws
 and connections, nothing of what only a user decides (where its ports lead, what its parameters are).
 
-Received: a parsed file; returned: components and their findings.
+Received: a parsed file; returned: names of components and findings.
 """
 
 from __future__ import annotations
@@ -43,8 +43,14 @@ def unused(file: syntax.File) -> list[syntax.Component]:
     return [component for name, component in components.items() if name not in used]
 
 
-def judged(document: Document, component: syntax.Component) -> Report:
-    """What is wrong with a component, and with what stands outside of all models and components of its file."""
+def judged(document: Document) -> Iterator[tuple[str, Report]]:
+    """Of each such component of a file: its name, and what is wrong with it and with what stands outside of all models
+    and components.
+    """
+    return ((part.name.name, _judged(document, part)) for part in unused(document.file))
+
+
+def _judged(document: Document, component: syntax.Component) -> Report:
     report, source = Report(), document.file.source
     whole = [i for i in document.file.items if isinstance(i, (syntax.Component, syntax.Model, syntax.Scene))]
     others = [item.span for item in whole if item is not component]

@@ -225,8 +225,8 @@ def check(text: str, name: str = "<text>") -> list[Diagnostic]:
     for target in targets.all_targets(document, report):
         with ex.fresh():
             checked(target, report)
-    for part in alone.unused(document.file):
-        report.extend(alone.judged(document, part))
+    for _, own in alone.judged(document):
+        report.extend(own)
     return list(report.diagnostics)
 
 

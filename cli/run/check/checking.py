@@ -44,12 +44,11 @@ def file_checked(asked: tuple[str, bool, bool]) -> Checked:
                 if explain:
                     said.append(("data", f"{path}: {target.name}: " + _passivity(summary)))
         parts = dict[str, bool]()
-        for part in alone.unused(document.file):
-            own = alone.judged(document, part)
+        for name, own in alone.judged(document):
             report.extend(own)
-            parts[part.name.name] = not own.failed and not wrong
-            if parts[part.name.name]:
-                said.append(("say", f"{path}: component {part.name.name}: ok"))
+            parts[name] = not own.failed and not wrong
+            if parts[name]:
+                said.append(("say", f"{path}: component {name}: ok"))
     except OSError as error:
         return Checked(tuple(report), tuple(said), unread=classify(error)[1])
     except ModelError as error:  # a file that is no text does not hide the others

@@ -36,8 +36,8 @@ def _found(source: SourceText) -> list[Diagnostic]:
     for target in all_targets(document, report):
         with ex.fresh():
             load.network(target.document, target.model, target.scene, report, required=False)
-    for part in alone.unused(document.file):
-        report.extend(alone.judged(document, part))
+    for _, own in alone.judged(document):
+        report.extend(own)
     return [d for d in report if d.severity == "error"]
 
 
