@@ -107,6 +107,8 @@ def with_literal_ranges(network: Network, number: Callable[[Node], float]) -> Ne
 
     number: the value of an expression of parameters, NaN of another.
     """
+    if all(node.op != "reduce" for node in topological(expressions(network, *DIFFERENTIATED))):
+        return network
     done: dict[Node, Node] = {}
 
     def literal(node: Node, args: tuple[Node, ...]) -> Node:
