@@ -9,6 +9,7 @@
 
 #define STAGES SD_ROSENBROCK_STAGES
 #define POWER 0.2          /* 1 / order of the estimate's error in the step */
+#define LEAST_POWER 0.39810717055349726 /* of an error that predicts: of 1e-2 */
 #define SAFE 0.9
 #define GROW 6.0           /* of the step at most */
 #define CUT 0.2            /* what a refused one is cut to at least */
@@ -74,11 +75,11 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
         return NULL;
     size_t m = (size_t)sd_whole_lanes(system->unknowns + 1), nnz = (size_t)system->entries + 1;
     double **vectors[] = {&rosenbrock->phi, &rosenbrock->yd, &rosenbrock->last, &rosenbrock->y, &rosenbrock->rate,
-                          &rosenbrock->drift, &rosenbrock->begin, &rosenbrock->ivp.ee, &rosenbrock->ivp.weight,
+                          &rosenbrock->known, &rosenbrock->drift, &rosenbrock->begin, &rosenbrock->ivp.ee, &rosenbrock->ivp.weight,
                           &rosenbrock->end, &rosenbrock->within, &rosenbrock->within_d, &rosenbrock->inner,
                           &rosenbrock->begin_end};
     size_t number = sizeof vectors / sizeof *vectors;
-    rosenbrock->memory = calloc((number + 2 * STAGES + SD_ROSENBROCK_DENSE) * m + 6 * nnz, sizeof(double));
+    rosenbrock->memory = calloc((number + STAGES + SD_ROSENBROCK_DENSE) * m + 6 * nnz, sizeof(double));
     rosenbrock->rate_row = calloc(2 * nnz, sizeof *rosenbrock->rate_row);
     if (!rosenbrock->memory || !rosenbrock->rate_row) {
         sd_rosenbrock_free(rosenbrock);
@@ -88,10 +89,8 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
     double *next = rosenbrock->memory;
     for (size_t i = 0; i < number; i++, next += m)
         *vectors[i] = next;
-    for (int i = 0; i < STAGES; i++, next += 2 * m) {
+    for (int i = 0; i < STAGES; i++, next += m)
         rosenbrock->u[i] = next;
-        rosenbrock->v[i] = next + m;
-    }
     for (int i = 0; i < SD_ROSENBROCK_DENSE; i++, next += m)
         rosenbrock->bend[i] = next;
     rosenbrock->jy = next;
@@ -151,31 +150,30 @@ void sd_rosenbrock_start(void *self, double t, const double *y, const double *yd
     if (rosenbrock->ivp.steps == 0)
         rosenbrock->opening = INFINITY;
     rosenbrock->ivp.h = fmin(rosenbrock->ivp.fixed_h > 0.0 ? rosenbrock->ivp.fixed_h : h, rosenbrock->ivp.h_max);
-    rosenbrock->error_accepted = rosenbrock->h_refused = 0.0;
+    rosenbrock->power_accepted = rosenbrock->h_refused = 0.0;
     rosenbrock->rejected = rosenbrock->sloped = rosenbrock->jumped = rosenbrock->lasting = 0;
 }
 
 /* the new point, and the next step's size */
 static void accept(sd_rosenbrock *rosenbrock, double error)
 {
-    double h = rosenbrock->ivp.h, ratio = pow(error, POWER) / SAFE;
-    if (rosenbrock->error_accepted > 0.0) { /* Gustafsson's predictive controller (Hairer & Wanner, IV.8.25) */
-        double predicted = rosenbrock->h_accepted / h * pow(error * error / rosenbrock->error_accepted, POWER) / SAFE;
+    const double h = rosenbrock->ivp.h, power = pow(error, POWER);
+    double ratio = power / SAFE;
+    if (rosenbrock->power_accepted > 0.0) { /* Gustafsson's predictive controller (Hairer & Wanner, IV.8.25) */
+        double predicted = rosenbrock->h_accepted / h * (power * power / rosenbrock->power_accepted) / SAFE;
         ratio = fmax(ratio, predicted);
     }
     double next = h / fmax(1.0 / GROW, fmin(1.0 / CUT, ratio));
     if (rosenbrock->ivp.steps < TELLING)
-        rosenbrock->opening = fmin(rosenbrock->opening, SAFE * h * pow(error * rosenbrock->ivp.rtol, -POWER));
+        rosenbrock->opening = fmin(rosenbrock->opening, SAFE * h / (power * pow(rosenbrock->ivp.rtol, POWER)));
     if (rosenbrock->rejected)
         next = fmin(next, h);
     rosenbrock->h_accepted = h;
-    rosenbrock->error_accepted = fmax(1e-2, error);
-    double *before = rosenbrock->last;
-    memcpy(before, rosenbrock->phi, (size_t)rosenbrock->ivp.n * sizeof *before);
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i++) {
-        rosenbrock->phi[i] = rosenbrock->y[i] + rosenbrock->u[STAGES - 1][i];
-        rosenbrock->yd[i] = rosenbrock->rate[i] + rosenbrock->v[STAGES - 1][i];
-    }
+    rosenbrock->power_accepted = fmax(LEAST_POWER, power);
+    const size_t size = (size_t)rosenbrock->ivp.n * sizeof(double);
+    memcpy(rosenbrock->last, rosenbrock->phi, size);
+    memcpy(rosenbrock->phi, rosenbrock->end, size);
+    memcpy(rosenbrock->yd, rosenbrock->rate, size);
     if (!rosenbrock->rejected)
         rosenbrock->h_refused = 0.0;
     sd_advance(&rosenbrock->ivp);
@@ -208,6 +206,13 @@ static int stays(sd_rosenbrock *rosenbrock, double error)
         return 0;
     }
     return rosenbrock->ivp.h <= longer * (fabs(error - before) <= SAME * before ? 0.5 : 1.0 / FAR_LONGER);
+}
+
+static void exchange(double **a, double **b)
+{
+    double *was = *a;
+    *a = *b;
+    *b = was;
 }
 
 int sd_rosenbrock_step(void *self)
@@ -267,10 +272,11 @@ int sd_rosenbrock_step(void *self)
         rosenbrock->sloped = 0;
     }
     if (rosenbrock->sloped) {
-        const size_t size = (size_t)rosenbrock->ivp.system->entries * sizeof(double);
-        memcpy(rosenbrock->jy, rosenbrock->jy_end, rosenbrock->lasting ? 0 : size);
-        memcpy(rosenbrock->jyd, rosenbrock->jyd_end, rosenbrock->lasting ? 0 : size);
-        memcpy(rosenbrock->begin, rosenbrock->begin_end, (size_t)rosenbrock->ivp.n * sizeof(double));
+        if (!rosenbrock->lasting) {
+            exchange(&rosenbrock->jy, &rosenbrock->jy_end);
+            exchange(&rosenbrock->jyd, &rosenbrock->jyd_end);
+        }
+        exchange(&rosenbrock->begin, &rosenbrock->begin_end);
     }
     return SD_FINE;
 }

@@ -5,7 +5,7 @@
  * Equations II, Springer 1996, sections IV.7 and VI.3 (implicit equations (3.18): y' = z, 0 = F(t, y, z)).
  * A step solves eight linear systems with one matrix and no iteration.  With J = dF/dy, E = dF/dyd and T = dF/dt at the last
  * accepted point, u_i and v_i what stage i adds to y and to z = y':
- *   (J + E / (gamma h)) u_i = -F(t + c_i h, Y_i, Z_i) + E (Z_i + s_i) - d_i h T,     v_i = u_i / (gamma h) - Z_i - s_i
+ *   (J + E / (gamma h)) u_i = -F(t + c_i h, Y_i, Z_i) + E W_i - d_i h T,     W_i = Z_i + s_i,     v_i = u_i / (gamma h) - W_i
  *   Y_i = y + sum_(j<i) a_ij u_j,   Z_i = z + sum_(j<i) a_ij v_j,   s_i = sum_(j<i) C_ij u_j / h
  * E may depend on y; what occurs undifferentiated follows from its own rows, whose remainders the next step takes in.
  * The last stage is the solution, y = Y_8 + u_8, and u_8 the difference to the embedded one of order 4: the error test.
@@ -27,7 +27,10 @@
 
 extern const double sd_rosenbrock_gamma;
 extern const double sd_rosenbrock_a[SD_ROSENBROCK_STAGES][SD_ROSENBROCK_STAGES];
-extern const double sd_rosenbrock_coupling[SD_ROSENBROCK_STAGES][SD_ROSENBROCK_STAGES]; /* C */
+/* of z in Z_i and W_i; of u_j / h in Z_i; of u_j / h in W_i */
+extern const double sd_rosenbrock_begin[SD_ROSENBROCK_STAGES];
+extern const double sd_rosenbrock_rate[SD_ROSENBROCK_STAGES][SD_ROSENBROCK_STAGES];
+extern const double sd_rosenbrock_known[SD_ROSENBROCK_STAGES][SD_ROSENBROCK_STAGES];
 extern const double sd_rosenbrock_c[SD_ROSENBROCK_STAGES], sd_rosenbrock_d[SD_ROSENBROCK_STAGES];
 extern const double sd_rosenbrock_dense_weight[SD_ROSENBROCK_DENSE][SD_ROSENBROCK_STAGES];
 
@@ -36,14 +39,14 @@ typedef struct sd_rosenbrock {
     sd_linear *linear;
     double opening;           /* over rtol^(1/5): the first step as an earlier run found it fit, 0: chosen; then as this one does */
     /* state of the integration */
-    double h_accepted, error_accepted, h_refused, error_refused;
+    double h_accepted, power_accepted, h_refused, error_refused; /* power: of the last error, that tells of the next step */
     int32_t rejected, jumped; /* jumped: whether the last one was taken for its state alone */
     double *phi, *yd;         /* [n] the last accepted point */
     double *last;             /* [n] the one before it */
-    double *y, *rate, *drift; /* [n] Y_i, Z_i, T */
+    double *y, *rate, *known, *drift; /* [n] Y_i, Z_i and, behind the last stage, the rates of the step's end; W_i; T */
     double *begin;            /* [n] F at the last accepted point */
     double *end, *within, *within_d, *inner; /* [n] the end of the step at hand; a point within, its correction */
-    double *u[SD_ROSENBROCK_STAGES], *v[SD_ROSENBROCK_STAGES], *bend[SD_ROSENBROCK_DENSE]; /* [n]; bend: of the polynomial */
+    double *u[SD_ROSENBROCK_STAGES], *bend[SD_ROSENBROCK_DENSE]; /* [n]; bend: of the polynomial */
     double *jy, *jyd, *g, *e, *memory;
     double *jy_end, *jyd_end, *begin_end; /* slopes, and F [n], at the end of the step at hand */
     int32_t sloped;           /* whether these are those of the last accepted point, behind a step jy, jyd and begin are */
@@ -59,7 +62,7 @@ int sd_rosenbrock_step(void *rosenbrock);
 /* rosenbrock_stages.c: F at (t, y, yd) into r [n]: SD_NONFINITE with its row where it is none */
 int sd_rosenbrock_residual(sd_rosenbrock *rosenbrock, double t, const double *y, const double *yd, double *r);
 /* J, E, F and T at the last accepted point, for steps of about the size at hand; the factors of J + E / (gamma h); all stages
- * of a step, whose end is then y + u[7] with the rates rate + v[7] */
+ * of a step, whose end is then `end` with the rates `rate` */
 int sd_rosenbrock_linearise(sd_rosenbrock *rosenbrock);
 int sd_rosenbrock_factorise(sd_rosenbrock *rosenbrock);
 int sd_rosenbrock_stages(sd_rosenbrock *rosenbrock);

@@ -27,9 +27,8 @@ double sd_rosenbrock_norm(const sd_rosenbrock *rosenbrock, const double *x, doub
  * correction at INSIDE of the step; in the weights, in `error`, of the state in `state` */
 static int look_within(sd_rosenbrock *rosenbrock, double *error, double *state)
 {
-    double *end = rosenbrock->end, *r = rosenbrock->inner, h = rosenbrock->ivp.h;
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i++)
-        end[i] = rosenbrock->y[i] + rosenbrock->u[STAGES - 1][i];
+    const double *end = rosenbrock->end;
+    double *r = rosenbrock->inner, h = rosenbrock->ivp.h;
     sd_rosenbrock_bend(rosenbrock);
     sd_rosenbrock_polynomial(rosenbrock, rosenbrock->phi, end, h, INSIDE, rosenbrock->within, rosenbrock->within_d);
     int cause = sd_rosenbrock_residual(rosenbrock, rosenbrock->ivp.t + INSIDE * h, rosenbrock->within, rosenbrock->within_d, r);
@@ -46,12 +45,10 @@ static int laws_hold(sd_rosenbrock *rosenbrock, double *error)
 {
     const sd_ivp *ivp = &rosenbrock->ivp;
     sd_system *system = ivp->system;
-    double t = ivp->t + ivp->h, *y = rosenbrock->end, *yd = rosenbrock->within_d, *r = rosenbrock->inner;
+    double t = ivp->t + ivp->h, *y = rosenbrock->end, *yd = rosenbrock->rate, *r = rosenbrock->inner;
     double *terms = rosenbrock->within, *open = rosenbrock->drift, *size = rosenbrock->u[0], passed = *error;
-    for (int32_t i = 0; i < ivp->n; i++) {
-        yd[i] = rosenbrock->rate[i] + rosenbrock->v[STAGES - 1][i];
+    for (int32_t i = 0; i < ivp->n; i++)
         size[i] = (fabs(y[i]) + ivp->magnitude[i]) / ivp->h;
-    }
     int cause = sd_rosenbrock_residual(rosenbrock, t, y, yd, r);
     if (cause != SD_FINE ||
         sd_first_unmet(system, t, y, size, r, DOUBTED, rosenbrock->g, ivp->magnitude, ivp->met, 0, terms) < 0)
@@ -72,10 +69,8 @@ static int laws_hold(sd_rosenbrock *rosenbrock, double *error)
 static int gives_way(sd_rosenbrock *rosenbrock, double *error, double *state)
 {
     sd_system *system = rosenbrock->ivp.system;
-    double t = rosenbrock->ivp.t + rosenbrock->ivp.h, *y = rosenbrock->end, *yd = rosenbrock->within_d, *r = rosenbrock->inner;
+    double t = rosenbrock->ivp.t + rosenbrock->ivp.h, *y = rosenbrock->end, *yd = rosenbrock->rate, *r = rosenbrock->inner;
     double lead = 1.0 / (sd_rosenbrock_gamma * rosenbrock->ivp.h), *jy = rosenbrock->jy_end, *jyd = rosenbrock->jyd_end;
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i++)
-        yd[i] = rosenbrock->rate[i] + rosenbrock->v[STAGES - 1][i];
     int cause = sd_rosenbrock_residual(rosenbrock, t, y, yd, rosenbrock->begin_end);
     if (cause != SD_FINE)
         return cause;

@@ -11,6 +11,7 @@
 #define SLOPE 1e-6         /* of the step: over which dF/dt is taken */
 #define TELLS 1e-8         /* of the longest step: over that, or the step, at least, for differences over less are round-off */
 #define RESOLVED 64.0      /* of what t resolves: at least that */
+#define ENDS 6             /* the first of the stages that add no more than the u of the one before to its point */
 
 int sd_rosenbrock_residual(sd_rosenbrock *rosenbrock, double t, const double *y, const double *yd, double *r)
 {
@@ -68,84 +69,110 @@ int sd_rosenbrock_factorise(sd_rosenbrock *rosenbrock)
     return failed == 2 ? SD_MEMORY : failed ? SD_SINGULAR : SD_FINE;
 }
 
-/* y, rate [n] := Y_s, Z_s;  v[s] := Z_s + s_s: from unknown i on, and from i2 on */
-static inline __attribute__((always_inline)) void place_lanes(sd_rosenbrock *rosenbrock, int s, int32_t i, int32_t i2)
+/* x[i .. i + SD_LANES) of what was just written number by number: loaded whole it would have to wait for that */
+#define IN_PARTS(x, i) ((sd_lanes){(x)[i], (x)[(i) + 1], (x)[(i) + 2], (x)[(i) + 3]})
+
+/* y, rate, known := Y_s, Z_s, W_s, from unknown i on; s: a number that is known when this is compiled */
+static inline __attribute__((always_inline)) void place_lanes(sd_rosenbrock *rosenbrock, const int s, int32_t i)
 {
-    const double *a = sd_rosenbrock_a[s], *c = sd_rosenbrock_coupling[s], over = 1.0 / rosenbrock->ivp.h;
-    double *const *u = rosenbrock->u, *const *v = rosenbrock->v;
-    sd_lanes y = SD_FROM(rosenbrock->phi, i), z = SD_FROM(rosenbrock->yd, i), lag = {0.0};
-    sd_lanes y2 = SD_FROM(rosenbrock->phi, i2), z2 = SD_FROM(rosenbrock->yd, i2), lag2 = {0.0};
-    for (int j = 0; j < s; j++) {
+    const double *a = sd_rosenbrock_a[s], *b = sd_rosenbrock_rate[s], *w = sd_rosenbrock_known[s];
+    const double over = 1.0 / rosenbrock->ivp.h;
+    double *const *u = rosenbrock->u;
+    const sd_lanes last = IN_PARTS(u[s - 1], i);
+    sd_lanes known = w[s - 1] * last;
+#pragma GCC unroll 8
+    for (int j = 0; j < s - 1; j++)
+        known += w[j] * SD_FROM(u[j], i);
+    known *= over;
+    if (s >= ENDS) { /* the point of the stage before and its u; known has no part of z */
+        const double lead = over / sd_rosenbrock_gamma;
+        SD_AT(rosenbrock->y, i) = SD_FROM(rosenbrock->y, i) + last;
+        SD_AT(rosenbrock->rate, i) = SD_FROM(rosenbrock->rate, i) + (lead * last - SD_FROM(rosenbrock->known, i));
+        SD_AT(rosenbrock->known, i) = known;
+        return;
+    }
+    const sd_lanes begin = sd_rosenbrock_begin[s] * SD_FROM(rosenbrock->yd, i);
+    sd_lanes y = a[s - 1] * last, rate = b[s - 1] * last;
+#pragma GCC unroll 8
+    for (int j = 0; j < s - 1; j++) {
         y += a[j] * SD_FROM(u[j], i);
-        z += a[j] * SD_FROM(v[j], i);
-        lag += c[j] * SD_FROM(u[j], i);
-        if (i2 != i) {
-            y2 += a[j] * SD_FROM(u[j], i2);
-            z2 += a[j] * SD_FROM(v[j], i2);
-            lag2 += c[j] * SD_FROM(u[j], i2);
-        }
+        rate += b[j] * SD_FROM(u[j], i);
     }
-    SD_AT(rosenbrock->y, i) = y;
-    SD_AT(rosenbrock->rate, i) = z;
-    SD_AT(rosenbrock->v[s], i) = z + over * lag;
-    if (i2 != i) {
-        SD_AT(rosenbrock->y, i2) = y2;
-        SD_AT(rosenbrock->rate, i2) = z2;
-        SD_AT(rosenbrock->v[s], i2) = z2 + over * lag2;
-    }
+    SD_AT(rosenbrock->y, i) = SD_FROM(rosenbrock->phi, i) + y;
+    SD_AT(rosenbrock->rate, i) = begin + over * rate;
+    SD_AT(rosenbrock->known, i) = begin + known;
 }
 
-/* two lanes at a time read the coefficients once */
+static inline __attribute__((always_inline)) void place_all(sd_rosenbrock *rosenbrock, const int s)
+{
+    for (int32_t i = 0; i < rosenbrock->ivp.n; i += SD_LANES)
+        place_lanes(rosenbrock, s, i);
+}
+
 static SD_WIDE void place(sd_rosenbrock *rosenbrock, int s)
 {
+    switch (s) {
+    case 1: place_all(rosenbrock, 1); break;
+    case 2: place_all(rosenbrock, 2); break;
+    case 3: place_all(rosenbrock, 3); break;
+    case 4: place_all(rosenbrock, 4); break;
+    case 5: place_all(rosenbrock, 5); break;
+    case 6: place_all(rosenbrock, 6); break;
+    default: place_all(rosenbrock, 7);
+    }
+}
+
+/* u[s] := -f - d_s h T + E known: the right side of a stage whose residual is f */
+static SD_WIDE void turn(sd_rosenbrock *rosenbrock, int s, const double *f, const double *known)
+{
     const int32_t n = rosenbrock->ivp.n;
-    int32_t i = 0;
-    for (; i + SD_LANES < n; i += 2 * SD_LANES)
-        place_lanes(rosenbrock, s, i, i + SD_LANES);
-    if (i < n)
-        place_lanes(rosenbrock, s, i, i);
-}
-
-/* u[s] := -F_s - d_s h T, where u[s] is F_s */
-static SD_WIDE void turn(sd_rosenbrock *rosenbrock, int s)
-{
     double *u = rosenbrock->u[s], dt = sd_rosenbrock_d[s] * rosenbrock->ivp.h;
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i += SD_LANES)
-        SD_AT(u, i) = -SD_FROM(u, i) - dt * SD_FROM(rosenbrock->drift, i);
-}
-
-/* u[s] += E v[s] */
-static void add_moved(sd_rosenbrock *rosenbrock, int s)
-{
-    double *u = rosenbrock->u[s], *v = rosenbrock->v[s];
+    for (int32_t i = 0; i < n; i += SD_LANES)
+        SD_AT(u, i) = -IN_PARTS(f, i) - dt * SD_FROM(rosenbrock->drift, i);
+    const int32_t *row = rosenbrock->rate_row, *column = rosenbrock->rate_column;
     for (int32_t k = 0; k < rosenbrock->rates; k++)
-        u[rosenbrock->rate_row[k]] += rosenbrock->e[k] * v[rosenbrock->rate_column[k]];
+        u[row[k]] += rosenbrock->e[k] * known[column[k]];
 }
 
-/* v[s] := u[s] / (gamma h) - v[s] */
-static SD_WIDE void close(sd_rosenbrock *rosenbrock, int s)
+/* end, rate := the end of the step and its rates */
+static SD_WIDE void close(sd_rosenbrock *rosenbrock)
 {
-    double *u = rosenbrock->u[s], *v = rosenbrock->v[s], lead = 1.0 / (sd_rosenbrock_gamma * rosenbrock->ivp.h);
-    for (int32_t i = 0; i < rosenbrock->ivp.n; i += SD_LANES)
-        SD_AT(v, i) = lead * SD_FROM(u, i) - SD_FROM(v, i);
+    const double lead = 1.0 / (sd_rosenbrock_gamma * rosenbrock->ivp.h);
+    for (int32_t i = 0; i < rosenbrock->ivp.n; i += SD_LANES) {
+        const sd_lanes last = IN_PARTS(rosenbrock->u[STAGES - 1], i);
+        SD_AT(rosenbrock->end, i) = SD_FROM(rosenbrock->y, i) + last;
+        SD_AT(rosenbrock->rate, i) = SD_FROM(rosenbrock->rate, i) + (lead * last - SD_FROM(rosenbrock->known, i));
+    }
 }
 
+/* all stages; each residual is looked at where `judged` */
+static int pass(sd_rosenbrock *rosenbrock, int judged)
+{
+    sd_system *system = rosenbrock->ivp.system;
+    turn(rosenbrock, 0, rosenbrock->begin, rosenbrock->yd);
+    sd_linear_solve(rosenbrock->linear, rosenbrock->u[0]);
+    for (int s = 1; s < STAGES; s++) {
+        double *u = rosenbrock->u[s], t = rosenbrock->ivp.t + sd_rosenbrock_c[s] * rosenbrock->ivp.h;
+        int cause = SD_FINE;
+        place(rosenbrock, s);
+        if (judged)
+            cause = sd_rosenbrock_residual(rosenbrock, t, rosenbrock->y, rosenbrock->rate, u);
+        else
+            sd_residual(system, t, rosenbrock->y, rosenbrock->rate, u);
+        if (cause || *system->stop)
+            return cause ? cause : SD_STOPPED;
+        turn(rosenbrock, s, u, rosenbrock->known);
+        sd_linear_solve(rosenbrock->linear, u);
+    }
+    close(rosenbrock);
+    return SD_FINE;
+}
+
+/* what is no number in any residual is none at the end, to which each u adds: only then is it looked for */
 int sd_rosenbrock_stages(sd_rosenbrock *rosenbrock)
 {
-    for (int s = 0; s < STAGES; s++) {
-        double *u = rosenbrock->u[s], t = rosenbrock->ivp.t + sd_rosenbrock_c[s] * rosenbrock->ivp.h;
-        place(rosenbrock, s);
-        int cause = SD_FINE;
-        if (s == 0)
-            memcpy(u, rosenbrock->begin, (size_t)rosenbrock->ivp.n * sizeof *u);
-        else if ((cause = sd_rosenbrock_residual(rosenbrock, t, rosenbrock->y, rosenbrock->rate, u)))
-            return cause;
-        turn(rosenbrock, s);
-        add_moved(rosenbrock, s);
-        sd_linear_solve(rosenbrock->linear, u);
-        close(rosenbrock, s);
-    }
-    return SD_FINE;
+    int cause = pass(rosenbrock, 0);
+    return cause || sd_finite(rosenbrock->ivp.n, rosenbrock->end) ? cause : pass(rosenbrock, 1);
 }
 
 SD_WIDE void sd_rosenbrock_bend(sd_rosenbrock *rosenbrock)
