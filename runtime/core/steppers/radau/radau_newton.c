@@ -173,6 +173,15 @@ static double noted_correction(sd_radau *radau)
     return size;
 }
 
+/* x^k, k of at least -1 */
+static double whole_power(double x, int k)
+{
+    double product = k < 0 ? 1.0 / x : 1.0;
+    for (; k > 0; k--)
+        product *= x;
+    return product;
+}
+
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
 {
@@ -211,7 +220,7 @@ int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
                 converged = 1;
             }
             trust = radau->theta < SLOW ? radau->theta / (1.0 - radau->theta) : 1.0 / DBL_EPSILON;
-            double end = trust * size * pow(radau->theta, usual - 1 - m) / tolerance;
+            double end = trust * size * whole_power(radau->theta, usual - 1 - m) / tolerance;
             if (!converged && !patient && end >= 1.0 && trust * size > tolerance) {
                 double far = fmax(1e-4, fmin(20.0, end));
                 *retry = 0.8 * pow(far, -1.0 / (radau->method->stages + usual - m));
