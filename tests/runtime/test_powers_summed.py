@@ -2,9 +2,14 @@
 
 import math
 
+import chain_model as chain
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
+from sysdyn.runtime.integrate.integrate import Integration, Request
+from sysdyn.runtime.model.carrier import load
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.start.start import consistent_start
 from sysdyn.runtime.trace.trace import Trace
 
 DRIVEN = """model driven {
@@ -42,3 +47,29 @@ def test_a_pulse_within_steps_is_not_taken_for_what_the_steps_before_it_were(tmp
     trace = Trace.open(tmp_path / "d.h5")
     exact = 2.0 * 0.02 * math.sqrt(math.pi / 2.0)
     assert trace["heat"].values[-1] == pytest.approx(exact, rel=1e-5)
+
+
+def _looks(rows):
+    """How often a run of a chain with so many rows, beside its steps, looks at energies and powers; its steps."""
+    seen = []
+
+    class Watched(chain.Chain):
+        @classmethod
+        def audit_rows(cls, *given):
+            seen.append(given[5])
+            super().audit_rows(*given)
+
+    system = System({"structure": chain.structure()}, chain.binding(2), load(Watched), "3")
+    instants = np.linspace(0.0, 0.2, rows)
+    asked = Request(0.2, instants, every_step=False, rtol=1e-6, index=3)
+    integration = Integration(system, consistent_start(system, 0.0), asked)
+    before = len(seen)
+    steps = integration.run(lambda _: None).statistics.steps
+    return len(seen) - before, steps
+
+
+def test_rows_within_a_step_take_the_powers_that_its_integral_took():
+    """A row looks at its own energies and no more: the polynomial of powers is there, of its step and those before."""
+    (few, steps), (many, same) = _looks(5), _looks(81)
+    assert steps == same > 80 / 3  # no step holds so many rows that points of its own serve them
+    assert many - few < 1.5 * 76

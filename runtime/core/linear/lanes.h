@@ -23,6 +23,13 @@ typedef int64_t sd_bits __attribute__((vector_size(8 * SD_LANES), aligned(8), ma
 #define SD_WIDE
 #endif
 
+/* a function whose loops are short: what vectors ask before they begin would take longer */
+#if defined(__GNUC__) && !defined(__clang__)
+#define SD_ONE_BY_ONE __attribute__((optimize("no-tree-vectorize")))
+#else
+#define SD_ONE_BY_ONE
+#endif
+
 /* room for n numbers in whole lanes */
 static inline int32_t sd_whole_lanes(int32_t n)
 {

@@ -7,6 +7,7 @@
 #include "run/compared.h"
 #include "run/meters/quadratures.h"
 #include "run/spanned.h"
+#include "linear/lanes.h"
 #include "system/settle_shown.h"
 
 #define FAILS 4 /* rows that meet their sums for each that does not: fewer are not worth looking */
@@ -38,11 +39,23 @@ void sd_run_settle(sd_run *run, double t)
     lend(run, 0);
 }
 
+/* whether any of the first unknowns, a whole number of lanes, lies further beyond those of the steps than `beyond` */
+static SD_WIDE int reaches(int32_t n, const double *point, const double *end, const double *usual, double beyond)
+{
+    sd_bits any = {0};
+    for (int32_t j = 0; j < n; j += SD_LANES) {
+        const sd_lanes size = SD_SIZES(SD_FROM(point, j)), last = beyond * SD_SIZES(SD_FROM(end, j));
+        any |= (size > last) & (size > beyond * SD_FROM(usual, j));
+    }
+    return (any[0] | any[1] | any[2] | any[3]) != 0;
+}
+
 /* How far the unknowns of a row within a step, as written, lie beyond those of the steps, its own end among them. */
 static void note_beyond(sd_run *run)
 {
     const double *end = run->stepper->y;
-    for (int32_t j = 0; j < run->stepper->n && j < run->written; j++) {
+    const int32_t n = run->stepper->n < run->written ? run->stepper->n : run->written, whole = n - n % SD_LANES;
+    for (int32_t j = reaches(whole, run->point, end, run->magnitude, run->beyond) ? 0 : whole; j < n; j++) {
         const double usual = run->magnitude[j], last = fabs(end[j]), size = last > usual ? last : usual;
         if (fabs(run->point[j]) > run->beyond * size && usual > 0.0)
             run->beyond = fabs(run->point[j]) / size;

@@ -147,7 +147,7 @@ static void measure(sd_run *run, double from, double t)
 {
     run->t_from = from;
     run->t_to = t;
-    run->sampled = run->noded = run->divided = run->spanned = run->told_here = 0;
+    run->sampled = run->noded = run->divided = run->by_past = run->spanned = run->told_here = 0;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
     if (run->unsummed > 1)

@@ -1,6 +1,7 @@
 /* Residual and Jacobian of a system: see assembly.h. */
 #include "system/assembly.h"
 #include "linear/lanes.h"
+#include "linear/number.h"
 
 #include <float.h>
 #include <math.h>
@@ -17,16 +18,27 @@
 #define ROOT_BESIDE 1e-8
 #define ROOT_LEAST 1e-12
 
+/* rows q' - f of a short stretch */
+static SD_APART SD_ONE_BY_ONE void put_few(int32_t number, const double *own, const double *q, const double *f, double *to)
+{
+    for (int32_t i = 0; i < number; i++)
+        to[i] = own ? (q[i] - f[i]) * own[i] : q[i] - f[i];
+}
+
 static inline void add_rows(const sd_system *system, double t, const double *y, const double *yd, double *r)
 {
     const double *scale = system->k_scale;
     for (const int32_t *span = system->k_span, *end = span + 4 * (size_t)system->k_spans; span < end; span += 4) {
         const double *restrict own = scale, *restrict q = yd + span[2], *restrict f = y + span[3];
         double *restrict to = r + span[1];
-        for (int32_t i = 0; i < span[0]; i++)
-            to[i] = q[i] - f[i];
-        for (int32_t i = 0; i < span[0] && own; i++)
-            to[i] *= own[i];
+        if (span[0] < SD_FEW) {
+            put_few(span[0], own, q, f, to);
+        } else {
+            for (int32_t i = 0; i < span[0]; i++)
+                to[i] = q[i] - f[i];
+            for (int32_t i = 0; i < span[0] && own; i++)
+                to[i] *= own[i];
+        }
         scale = own ? own + span[0] : NULL;
     }
     for (const sd_call *call = system->call, *end = call + system->calls; call < end; call++)

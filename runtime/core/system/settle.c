@@ -23,25 +23,6 @@
 #define BEYOND 1e3      /* times the point that was found, from which a magnitude was that of an iterate */
 #define CONTRACTS 0.02  /* old factors are kept while one step reduces the residual to this part */
 
-double sd_settle_measure(sd_settle *settle, double t, const double *y, const double *yd)
-{
-    double worst = 0.0, own = 0.0, sum = 0.0;
-    sd_residual(settle->system, t, y, yd, settle->r);
-    for (int32_t i = 0; i < settle->rows; i++) {
-        double v = fabs(settle->r[i] * settle->row_scale[i]);
-        v = v < INFINITY ? v : INFINITY; /* of what is no number the next row would be larger */
-        worst = v > worst ? v : worst;
-        if (settle->sort[i] == SD_CONSTRAINT)
-            sum += v * v;
-        if (settle->sort[i] != SD_RATE && v > own)
-            own = v;
-    }
-    settle->own = own;
-    settle->residual = worst;
-    settle->constraints = sqrt(sum);
-    return worst;
-}
-
 /* the basis at (t, y, yd), an iterate */
 static int choose(sd_settle *settle, double t, const double *y, const double *yd)
 {
@@ -85,6 +66,8 @@ static int follow(sd_settle *settle, double t, double *y, double *yd, double *be
             break;
         double pulled = 0.0;
         moved = sd_settle_move_basic(settle, y, yd, &pulled);
+        if (!settle->system->left) /* as the point will be left: what is measured of it then stays */
+            sd_follow_flows(settle->k_span, settle->k_spans, y, yd);
         state += pulled;
         double now = sd_settle_measure(settle, t, y, yd);
         failed = !isfinite(now) || state > still;

@@ -259,10 +259,11 @@ class Run(c.Structure):
         ("turns", D),
         ("looked", P),
         ("noded", I),
+        ("node", D * NODES),
         ("node_power", D * (2 * NODES)),
         ("difference", D * (2 * NODES + 2)),
         ("spanning", P),
-        *[(name, I) for name in ["spanned", "told_here", "divided", "strayed", "skipped"]],
+        *[(name, I) for name in ["spanned", "told_here", "divided", "by_past", "strayed", "skipped"]],
     ]
 
 

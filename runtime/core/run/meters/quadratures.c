@@ -1,8 +1,11 @@
 /* Integrals of powers over the last step: see quadratures.h. */
 #include "run/meters/quadratures.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
+
+#include "linear/lanes.h"
 
 /* Of the tolerance, and of the powers themselves: what the last term may be.  A balance is judged by ten tolerances at least, and
  * what is left behind the last term is less by as much again: sums over a run are off by 0.001 to 0.007 tolerances (a grid, a
@@ -10,6 +13,8 @@
 #define LITTLE 1.0
 /* Rows within a step from which on the powers at SD_NODES of its points tell all their sums: a row of its own takes two to four */
 #define MANY 4
+enum { POINTS = SD_PAST + 3 }; /* at which powers are known where steps before tell */
+#define PLAIN 5 /* nodes up to which their polynomial is known by the factors of s^k, s the part of the step */
 
 /* inner points of Lobatto's rule of eight, and the end; its weights behind that of the start, which is that of the end */
 static const double lobatto[SD_NODES] = {0.06412992574519594, 0.2041499092834289, 0.39535039104876046, 0.6046496089512394,
@@ -104,6 +109,7 @@ static void integrate_nodes(sd_run *run, double part)
     const sd_stepper *stepper = run->stepper;
     double from = run->t_from, h = length_of(run), share[SD_NODES + 1];
     run->noded = stepper->collocated ? stepper->nodes : 0;
+    memcpy(run->node, stepper->node, (size_t)run->noded * sizeof *run->node);
     if (part < 1.0) { /* the whole step takes nothing of its start */
         shares(stepper->nodes, stepper->node, part, share);
         weigh(run, run->power, h * share[0]);
@@ -139,16 +145,32 @@ static int sure(const sd_run *run, const double *open)
     return 1;
 }
 
+/* sum, left [audited], in whole lanes, := rows times their two weights; energies, which come first, have no integral */
+static SD_WIDE void weigh_all(int32_t audited, const double *const rows[POINTS], const double own[POINTS],
+                              const double last[POINTS], double *sum, double *left)
+{
+    for (int32_t k = 0; k < audited; k += SD_LANES) {
+        sd_lanes a = {0.0}, b = {0.0};
+        for (int i = 0; i < POINTS; i++) {
+            const sd_lanes row = SD_FROM(rows[i], k);
+            a += own[i] * row;
+            b += last[i] * row;
+        }
+        SD_AT(sum, k) = a;
+        SD_AT(left, k) = b;
+    }
+    sum[0] = sum[1] = 0.0;
+}
+
 /* By the polynomial through powers at the ends and in the middle of the step, and at the starts p of those before it: Simpson's rule
  * and, in parts s of the step, w = s (s - 1/2) (s - 1),
  *     int w (s - p_1) ds f[0, 1/2, 1, p_1, p_2] + int w (s - p_1) (s - p_2) ds f[0, 1/2, 1, p_1, p_2, p_3],
  * where int w = int w (s - 1/2)^2 = 0, int w (s - 1/2) = -1/120.  0: the last term is not little, or there is none. */
 static int integrate_past(sd_run *run, double to)
 {
-    enum { POINTS = SD_PAST + 3 };
     static const double simpson[POINTS] = {1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0};
     const double *rows[POINTS] = {run->power, run->middle, run->sample}, from = run->t_from, h = to - from;
-    double at[POINTS] = {0.0, 0.5, 1.0}, difference[POINTS], *open = run->work;
+    double at[POINTS] = {0.0, 0.5, 1.0}, *open = run->work;
     if (run->pasts < SD_PAST)
         return 0;
     for (int k = 0; k < SD_PAST; k++) {
@@ -156,23 +178,18 @@ static int integrate_past(sd_run *run, double to)
         rows[3 + k] = run->past[k];
     }
     const double higher = (at[3] + at[4] - 1.0) / 120.0 * h, lower = -h / 120.0;
-    memset(open, 0, (size_t)run->audited * sizeof *open);
+    double own[POINTS], last[POINTS];
     for (int i = 0; i < POINTS; i++) {
         double product = i < 3 ? 0.5 * (i == 1 ? -0.5 : 1.0) : at[i] * (at[i] - 0.5) * (at[i] - 1.0);
         for (int j = 3; j < POINTS; j++)
             product *= i == j ? 1.0 : at[i] - at[j];
-        difference[i] = 1.0 / product;
-        if (!isfinite(difference[i])) /* steps below the resolution of time share an instant */
+        if (!(fabs(product) >= DBL_MIN)) /* steps below the resolution of time share an instant */
             return 0;
+        const double difference = 1.0 / product;
+        last[i] = higher * difference;
+        own[i] = h * simpson[i] + lower * (at[i] - at[POINTS - 1]) * difference + last[i];
     }
-    for (int i = 0; i < POINTS; i++) {
-        const double last = higher * difference[i];
-        const double own = h * simpson[i] + lower * (at[i] - at[POINTS - 1]) * difference[i] + last;
-        for (int32_t k = 2; k < run->audited; k++) {
-            run->integral[k] += own * rows[i][k];
-            open[k] += last * rows[i][k];
-        }
-    }
+    weigh_all(run->audited, rows, own, last, run->integral, open);
     return sure(run, open);
 }
 
@@ -220,7 +237,9 @@ int sd_run_integrate(sd_run *run, double to)
     run->sampled = to == stepper->ivp->t;
     look_at_end(run, to);
     sd_run_audit(run, to, run->point, run->point_d, run->sample);
-    if (!integrate_past(run, to)) {
+    const int known = integrate_past(run, to);
+    run->by_past = known && run->sampled;
+    if (!known) {
         integrate_lobatto(run, to);
         look_at_end(run, to);
     }
@@ -252,6 +271,7 @@ static int look_within(sd_run *run)
         missed[i] = h * lobatto_weight[SD_NODES - 1] * run->power[2 + i] - run->integral[2 + i];
         size[i] = fabs(run->integral[2 + i]);
     }
+    memcpy(run->node, lobatto, sizeof lobatto);
     for (int32_t k = 0; k < SD_NODES; k++) {
         const double *values = run->after;
         if (k < SD_NODES - 1) {
@@ -267,32 +287,87 @@ static int look_within(sd_run *run)
     return fabs(missed[0]) + fabs(missed[1]) <= LITTLE * run->stepper->ivp->rtol * (size[0] + size[1]);
 }
 
-/* where the powers are known: parts of the step behind its start */
-static const double *nodes_of(const sd_run *run)
+/* Powers at the middle and the end of the last step and at the starts of those before it: the polynomial by which its integrals
+ * are known, and within the step is off by no more than there. */
+static void look_back(sd_run *run)
 {
-    return has_own(run->stepper) ? run->stepper->node : lobatto;
+    const double from = run->t_from, h = run->t_to - from;
+    run->node[0] = 0.5;
+    run->node[1] = 1.0;
+    memcpy(run->node_power[0], run->middle + 2, sizeof run->node_power[0]);
+    memcpy(run->node_power[1], run->after + 2, sizeof run->node_power[1]);
+    for (int k = 0; k < SD_PAST; k++) {
+        run->node[2 + k] = (run->t_past[k] - from) / h;
+        memcpy(run->node_power[2 + k], run->past[k] + 2, sizeof run->node_power[2 + k]);
+    }
 }
 
-/* the divided differences of the powers at the start and the nodes */
+/* so many powers within or around the last step tell the sums up to its rows; -1: none do */
+static int32_t find_powers(sd_run *run)
+{
+    if (run->by_past && run->t_to == run->stepper->ivp->t) {
+        look_back(run);
+        return 2 + SD_PAST;
+    }
+    return is_crowded(run) && look_within(run) ? SD_NODES : -1;
+}
+
+/* The divided differences of the powers at the start and the nodes; of few of these what they are as factors of s^k instead,
+ * s the part of the step, by which a sum takes a tenth of the time. */
 static void divide(sd_run *run)
 {
-    const double *node = nodes_of(run);
-    memcpy(run->difference[0], run->power + 2, sizeof run->difference[0]);
-    memcpy(run->difference[1], run->node_power[0], (size_t)run->noded * sizeof run->difference[0]);
+    const double *node = run->node;
+    double (*difference)[2] = run->difference;
+    memcpy(difference[0], run->power + 2, sizeof difference[0]);
+    memcpy(difference[1], run->node_power[0], (size_t)run->noded * sizeof difference[0]);
     for (int32_t order = 1; order <= run->noded; order++)
         for (int32_t k = run->noded; k >= order; k--) {
-            const double apart = node[k - 1] - (k > order ? node[k - order - 1] : 0.0);
+            const double apart = 1.0 / (node[k - 1] - (k > order ? node[k - order - 1] : 0.0));
             for (int i = 0; i < 2; i++)
-                run->difference[k][i] = (run->difference[k][i] - run->difference[k - 1][i]) / apart;
+                difference[k][i] = (difference[k][i] - difference[k - 1][i]) * apart;
         }
+    for (int32_t from = run->noded - 1; from > 0 && run->noded <= PLAIN; from--)
+        for (int32_t k = from; k < run->noded; k++)
+            for (int i = 0; i < 2; i++)
+                difference[k][i] -= node[from - 1] * difference[k + 1][i];
     run->divided = 1;
+}
+
+/* sum := int_0^part of the polynomial of few nodes, over part */
+static void sum_plainly(const sd_run *run, double part, double sum[2])
+{
+    static const double inverse[PLAIN + 1] = {1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0};
+    double a = 0.0, b = 0.0;
+    for (int32_t k = run->noded; k >= 0; k--) {
+        a = a * part + run->difference[k][0] * inverse[k];
+        b = b * part + run->difference[k][1] * inverse[k];
+    }
+    sum[0] = a;
+    sum[1] = b;
+}
+
+/* the same of many, by Gauss's rule */
+static void sum_by_gauss(const sd_run *run, double part, double sum[2])
+{
+    sum[0] = sum[1] = 0.0;
+    for (int p = 0; p < 4; p++) {
+        const double s = part * (0.5 + gauss[1][p]);
+        double power[2] = {run->difference[run->noded][0], run->difference[run->noded][1]};
+        for (int32_t k = run->noded - 1; k >= 0; k--) { /* each is that from node k on */
+            const double apart = k > 0 ? s - run->node[k - 1] : s;
+            power[0] = power[0] * apart + run->difference[k][0];
+            power[1] = power[1] * apart + run->difference[k][1];
+        }
+        sum[0] += gauss_weight[1][p] * power[0];
+        sum[1] += gauss_weight[1][p] * power[1];
+    }
 }
 
 int sd_run_sum(sd_run *run, double to, double sum[2])
 {
     const sd_stepper *stepper = run->stepper;
     if (!run->noded)
-        run->noded = is_crowded(run) && look_within(run) ? SD_NODES : -1;
+        run->noded = find_powers(run);
     if (run->noded > 0 && !run->divided)
         divide(run);
     if (run->noded < 0) {
@@ -300,21 +375,9 @@ int sd_run_sum(sd_run *run, double to, double sum[2])
         memcpy(sum, run->integral + 2, 2 * sizeof *sum);
         return there;
     }
-    const double *node = nodes_of(run), *moves = has_own(stepper) ? stepper->moves : NULL;
+    const double *moves = has_own(stepper) ? stepper->moves : NULL;
     const double part = (to - run->t_from) / (stepper->ivp->t - run->t_from);
-    const int high = run->noded > 3;
-    sum[0] = sum[1] = 0.0;
-    for (int p = 0; p < (high ? 4 : 2); p++) {
-        const double s = part * (0.5 + gauss[high][p]);
-        double power[2] = {run->difference[run->noded][0], run->difference[run->noded][1]};
-        for (int32_t k = run->noded - 1; k >= 0; k--) { /* each is that from node k on */
-            const double apart = k > 0 ? s - node[k - 1] : s;
-            power[0] = power[0] * apart + run->difference[k][0];
-            power[1] = power[1] * apart + run->difference[k][1];
-        }
-        sum[0] += gauss_weight[high][p] * power[0];
-        sum[1] += gauss_weight[high][p] * power[1];
-    }
+    (run->noded <= PLAIN ? sum_plainly : sum_by_gauss)(run, part, sum);
     for (int i = 0; i < 2; i++)
         sum[i] = part * length_of(run) * sum[i] + (moves ? moves[2 + i] : 0.0);
     return 0;
