@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn import api
+from sysdyn.runtime.integrate.integrate import Integration
 
 FILTER = """
 from std.electrical import resistor, capacitor, inductor, voltage, diode
@@ -64,3 +65,20 @@ def test_a_pulse_between_nodes_is_seen_by_its_rows(pulse, method, tmp_path):
     flow = (trace["a"].values - trace["b"].values) / 1e3
     assert np.abs(np.abs(trace["i"].values) - np.abs(flow)).max() < 1e-11
     assert np.abs(trace["c"].values - 0.6 * trace["b"].values).max() < 1e-9
+
+
+def test_a_row_of_a_steep_law_is_measured_as_its_last_move_leaves_it(monkeypatch, tmp_path):
+    """Rates that follow flows are put with each move: what was measured behind the last one is what the row tells."""
+    kept = []
+
+    def run(self, *given, **more):
+        found = whole(self, *given, **more)
+        kept.append((self.settler.core.contents.calls, self.settler.system.core.residual_evaluations))
+        return found
+
+    whole = Integration.run
+    monkeypatch.setattr(Integration, "run", run)
+    rows(tmp_path, "5 V*sin(2*pi*40 Hz*t)", "diode", "bdf", "every 0.2 ms")
+    ((settled, measured),) = kept
+    assert settled > 100
+    assert measured < 5 * settled  # as they come, and behind three or four moves
