@@ -10,7 +10,8 @@ int sd_settle_provide_point(sd_settle *settle);
 int sd_settle_provide_best(sd_settle *settle);
 /* room for slopes, and for what a basis takes of them; 0: no memory */
 int sd_settle_provide_slopes(sd_settle *settle);
-/* largest scaled residual at (t, y, yd) [unknowns of the system], in that room; settle->own, constraints too (settle_measure.c) */
+/* largest scaled residual at (t, y, yd) [unknowns of the system], in that room; settle->own, constraints too
+ * (settle_measure.c) */
 double sd_settle_measure(sd_settle *settle, double t, const double *y, const double *yd);
 /* whether room counts more than time */
 int sd_settle_large(const sd_settle *settle);
