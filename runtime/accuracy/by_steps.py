@@ -57,10 +57,8 @@ def by_steps(runs: Runs, options: Options, target: Floats) -> Achieved | Sampled
     """What runs of a model that can but relax are worth, or the last of them where they miss what was asked; None: it
     is another, or too much happens.
     """
-    way, stops = runs.way, options.stops is not None and bool(np.isfinite(options.stops).any())
-    if way.method != "radau" or options.order or options.events or stops or runs.system.unknowns <= SIMPLE:
-        return None
-    if not FINEST <= float(np.min(target)) <= COARSEST or not relaxes(runs.system, runs.start):
+    way = runs.way
+    if not FINEST <= float(np.min(target)) <= COARSEST or not can_but_relax(runs, options):
         return None
 
     def take(stages: tuple[int, int] | None, steps: int | None) -> None:
@@ -69,6 +67,14 @@ def by_steps(runs: Runs, options: Options, target: Floats) -> Achieved | Sampled
     found = shortened(runs.sampled, target, take)
     take(runs.way.stages if isinstance(found, Achieved) else way.stages, None)
     return found
+
+
+def can_but_relax(runs: Runs, options: Options) -> bool:
+    """Whether the model can do nothing else, on a way of radau that nothing restarts."""
+    way, stops = runs.way, options.stops is not None and bool(np.isfinite(options.stops).any())
+    if way.method != "radau" or options.order or options.events or stops or runs.system.unknowns <= SIMPLE:
+        return False
+    return relaxes(runs.system, runs.start)
 
 
 def shortened(run: Run, target: Floats, take: Take) -> Achieved | Sampled | None:

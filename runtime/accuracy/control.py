@@ -18,6 +18,7 @@ import numpy as np
 from sysdyn.runtime.accuracy.estimate import DEAR, LENGTHY, STRETCH, Estimate, is_held
 from sysdyn.runtime.accuracy.laws import Law
 from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, parted
+from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -69,10 +70,11 @@ class Achieved:
 
 @dataclass(frozen=True, slots=True)
 class Lighter:
-    """A method whose runs cost less where little happens.  law: how its errors follow its tolerance; take: the runs go
-    on with it; leave: they go on with the method before, compared with the run before.
+    """A method whose runs cost less where little happens.  way: it; law: how its errors follow its tolerance; take: the
+    runs go on with it; leave: they go on with the method before, compared with the run before.
     """
 
+    way: Way
     law: Law
     take: Callable[[], None]
     leave: Callable[[], None]

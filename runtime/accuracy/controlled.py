@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.accuracy.by_steps import by_steps
+from sysdyn.runtime.accuracy.carried import carried, serves
 from sysdyn.runtime.accuracy.control import Achieved, Lighter, control
 from sysdyn.runtime.accuracy.options import Options, own_tolerances
 from sysdyn.runtime.accuracy.round_off import blurred
@@ -90,7 +91,12 @@ def _achieved(
 ) -> Achieved:
     """Runs by one method; last: no other takes over, so that it goes on where it would be left to the next."""
     target, first = _targets(runs, options), options.first
-    relaxed = by_steps(runs, options, target) if first is None and not (doubted or tame) else None
+    trusted = first is None and not (doubted or tame)
+    if trusted and lighter is not None and serves(runs, options, target):
+        achieved = carried(runs, lighter.way, target)
+        if achieved is not None:
+            return achieved
+    relaxed = by_steps(runs, options, target) if trusted else None
     if isinstance(relaxed, Achieved):
         return relaxed
     law = replace(runs.way.law, brief=False) if last else runs.way.law
@@ -107,7 +113,7 @@ def _lighter(runs: Runs, options: Options, others: tuple[Way, ...]) -> Lighter |
     if way.method != "radau" or bent or not others or others[0].method != "bdf":
         return None
     light = replace(others[0], reason=LITTLE_HAPPENS)
-    return Lighter(light.law, lambda: runs.take(light, LIGHT), lambda: runs.take_back(way))
+    return Lighter(light, light.law, lambda: runs.take(light, LIGHT), lambda: runs.take_back(way))
 
 
 def _unbalanced(runs: Runs, options: Options) -> float:

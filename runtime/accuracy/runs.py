@@ -20,7 +20,7 @@ from sysdyn.runtime.accuracy.way import FACTORED, HELD, SPARE, STIFF, Way
 from sysdyn.runtime.events.kinks import LIVE
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.origin import Origin
-from sysdyn.runtime.integrate.request import LONGEST, STEP, TRACE, Finished, Request
+from sysdyn.runtime.integrate.request import CARRIED, LONGEST, STEP, TRACE, Finished, Request
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
@@ -81,6 +81,7 @@ class Runs:
         self.writer: Writer | None = None
         self.finished: Finished | None = None
         self.samples: list[Floats] = []
+        self.carried: list[Floats] = []
         self.done: tuple[Finished, list[Floats], Writer] | None = None
         self.controlled = False
 
@@ -154,6 +155,7 @@ class Runs:
             audited=bool(self.quantities.meters),
             opening=self.opening,
             ceiling=self.ceiling,
+            carried=self.way.carried,
             apart=APART if draft and (self.instants.open or early) else 0.0,
             events=options.events or None,
             begin=self.begin,
@@ -185,6 +187,9 @@ class Runs:
 
     def _write(self, rows: Floats) -> None:
         kind = rows[:, 1].astype(np.int32)
+        if self.way.carried:
+            self.carried.append(rows[kind == CARRIED])
+            rows, kind = rows[kind != CARRIED], kind[kind != CARRIED]
         traced = rows[(kind & TRACE) > 0]
         self.compared.take(rows, kind)
         assert self.writer is not None
@@ -217,7 +222,7 @@ class Runs:
     def run(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Finished:
         """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
         first = self.done is None
-        self.samples = []
+        self.samples, self.carried = [], []
         self.watched = self.options.watch(self.names) if self.options.watch is not None else None
         self.writer = self.keeping.writer(self.layout(rtol, atol), first)
         integration = Integration(self.system, self.start, self.request(rtol, atol, longest), self.origin)

@@ -222,7 +222,7 @@ class Integration:
         method.fixed_h = request.fixed_step or 0.0
         self._tell()
         if request.method == "bdf":
-            method.max_order = request.max_order
+            method.max_order, method.carried.wanted = request.max_order, int(request.carried)
         elif request.method == "radau":
             steep = any(scale.block == "dynamics_scale" for scale in self.system.form.scales)
             method.stages, method.balances, method.begins = first, int(steep), self.request.begins

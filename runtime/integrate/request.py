@@ -22,9 +22,10 @@ ON_UNDERLYING = ("dopri", "energy")
 OF_INDEX_ONE = ("rosenbrock",)
 """Methods that integrate equations of index 1 alone, as written or with constraints differentiated twice (form 1)."""
 
-TRACE, STEP, COMPARED, RELAXING = 1, 2, 4, 8
+TRACE, STEP, COMPARED, RELAXING, CARRIED = 1, 2, 4, 8, 16
 """Kinds of rows (their second column, a sum); RELAXING: compared, where something relaxes at once behind a
-restart; in the place of energies these have what core/run/rows.c (`relaxes`) tells."""
+restart; in the place of energies these have what core/run/compared.c (`relaxes`) tells; CARRIED: of the ends of
+steps, in the place of rates what is observed there without the error carried along the run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,8 @@ class Request:
     unstrained: steps, with a quarter of those before, in which Newton may not fail in nearly every second one, else it
     is given up (cause strained); 0: it goes on whatever fails; tried: another method follows where it creeps;
     apart: part of a step; instants within it that are nearer to the row before are passed over;
-    extrema: what is observed is looked at within steps for its least and largest values.
+    extrema: what is observed is looked at within steps for its least and largest values;
+    carried: the bdf carries its error along, of which each step has a row (core/steppers/bdf/bdf_transport.c).
     """
 
     t_end: float
@@ -87,6 +89,7 @@ class Request:
     tried: bool = False
     opening: float = 0.0
     ceiling: Floats | None = None
+    carried: bool = False
 
     @property
     def tolerance(self) -> float:

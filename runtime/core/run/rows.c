@@ -86,7 +86,7 @@ static int stays(const sd_run *run, int32_t kind)
 }
 
 /* The point of a row moved there; where only runs are compared by it, roughly.  rated: its rates are wanted too */
-static void settle_row(sd_run *run, double t, int32_t kind, int rated)
+void sd_run_settle_row(sd_run *run, double t, int32_t kind, int rated)
 {
     if (run->settle && (rated || (!stays(run, kind) && !meets(run, t)))) {
         double enough = run->settle->enough;
@@ -162,7 +162,7 @@ static void note_step(sd_run *run, double t)
     for (int32_t i = 0; i < run->observed && !grown && !run->bare; i++)
         grown = run->values[i] > GROWN * run->largest[i];
     if (grown) {
-        settle_row(run, t, 0, 0);
+        sd_run_settle_row(run, t, 0, 0);
         find_own_sizes(run, t);
     }
     note_sizes(run);
@@ -223,7 +223,7 @@ static void span_row(sd_run *run, double t, int32_t kind, int summed, double sum
     if (summed)
         sd_run_sum(run, t, sum); /* before: it takes the room of the point */
     if (!sd_run_span(run, t))
-        settle_row(run, t, kind, 0);
+        sd_run_settle_row(run, t, kind, 0);
 }
 
 /* one output row at an instant of the last step, written as of `label`; two where it is compared too */
@@ -242,7 +242,7 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
         find_point(run, t, !at_step && !unsummed, sum);
         if (compared)
             find_slopes(run, t);
-        settle_row(run, t, (int32_t)kind, begun);
+        sd_run_settle_row(run, t, (int32_t)kind, begun);
     }
     if (run->magnitude && !at_step)
         note_beyond(run);
@@ -330,6 +330,8 @@ int sd_run_drain(sd_run *run)
             emit(run, instant, instant, kind, 0);
             continue;
         }
+        if (run->carried && (run->stepper->ivp->steps % run->carried == 0 || t == run->stepper->ivp->t_end))
+            sd_run_carried(run, t);
         double kind = kind_here(run, asked);
         if (t == run->stepper->ivp->t_end || t < run->stepper->ivp->t)
             kind = (double)((int32_t)kind | run->end_kind);

@@ -34,6 +34,7 @@ class Stepper(c.Structure):
         ("values", P),
         ("onto", P),
         ("spare", P),
+        ("less_error", P),
     ]
 
 
@@ -65,6 +66,16 @@ class Ivp(c.Structure):
     ]
 
 
+class Carried(c.Structure):
+    """sd_bdf_carried."""
+
+    _fields_ = [
+        *[(name, I) for name in ["wanted", "shown"]],
+        ("phi", P * (MAX_ORDER + 2)),
+        *[(name, P) for name in ["e", "ed", "ee", "source", "memory"]],
+    ]
+
+
 class Bdf(c.Structure):
     """sd_bdf."""
 
@@ -90,6 +101,7 @@ class Bdf(c.Structure):
         ("aparts", I),
         ("error_next", D),
         ("orders", L),
+        ("carried", Carried),
     ]
 
 

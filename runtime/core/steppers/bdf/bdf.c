@@ -69,7 +69,8 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     bdf->ivp.n = system->unknowns;
     bdf->max_order = SD_MAX_ORDER;
     bdf->ivp.stepper = (sd_stepper){.self = bdf, .ivp = &bdf->ivp, .n = bdf->ivp.n, .y = bdf->phi[0], .yd = bdf->yd,
-                                    .step = sd_bdf_step, .dense = sd_bdf_dense, .values = values, .start = sd_bdf_start};
+                                    .step = sd_bdf_step, .dense = sd_bdf_dense, .values = values, .start = sd_bdf_start,
+                                    .less_error = &bdf->carried.shown};
     return bdf;
 }
 
@@ -78,6 +79,7 @@ void sd_bdf_free(sd_bdf *bdf)
     if (!bdf)
         return;
     free(bdf->memory);
+    free(bdf->carried.memory);
     free(bdf->powered);
     free(bdf);
 }
@@ -106,6 +108,8 @@ void sd_bdf_start(void *self, double t, const double *y, const double *yd, doubl
     bdf->rising = bdf->max_order > 1;
     bdf->contraction = UNKNOWN;
     bdf->ready = 0;
+    if (bdf->carried.wanted && sd_bdf_transport_begin(bdf))
+        bdf->carried.wanted = 0;
 }
 
 /* G := dF/dy + cj dF/dyd and its factors; a fresh Jacobian where asked */
@@ -204,7 +208,7 @@ static int factors_serve(const sd_bdf *bdf)
 
 /* A correction by factors of another cj, between what it would be where one part of the matrix alone counted, and the other;
  * multipliers answer to powers of cj besides */
-static void balance(sd_bdf *bdf, double *d)
+void sd_bdf_balance(const sd_bdf *bdf, double *d)
 {
     double ratio = bdf->cj / bdf->cj_factored, part = 2.0 / (1.0 + ratio), power[3] = {1.0, ratio, ratio * ratio};
     if (ratio == 1.0)
@@ -235,7 +239,7 @@ static int iterate(sd_bdf *bdf, double t)
             break;
         converged = 0;
         sd_linear_solve(bdf->linear, d);
-        balance(bdf, d);
+        sd_bdf_balance(bdf, d);
         bdf->extra += others && m > 0;
         double size = sd_bdf_move(bdf, m == 0);
         if (!isfinite(size))
@@ -381,7 +385,11 @@ int sd_bdf_step(void *self)
         project(bdf);
         sd_bdf_orders(bdf, norm);
     }
+    if (bdf->carried.wanted)
+        sd_bdf_transport(bdf);
     sd_bdf_accept(bdf, norm, order_next);
+    if (bdf->carried.wanted)
+        sd_bdf_transport_shift(bdf);
     return SD_FINE;
 }
 
@@ -400,4 +408,8 @@ void sd_bdf_dense(const void *self, double t, double *y, double *yd)
     sd_bdf_interpolate(bdf, k, value, rate, y, yd);
     if (bdf->ivp.taken == 0 && yd)
         memcpy(yd, bdf->yd, (size_t)bdf->ivp.n * sizeof *yd);
+    for (int32_t i = 0; bdf->carried.shown && i < bdf->ivp.n; i++) {
+        y[i] -= bdf->carried.e[i];
+        yd[i] -= bdf->carried.ed[i];
+    }
 }
