@@ -25,15 +25,15 @@ from sysdyn.runtime.model.system import LARGE
 
 FINEST = 3e-4
 """Of accuracies below methods of higher order are cheaper (by_steps.py; ladders at 1e-4: 1.05 to 1.9 times its CPU)."""
-SAFETY, LOOSEST = 1.5, 1e-2
-"""Of the error carried, which was 0.91 to 1.18 of the largest error at any step (ladders and grids) up to this tolerance,
-0.73 to 1.35 at ten times that."""
+SAFETY, LOOSEST = 1.5, 5e-3
+"""Of the error carried, which was 0.91 to 1.18 of the largest error at any step (ladders and grids) up to this
+tolerance, 0.73 to 1.35 at ten times that."""
 FAINT = 1e-2
-"""Of the largest of its unit: of a quantity that is less the steps are not made (what a pulse sends through a line, 1e-10
-of it, was estimated at a fifteenth of its error), and another method follows."""
-PART, FALLS, EASY = 0.1, 0.2, 1e-3
+"""Of the largest of its unit: of a quantity that is less the steps are not made (what a pulse sends through a line,
+1e-10 of it, was estimated at a fifteenth of its error), and another method follows."""
+PART, FALLS, EASY = 0.05, 0.2, 1e-3
 """Of the accuracy: the tolerance that does for one of EASY; each decade finer takes FALLS of a decade beside."""
-RUNS, AIM, LEAST = 2, 2.0, 0.3
+RUNS, AIM, LEAST = 2, 1.5, 0.5
 """Runs at most; how far below what was asked the second aims, and what is left of its tolerance at most."""
 STEPS = 400
 """Of a run at most: what takes more is left to methods of higher order."""

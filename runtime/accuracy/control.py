@@ -70,14 +70,14 @@ class Achieved:
 
 @dataclass(frozen=True, slots=True)
 class Lighter:
-    """A method whose runs cost less where little happens.  way: it; law: how its errors follow its tolerance; take: the
-    runs go on with it; leave: they go on with the method before, compared with the run before.
+    """A method whose runs cost less where little happens.  law: how its errors follow its tolerance; take: the runs go on
+    with it; leave: they go on with the method before, compared with the run before; way: of it, where it is known.
     """
 
-    way: Way
     law: Law
     take: Callable[[], None]
     leave: Callable[[], None]
+    way: Way | None = None
 
 
 Run = Callable[[float, float], Sampled]

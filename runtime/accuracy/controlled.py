@@ -92,7 +92,7 @@ def _achieved(
     """Runs by one method; last: no other takes over, so that it goes on where it would be left to the next."""
     target, first = _targets(runs, options), options.first
     trusted = first is None and not (doubted or tame)
-    if trusted and lighter is not None and serves(runs, options, target):
+    if trusted and lighter is not None and lighter.way is not None and serves(runs, options, target):
         achieved = carried(runs, lighter.way, target)
         if achieved is not None:
             return achieved
@@ -113,7 +113,7 @@ def _lighter(runs: Runs, options: Options, others: tuple[Way, ...]) -> Lighter |
     if way.method != "radau" or bent or not others or others[0].method != "bdf":
         return None
     light = replace(others[0], reason=LITTLE_HAPPENS)
-    return Lighter(light, light.law, lambda: runs.take(light, LIGHT), lambda: runs.take_back(way))
+    return Lighter(light.law, lambda: runs.take(light, LIGHT), lambda: runs.take_back(way), light)
 
 
 def _unbalanced(runs: Runs, options: Options) -> float:

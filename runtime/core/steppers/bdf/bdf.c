@@ -108,8 +108,7 @@ void sd_bdf_start(void *self, double t, const double *y, const double *yd, doubl
     bdf->rising = bdf->max_order > 1;
     bdf->contraction = UNKNOWN;
     bdf->ready = 0;
-    if (bdf->carried.wanted && sd_bdf_transport_begin(bdf))
-        bdf->carried.wanted = 0;
+    sd_bdf_transport_begin(bdf);
 }
 
 /* G := dF/dy + cj dF/dyd and its factors; a fresh Jacobian where asked */
@@ -204,19 +203,6 @@ static int factors_serve(const sd_bdf *bdf)
         return 1;
     double effort = bdf->ivp.system->scales ? 0.0 : sd_linear_effort(bdf->linear);
     return ratio <= APART && ratio >= 1.0 / APART && effort >= DEAR && bdf->extra < SPENT * effort;
-}
-
-/* A correction by factors of another cj, between what it would be where one part of the matrix alone counted, and the other;
- * multipliers answer to powers of cj besides */
-void sd_bdf_balance(const sd_bdf *bdf, double *d)
-{
-    double ratio = bdf->cj / bdf->cj_factored, part = 2.0 / (1.0 + ratio), power[3] = {1.0, ratio, ratio * ratio};
-    if (ratio == 1.0)
-        return;
-    for (int32_t i = 0; i < bdf->ivp.n; i++)
-        d[i] *= part;
-    for (int32_t k = 0; k < bdf->powers; k++)
-        d[bdf->powered[k]] *= power[bdf->ivp.power[bdf->powered[k]]];
 }
 
 /* Newton's iteration from the prediction with the present factors */
@@ -385,11 +371,9 @@ int sd_bdf_step(void *self)
         project(bdf);
         sd_bdf_orders(bdf, norm);
     }
-    if (bdf->carried.wanted)
-        sd_bdf_transport(bdf);
+    sd_bdf_transport(bdf);
     sd_bdf_accept(bdf, norm, order_next);
-    if (bdf->carried.wanted)
-        sd_bdf_transport_shift(bdf);
+    sd_bdf_transport_shift(bdf);
     return SD_FINE;
 }
 
@@ -408,8 +392,5 @@ void sd_bdf_dense(const void *self, double t, double *y, double *yd)
     sd_bdf_interpolate(bdf, k, value, rate, y, yd);
     if (bdf->ivp.taken == 0 && yd)
         memcpy(yd, bdf->yd, (size_t)bdf->ivp.n * sizeof *yd);
-    for (int32_t i = 0; bdf->carried.shown && i < bdf->ivp.n; i++) {
-        y[i] -= bdf->carried.e[i];
-        yd[i] -= bdf->carried.ed[i];
-    }
+    sd_bdf_without(bdf, y, yd);
 }

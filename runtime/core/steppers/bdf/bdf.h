@@ -77,12 +77,13 @@ double sd_bdf_norm(const sd_bdf *bdf, const double *x, const double *minus);
 void sd_bdf_interpolate(const sd_bdf *bdf, int32_t order, const double *value, const double *rate, double *y,
                         double *yd);
 void sd_bdf_shift(sd_bdf *bdf);
-/* bdf_transport.c: room for e, which goes on where it was; e at the end of a step that passed; its differences behind it */
-int sd_bdf_transport_begin(sd_bdf *bdf);
+void sd_bdf_balance(const sd_bdf *bdf, double *d);
+/* bdf_transport.c, where e is wanted: room for it (without memory it is not), and it goes on where it was; e at the end of a
+ * step that passed; its differences behind it; y, yd [n] of that end less e, where that is shown */
+void sd_bdf_transport_begin(sd_bdf *bdf);
 void sd_bdf_transport(sd_bdf *bdf);
 void sd_bdf_transport_shift(sd_bdf *bdf);
-/* bdf.c */
-void sd_bdf_balance(const sd_bdf *bdf, double *d);
+void sd_bdf_without(const sd_bdf *bdf, double *y, double *yd);
 /* controller.c */
 int sd_bdf_test(sd_bdf *bdf, double ck, double *norm, double *error, int32_t *order_next);
 void sd_bdf_accept(sd_bdf *bdf, const double *norm, int32_t order_next);

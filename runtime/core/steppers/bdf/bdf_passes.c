@@ -105,6 +105,19 @@ static inline __attribute__((always_inline)) void interpolate(const sd_bdf *bdf,
     }
 }
 
+/* A correction by factors of another cj, between what it would be where one part of the matrix alone counted, and the other;
+ * multipliers answer to powers of cj besides */
+void sd_bdf_balance(const sd_bdf *bdf, double *d)
+{
+    double ratio = bdf->cj / bdf->cj_factored, part = 2.0 / (1.0 + ratio), power[3] = {1.0, ratio, ratio * ratio};
+    if (ratio == 1.0)
+        return;
+    for (int32_t i = 0; i < bdf->ivp.n; i++)
+        d[i] *= part;
+    for (int32_t k = 0; k < bdf->powers; k++)
+        d[bdf->powered[k]] *= power[bdf->ivp.power[bdf->powered[k]]];
+}
+
 /* y, yd [n] := sums of the differences up to an order, times value and times rate [order + 1]; the first one counts once;
  * yd NULL: not asked for */
 SD_WIDE void sd_bdf_interpolate(const sd_bdf *bdf, int32_t order, const double *value, const double *rate, double *y,

@@ -16,14 +16,15 @@
 #define NEAR 1.5 /* ratio of cj to that of the factors up to which one solution does: a fifth of a change of e is left at most,
                   * which the next step finds */
 
-int sd_bdf_transport_begin(sd_bdf *bdf)
+void sd_bdf_transport_begin(sd_bdf *bdf)
 {
     sd_bdf_carried *carried = &bdf->carried;
-    size_t m = (size_t)sd_whole_lanes(bdf->ivp.n);
-    if (!carried->memory)
+    const size_t m = (size_t)sd_whole_lanes(bdf->ivp.n);
+    if (carried->wanted && !carried->memory)
         carried->memory = calloc((SD_MAX_ORDER + 2 + VECTORS) * m + 1, sizeof(double));
-    if (!carried->memory)
-        return SD_MEMORY;
+    carried->wanted = carried->wanted && carried->memory;
+    if (!carried->wanted)
+        return;
     double *next = carried->memory;
     for (int i = 0; i < SD_MAX_ORDER + 2; i++, next += m)
         carried->phi[i] = next;
@@ -31,7 +32,6 @@ int sd_bdf_transport_begin(sd_bdf *bdf)
     for (int i = 0; i < VECTORS; i++, next += m)
         *vector[i] = next;
     memset(carried->phi[1], 0, (SD_MAX_ORDER + 1) * m * sizeof(double));
-    return SD_FINE;
 }
 
 /* passes over differences take those of e for those of y, and once more the other way round */
@@ -64,7 +64,7 @@ static void right_side(sd_bdf *bdf)
 }
 
 /* source := (rate) ee less the predicted rate of e; the correction of e begins with nothing */
-SD_WIDE static void begin(sd_bdf *bdf, double rate)
+static SD_WIDE void begin(sd_bdf *bdf, double rate)
 {
     const double *const ee = bdf->ivp.ee, *const ed = bdf->carried.ed;
     double *const source = bdf->carried.source, *const correction = bdf->carried.ee;
@@ -75,7 +75,7 @@ SD_WIDE static void begin(sd_bdf *bdf, double rate)
 }
 
 /* e moved by delta, with all that goes with it */
-SD_WIDE static void move(sd_bdf *bdf)
+static SD_WIDE void move(sd_bdf *bdf)
 {
     const double cj = bdf->cj, *const delta = bdf->delta;
     sd_bdf_carried *carried = &bdf->carried;
@@ -93,6 +93,8 @@ void sd_bdf_transport(sd_bdf *bdf)
 {
     const double cj = bdf->cj, ratio = cj / bdf->cj_factored;
     double rate = -cj;
+    if (!bdf->carried.wanted)
+        return;
     for (int32_t i = 0; i <= bdf->order; i++)
         rate += 1.0 / bdf->psi[i];
     if (bdf->ivp.taken == 1) /* the difference with which it began stands for a point twice */
@@ -110,8 +112,18 @@ void sd_bdf_transport(sd_bdf *bdf)
     }
 }
 
+void sd_bdf_without(const sd_bdf *bdf, double *y, double *yd)
+{
+    for (int32_t i = 0; bdf->carried.shown && i < bdf->ivp.n; i++) {
+        y[i] -= bdf->carried.e[i];
+        yd[i] -= bdf->carried.ed[i];
+    }
+}
+
 void sd_bdf_transport_shift(sd_bdf *bdf)
 {
+    if (!bdf->carried.wanted)
+        return;
     exchange(bdf);
     sd_bdf_shift(bdf);
     exchange(bdf);
