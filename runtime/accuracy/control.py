@@ -70,8 +70,8 @@ class Achieved:
 
 @dataclass(frozen=True, slots=True)
 class Lighter:
-    """A method whose runs cost less where little happens.  law: how its errors follow its tolerance; take: the runs go on
-    with it; leave: they go on with the method before, compared with the run before; way: of it, where it is known.
+    """A method whose runs cost less where little happens.  law: how its errors follow its tolerance; take: the runs go
+    on with it; leave: they go on with the method before, compared with the run before; way: of it, where it is known.
     """
 
     law: Law
