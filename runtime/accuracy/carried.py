@@ -2,7 +2,7 @@
 
 Its slopes are constant, and e = values less solution is stepped by the formula itself with the factors at hand
 (core/steppers/bdf/bdf_transport.c): one solution more a step and no second run.  What is observed with e and without it
-is compared at every third step.  No second run passes by what the steps of this one do not meet: they are half as long
+is compared at every step.  No second run passes by what the steps of this one do not meet: they are half as long
 at most.
 """
 
