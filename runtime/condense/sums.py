@@ -95,7 +95,7 @@ class Straights:
         self._factors, self._constants = np.zeros(self._order.size), np.zeros(number)
         self._source, offset = found.source[ranges(entry, terms)], np.cumsum(terms) - terms
         self.array, self.number = (lib.Straight * max(begin.size, 1))(), int(begin.size)
-        lines = self._lines = np.frombuffer(self.array, dtype=LINE)[: begin.size]
+        lines = self._lines = np.frombuffer(memoryview(self.array), dtype=LINE)[: begin.size]
         lines["place"], lines["number"], lines["terms"] = found.place[begin], length, terms
         lines["audited"] = lines["rated"] = 1
         lines["source"] = self._source.ctypes.data + self._source.itemsize * offset

@@ -1,7 +1,6 @@
 /* Residual and Jacobian of a system: see assembly.h. */
 #include "system/assembly.h"
 #include "linear/lanes.h"
-#include "linear/number.h"
 
 #include <float.h>
 #include <math.h>
@@ -19,7 +18,7 @@
 #define ROOT_LEAST 1e-12
 
 /* rows q' - f of a short stretch */
-static SD_APART SD_ONE_BY_ONE void put_few(int32_t number, const double *own, const double *q, const double *f, double *to)
+static SD_ONE_BY_ONE void put_few(int32_t number, const double *own, const double *q, const double *f, double *to)
 {
     for (int32_t i = 0; i < number; i++)
         to[i] = own ? (q[i] - f[i]) * own[i] : q[i] - f[i];

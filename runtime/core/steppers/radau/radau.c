@@ -288,7 +288,7 @@ static int find_stages(sd_radau *radau, trial *one)
     }
     one->strained |= cause == SD_NEWTON && one->fresh;
     /* once it fails in any model: twice in a row it may be for no step's length */
-    if (cause == SD_NEWTON && one->fresh && radau->strained && one->failures > 0 && one->leap == 0 && !steep)
+    if (cause == SD_NEWTON && one->fresh && radau->strained && one->leap == 0 && !steep)
         cause = coupled(radau, &one->iterations);
     return cause;
 }
