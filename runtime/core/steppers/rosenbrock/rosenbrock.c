@@ -75,9 +75,9 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
         return NULL;
     size_t m = (size_t)sd_whole_lanes(system->unknowns + 1), nnz = (size_t)system->entries + 1;
     double **vectors[] = {&rosenbrock->phi, &rosenbrock->yd, &rosenbrock->last, &rosenbrock->y, &rosenbrock->rate,
-                          &rosenbrock->known, &rosenbrock->drift, &rosenbrock->begin, &rosenbrock->ivp.ee,
-                          &rosenbrock->ivp.weight, &rosenbrock->end, &rosenbrock->within, &rosenbrock->within_d,
-                          &rosenbrock->inner, &rosenbrock->begin_end, &rosenbrock->ivp.lately};
+                          &rosenbrock->known, &rosenbrock->drift, &rosenbrock->begin, &rosenbrock->ivp.ee, &rosenbrock->ivp.weight,
+                          &rosenbrock->end, &rosenbrock->within, &rosenbrock->within_d, &rosenbrock->inner,
+                          &rosenbrock->begin_end, &rosenbrock->ivp.lately};
     size_t number = sizeof vectors / sizeof *vectors;
     rosenbrock->memory = calloc((number + STAGES + SD_ROSENBROCK_DENSE) * m + 6 * nnz, sizeof(double));
     rosenbrock->rate_row = calloc(2 * nnz, sizeof *rosenbrock->rate_row);
