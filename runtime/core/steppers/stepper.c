@@ -5,8 +5,7 @@
 
 #define FADES 0.8   /* part that a step leaves of what an unknown has been lately */
 #define SMALL 1e-4  /* of its magnitude: what it counts as at least */
-#define RESOLVED 1e3 /* round-offs of it: the error at least that is asked of an unknown, by what it has been lately */
-#define FEW 100.0   /* steps whose lengths, each rounded, still add up to the span */
+#define FEW 100.0 /* steps whose lengths, each rounded, still add up to the span */
 
 void sd_stepper_start(sd_stepper *stepper, double t, const double *y, const double *yd)
 {
@@ -29,13 +28,12 @@ void sd_begin(sd_ivp *ivp, double t)
 void sd_weigh(sd_ivp *ivp, double tolerance, const double *y)
 {
     const double part = tolerance == ivp->rtol ? 1.0 : tolerance / ivp->rtol;
-    const double least = fmin(1.0, fmax(SMALL, RESOLVED * DBL_EPSILON / tolerance));
     for (int32_t i = 0; i < ivp->n; i++) {
         double size = fabs(y[i]);
         sd_met(size, &ivp->met[i], &ivp->magnitude[i]);
         double most = ivp->magnitude[i];
         if (ivp->lately && ivp->test[i] >= 0)
-            most = ivp->lately[i] = fmax(fmax(size, least * most), FADES * ivp->lately[i]);
+            most = ivp->lately[i] = fmax(fmax(size, SMALL * most), FADES * ivp->lately[i]);
         double atol = ivp->atol && ivp->test[i] >= 0 ? part * ivp->atol[i] : tolerance * most;
         if (ivp->weight)
             ivp->weight[i] = 1.0 / (atol + tolerance * size);

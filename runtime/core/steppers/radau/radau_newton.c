@@ -3,7 +3,6 @@
 
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define ITERATIONS 7       /* of Newton a step of three stages */
@@ -37,10 +36,6 @@ void sd_radau_provide_weights(sd_radau *radau)
     int powers = 0;
     for (int32_t i = 0; i < radau->ivp.n; i++)
         powers |= radau->ivp.power[i] != 0;
-    if (powers) { /* corrections of what constraints hold are no smaller than round-off of the largest makes them */
-        free(radau->ivp.lately);
-        radau->ivp.lately = NULL;
-    }
     int others = powers || (radau->ivp.atol && !radau->ivp.weight);
     if (others && !radau->powered)
         radau->powered = calloc(3 * m, sizeof *radau->powered);
