@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#define FADES 0.8   /* part that a step leaves of what an unknown has been lately */
-#define SMALL 1e-4  /* of its magnitude: what it counts as at least */
 #define FEW 100.0 /* steps whose lengths, each rounded, still add up to the span */
 
 void sd_stepper_start(sd_stepper *stepper, double t, const double *y, const double *yd)
@@ -18,11 +16,8 @@ void sd_begin(sd_ivp *ivp, double t)
     ivp->h_used = 0.0;
     ivp->taken = 0;
     ivp->tested = 0;
-    for (int32_t i = 0; i < ivp->n; i++) {
+    for (int32_t i = 0; i < ivp->n; i++)
         ivp->tested += ivp->test[i] >= 0;
-        if (ivp->lately)
-            ivp->lately[i] = ivp->magnitude[i];
-    }
 }
 
 void sd_weigh(sd_ivp *ivp, double tolerance, const double *y)
@@ -31,10 +26,7 @@ void sd_weigh(sd_ivp *ivp, double tolerance, const double *y)
     for (int32_t i = 0; i < ivp->n; i++) {
         double size = fabs(y[i]);
         sd_met(size, &ivp->met[i], &ivp->magnitude[i]);
-        double most = ivp->magnitude[i];
-        if (ivp->lately && ivp->test[i] >= 0)
-            most = ivp->lately[i] = fmax(fmax(size, SMALL * most), FADES * ivp->lately[i]);
-        double atol = ivp->atol && ivp->test[i] >= 0 ? part * ivp->atol[i] : tolerance * most;
+        double atol = ivp->atol && ivp->test[i] >= 0 ? part * ivp->atol[i] : tolerance * ivp->magnitude[i];
         if (ivp->weight)
             ivp->weight[i] = 1.0 / (atol + tolerance * size);
     }

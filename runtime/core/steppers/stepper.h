@@ -79,9 +79,6 @@ typedef struct sd_ivp {
     int32_t tested;           /* unknowns in the error test */
     double t, h, h_used;      /* the last accepted point; steps that come and that led there */
     double *ee, *weight;      /* [n] the last local error, and what the error test weighs it by */
-    double *lately;           /* [n] the largest that what carries the state has been over the last steps, which stands in its
-                               * error for the magnitude: what grows a thousandfold from little carries its error along
-                               * (relaxation oscillators, reactions); NULL: magnitudes serve */
     int64_t steps, rejected_steps, newton_failures;
     int64_t taken;            /* steps since the last start */
     int32_t cause, bad_row, bad_column; /* of the failure of a step */
@@ -116,7 +113,7 @@ void sd_stepper_start(sd_stepper *stepper, double t, const double *y, const doub
 
 /* what methods have in common (stepper.c): at t, where a start begins; which unknowns are tested */
 void sd_begin(sd_ivp *ivp, double t);
-/* magnitudes grow with y [n], and weight [n] := 1 / (atol + tolerance |y|); atol belongs to rtol; once a step */
+/* magnitudes grow with y [n], and weight [n] := 1 / (atol + tolerance |y|); atol belongs to rtol */
 void sd_weigh(sd_ivp *ivp, double tolerance, const double *y);
 /* sum of squares of a - b [n] over the tested unknowns in the weights; b may be NULL */
 double sd_squares(const sd_ivp *ivp, const double *a, const double *b);

@@ -59,7 +59,7 @@ class Ivp(c.Structure):
         *[(name, P) for name in ["atol", "magnitude", "met", "test", "power", "project"]],
         ("tested", I),
         *[(name, D) for name in ["t", "h", "h_used"]],
-        *[(name, P) for name in ["ee", "weight", "lately"]],
+        *[(name, P) for name in ["ee", "weight"]],
         *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
         *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
         ("stepper", Stepper),

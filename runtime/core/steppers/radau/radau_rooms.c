@@ -197,8 +197,6 @@ sd_radau *sd_radau_new(sd_system *system, sd_linear *linear, sd_linear_z *const 
         return NULL;
     }
     radau->yd = radau->phi + m;
-    if (system->scales == 0 && !sd_radau_sparing(radau))
-        radau->ivp.lately = calloc(m, sizeof(double));
     sd_radau_gaps(radau->gap);
     radau->method = radau->used = sd_radau_methods;
     radau->ivp.stepper = (sd_stepper){
@@ -214,7 +212,6 @@ void sd_radau_free(sd_radau *radau)
         return;
     leave_room(radau);
     free(radau->phi);
-    free(radau->ivp.lately);
     free(radau->powered);
     free(radau->gap);
     free(radau->at_zero);

@@ -77,7 +77,7 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
     double **vectors[] = {&rosenbrock->phi, &rosenbrock->yd, &rosenbrock->last, &rosenbrock->y, &rosenbrock->rate,
                           &rosenbrock->known, &rosenbrock->drift, &rosenbrock->begin, &rosenbrock->ivp.ee, &rosenbrock->ivp.weight,
                           &rosenbrock->end, &rosenbrock->within, &rosenbrock->within_d, &rosenbrock->inner,
-                          &rosenbrock->begin_end, &rosenbrock->ivp.lately};
+                          &rosenbrock->begin_end};
     size_t number = sizeof vectors / sizeof *vectors;
     rosenbrock->memory = calloc((number + STAGES + SD_ROSENBROCK_DENSE) * m + 6 * nnz, sizeof(double));
     rosenbrock->rate_row = calloc(2 * nnz, sizeof *rosenbrock->rate_row);
@@ -105,8 +105,6 @@ sd_rosenbrock *sd_rosenbrock_new(sd_system *system, sd_linear *linear)
     if (linear->elimination)
         linear->elimination->orders = 1; /* nothing corrects what its stages solve for */
     rosenbrock->ivp.n = system->unknowns;
-    if (system->scales > 0)
-        rosenbrock->ivp.lately = NULL;
     rosenbrock->ivp.stepper = (sd_stepper){
         .self = rosenbrock, .ivp = &rosenbrock->ivp, .n = rosenbrock->ivp.n, .y = rosenbrock->phi, .yd = rosenbrock->yd,
         .step = sd_rosenbrock_step, .dense = within, .values = values, .start = sd_rosenbrock_start};
