@@ -160,8 +160,8 @@ class Straights:
                 self.array[number].alike = 1
         place = np.append(np.int32(0), np.cumsum(kept, dtype=np.int32))
         size = self._factors.itemsize
-        entry = (self._lines["factor"].astype(np.int64) - self._factors.ctypes.data) // size
+        at = (self._lines["factor"].astype(np.int64) - self._factors.ctypes.data) // size
         self._factors = self._factors[kept]
-        self._lines["factor"] = self._factors.ctypes.data + size * place[entry].astype(np.int64)
+        self._lines["factor"] = self._factors.ctypes.data + size * place[at].astype(np.int64)
         if not self._some.any():
             self._constants = self._constants[:0].copy()
