@@ -52,7 +52,7 @@ typedef struct sd_run {
     int32_t instants, every_step;
     int32_t glances, glanced;         /* instants of a step that are watched, at even parts of it, its end among them; those
                                        * within it that are written */
-    int32_t carried;                  /* every so many steps there is a row of SD_CARRIED; 0: none */
+    int32_t carried;                  /* at the end of each step there is a row of SD_CARRIED */
     int32_t sizes_at_steps;           /* largest is over the ends of all steps, not of those with a row alone */
     int32_t bare;                     /* what is observed follows from the state: rows for comparison alone are not settled */
     int32_t told;                     /* it does by the settler's `told` rows: one that meets these is not settled; falls to

@@ -30,10 +30,6 @@ SWIFT = 100.0
 """Of the tolerance: what is observed would move by more of its largest in a step, by the equations beside the dense
 output, where it relaxes at once (smooth motions: up to ten).
 """
-CARRIED_EVERY = 1
-"""Steps of a run that carries its error along for each row that tells of it (with 3 the error of a pulse that a fast
-line follows stood between rows: 1.8 times what was told).
-"""
 CREDIT = 16
 """Rows that are looked at before it shows that few of them meet their sums."""
 
@@ -123,7 +119,7 @@ class Driver:
         self._kinds = np.ascontiguousarray(kinds, dtype=np.int32)
         run.instant, run.instant_kind = lib.pointer(self._instants), lib.pointer(self._kinds)
         run.instants, run.every_step = self._instants.size, int(request.every_step)
-        run.sizes_at_steps, run.carried = 1, CARRIED_EVERY * request.carried
+        run.sizes_at_steps, run.carried = 1, int(request.carried)
         run.glances, run.apart = GLANCES * request.sample_steps, request.apart
         self.rows = np.empty((ROOM if width < ROOM else 64, width))
         run.row, run.room = lib.pointer(self.rows), self.rows.shape[0]

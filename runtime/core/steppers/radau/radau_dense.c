@@ -27,9 +27,9 @@ void sd_radau_gaps(double gap[SD_METHODS][SD_STAGES + 1][SD_STAGES + 1])
     }
 }
 
-/* Lagrange weights of the nodes 0, c_1, ..., c_s = 1 at x, and their derivatives by x: products of what lies before and
- * behind each node */
-static void lagrange(const sd_radau *radau, const sd_radau_method *method, double x, double *value, double *slope)
+/* Lagrange weights of the nodes 0, c_1, ..., c_s = 1 at x, and their derivatives by x where they are asked for (slope NULL:
+ * they are not): products of what lies before and behind each node */
+static inline void lagrange(const sd_radau *radau, const sd_radau_method *method, double x, double *value, double *slope)
 {
     const double(*gap)[SD_STAGES + 1] = radau->gap[method - sd_radau_methods];
     double far[SD_STAGES + 1] = {x}, behind[SD_STAGES + 2], behind_d[SD_STAGES + 2], before = 1.0, before_d = 0.0;
@@ -40,32 +40,17 @@ static void lagrange(const sd_radau *radau, const sd_radau_method *method, doubl
     behind_d[s + 1] = 0.0;
     for (int i = s; i > 0; i--) {
         behind[i] = behind[i + 1] * far[i];
-        behind_d[i] = behind_d[i + 1] * far[i] + behind[i + 1];
+        if (slope)
+            behind_d[i] = behind_d[i + 1] * far[i] + behind[i + 1];
     }
     for (int i = 0; i <= s; i++) {
         value[i] = gap[i][i] * before * behind[i + 1];
-        slope[i] = gap[i][i] * (before_d * behind[i + 1] + before * behind_d[i + 1]);
-        before_d = before_d * far[i] + before;
+        if (slope) {
+            slope[i] = gap[i][i] * (before_d * behind[i + 1] + before * behind_d[i + 1]);
+            before_d = before_d * far[i] + before;
+        }
         before *= far[i];
     }
-}
-
-/* the same weights alone */
-static void lagrange_values(const sd_radau *radau, const sd_radau_method *method, double x, double *value)
-{
-    const double(*gap)[SD_STAGES + 1] = radau->gap[method - sd_radau_methods];
-    const int s = method->stages;
-    double behind = 1.0, before = x;
-    value[0] = gap[0][0];
-    for (int i = 1; i <= s; i++) {
-        value[i] = gap[i][i] * before;
-        before *= x - method->c[i - 1];
-    }
-    for (int i = s; i > 0; i--) {
-        value[i] *= behind;
-        behind *= x - method->c[i - 1];
-    }
-    value[0] *= behind;
 }
 
 void sd_radau_note_points(sd_radau *radau)
@@ -341,7 +326,7 @@ double sd_radau_between(const sd_radau *radau)
     if (radau->ivp.taken == 0)
         return 0.0;
     const double before = -radau->ivp.h_used / radau->ivp.h;
-    lagrange_values(radau, method, before, v);
+    lagrange(radau, method, before, v, NULL);
     for (int32_t i = 0; i < radau->ivp.n; i++)
         if (radau->ivp.test[i] == 0 && !radau->led[i]) {
             double off = radau->phi[i] - sd_radau_last(radau, i);
@@ -363,7 +348,7 @@ void sd_radau_extrapolate(sd_radau *radau, double h)
             memset(radau->z[s], 0, (size_t)sd_whole_lanes(radau->ivp.n) * sizeof(double));
             continue;
         }
-        lagrange_values(radau, used, 1.0 + radau->method->c[s] * h / radau->ivp.h_used, v);
+        lagrange(radau, used, 1.0 + radau->method->c[s] * h / radau->ivp.h_used, v, NULL);
         v[used->stages] -= 1.0; /* of the point that the step begins at */
         sd_radau_combine(used->stages, radau->ivp.n, v + 1, radau->kept, radau->z[s]);
     }

@@ -140,12 +140,7 @@ static void set_lead(sd_radau *radau)
 SD_WIDE void sd_radau_stage(sd_radau *radau, int s, double *y, double *rate)
 {
     set_lead(radau);
-    if (radau->method->stages == 3)
-        sd_combine(3, radau->ivp.n, radau->lead[s], radau->z, rate);
-    else if (radau->method->stages == 5)
-        sd_combine(5, radau->ivp.n, radau->lead[s], radau->z, rate);
-    else
-        sd_combine(7, radau->ivp.n, radau->lead[s], radau->z, rate);
+    sd_radau_combine(radau->method->stages, radau->ivp.n, radau->lead[s], radau->z, rate);
     for (int32_t i = 0; i < radau->ivp.n; i += SD_LANES)
         SD_AT(y, i) = SD_FROM(radau->phi, i) + SD_FROM(radau->z[s], i);
 }
