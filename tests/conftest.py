@@ -4,12 +4,15 @@ import gc
 import os
 import sys
 from collections import Counter
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")  # no test depends on wall time
+
+sys.path.insert(0, str(Path(__file__).parent / "data"))  # `reference_values`, for all rooms
 
 GOLDEN = 0.6180339887498949
 

@@ -57,14 +57,32 @@ def test_no_room_holds_more_files_than_one_takes_in():
         assert sum(path.is_file() and path.suffix in {".py", ".c", ".h"} for path in room.iterdir()) <= 24, room
 
 
-def test_nothing_but_the_rooms_stands_at_the_top():
-    """What a command leaves where it is run is not committed with the rest."""
+def tracked():
+    """Paths of all files that are committed, relative to the root."""
     if shutil.which("git") is None or not (ROOT / ".git").exists():
         pytest.skip("not a clone")
-    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+
+
+OUTSIDE = re.compile(r"\.\./shared|shared/[A-Za-z]|SYSDYN_[S]HARED|/(?:work|home|root|Users)/[A-Za-z]")
+"""Folders beside a clone, and absolute paths of one machine."""
+
+
+def test_no_file_names_a_folder_outside_the_repository():
+    named = {}
+    for path in tracked():
+        text = (ROOT / path).read_bytes()
+        found = OUTSIDE.findall(text.decode("utf-8", "replace")) if b"\0" not in text else []
+        if found and path != "tests/test_rooms.py":
+            named[path] = found
+    assert named == {}
+
+
+def test_nothing_but_the_rooms_stands_at_the_top():
+    """What a command leaves where it is run is not committed with the rest."""
     rooms = {"dsl", "compiler", "runtime", "cli", "models", "tests", ".ci"}
     files = {"pyproject.toml", "README.md", "CHANGELOG.md", "LICENSE", ".gitignore", ".pre-commit-hooks.yaml"}
-    assert {path.partition("/")[0] for path in listed.splitlines()} == rooms | files
+    assert {path.partition("/")[0] for path in tracked()} == rooms | files
 
 
 def test_every_room_stands_on_the_page_of_its_house():

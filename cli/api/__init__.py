@@ -26,6 +26,7 @@ from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import Ran, run
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.cli.sweep.opened import Sweep
+from sysdyn.distribution import warn_of_other
 from sysdyn.dsl import alone
 from sysdyn.dsl import load as load_
 from sysdyn.dsl.model import expression as ex
@@ -34,6 +35,8 @@ from sysdyn.dsl.text.source import SourceText
 from sysdyn.runtime.judgement import NotMet as Missed
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.trace.trace import Trace
+
+warn_of_other()  # where the other project's `sysdyn/__init__.py` lies over ours, nothing before this is ours
 
 __all__ = [
     "Diagnostic",

@@ -12,6 +12,8 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import sysdyn
+from sysdyn import distribution
 from sysdyn.cli.options import BACKENDS
 from sysdyn.values import dataclass
 
@@ -64,9 +66,11 @@ def examine() -> Iterator[Finding]:
 
 
 def _versions() -> Iterator[Finding]:
-    own = importlib.metadata.version("sysdyn")
-    where = Path(__file__).parents[2]
-    yield Finding("sysdyn", "ok", f"{own}, {where}")
+    yield Finding("sysdyn", "ok", f"{sysdyn.__version__}, {Path(__file__).parents[2]}")
+    others = list(importlib.metadata.distributions(name=distribution.TAKEN))
+    if others:
+        other = f"{distribution.TAKEN} {others[0].version}, {others[0].locate_file('')}"
+        yield Finding("sysdyn", "error", "another project's files are in the same folder", distribution.advise(other))
     yield Finding("python", "ok", f"{platform.python_version()}, {sys.executable}; {platform.platform()}")
     found, missing = [], []
     for name in NEEDED:
@@ -83,7 +87,7 @@ def _core() -> Iterator[Finding]:
     try:
         from sysdyn.runtime import _core as core  # type: ignore[attr-defined]
     except ImportError as error:
-        yield Finding("core", "error", str(error), "pip install sysdyn again: the solver's core is built then")
+        yield Finding("core", "error", str(error), f"install {distribution.NAME} again: the core is built then")
         return
     yield Finding("core", "ok", str(core.__file__))
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import platform
 import re
 from pathlib import Path
 
+import sysdyn
+from sysdyn import distribution
 from sysdyn.cli import whole_files
 from sysdyn.cli.failures import UsageError
 from sysdyn.dsl.parser.parse import parse
@@ -34,11 +37,13 @@ def write(folder: Path) -> list[Path]:
     name = named(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} is there already and not empty: another name, or an empty folder")
+    python = ".".join(platform.python_version_tuple()[:2])
+    stated = {"NAME": name, "REQUIREMENT": distribution.requirement(sysdyn.__version__), "PYTHON": python}
     written = []
     for source, place in FILES.items():
         path = folder / place.format(name=name)
         path.parent.mkdir(parents=True, exist_ok=True)
         text = (TEMPLATE / source).read_text(encoding="utf-8")
-        whole_files.write(path, re.sub(r"\bNAME\b", name, text))
+        whole_files.write(path, re.sub(r"\b(?:NAME|REQUIREMENT|PYTHON)\b", lambda word: stated[word[0]], text))
         written.append(path)
     return written

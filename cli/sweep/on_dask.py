@@ -185,7 +185,7 @@ def results(
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
-        raise UsageError("--dask needs Dask: pip install 'sysdyn[dask]'") from None
+        raise UsageError("--dask needs Dask: pip install distributed") from None
     whole = replace(request, file=str(real(request.file)))
     try:
         client = distributed.Client(address, timeout=10)

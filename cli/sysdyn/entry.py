@@ -12,5 +12,8 @@ def main() -> None:
     if sys.platform != "win32":  # which knows no masks of signals: there an interruption meanwhile ends the import
         held = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM, signal.SIGHUP))
     from sysdyn.cli.main import main as command
+    from sysdyn.distribution import warn_of_other
+
+    warn_of_other()
 
     command(held=held)

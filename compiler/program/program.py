@@ -19,7 +19,7 @@ from sysdyn.values import dataclass
 
 Operand = int | float  # the number of an assignment, or a constant
 
-ROWS_A_ROUTINE = 50  # gcc -O2: 1000 equations 12.1 s in one function, 1.85 s in functions of 50 (FACTS.md)
+ROWS_A_ROUTINE = 50  # gcc -O2: 1000 equations 12.1 s in one function, 1.85 s in functions of 50
 ENTRIES_A_ROUTINE = 150  # about three entries a row
 STATEMENTS_A_ROUTINE = 2000  # of long rows: as many as 50 rows of 40 operations
 TERMS_A_PIECE = 50  # terms of one row: each about as long as a row of its own

@@ -1,4 +1,4 @@
-"""A trace being written: HDF5 as CONTRACT.md lays it down, streamed, readable after kill -9 at any moment.
+"""A trace being written: HDF5 as `sysdyn help traces` lays it down, streamed, readable after kill -9 at any moment.
 
 Rows wait in memory and go to the file together once a second (or when there are many).  Measured: a kill within an
 HDF5 flush leaves a file whose chunks lie behind its end, so no file is ever written under the trace's own name: see

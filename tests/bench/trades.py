@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import re
 import sys
 import tempfile
@@ -102,8 +101,7 @@ def main() -> int:
     parser.add_argument("models", nargs="*", default=list(MODELS), metavar="MODEL")
     parser.add_argument("--accuracy", default="1e-2,1e-4,1e-6", metavar="A,...")
     asked = parser.parse_args()
-    shared = Path(os.environ.get("SYSDYN_SHARED", Path(__file__).parents[3] / "shared"))
-    book = json.loads((shared / "seed" / "references.json").read_text(encoding="utf-8"))
+    book = json.loads((Path(__file__).parents[1] / "data" / "references.json").read_text(encoding="utf-8"))
     print(f"{'model':18s} accuracy  runs tried   work    cost  stated / true  at the instants   chosen")
     for name in asked.models:
         with tempfile.TemporaryDirectory() as folder:

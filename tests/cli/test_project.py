@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import sysdyn
+from sysdyn import distribution
 from sysdyn.cli.main import run
 from sysdyn.cli.project import health, skeleton
 
@@ -96,7 +97,7 @@ def test_doctor_tells_a_machine_that_computes_something_else(capsys, monkeypatch
 
 
 def test_the_package_says_its_version_and_is_the_command():
-    assert sysdyn.__version__ == importlib.metadata.version("sysdyn")
+    assert sysdyn.__version__ == importlib.metadata.version(distribution.NAME)
     with pytest.raises(AttributeError):
         _ = sysdyn.nothing
     command = [sys.executable, "-m", "sysdyn", "--version"]
@@ -115,3 +116,69 @@ def test_the_hooks_of_pre_commit_pass_on_a_new_project(tmp_path, monkeypatch, ca
     for entry in entries:
         assert run([*entry.split(), "swing.sd"]) == 0
     assert (tmp_path / "swing" / "swing.sd").read_bytes() == before
+
+
+STRANGER = "sysdyn-0.1.0.dist-info"
+
+
+@pytest.mark.parametrize("name", [STRANGER, "sysdyn-1.2.egg-info", "sysdyn-0.1.0-py3.11.egg-info"])
+def test_the_other_project_of_this_name_is_told_by_the_import(name, tmp_path, monkeypatch):
+    """Its files lie in the same folder of site-packages: both `sysdyn/__init__.py` and ours are one file."""
+    site = tmp_path / "sysdyn"
+    site.mkdir()
+    monkeypatch.setattr(distribution, "__file__", str(site / "distribution.py"))
+    distribution.warn_of_other.cache_clear()
+    (tmp_path / "sysdyn_compiler-0.1.0.dist-info").mkdir()
+    distribution.warn_of_other()  # its own metadata are no stranger's: -W error
+    (tmp_path / name).mkdir()
+    distribution.warn_of_other.cache_clear()
+    with pytest.warns(RuntimeWarning, match="pip uninstall sysdyn sysdyn-compiler, then install sysdyn-compiler again"):
+        distribution.warn_of_other()
+    distribution.warn_of_other()  # once
+
+
+def test_the_other_project_of_this_name_is_told_by_doctor(tmp_path, monkeypatch, capsys):
+    (tmp_path / STRANGER).mkdir()
+    (tmp_path / STRANGER / "METADATA").write_text("Metadata-Version: 2.1\nName: sysdyn\nVersion: 0.1.0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert run(["doctor"]) == 1
+    assert "pip uninstall sysdyn sysdyn-compiler" in capsys.readouterr().out
+
+
+ORIGINS = {
+    None: "sysdyn-compiler==0.1.0",
+    '{"url": "https://host.example/a/sysdyn", "vcs_info": {"vcs": "git", "commit_id": "5eb3119a"}}': (
+        '"sysdyn-compiler @ git+https://host.example/a/sysdyn@5eb3119a"'
+    ),
+    '{"url": "file:///a/sysdyn", "dir_info": {}}': "wheels/sysdyn_compiler-*",
+    '{"url": "file:///a/sysdyn_compiler-0.1.0-cp311-cp311-linux_x86_64.whl", "archive_info": {}}': (
+        "wheels/sysdyn_compiler-*"
+    ),
+}
+
+
+@pytest.mark.parametrize(("origin", "wanted"), ORIGINS.items())
+def test_a_new_project_installs_this_distribution_and_no_stranger(origin, wanted, tmp_path, monkeypatch, capsys):
+    """As pip recorded where this installation comes from (PEP 610): index, repository, folder, file."""
+
+    class Installed:
+        def read_text(self, name):
+            assert name == "direct_url.json"
+            return origin
+
+    monkeypatch.setattr(importlib.metadata, "distribution", lambda name: {distribution.NAME: Installed()}[name])
+    assert run(["new", str(tmp_path / "swing")]) == 0
+    ci = (tmp_path / "swing/.github/workflows/models.yml").read_text()
+    assert f"      - run: pip install {wanted}\n" in ci
+    assert ("put a wheel of it there" in capsys.readouterr().err) == wanted.startswith("wheels/")
+
+
+def test_no_page_advises_to_install_the_other_project():
+    """`pip install sysdyn` is a stranger's package."""
+    root = Path(__file__).resolve().parents[2]
+    pages = [p for top in ("cli", "dsl", "compiler", "runtime", "models", "README.md") for p in [root / top]]
+    files = [f for p in pages for f in ([p] if p.is_file() else p.rglob("*")) if f.suffix in {".py", ".md", ".yml"}]
+    assert len(files) > 500
+    advice = re.compile(r"pip3? install[^\n]* ['\"]?sysdyn(?![-_\w])")
+    named = [f for f in files if advice.search(f.read_text(encoding="utf-8"))]
+    assert named == []

@@ -115,7 +115,7 @@ def test_processes_killed_at_random_lose_nothing(fall):
 
 @pytest.fixture(scope="module")
 def cluster():
-    distributed = pytest.importorskip("distributed", reason="needs Dask: pip install 'sysdyn[dask]'")
+    distributed = pytest.importorskip("distributed", reason="needs Dask: pip install distributed")
     import cloudpickle
     from sysdyn.cli.sweep import on_dask
 

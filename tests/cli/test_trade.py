@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from reference_values import load
 from schema import NUMBER, conforms, envelope
 from sysdyn import api
 from sysdyn.cli.main import run
@@ -92,10 +93,7 @@ scene run of osc {
 
 @pytest.fixture(scope="module")
 def references():
-    shared = os.environ.get("SYSDYN_SHARED")
-    if not shared:
-        pytest.skip("SYSDYN_SHARED names the folder with seed/references.json")
-    return json.loads((Path(shared) / "seed" / "references.json").read_text(encoding="utf-8"))
+    return load("references.json")
 
 
 def at_the_instants_of_the_book(name, entry, folder):

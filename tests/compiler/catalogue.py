@@ -1,8 +1,6 @@
 """Networks of the seed's catalogue, read from its Python-syntax strings with `ast` (never evaluated)."""
 
 import ast
-import json
-import os
 from pathlib import Path
 
 from sysdyn.dsl.model import expression as x
@@ -22,17 +20,9 @@ from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import SourceText
 
 ROOT = Path(__file__).resolve().parents[2]
-SHARED = Path(os.environ.get("SYSDYN_SHARED", ROOT.parent / "shared"))
 ONE = Unit((), 1.0, "1")
 PLACE = SourceText("catalogue", "model\n").place(0, 5)
 BLOCKS = ("dynamics", "phi_reaction", "psi_reaction", "momentum", "phi", "psi", "gamma", "lambda")
-
-
-def load(name):
-    path = SHARED / "seed" / name
-    if not path.exists():
-        raise FileNotFoundError(f"the seed is not at {path}: set SYSDYN_SHARED to the folder that holds seed/")
-    return json.loads(path.read_text())
 
 
 def convert(text, names):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from carriers import CCarrier, NumpyCarrier
-from catalogue import BLOCKS, convert, load, network, state
+from catalogue import BLOCKS, convert, network, state
+from reference_values import load
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.forms.descriptor import BLOCKS as ALL_BLOCKS
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from carriers import CCarrier, NumpyCarrier
-from catalogue import PLACE, load, network
+from catalogue import PLACE, network
 from chains import chain
+from reference_values import load
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.compiler.program import build as build_
 from sysdyn.compiler.program import cache as cache_

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from carriers import NumpyCarrier
-from catalogue import ONE, PLACE, load, network
+from catalogue import ONE, PLACE, network
 from chains import blank, coordinate, parameter
+from reference_values import load
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x

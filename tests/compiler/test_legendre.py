@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from catalogue import convert, load, names_of, network
+from catalogue import convert, names_of, network
+from reference_values import load
 from sysdyn.compiler.forms.legendre import COUPLED, transformed
 from sysdyn.compiler.model.energies import energies
 from sysdyn.compiler.pipeline import compile_network

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sympy
-from catalogue import load, network
+from catalogue import network
 from chains import chain
+from reference_values import load
 from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.forms.descriptor import verify_descriptor
 from sysdyn.compiler.model import energies

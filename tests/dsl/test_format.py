@@ -14,8 +14,9 @@ from sysdyn.dsl.text.source import SourceText, Span
 from sysdyn.dsl.tree import syntax as s
 from sysdyn.dsl.tree.sameness import first_difference
 
+ROOT = Path(__file__).parents[2]
 CORPUS = sorted((Path(__file__).parent / "corpus").glob("*.sd"))
-SHARED = sorted(Path("/work/shared/language").glob("*/*.sd"))
+MODELS = sorted((ROOT / "models").glob("*/*.sd")) + sorted((ROOT / "dsl" / "std").glob("**/*.sd"))
 NOWHERE = Span(0, 0)
 
 
@@ -32,7 +33,7 @@ def check_round_trip(text):
     return once
 
 
-@pytest.mark.parametrize("path", [*CORPUS, *SHARED], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [*CORPUS, *MODELS], ids=lambda path: path.stem)
 def test_formatting_is_idempotent_and_keeps_the_tree_and_the_comments(path):
     text = SourceText.read(path).text
     once = check_round_trip(text)

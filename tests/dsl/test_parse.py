@@ -18,8 +18,9 @@ from sysdyn.dsl.text.source import SourceText, Span
 from sysdyn.dsl.tree import syntax
 from sysdyn.dsl.tree.sameness import same_tree
 
+ROOT = Path(__file__).parents[2]
 CORPUS = sorted((Path(__file__).parent / "corpus").glob("*.sd"))
-SHARED = sorted(Path("/work/shared/language").glob("*/*.sd"))
+MODELS = sorted((ROOT / "models").glob("*/*.sd")) + sorted((ROOT / "dsl" / "std").glob("**/*.sd"))
 
 
 def tree(text):
@@ -54,8 +55,8 @@ def test_the_corpus_parses_without_findings(path):
     assert parse(SourceText.read(path))[1] == ()
 
 
-@pytest.mark.parametrize("path", SHARED, ids=lambda path: path.stem)
-def test_the_shared_models_parse_without_findings(path):
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_models_and_library_parse_without_findings(path):
     assert parse(SourceText.read(path))[1] == ()
 
 

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from reduced import ROOT, load
+from reduced import ROOT
+from reference_values import load
 from sysdyn.cli.analysis.asked import begun, compiled
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.compiler.binding.oracle import Oracle

@@ -1,7 +1,7 @@
 """Rows of a text against an independent solution, for the capabilities that the seed lists."""
 
 from book_entries import BOOK, ENTRIES, begin, residual
-from reduced import load
+from reference_values import load
 from sysdyn.cli.main import run
 from sysdyn.dsl.model import expression as ex
 from sysdyn.runtime.structure.structure import structure

@@ -4,24 +4,13 @@ Right sides come as strings in Python syntax; they are read with `ast` and turne
 """
 
 import ast
-import json
 import operator
-import os
 from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 ROOT = Path(__file__).resolve().parents[2]
-SHARED = Path(os.environ.get("SYSDYN_SHARED", ROOT.parent / "shared"))
-
-
-def load(name):
-    """A file of the seed."""
-    path = SHARED / "seed" / name
-    if not path.exists():
-        raise FileNotFoundError(f"the seed is not at {path}: set SYSDYN_SHARED to the folder that holds seed/")
-    return json.loads(path.read_text())
 
 
 def lambert(z):

@@ -1,7 +1,7 @@
 """The texts of models/book: each descriptor model of the catalogue with its unknowns, index and solution.
 
 n coordinates, m1 displacement, m2 flow, m3 effort and m4 dynamic constraints, momenta, differential index, and the
-residual on the independent solution of seed/descriptor_values.json; models/book/README.md is the table of them.
+residual on the independent solution of descriptor_values.json; models/book/README.md is the table of them.
 """
 
 import re

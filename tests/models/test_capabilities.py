@@ -1,4 +1,4 @@
-"""What the seed asks a modeller to be able to do (seed/README.md, section 2), a test named after each: 1 to 22.
+"""What the seed asks a modeller to be able to do (tests/data/README.md), a test named after each: 1 to 22.
 
 Most use the texts of models/book: the compiled rows must hold on the independent solution (`meets`), beside what is
 particular to the capability.  Stability and inequalities (53, 54) are tested in files of their own too.

@@ -1,4 +1,4 @@
-"""What the seed asks a modeller to be able to do (seed/README.md, section 2): principles and equations, 23 to 43."""
+"""What the seed asks a modeller to be able to do (tests/data/README.md): principles and equations, 23 to 43."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the seed asks a modeller to be able to do (seed/README.md, section 2): numerics and beyond, 44 to 59."""
+"""What the seed asks a modeller to be able to do (tests/data/README.md): numerics and beyond, 44 to 59."""
 
 import json
 

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from reduced import ROOT, load
+from reduced import ROOT
+from reference_values import load
 from sysdyn.api import simulate
 
 SEED = ROOT / "models" / "seed"

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from reduced import ROOT, load
+from reduced import ROOT
+from reference_values import load
 from scipy.integrate import solve_ivp
 from sysdyn.api import simulate
 from sysdyn.cli.main import run as main

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from changed import CHANGED, EXTREME, STIFF
-from reduced import ROOT, load, solution
+from reduced import ROOT, solution
+from reference_values import load
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report

@@ -61,7 +61,7 @@ def test_tolerance_against_error_of_the_oscillator():
 
 
 def test_stabilised_pendulum_keeps_its_constraints_and_energy():
-    # reference values of seed/references.json, pendulum, t = 0.4, 1, 4
+    # reference values of references.json, pendulum, t = 0.4, 1, 4
     q1 = [0.2788161732553531, -0.18588523467690846, -0.12866541720223088]
     kappa = [2.3900013221216994, 2.4181679205005557, 2.4298740715415423]
     rows, columns, finished = run(models.pendulum(), 4.0, "2", 2, [0.4, 1.0, 4.0], rtol=1e-8)
@@ -92,14 +92,14 @@ def test_hamiltonian_agrees_with_lagrangian():
 
 
 def test_index_two_circuit_of_massless_coordinates():
-    # seed/references.json, lead_filter at t = 1
+    # references.json, lead_filter at t = 1
     _, columns, _ = run(models.lead_filter(), 1.0, "3", 2, rtol=1e-8)
     assert columns["q_2"][-1] == pytest.approx(-0.00001891163095, rel=1e-6)
     assert columns["f_3"][-1] == pytest.approx(0.000756465238384, rel=1e-6)
 
 
 def test_valves_through_zero_slope_and_stiff_diode():
-    # seed/references.json, nonlinear_fluid at t = 60
+    # references.json, nonlinear_fluid at t = 60
     _, columns, _ = run(models.nonlinear_fluid(), 60.0, "3", 2, rtol=1e-8)
     assert columns["q_2"][-1] == pytest.approx(4.971874535507478, rel=1e-6)
     assert columns["f_3"][-1] == pytest.approx(0.728375598501610, rel=1e-6)

@@ -19,7 +19,7 @@ from sysdyn.runtime.start.start import consistent_start
 from sysdyn.runtime.trace.trace import Trace
 from test_bdf import run
 
-# seed/references.json, pendulum, t = 0.4, 1, 4
+# references.json, pendulum, t = 0.4, 1, 4
 INSTANTS = [0.4, 1.0, 4.0]
 Q1 = np.array([0.2788161732553531, -0.18588523467690846, -0.12866541720223088])
 KAPPA = np.array([2.3900013221216994, 2.4181679205005557, 2.4298740715415423])
@@ -75,7 +75,7 @@ def test_pendulum_with_step_control(form, index):
 
 @pytest.mark.long
 def test_index_two_circuit_valves_and_a_stiff_diode():
-    # seed/references.json: lead_filter at 1, nonlinear_fluid at 60
+    # references.json: lead_filter at 1, nonlinear_fluid at 60
     columns = run(models.lead_filter(), 1.0, "3", 2, method="radau", rtol=1e-8)[1]
     assert columns["q_2"][-1] == pytest.approx(-0.00001891163095, rel=1e-6)
     columns = run(models.nonlinear_fluid(), 60.0, "3", 2, method="radau", rtol=1e-8)[1]

@@ -18,7 +18,7 @@ from sysdyn.runtime.start.start import consistent_start
 from sysdyn.runtime.structure.structure import structure
 from sysdyn.runtime.trace.trace import Trace
 
-# seed/references.json, redundant_pendulum (m = l = 1, from th = 1 at rest)
+# references.json, redundant_pendulum (m = l = 1, from th = 1 at rest)
 T = [0.0, 0.4, 1.0, 1.6, 2.4, 3.2, 4.0]
 Q1 = [
     0.8414709848078965, 0.38292717471839827, -0.8305346852026649, -0.013072796467212065, 0.6654970164466453,

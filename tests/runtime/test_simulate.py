@@ -9,7 +9,7 @@ from sysdyn.runtime.model.failures import SolverFailure, WrongOption
 from sysdyn.runtime.simulate import simulate
 from sysdyn.runtime.trace.trace import Parameter, Trace
 
-# /work/shared/seed/references.json: values at the last instant of each system
+# references.json: values at the last instant of each system
 END = {
     "pendulum": (
         models.pendulum,

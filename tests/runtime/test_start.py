@@ -7,7 +7,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
 from sysdyn.runtime.structure.order import freedom
 
-# rows 0 of /work/shared/seed/descriptor_values.json as printed in seed/README.md, section 5
+# rows 0 of descriptor_values.json
 REFERENCES = {
     "pendulum": (
         models.pendulum,

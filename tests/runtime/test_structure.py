@@ -8,7 +8,7 @@ from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.start.start import consistent_start
 from sysdyn.runtime.structure.structure import _growth_index, null_vectors, pencil_index, structure
 
-# differential index of the seed's catalogue (seed/README.md, sections 3 and 4)
+# differential index of the seed's catalogue (tests/data/README.md)
 CASES = {
     "pendulum": (models.pendulum, 3, 1),
     "pendulum hamiltonian": (lambda: models.pendulum("hamiltonian"), 3, 1),

@@ -11,7 +11,8 @@ from sysdyn import api
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "compiler"))
 
-from catalogue import load, network, state
+from catalogue import network, state
+from reference_values import load
 from sysdyn.cli.run.generated import module_of
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request.asked import Request as Simulation

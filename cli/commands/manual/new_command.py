@@ -8,6 +8,8 @@ import shlex
 from pathlib import Path
 
 import click
+import sysdyn
+from sysdyn import distribution
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import FAULT
 from sysdyn.dsl.text.source import real
@@ -30,6 +32,8 @@ def command(console: Console, name: Path) -> int:
         return console.finish(FAULT)
     if not console.quiet:
         console.data("\n".join(str(name / p.relative_to(folder)) for p in (*written, *kept)))
+    if distribution.requirement(sysdyn.__version__).startswith(distribution.WHEELS):
+        console.say(f"CI installs {distribution.NAME} from {distribution.WHEELS}/: put a wheel of it there (pip wheel)")
     console.say(f"next: cd {shlex.quote(str(name))}; sysdyn simulate {model}.sd --scene {skeleton.GOLDEN_SCENE}")
     return console.finish()
 
