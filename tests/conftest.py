@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 import sys
 from collections import Counter
 from pathlib import Path
@@ -13,6 +14,12 @@ settings.register_profile("any machine", deadline=None, suppress_health_check=[H
 settings.load_profile("any machine")  # no test depends on wall time
 
 sys.path.insert(0, str(Path(__file__).parent / "data"))  # `reference_values`, for all rooms
+
+# a shell ignores some of these in what it starts in the background, and children would inherit that
+for _signal in {"SIGINT", "SIGTERM", "SIGHUP"} & set(dir(signal)):
+    _number = getattr(signal, _signal)
+    if signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, signal.default_int_handler if _signal == "SIGINT" else signal.SIG_DFL)
 
 GOLDEN = 0.6180339887498949
 

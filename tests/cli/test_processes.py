@@ -166,12 +166,12 @@ from sysdyn.cli import main
 class Held:
     def __del__(self):
         print("taken apart", flush=True)
-        time.sleep(5.0)
+        time.sleep(3600.0)
 @click.command()
 def command():
     Held()
     print("went on", flush=True)
-    time.sleep(5.0)
+    time.sleep(3600.0)
 main.Group.get_command = lambda *_: command
 main.main(["check"])
 """
@@ -183,10 +183,8 @@ def test_an_interruption_while_an_object_is_taken_apart_is_not_lost(sent):
     command = [sys.executable, "-c", LOST]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "taken apart\n"
-        began = time.monotonic()
         process.send_signal(sent)
-        out, said = process.communicate(timeout=8)
-        assert time.monotonic() - began < 3.0
+        out, said = process.communicate(timeout=60)
     assert process.returncode == 130
     assert out == "went on\n"
     assert said.split() == ["interrupted"]

@@ -5,7 +5,6 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import h5py
@@ -199,9 +198,7 @@ def test_a_limit_of_wall_time_has_a_unit(model, capsys, command):
 def test_the_limit_of_a_reduction_counts_from_its_first_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     path = write(tmp_path, DRIVEN.replace("1e7 s", "400 s"))  # of more steps the end would be out of reach
-    began = time.monotonic()
     assert run(["reduce", path, "--max-wall", "0.3"]) == 3
-    assert time.monotonic() - began < 20.0
     assert "E934" in capsys.readouterr().err
 
 
