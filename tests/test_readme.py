@@ -68,8 +68,15 @@ def test_the_python_example_runs(tmp_path, monkeypatch, capsys):
 
 
 def test_gallery_table_names_every_model():
+    page = (ROOT / "models/README.md").read_text(encoding="utf-8")
     for path in (ROOT / "models/gallery").glob("*.sd"):
-        assert f"`{path.stem}`" in README
+        assert f"`{path.stem}`" in page
+
+
+def test_the_page_is_short_and_its_links_lead_to_files():
+    assert len(README.splitlines()) < 250
+    for link in re.findall(r"\]\(([^)#:]+)\)", README):
+        assert (ROOT / link).exists(), link
 
 
 def test_the_page_of_measurements_names_every_program():
