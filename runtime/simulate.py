@@ -226,5 +226,4 @@ def close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) ->
     estimate = achieved.error_estimate if achieved is not None else None
     verdict = UNJUDGED if judgement is None else judgement.attributes()
     attributes = {**runs.accounts.attributes(estimate), **verdict}
-    nominal = runs.quantities.nominal(finished.largest, finished.magnitude)
-    writer.finish(nominal, attributes, judgement is not None, finished.events)
+    writer.finish(runs.nominal(finished), attributes, judgement is not None, finished.events)

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 from sysdyn.runtime.accuracy import fronts, pairs
 from sysdyn.runtime.accuracy.common_instants import MANY, MOST, VALUES, Instants, Thinned, common, late_by
+from sysdyn.runtime.accuracy.nominals import nominals_of_quantities, nominals_of_unknowns
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.accuracy.pairs import Sampled
 from sysdyn.runtime.accuracy.quantities import Quantities
@@ -28,12 +29,13 @@ BEYOND = 100.0
 
 
 class Compared:
-    """samplings: of the last two runs; jumps (s): events of the last; observed: how many values a row has."""
+    """samplings: of the last two runs; finished: the last; jumps (s): its events; observed: values in a row."""
 
     def __init__(self, options: Options, instants: Instants, observed: int) -> None:
         self.options, self.instants, self._observed = options, instants, observed
         self.samplings: tuple[Sampled, ...] = ()
         self.jumps: Floats | None = None
+        self.finished: Finished | None = None
         self._at: Floats | None = None
         self._opened: tuple[Finished, LeftOpen] | None = None
         self._own: list[Floats] = []
@@ -91,8 +93,12 @@ class Compared:
         noise = pairs.ROUND_OFF * quantities.beside(finished.largest, finished.magnitude)
         noise = np.append(noise, np.zeros(len(quantities.meters)))
         late = self._late(rows, quantities) if instants is not None else 0.0
-        open_ = partial(self._open_quantities, finished, quantities)
+        asked, own = quantities.asked(self.options), quantities.terms_of_run(finished)
         sizes, steps = quantities.of_run(finished), finished.statistics.steps
+        if ((own > 0.0) & (noise > asked * own)).any():  # else noise excuses less than is asked
+            nominal = self._nominal(finished, quantities)
+            sizes, noise = np.minimum(sizes, nominal), np.minimum(noise, asked * nominal)
+        open_ = partial(self._open_quantities, finished, quantities)
         between = self._between(rows, finished, quantities)
         jump = np.append(self._jump[quantities.places], np.full(len(quantities.meters), np.inf))
         passed = np.where(rows[:, 1:2].astype(np.int32) & RELAXING, rows[:, 2:4], 0.0)
@@ -100,7 +106,7 @@ class Compared:
             tolerance, values, sizes, steps, noise, open_, between, late, there, jump, len(finished.events), passed,
             self._passed_over(finished, quantities),
         )  # fmt: skip
-        self.samplings = (*self.samplings[-1:], found)
+        self.samplings, self.finished = (*self.samplings[-1:], found), finished
         return found
 
     def _passed_over(self, finished: Finished, quantities: Quantities) -> Floats | None:
@@ -172,9 +178,26 @@ class Compared:
         return self._opened[1]
 
     def _open_quantities(self, finished: Finished, quantities: Quantities) -> Floats:
-        """What the equations of a run leave open of each compared quantity by round-off."""
+        """What round-off excuses of each compared quantity: what the equations of a run leave open of it, but no more
+        than the accuracy asked times its nominal value.
+        """
         found = self.left_open(finished, quantities.system).quantities[quantities.places]
-        return np.append(found, np.zeros(len(quantities.meters)))
+        found = np.append(found, np.zeros(len(quantities.meters)))
+        return np.minimum(found, quantities.asked(self.options) * self._nominal(finished, quantities))
+
+    def _nominal(self, finished: Finished, quantities: Quantities) -> Floats:
+        """Nominal value of each compared quantity: its largest value or term, or what the rows that determine the
+        unknowns make of it (`nominals.py`); no bound where a large system is not asked for it.
+        """
+        own = quantities.terms_of_run(finished)
+        if finished.last is None or finished.peaks is None:
+            return np.full(own.size, np.inf)
+        point = finished.reached, *finished.last[0]()
+        step = (finished.reached - self.options.t_start) / max(finished.statistics.steps, 1)
+        unknowns = nominals_of_unknowns(quantities.system, point, finished.peaks, step)
+        by_rows = nominals_of_quantities(quantities.system, point, unknowns, step)[quantities.places]
+        own[: by_rows.size] = np.maximum(own[: by_rows.size], by_rows)
+        return own
 
     def worst(self, names: tuple[str, ...], target: Floats) -> tuple[str, float, float | None, bool]:
         """Of the last two runs: the quantity whose difference is largest beside what is asked of it (target

@@ -17,8 +17,7 @@ from sysdyn.runtime.accuracy.round_off import blurred
 from sysdyn.runtime.accuracy.runs import Runs
 from sysdyn.runtime.accuracy.second_opinion import confirmed
 from sysdyn.runtime.accuracy.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
-from sysdyn.runtime.judgement import Estimate, judge
-from sysdyn.runtime.model.description import Floats
+from sysdyn.runtime.judgement import EPS, Estimate, judge
 from sysdyn.runtime.model.failures import SolverFailure, WrongOption
 
 NO_FURTHER = 1.0 + 1e-6
@@ -44,17 +43,6 @@ def _left(runs: Runs, failure: SolverFailure) -> str:
     return f"{method} stopped at {failure.time:.6g} s"
 
 
-def _targets(runs: Runs, options: Options) -> Floats:
-    """Accuracy wanted of each compared quantity; infinite where none is."""
-    names = list(runs.quantities.compared)
-    target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)
-    for name, wanted in options.accuracy_on:
-        if name not in names:
-            raise WrongOption(f"accuracy on '{name}': it is not traced")
-        target[names.index(name)] = wanted
-    return target
-
-
 def controlled(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved | None:
     """Runs with accuracy control; None of one run with the solver's own tolerances."""
     if runs.method == "euler":
@@ -67,7 +55,9 @@ def controlled(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieve
         return None
     achieved = _chosen(runs, options, others) if options.method == "auto" else _achieved(runs, options)
     achieved = _balanced(runs, options, achieved)
-    return confirmed(runs, achieved, _targets(runs, options)) if options.accuracy_check else achieved
+    if achieved.error_estimate is not None:  # two runs may have the same numbers, which are doubles all the same
+        achieved = replace(achieved, error_estimate=max(achieved.error_estimate, EPS))
+    return confirmed(runs, achieved, runs.quantities.asked(options)) if options.accuracy_check else achieved
 
 
 def unmet(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Estimate, ...]:
@@ -75,8 +65,8 @@ def unmet(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Esti
     if achieved is None:
         return ()
     if achieved.met:
-        return blurred(runs, options.t_end, _targets(runs, options))
-    name, asked, time, undefined = runs.compared.worst(runs.quantities.compared, _targets(runs, options))
+        return blurred(runs, options.t_end, runs.quantities.asked(options))
+    name, asked, time, undefined = runs.compared.worst(runs.quantities.compared, runs.quantities.asked(options))
     return (Estimate(name, achieved.error_estimate, asked, time, undefined),)
 
 
@@ -90,7 +80,7 @@ def _achieved(
     lighter: Lighter | None = None,
 ) -> Achieved:
     """Runs by one method; last: no other takes over, so that it goes on where it would be left to the next."""
-    target, first = _targets(runs, options), options.first
+    target, first = runs.quantities.asked(options), options.first
     trusted = first is None and not (doubted or tame)
     if trusted and lighter is not None and lighter.way is not None and serves(runs, options, target):
         achieved = carried(runs, lighter.way, target)

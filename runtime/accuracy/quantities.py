@@ -13,6 +13,7 @@ from sysdyn.runtime.integrate.request import Finished
 from sysdyn.runtime.integrate.rows.ledgers import turned_over
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.failures import WrongOption
 from sysdyn.runtime.model.scales import ROUND_OFF, kinds_and_units
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.trace.trace import Column
@@ -76,14 +77,29 @@ class Quantities:
 
     def nominal(self, largest: Floats, magnitude: Floats) -> dict[str, float]:
         """Nominal magnitude of each stored quantity."""
-        return self._named(self.sizes(largest, magnitude))
+        return self.named(self.sizes(largest, magnitude))
 
     def terms(self, largest: Floats) -> dict[str, float]:
         """Largest terms of each stored quantity, where it is a difference; largest [observed]."""
-        return self._named(largest[self.places])
+        return self.named(largest[self.places])
 
-    def _named(self, values: Floats) -> dict[str, float]:
+    def named(self, values: Floats) -> dict[str, float]:
+        """Values of the stored quantities [columns] by their names."""
         return dict(zip(self.names, values.tolist(), strict=True))
+
+    def terms_of_run(self, finished: Finished) -> Floats:
+        """Largest values and terms of the compared quantities of a run [compared]."""
+        return np.append(finished.largest[self.places], [_turned_over(meter, finished) for meter in self.meters])
+
+    def asked(self, options: Options) -> Floats:
+        """Accuracy wanted of each compared quantity [compared]; infinite where none is."""
+        names = list(self.compared)
+        target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)
+        for name, wanted in options.accuracy_on:
+            if name not in names:
+                raise WrongOption(f"accuracy on '{name}': it is not traced")
+            target[names.index(name)] = wanted
+        return target
 
     def of_run(self, finished: Finished) -> Floats:
         """What errors of the compared quantities of a run are relative to [compared]."""

@@ -292,6 +292,13 @@ class Runs:
         steps: float = last.steps * (last.tolerance / tolerance) ** (1.0 / (lib.MAX_ORDER + 1))
         return steps > self.patience
 
+    def nominal(self, finished: Finished) -> dict[str, float]:
+        """Nominal value of each stored quantity: what errors of the run that stands were relative to."""
+        sampled = self.compared.samplings
+        if sampled and finished is self.compared.finished:
+            return self.quantities.named(sampled[-1].largest[: self.quantities.places.size])
+        return self.quantities.nominal(finished.largest, finished.magnitude)
+
     def open_balances(self) -> Floats:
         """What the equations of the last run leave open of the balance of each ledger by round-off."""
         assert self.finished is not None

@@ -414,9 +414,10 @@ class Integration:
         met, magnitude = self.sizes.at(last()[0], last=True)
         magnitude = self.confirmed(met, magnitude)
         most = None if self.system.unknowns > LARGE else ceiling(self.system, met, magnitude)
+        peaks = None if self.system.unknowns > LARGE else met.copy()
         magnitude, met = (group_maxima(self.system, sizes) for sizes in (magnitude, met))
         self._spare()
-        return replace(found, magnitude=magnitude, last=(last, met), ceiling=most)
+        return replace(found, magnitude=magnitude, last=(last, met), ceiling=most, peaks=peaks)
 
     def _leave_method(self) -> None:
         """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""

@@ -128,6 +128,7 @@ class Finished:
     unknown of a row within a step, in magnitudes that it has at steps; last: what gives y and yd at its end
     [unknowns], the largest |y| of each kind and unit; opening, ceiling: for the next run's request; extrema: least and
     largest values within steps [2, observed] (infinite where there are none), where these were looked into;
+    peaks: largest |y| met [unknowns] (None: of a large system);
     open: rows of block observe that nothing determined at times, and the contacts between which they floated.
     """
 
@@ -144,6 +145,7 @@ class Finished:
     opening: float = 0.0
     ceiling: Floats | None = None
     extrema: Floats | None = None
+    peaks: Floats | None = None
     open: dict[int, tuple[str, ...]] = field(default_factory=dict)
 
     @property

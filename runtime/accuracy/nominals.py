@@ -1,0 +1,84 @@
+"""Nominal values of unknowns and of traced quantities, by the rows that determine them.
+
+A quantity may be zero by symmetry: then it has no size of its own, and what round-off leaves of it is nobody's error.
+How much may be excused so is bounded by the accuracy asked times its nominal value.  That is not the largest value of
+its unit, which can be 1e61 A in a diode across a source while the quantity is 1 mA: each unknown is paired with one
+row, by a matching on the largest entries (Duff and Koster 2001), and its nominal value is its own peak, or what the
+other terms of that row make of it where they are larger.
+
+Received: a system, its last point, peaks of its unknowns; returned: nominal values, in SI units.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from sysdyn.runtime.model.description import Floats, Ints
+from sysdyn.runtime.model.patterns import Pattern
+from sysdyn.runtime.model.system import System
+from sysdyn.runtime.numerics.equilibrate import sparse_factors
+from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.points import uniform
+
+PIVOT = 0.1
+"""Of the largest entry of its column, equilibrated: what may pair an unknown with a row (a usual threshold pivot)."""
+HOPS = 3
+"""Pairs in a row along which a nominal value is handed on: balance, momentum, flow."""
+STEP, TRIES = 2.0**-12, 3
+"""Of the nominal values: the step of a slope; directions in which it is taken, so that no two moves cancel in all."""
+
+
+def nominals_of_unknowns(system: System, point: tuple[float, Floats, Floats], peaks: Floats, step: float) -> Floats:
+    """Nominal value of each unknown [unknowns] at a point (t in s, y, yd); peaks [unknowns]: largest |y| met; step [s]:
+    a typical one, by which rates count.  Only the peaks where the Jacobian has entries that are no numbers.
+    """
+    rows, columns = system.pattern.row, system.pattern.columns_of()
+    jy, jyd = system.jacobian(*point)
+    with np.errstate(all="ignore"):
+        entry = np.abs(jy) + np.abs(jyd) / step
+    if not np.isfinite(entry).all():
+        return peaks.copy()
+    row_of = _pair(system, entry)
+    nominal, paired = peaks.copy(), row_of >= 0
+    own = rows == row_of[columns]  # the entry at which an unknown meets its row
+    pivot = np.zeros(system.unknowns)
+    pivot[columns[own]] = entry[own]
+    for _ in range(HOPS):
+        terms = np.zeros(system.rows)
+        with np.errstate(over="ignore"):
+            np.maximum.at(terms, rows[~own], (entry * nominal[columns])[~own])
+            made = np.divide(terms[row_of], pivot, out=np.zeros(system.unknowns), where=paired & (pivot > 0.0))
+        np.fmax(nominal, np.where(np.isfinite(made), made, 0.0), out=nominal)
+    return nominal
+
+
+def _pair(system: System, entry: Floats) -> Ints:
+    """The row of each unknown [unknowns], along entries that are large in their column as far as they suffice; -1:
+    none.
+    """
+    pattern = system.pattern
+    rows, columns = pattern.row, pattern.columns_of()
+    row, column = sparse_factors(rows, columns, entry, (system.rows, system.unknowns))
+    scaled = entry * row[rows] * column[columns]
+    largest = np.zeros(system.unknowns)
+    np.maximum.at(largest, columns, scaled)
+    large = (scaled >= PIVOT * largest[columns]) & (scaled > 0.0)
+    begin = np.concatenate([[0], np.cumsum(np.bincount(columns[large], minlength=system.unknowns))]).astype(np.int32)
+    first = matched(Pattern(system.rows, system.unknowns, begin, np.ascontiguousarray(rows[large], dtype=np.int32)))
+    return matched(pattern, first)
+
+
+def nominals_of_quantities(system: System, point: tuple[float, Floats, Floats], nominal: Floats, step: float) -> Floats:
+    """What nominal values of the unknowns [unknowns], and rates that reach them in a step (s), make of each observed
+    quantity [observed], to first order.
+    """
+    t, y, yd = point
+    n = system.form.written
+    with np.errstate(all="ignore"):
+        here = system.observe(t, y[:n], yd[:n])
+        found = np.zeros(here.size)
+        for k in range(TRIES):
+            signs = np.where(uniform(n, 0, k * n) < 0.5, -1.0, 1.0)
+            by = STEP * signs * nominal[:n]
+            moved = system.observe(t, y[:n] + by, yd[:n] + by / step)
+            np.fmax(found, np.abs(moved - here) / STEP, out=found)
+    return np.where(np.isfinite(found), found, 0.0)
