@@ -77,6 +77,18 @@ class Options:
     parameters: tuple[Parameter, ...] = ()
 
 
+HIGHEST = 3
+"""Index as written up to which a form is integrated: a step of length h divides round-off by h^(index - 1)."""
+
+
+def above_highest(index: int) -> str:
+    """Why a model of that index is not integrated, and the remedy."""
+    return (
+        f"the index is {index}, and nothing above {HIGHEST} is integrated: a store lies between what a constraint"
+        " prescribes and the effort that enforces it; prescribe the displacement that this effort acts on"
+    )
+
+
 def choose_index(wanted: str, facts: Structure, method: str = "auto") -> tuple[str, int, tuple[str, ...]]:
     """Form of the runtime, its index, warnings.  Raises NoSuchForm for a method that cannot integrate the form."""
     written = facts.index
@@ -88,6 +100,8 @@ def choose_index(wanted: str, facts: Structure, method: str = "auto") -> tuple[s
         )
     if wanted == "0":
         return "0", 1, ()
+    if written is not None and written > HIGHEST:
+        raise NoSuchForm(above_highest(written))
     if method in OF_INDEX_ONE:
         if wanted not in ("auto", "1") and (written is None or written > 1):
             raise NoSuchForm(f"method {method} integrates equations of index 1, and index {wanted} was asked for")
@@ -95,10 +109,7 @@ def choose_index(wanted: str, facts: Structure, method: str = "auto") -> tuple[s
     if written is None:
         return "3", 2, ("the model's index could not be determined: integrated as written",)
     if wanted == "auto":
-        if written == 3:
-            return "2", 2, ()
-        note = (f"index {written} is integrated as written: expect large errors",) if written > 3 else ()
-        return "3", written, note
+        return ("2", 2, ()) if written == 3 else ("3", written, ())
     if wanted == "3":
         note = ("index 3 integrated directly: about 100 times less accurate than the stabilised form",)
         return "3", written, note if written >= 3 else ()

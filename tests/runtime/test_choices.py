@@ -177,10 +177,12 @@ def test_forms_that_a_method_cannot_step_are_refused_and_doubtful_ones_are_said(
     assert choose_index("2", facts(1), "rosenbrock")[:2] == ("3", 1)  # of index 1 as it is written
     with pytest.raises(WrongOption, match="index 7"):
         choose_index("7", facts(3))
-    notes = {(w, i): choose_index(w, facts(i))[2] for w, i in (("3", 3), ("3", 2), ("auto", 4), ("auto", None))}
-    assert [len(note) for note in notes.values()] == [1, 0, 1, 1]
+    notes = {(w, i): choose_index(w, facts(i))[2] for w, i in (("3", 3), ("3", 2), ("auto", None))}
+    assert [len(note) for note in notes.values()] == [1, 0, 1]
     assert "100 times less accurate" in notes["3", 3][0]
-    assert "index 4 is integrated as written" in notes["auto", 4][0]
+    for wanted, method in (("auto", "auto"), ("3", "bdf"), ("2", "radau"), ("1", "rosenbrock")):
+        with pytest.raises(NoSuchForm, match="the index is 4, and nothing above 3 is integrated"):
+            choose_index(wanted, facts(4), method)
 
 
 def test_the_first_method():

@@ -89,6 +89,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     from sysdyn.cli.run.verdict.expectations import missing_goldens
     from sysdyn.compiler.binding.certificate import certificate
     from sysdyn.compiler.binding.jumps import jumps
+    from sysdyn.runtime.accuracy.options import HIGHEST, above_highest
 
     prepared = prepare(network, report, backend="numpy")
     if prepared is None:
@@ -112,9 +113,12 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     facts = started.facts
     if prepared.formulation == "kane":  # it leaves out the rows of flow constraints
         facts = counted_as(prepared, t0, facts)
+    runs = facts.index is None or facts.index <= HIGHEST
+    if not runs:
+        report.note("N608", above_highest(facts.index), prepared.network.place)
     judged = certificate(prepared.network, prepared.binding)
     return {
-        "ok": not report.failed,
+        "ok": runs and not report.failed,
         "formulation": prepared.formulation,
         **facts.counts,
         "moved": described(prepared, started.state),
