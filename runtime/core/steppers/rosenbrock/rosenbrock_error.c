@@ -9,6 +9,8 @@
 #define DOUBTED 0.1        /* of a steep row's terms: what it may be off before slopes tell whether tolerances let it be */
 #define LOOSE 5e-3         /* tolerance beyond which that is asked: to 1e-3 it refused none of the steps of five circuits */
 #define GIVEN 0.1          /* of a slope: what is less has given way */
+#define UNMET 10.0         /* tolerances of its unknowns that a row may be off at the end of a step */
+#define ROUND_OFF 1e-12    /* of its terms: what a row is always off */
 
 double sd_rosenbrock_norm(const sd_rosenbrock *rosenbrock, const double *x, double h, double *state)
 {
@@ -64,6 +66,20 @@ static int laws_hold(sd_rosenbrock *rosenbrock, double *error)
     return SD_FINE;
 }
 
+/* whether every row of the end is met as far as the tolerances of its unknowns let it be, by the slopes there.  No stage iterates:
+ * a row of an algebraic Jacobian that is singular has no correction at all, and is carried along unmet without an error */
+static int rows_hold(sd_rosenbrock *rosenbrock)
+{
+    const sd_ivp *ivp = &rosenbrock->ivp;
+    double *size = rosenbrock->u[0], *open = rosenbrock->drift;
+    for (int32_t i = 0; i < ivp->n; i++) {
+        size[i] = (fabs(rosenbrock->end[i]) + ivp->magnitude[i]) / ivp->h;
+        open[i] = UNMET * (ivp->weight[i] > 0.0 ? 1.0 / ivp->weight[i] : ivp->rtol * ivp->magnitude[i]);
+    }
+    return sd_first_astray(ivp->system, ivp->t + ivp->h, rosenbrock->end, size, rosenbrock->begin_end, ROUND_OFF,
+                           rosenbrock->jy_end, rosenbrock->jyd_end, ivp->h, open, 1, rosenbrock->within) < 0;
+}
+
 /* what the end is off by the slopes there, where a law has given way within the step (a tanh that saturates): by those at its
  * begin, which hold it, what is left of its row is next to nothing.  Slopes and factors are not the begin's then. */
 static int gives_way(sd_rosenbrock *rosenbrock, double *error, double *state)
@@ -82,8 +98,12 @@ static int gives_way(sd_rosenbrock *rosenbrock, double *error, double *state)
     int32_t e = 0;
     while (e < system->entries && !(fabs(jy[e]) < GIVEN * fabs(rosenbrock->jy[e])))
         e++;
-    if (e == system->entries)
-        return SD_FINE;
+    if (e == system->entries) {
+        if (rows_hold(rosenbrock))
+            return SD_FINE;
+        *error = INFINITY;
+        return SD_ERROR_TEST;
+    }
     for (e = 0; e < system->entries; e++)
         rosenbrock->g[e] = jy[e] + lead * jyd[e];
     if (sd_linear_factor(rosenbrock->linear, rosenbrock->g, rosenbrock->ivp.magnitude))
