@@ -56,7 +56,9 @@ class Rows:
         here, free = self.slopes(x), self.free[self.columns]
         aside = self.size * np.random.default_rng(1).uniform(0.5, 1.5, x.size)
         a, b = here[free], self.slopes(np.where(self.free, x + aside, x))[free]
-        if not (np.abs(a - b) <= ALIKE * np.maximum(np.abs(a), np.abs(b))).all():
+        with np.errstate(invalid="ignore"):  # a slope beyond the largest number is like none
+            alike = np.abs(a - b) <= ALIKE * np.maximum(np.abs(a), np.abs(b))
+        if not alike.all():
             return False
         return self._unmet(x, here, self.asked)
 

@@ -99,6 +99,11 @@ class Restart:
         moved &= self.state
         if same is not None and not moved.any():  # no state need jump: there is no impulse
             return *same, np.zeros(y.size), self._lives
+        # a switch that opens on a coil: the exponential law beside it bears its current, and no store jumps
+        if self.settler.system.form.scales and not quickly:
+            steep = self._search(t, y, yd, free=False)
+            if steep is not None and self._stays(steep[0], y, magnitude):
+                return *steep, np.zeros(y.size), True
         push = None
         if same is None or moved[self.settler.system.kinds == "q"].any():
             y, push = self.instant.displacements(t, y, yd, magnitude, sums=self.sums)
@@ -144,8 +149,8 @@ class Restart:
         """Magnitudes [number] of the first unknowns."""
         return lib.reader(self.settler.core.contents.scale, number).copy()
 
-    def _search(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
-        """The same as a start finds it: first with the state held, then with everything free."""
+    def _search(self, t: float, y: Floats, yd: Floats, *, free: bool = True) -> tuple[Floats, Floats] | None:
+        """The same as a start finds it: first with the state held, then (free) with everything free."""
         starter = Starter(self.settler.system.another("3"))
         starter.every &= ~starter.groups("initial")
         # nothing is known behind a jump by what was next to zero before it, rates least of all
@@ -155,7 +160,7 @@ class Restart:
         idle, state = np.zeros((2, guess.size), dtype=bool)
         idle[starter.n :] = np.isin(starter.rates, starter.system.idle_multipliers())
         guess[idle], state[: y.size] = 0.0, self.state
-        for held in (state, np.zeros_like(state)):
+        for held in (state, np.zeros_like(state))[: 1 + free]:
             found = behind(starter, t, guess, ~(idle | held))
             if found is not None:
                 return starter.expand(found)

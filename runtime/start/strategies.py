@@ -27,6 +27,10 @@ WALKED = 0.2
 """Share of the work of a search that walking down steep laws may take."""
 LEAST_PART = 1e-6
 """Of misses: less is not faded out at once."""
+BRACKETS = 10.0 ** np.arange(-6, 10)
+"""Of the size of an unknown: how far from where it is a row is looked at for another sign."""
+HALVINGS = 100
+"""More than a double has digits between two arguments of unlike size."""
 FOLLOWED, NEARLY = 12, 1e-4
 """Iterations in which Newton's method follows what fades, and the scaled residual at which it has."""
 
@@ -240,6 +244,67 @@ def _numbered(places: Ints, used: Mask) -> Ints:
     return (np.cumsum(used) - 1)[places]
 
 
+def _substituted(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """By Newton's method from where forward substitution leads: rows as written that read one unknown which is not
+    known yet determine it, one after another.  Behind a switch that opens on a coil the current of a diode is the
+    coil's, and its effort the one at which its law carries that, e = vT ln(1 + f/Is), however flat it is at the guess.
+    """
+    near, unknown = x.copy(), free & starter.following(t, x)
+    rows, multipliers = starter.settled.held  # which read "multiplier = 0"
+    stands = ~np.isin(starter.rows, rows) | np.isin(starter.columns, multipliers)
+    row, column = starter.rows[stands], starter.columns[stands]
+    left = _as_written(starter, t, x)
+    while True:
+        counts = np.bincount(row[unknown[column]], minlength=left.size)
+        places = np.flatnonzero((left & (counts == 1))[row] & unknown[column])
+        if not places.size:
+            break
+        at = places[0]
+        left[row[at]] = unknown[column[at]] = False
+        if (root := _root_of_row(starter, t, near, int(row[at]), int(column[at]))) is None:
+            return
+        near[column[at]] = root
+    if (near != x).any():
+        with starter.granted():
+            found = first(_newton(starter, t, near, guess, free), near)
+        yield found
+
+
+def _root_of_row(starter: Starter, t: float, x: Floats, row: int, column: int) -> float | None:
+    """Where a row is zero along one unknown, nearest to where that is: by bisection, for a law may be flat or beyond
+    the largest number on the way.  None where its sign does not change.
+    """
+    here, at = x.copy(), float(x[column])
+
+    def value(z: float) -> float:
+        here[column] = z
+        with np.errstate(all="ignore"):
+            return float(starter.residual(t, here)[row])
+
+    begun = value(at)
+    if begun == 0.0:
+        return at
+    size = max(float(starter.scale(t, x)[column]), abs(at))
+    for part in BRACKETS:
+        for low in (at + part * size, at - part * size):
+            if value(low) * begun <= 0.0:
+                return _bisected(value, low, at, begun)
+    return None
+
+
+def _bisected(value: Callable[[float], float], low: float, high: float, above: float) -> float:
+    """The zero between two arguments, with the value at `high`, to the last digit or HALVINGS of their distance."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        if value(middle) * above > 0.0:
+            high = middle
+        else:
+            low = middle
+    return low
+
+
 def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """Everything at once from points around: where a guess lies on a singular point."""
     for beside in around(starter, t, x, free):
@@ -298,6 +363,8 @@ def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
     """A point behind a jump at which all rows hold that must, from x; None where none was found.  A step of 10 V across
     a diode makes steep laws lie far behind it.
     """
-    ways = (way for _, way in applicable(starter, t, x) if way in (_newton, _walked, _led))
-    found, holds = first((found for way in ways for found in way(starter, t, x, x, free)), x)
+    some = {way for _, way in applicable(starter, t, x)}
+    ways = (way for way in (_newton, _substituted, _walked, _led, _between) if way is _substituted or way in some)
+    with np.errstate(all="ignore"):  # an exponential may be beyond the largest number on the way, where nothing holds
+        found, holds = first((found for way in ways for found in way(starter, t, x, x, free)), x)
     return found.x if holds else None
