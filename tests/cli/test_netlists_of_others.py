@@ -4,7 +4,7 @@ Values are ngspice's, at small steps (the largest step a thousandth of the span 
 """
 
 import json
-import time
+import sys
 
 import numpy as np
 import pytest
@@ -264,16 +264,25 @@ def test_limits_of_the_language_are_those_of_import(tmp_path, capsys):
         assert np.interp(10.5e-3, trace.time, trace[name].values) == pytest.approx(3.5 / 3 + 0.123456, rel=1e-6)
 
 
-def test_many_elements_take_time_in_proportion():
-    """40 000 elements took 50 s by a scan for names that stand twice; here 1.5 s."""
+def test_many_elements_take_work_in_proportion():
+    """A scan for names that stand twice took the square of their number (50 s of 40 000 elements; now 1.5 s)."""
 
-    def took(size):
-        source, begin = SourceText("n.cir", ladder(size)), time.process_time()
-        formatted(Writer(Reader(source, Report()).netlist, source, Report()).text())
-        return time.process_time() - begin
+    def calls(size):
+        source, count = SourceText("n.cir", ladder(size)), 0
 
-    took(1000)
-    assert took(20_000) < 30.0 * min(took(2000) for _ in range(3))
+        def count_them(frame, event, what):
+            nonlocal count
+            count += 1
+
+        sys.setprofile(count_them)
+        try:
+            formatted(Writer(Reader(source, Report()).netlist, source, Report()).text())
+        finally:
+            sys.setprofile(None)
+        return count
+
+    small = calls(500)  # and what is made once
+    assert calls(4000) - calls(2000) < 5 * (calls(1000) - small)
 
 
 @pytest.mark.parametrize("inside", [False, True])
