@@ -51,8 +51,9 @@ class Circuit:
 
 @dataclass(slots=True)
 class Netlist:
-    """All of a text.  initial: V by node, of `.ic`; tran: (step, stop, start) s; uic: initial conditions are used as
-    they are; temperature, nominal: K of the circuit and of its models; shared: nodes of `.global`.
+    """All of a text.  initial: V by node, of `.ic`; tran: (step or 0, stop, start) s; uic: initial conditions are used
+    as they are; temperature, nominal: K of the circuit and of its models; width, length: m, of a transistor that says
+    none; shared: nodes of `.global`.
     """
 
     title: str

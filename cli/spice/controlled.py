@@ -18,7 +18,7 @@ def controlled(kind: str, letter: str, unit: str, *, by_current: bool) -> Callab
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
         times, words = _times(words, scope, kind == "flow")
         size = 1 if by_current else 2
-        count, rest = (_order(words), words[5:]) if words[3] == "poly" else (1, words[3:])
+        count, rest = (_order(words), words[5:]) if words[3:4] == ("poly",) else (1, words[3:])
         controls, numbers = rest[: size * count], rest[size * count :]
         if "=" in words or any("=" in w for w in words) or len(controls) < size * count or not numbers:
             form = "VSOURCE GAIN" if by_current else "NC+ NC- GAIN"
@@ -28,7 +28,7 @@ def controlled(kind: str, letter: str, unit: str, *, by_current: bool) -> Callab
             for k in range(count)
         ]
         gains = [times * value(w, scope.known) for w in numbers]
-        if words[3] == "poly":
+        if words[3:4] == ("poly",):
             text = _polynomial(gains, read, "A" if by_current else "V", "V" if kind == "effort" else "A")
         elif len(gains) > 1:
             raise Unreadable(f"'{card.text[:60]}': '{numbers[1]}' behind the gain is not known")
@@ -48,6 +48,8 @@ def _times(words: tuple[str, ...], scope: Scope, parallel: bool) -> tuple[float,
 
 def _order(words: tuple[str, ...]) -> int:
     """How many quantities a polynomial reads."""
+    if len(words) < 5:
+        raise Unreadable("POLY without a number of controlling quantities")
     if not words[4].isdecimal() or not 0 < int(words[4][:6]) <= len(words):
         raise Unreadable(f"POLY({words[4]}): a number of controlling quantities is wanted")
     return int(words[4])

@@ -133,7 +133,9 @@ def _is_value(word: str) -> bool:
 def _passive(kind: str, letter: str, unit: str, state: str, state_unit: str) -> Callable[[Card, Scope], Element]:
     def element(card: Card, scope: Scope) -> Element:
         words = enough(card, 4)
-        amount, rest = (words[5], words[6:]) if words[3:5] == (letter.lower(), "=") else (words[3], words[4:])
+        named = words[3:5] == (letter.lower(), "=")
+        words = enough(card, 6) if named else words
+        amount, rest = (words[5], words[6:]) if named else (words[3], words[4:])
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
         said = details(rest, scope, areas=False)
         factor = said.heat(scope).resistance(

@@ -61,7 +61,7 @@ class Writer:
     def __init__(self, netlist: Netlist, source: SourceText, report: Report) -> None:
         self.netlist, self.source, self.report = netlist, source, report
         self.written = _Written()
-        step, end, _ = netlist.tran or (1e-3, 1.0, 0.0)
+        step, end, _ = netlist.tran or (0.0, 1.0, 0.0)
         self.asked = ("V", step, end)
         self.names: dict[Circuit, _Names] = {}
 
@@ -73,6 +73,9 @@ class Writer:
             self.report.error("E941", str(error), (error.card or self._any()).place)
             return ""
         self._tell_of_junctions(calls)
+        for node, (_, card) in self.netlist.initial.items():
+            if "." not in node and node not in calls.uses[self.netlist.top].nodes:
+                self.report.error("E941", f".ic of '{node}': there is no such node", card.place)
         library = {name for name, module in exported().items() if module == "electrical"}
         coils = max((len(_coils(circuit)) for circuit in calls.uses), default=0)
         given = Names(library.union(BUILTINS, LOCAL, (f"coils_{n}" for n in range(2, coils + 1))), "x_")
@@ -167,7 +170,7 @@ class Writer:
     def _held(self, cards: Iterable[Card], named: _Names) -> dict[str, str]:
         """By capacitor the line of `init` that `.ic` asks without UIC: a capacitor to ground holds the node."""
         held, rest = held_nodes(self.netlist.initial, cards)
-        for node in rest:
+        for node in (n for n in rest if n in named.nodes or "." in n):
             text = f".ic of '{node}': no capacitor from it to ground holds its voltage"
             self.report.error("E941", text, self.netlist.initial[node][1].place, help="UIC, and C... IC=")
         return {head: f"init {named.labels[head]}.e = {quantity(volt, 'V')}" for head, volt in held.items()}

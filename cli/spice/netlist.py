@@ -145,7 +145,7 @@ def _value(text: str, known: Mapping[str, float]) -> float:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of literals that are none: they are findings here
             tree = ast.parse(_SCALED.sub(written, plain.replace("^", "**")), mode="eval")
-        return _walk(tree.body, {**CONSTANTS, **known})
+        return _walk(tree.body, known)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise Unreadable(f"'{text}' is no number and no expression of parameters") from None
     except (ZeroDivisionError, OverflowError, TypeError):
@@ -156,9 +156,9 @@ def _walk(node: ast.AST, known: Mapping[str, float]) -> float:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         return float(node.value)
     if isinstance(node, ast.Name):
-        if node.id not in known:
+        if node.id not in known and node.id not in CONSTANTS:
             raise Unreadable(f"there is no parameter '{node.id}'")
-        return known[node.id]
+        return known[node.id] if node.id in known else CONSTANTS[node.id]
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
         return _OPERATORS[type(node.op)](_walk(node.left, known), _walk(node.right, known))
     if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:

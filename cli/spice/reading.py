@@ -29,8 +29,6 @@ probe ramptime reltol reltran savecurrents seed seedinfo sparse srcsteps trtol t
 """
 TOLERATED = frozenset(_OPTIONS.split())
 """Options of SPICE's solver and of its output: none of the circuit."""
-ROWS = 1000
-"""Rows of a trace whose step nobody gives."""
 
 
 class Reader:
@@ -81,6 +79,8 @@ class Reader:
             _enter(inside.models, plain[1], Model(plain[2], dict(pairs(plain[3:])), card))
         elif head == ".global":
             self.netlist.shared |= dict.fromkeys(words[1:])
+        elif head == ".ic" and inside is not self.netlist.top:
+            raise Unreadable("'.ic' inside a subcircuit: IC= at its capacitors, or '.ic v(x1.node)=...' outside")
         elif head in ASKED:
             self._asked.append(card)
         elif head in (".print", ".plot", ".save", ".probe"):
@@ -124,6 +124,7 @@ class Reader:
             netlist.known = evaluate(top.parameters, {})
         except Unreadable as error:
             self._refuse(error, next(iter(top.parameters.values())).card)
+            netlist.top = Circuit(top.name)  # nothing else is known then
             return
         for card in self._asked:
             try:
@@ -156,7 +157,7 @@ class Reader:
         if self.netlist.tran is not None:
             raise Unreadable("'.tran' stands here twice")
         start = times[2] if len(times) > 2 else 0.0
-        self.netlist.tran, self.netlist.uic = (step or end / ROWS, end, start), "uic" in words
+        self.netlist.tran, self.netlist.uic = (step, end, start), "uic" in words
 
     def _temperature(self, card: Card, known: Mapping[str, float]) -> None:
         """`.temp T`, in Celsius."""

@@ -9,7 +9,7 @@ from sysdyn.cli.spice.circuit import GROUND, Netlist
 from sysdyn.cli.spice.writing import quantity
 
 MOST, STEPS = 1e5, 1000
-"""Rows of a trace at most, and of one whose step would make more."""
+"""Rows of a trace at most, and of one whose step would make more or is not given."""
 SHOWN = 24
 """Nodes that are traced where nothing is asked."""
 
@@ -23,7 +23,7 @@ def scene(netlist: Netlist, model: str, nodes: Mapping[str, str], labels: Mappin
     traced = traced or [f"{n}.e as v_{_plain(word)}" for word, n in list(nodes.items())[:SHOWN]]
     yield f"scene tran of {model} {{"
     yield f"  time 0 s to {quantity(end, 's')}"
-    every = quantity(step if end / step <= MOST else end / STEPS, "s")
+    every = quantity(step if end <= MOST * step else end / STEPS, "s")
     if traced:
         yield f"  trace {', '.join(dict.fromkeys(traced))} every {every}"
     yield "}"

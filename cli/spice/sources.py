@@ -27,7 +27,9 @@ class Shape:
 EXACT = 1e-12
 """Share by which a sum of decimal times may be off; std.electrical's `pulse` grants it too."""
 Asked = tuple[str, float, float]
-"""Unit, step and end of `.tran`."""
+"""Unit, step (0 where none is given) and end of `.tran`."""
+STEEP = 1e-3
+"""Share of a pulse that an edge takes where neither it nor a step is given."""
 
 
 def _at(values: list[float], k: int, default: float) -> float:
@@ -74,7 +76,9 @@ def _pulse(v: list[float], asked: Asked) -> Shape:
     unit, step, end = asked
     _known(v, 7, "PULSE(V1 V2 TD TR TF PW PER)")
     low, high, delay = _at(v, 0, 0.0), _at(v, 1, 0.0), _at(v, 2, 0.0)
-    rise, fall, width = _at(v, 3, 0.0) or step, _at(v, 4, 0.0) or step, _at(v, 5, 0.0) or end
+    width = _at(v, 5, 0.0) or end
+    edge = step or STEEP * min(width, _at(v, 6, 0.0) or end, end)
+    rise, fall = _at(v, 3, 0.0) or edge, _at(v, 4, 0.0) or edge
     if not (rise > 0.0 and fall > 0.0 and width >= 0.0):
         raise Unreadable("PULSE: times of rising, falling and between them from 0 s on are wanted")
     whole = rise + width + fall

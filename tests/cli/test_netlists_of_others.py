@@ -110,6 +110,9 @@ CIRCUITS = {
         RC + ".op\n.ac dec 10 1 1k\n.tran 10u 5m\n.dc V1 0 1 0.1\n.four 1k v(out)\n.meas x max v(in)\n", CHARGING
     ),
     "a step of zero": (RC + ".tran 0 5m\n", CHARGING),
+    "a step of zero and steep edges": (
+        "V1 a 0 pulse(0 1 1u 0 0 4u 10u)\nR1 a 0 1k\n.tran 0 100m\n", {"v_a": {3e-6: 1.0, 8e-6: 0.0, 13e-6: 1.0}},
+    ),
     "AC and DC anywhere": (
         "V1 a 0 sin(0 1 1k) ac 1 dc 0\nR1 a b 1k\nC1 b 0 100n\nV2 c 0 ac 1 90 dc 2 pwl(0,0 1m,1)\nR2 c 0 1\n"
         "V3 d 0 ac 1 dc 3\nR3 d 0 1\nV4 (e 0) sin 0 1 50 ac 1\nR4 e 0 1\nV5 f 0 3 ac 1\nR5 f 0 1\n.tran 10u 2m\n",
@@ -195,6 +198,12 @@ def test_other_analyses_are_one_note(tmp_path, capsys):
         ("D1 a 0 d\n.model d d(is={x})", 4, "no parameter 'x'"),
         (".ic v(b)=1\nR2 a b 1k\n.tran 1u 1m", 3, "no capacitor"),
         (".ic a=1", 3, "V(NODE)"),
+        ("R1 a 0 r =", 3, "ends too early"),
+        ("G1 a 0 m = 2", 3, "expressions are not known"),
+        ("F1 a 0 poly m=2", 3, "POLY without"),
+        (".ic v(zz)=1\nC1 b 0 1u\n.tran 1u 1m uic", 3, "no such node"),
+        (".subckt s a\n.ic v(a)=1\n.ends", 4, "inside a subcircuit"),
+        ("V2 b 0 exp(0 1)\n.tran 0 1m", 3, "time constants"),
     ],
 )  # fmt: skip
 def test_what_would_be_another_circuit_is_refused_by_name(cards, line, said, tmp_path, capsys):
