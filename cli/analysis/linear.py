@@ -40,6 +40,8 @@ Input = tuple[str, tuple[int, ...]]
 _INPUT = re.compile(r"(.+?)(?:\[\s*(-?\d+(?:\s*,\s*-?\d+)*)\s*\])?")
 MOVING = 1e-9
 """Largest rate of a state, in its size a second, that counts as rest."""
+VELOCITIES, MOMENTA = ("m/s", "rad/s"), ("N.s", "N.m.s")
+"""Units of unknowns that tell that a body moves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +288,7 @@ def _reads_ledger(expression: object) -> bool:
 
 def _felt_moves(system: System, small: Reduced, found: Found) -> tuple[bool, bool]:
     """Whether the motion changes what the matrices say, and whether there is one that goes on steadily."""
-    state = found.state
+    state, lasting = found.state, _lasting(system, found)
     yd = state.yd.copy()
     yd[system.form.k_q] = state.y[system.form.k_f]
     rates = np.where(small.places >= 0, yd[small.places], 0.0)
@@ -294,4 +296,27 @@ def _felt_moves(system: System, small: Reduced, found: Found) -> tuple[bool, boo
     rates = np.where(np.abs(rates) > MOVING * size, rates, 0.0)
     changes = small.a @ rates
     felt = np.abs(changes) > MOVING * np.maximum(np.abs(small.a) @ np.abs(rates), 1e-300)
-    return bool(felt.any()), bool(rates.any() and not felt.any())
+    goes_on = rates[(small.places >= 0) & lasting[small.places]].any() or _rolls(system, found)
+    return bool(felt.any()), bool(goes_on and not felt.any())
+
+
+def _lasting(system: System, found: Found) -> NDArray[np.bool_]:
+    """Unknowns whose going on is a motion: states, and displacements that something depends on [unknowns as written].
+
+    Charges and volumes that pass through a circuit at rest are none.
+    """
+    tangible = {c.name for c in found.prepared.compiled.energies.coordinates if c.tangible}
+    families, kinds = system.description.families, system.kinds[: system.form.written]
+    owned = [families[int(k)].owner in tangible for k in system.family_of[: system.form.written]]
+    return np.asarray((kinds == "s") | np.array(owned, dtype=bool), dtype=bool)
+
+
+def _rolls(system: System, found: Found) -> bool:
+    """Whether a body has a velocity or a momentum, also where no position is an unknown: of a wheel that rolls."""
+    units = {c.name: (c.units, c.tangible) for c in found.prepared.compiled.energies.coordinates}
+    for k in np.flatnonzero(np.abs(found.state.y[: system.form.written]) > MOVING):
+        owner, kind = system.description.families[int(system.family_of[k])].owner, str(system.kinds[k])
+        known, tangible = units.get(owner, ({}, False))
+        if known.get(kind) in VELOCITIES or (known.get(kind) in MOMENTA and (tangible or kind == "p")):
+            return True
+    return False

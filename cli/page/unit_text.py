@@ -83,23 +83,26 @@ def _factor(tokens: list[re.Match[str]], k: int) -> tuple[Unit, int]:
     else:
         raise ValueError(operator)
     power, k = _power(tokens, k + 1)
-    if abs(power) > 30:
+    if not -30 <= power <= 30:
         raise ValueError("power")
-    return Unit(raised(unit.dimension, power), unit.scale**power, ""), k
+    scale = unit.scale**power if isinstance(power, int) else Fraction(float(unit.scale) ** float(power))
+    return Unit(raised(unit.dimension, power), scale, ""), k
 
 
-def _power(tokens: list[re.Match[str]], k: int) -> tuple[int, int]:
-    """`^2`, `**-1`, or a number that follows at once: `m2`, `s-1`."""
+def _power(tokens: list[re.Match[str]], k: int) -> tuple[int | Fraction, int]:
+    """`^2`, `**-1`, `^1.5`, `^1/3`, or a number that follows at once: `m2`, `s-1`."""
     if k < len(tokens) and tokens[k].group(3) in ("^", "**"):
         k += 1
         bracket = tokens[k].group(3) == "("
         k += bracket
         sign = -1 if tokens[k].group(3) == "-" else 1
         k += tokens[k].group(3) in ("+", "-")
-        power = sign * int(tokens[k].group(1) or "x")
+        power = sign * Fraction(tokens[k].group(1) or "x")
+        if k + 2 < len(tokens) and tokens[k + 1].group(3) == "/" and tokens[k + 2].group(1) in ("2", "3", "4"):
+            power, k = power / int(tokens[k + 2].group(1)), k + 2
         if bracket and tokens[k + 1].group(3) != ")":
             raise ValueError(")")
-        return power, k + 1 + bracket
+        return int(power) if power.denominator == 1 else power.limit_denominator(1000), k + 1 + bracket
     close = k < len(tokens) and tokens[k].start() == tokens[k - 1].end() and bool(tokens[k - 1].group(2))
     if close and tokens[k].group(1) and tokens[k].group(1).isdigit():
         return int(tokens[k].group(1)), k + 1

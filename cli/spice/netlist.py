@@ -7,7 +7,7 @@ import math
 import operator
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 
 from sysdyn.dsl.text.source import Place, SourceText
@@ -15,8 +15,12 @@ from sysdyn.values import dataclass
 
 SCALES = {
     "t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12, "f": 1e-15,
+    "\u00b5": 1e-6, "\u03bc": 1e-6,
 }  # fmt: skip
-_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)([a-z]*)", re.IGNORECASE)
+POWERS = {letters: round(math.log10(scale)) for letters, scale in SCALES.items() if letters != "mil"}
+_NUMBER = re.compile(
+    r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(meg|mil|[tgkmunpf\u00b5\u03bc])?[a-z\u03c9]*", re.IGNORECASE
+)
 _WORD = re.compile(r"\{[^{}]*\}|'[^']*'|[^\s(),={}']+|[(),=]")
 _SCALED = re.compile(r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(t|g|meg|k|mil|m|u|n|p|f)?[a-z]*(?![\w.(])")
 MOST = 400
@@ -24,7 +28,9 @@ MOST = 400
 
 
 class Unreadable(Exception):  # noqa: N818 (a finding)
-    """What a card says cannot be read; str: the reason."""
+    """What a card says cannot be read; str: the reason; card: where it stands, if not where it is read."""
+
+    card: Card | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,18 +57,35 @@ class Card:
 def cards(source: SourceText, *, titled: bool = True) -> tuple[str, list[Card]]:
     """The title (an included text has none) and the statements of a text; lines that begin with '+' go on."""
     joined: list[tuple[int, int, str]] = []
+    commands = False  # between .control and .endc stand the commands of another program
     for number in range(1 + titled, len(source.line_starts) + 1):
         line, start = source.line(number), source.line_starts[number - 1]
+        first = line.split(None, 1)[0].lower() if line.strip() else ""
+        if commands:
+            commands = first != ".endc"
+            continue
+        commands = first == ".control"
         plain = re.split(r";|\$\s|//", line, maxsplit=1)[0].rstrip()
         if not plain.strip() or plain.lstrip().startswith("*"):
             continue
         if plain.lstrip().startswith("+") and joined:
-            first, end, text = joined[-1]
-            joined[-1] = first, end, f"{text} {plain.lstrip()[1:]}"
+            begin, end, text = joined[-1]
+            joined[-1] = begin, end, f"{text} {plain.lstrip()[1:]}"
         else:
             joined.append((start + len(plain) - len(plain.lstrip()), start + len(plain), plain.strip()))
     found = [Card(tuple(w.lower() for w in _WORD.findall(text)), a, b, text, source) for a, b, text in joined]
     return source.line(1).strip(), [card for card in found if card.words]
+
+
+def pairs(words: Sequence[str]) -> list[tuple[str, str]]:
+    """`a = 1 b = 2` as pairs."""
+    plain = [w for w in words if w not in ("(", ")", ",")]
+    found = []
+    for k in range(0, len(plain), 3):
+        if k + 2 >= len(plain) or plain[k + 1] != "=":
+            raise Unreadable(f"'{plain[k]}': NAME=VALUE is wanted")
+        found.append((plain[k], plain[k + 2]))
+    return found
 
 
 def number(text: str) -> float | None:
@@ -70,17 +93,17 @@ def number(text: str) -> float | None:
     found = _NUMBER.fullmatch(text)
     if found is None:
         return None
-    suffix = found[2].lower()
-    scale = next((s for s in ("meg", "mil", *SCALES) if suffix.startswith(s)), "")
-    return scaled(found[1], scale)
+    return scaled(found[1], (found[2] or "").lower())
 
 
 def scaled(text: str, scale: str) -> float:
     """A number with the letters of a scale; one of ten as if it were written out, so that 0.1n is 1e-10."""
     if scale == "mil":
         return float(text) * SCALES[scale]
+    if not scale:
+        return float(text)
     digits, _, power = text.lower().partition("e")
-    return float(f"{digits}e{int(power or '0') + (round(math.log10(SCALES[scale])) if scale else 0)}")
+    return float(f"{digits}e{int(power or '0') + POWERS[scale]}")
 
 
 _OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
@@ -122,7 +145,7 @@ def _value(text: str, known: Mapping[str, float]) -> float:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of literals that are none: they are findings here
             tree = ast.parse(_SCALED.sub(written, plain.replace("^", "**")), mode="eval")
-        return _walk(tree.body, {**CONSTANTS, **known})
+        return _walk(tree.body, known)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise Unreadable(f"'{text}' is no number and no expression of parameters") from None
     except (ZeroDivisionError, OverflowError, TypeError):
@@ -133,9 +156,9 @@ def _walk(node: ast.AST, known: Mapping[str, float]) -> float:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         return float(node.value)
     if isinstance(node, ast.Name):
-        if node.id not in known:
+        if node.id not in known and node.id not in CONSTANTS:
             raise Unreadable(f"there is no parameter '{node.id}'")
-        return known[node.id]
+        return known[node.id] if node.id in known else CONSTANTS[node.id]
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
         return _OPERATORS[type(node.op)](_walk(node.left, known), _walk(node.right, known))
     if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:

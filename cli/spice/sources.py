@@ -1,6 +1,6 @@
 """Shapes of sources: what V and I are over time.
 
-A shape gives an expression of the language; PULSE and PWL of voltages are components of std.electrical.
+A shape gives an expression of the language; PULSE and PWL are components.
 """
 
 from __future__ import annotations
@@ -16,16 +16,20 @@ from sysdyn.values import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """expression: of the language; or component with its arguments; start: value at t = 0."""
+    """expression: of the language; or component with its arguments; local: one that std.electrical lacks."""
 
-    start: float
     expression: str = ""
     component: str = ""
     arguments: str = ""
+    local: bool = False
 
 
+EXACT = 1e-12
+"""Share by which a sum of decimal times may be off; std.electrical's `pulse` grants it too."""
 Asked = tuple[str, float, float]
-"""Unit, step and end of `.tran`."""
+"""Unit, step (0 where none is given) and end of `.tran`."""
+STEEP = 1e-3
+"""Share of a pulse that an edge takes where neither it nor a step is given."""
 
 
 def _at(values: list[float], k: int, default: float) -> float:
@@ -34,14 +38,21 @@ def _at(values: list[float], k: int, default: float) -> float:
 
 def direct(number: float, unit: str) -> Shape:
     """A constant."""
-    return Shape(number, quantity(number, unit))
+    return Shape(quantity(number, unit))
+
+
+def _known(v: list[float], most: int, form: str) -> None:
+    """No value behind those of a shape."""
+    if any(v[most:]):
+        raise Unreadable(f"{form}: a value more than these, {v[most]:g}, is not known")
 
 
 def _sine(v: list[float], asked: Asked) -> Shape:
     """SIN(VO VA FREQ TD THETA PHASE)."""
     unit, _, end = asked
+    _known(v, 6, "SIN(VO VA FREQ TD THETA PHASE)")
     offset, size = _at(v, 0, 0.0), _at(v, 1, 0.0)
-    rate, delay, damping, phase = _at(v, 2, 1.0 / end), _at(v, 3, 0.0), _at(v, 4, 0.0), _at(v, 5, 0.0)
+    rate, delay, damping, phase = _at(v, 2, 0.0) or 1.0 / end, _at(v, 3, 0.0), _at(v, 4, 0.0), _at(v, 5, 0.0)
     time = "t" if delay == 0.0 else f"(t - {quantity(delay, 's')})"
     angle = f"2*pi*{_held(quantity(rate, 'Hz'))}*{time}" + (f" + {plain(phase)}*pi/180" if phase else "")
     wave = f"{_held(quantity(size, unit))}*sin({angle})"
@@ -51,8 +62,8 @@ def _sine(v: list[float], asked: Asked) -> Shape:
     if delay > 0.0:
         still = quantity(offset + begin, unit)
         moving = wave if offset == 0.0 else f"{quantity(offset, unit)} + {wave}"
-        return Shape(offset + begin, f"if t < {quantity(delay, 's')} then {still} else {moving}")
-    return Shape(offset + begin, wave if offset == 0.0 else f"{quantity(offset, unit)} + {wave}")
+        return Shape(f"if t < {quantity(delay, 's')} then {still} else {moving}")
+    return Shape(wave if offset == 0.0 else f"{quantity(offset, unit)} + {wave}")
 
 
 def _held(text: str) -> str:
@@ -61,36 +72,45 @@ def _held(text: str) -> str:
 
 
 def _pulse(v: list[float], asked: Asked) -> Shape:
-    """PULSE(V1 V2 TD TR TF PW PER)."""
+    """PULSE(V1 V2 TD TR TF PW PER); a period shorter than its pulse begins again in the midst of it."""
     unit, step, end = asked
+    _known(v, 7, "PULSE(V1 V2 TD TR TF PW PER)")
     low, high, delay = _at(v, 0, 0.0), _at(v, 1, 0.0), _at(v, 2, 0.0)
-    rise, fall = _at(v, 3, 0.0) or step, _at(v, 4, 0.0) or step
-    width, period = _at(v, 5, 0.0) or end, _at(v, 6, 0.0) or max(end, 0.0) * 2.0 + rise + fall + _at(v, 5, 0.0)
-    period = max(period, rise + width + fall)
+    width = _at(v, 5, 0.0) or end
+    edge = step or STEEP * min(width, _at(v, 6, 0.0) or end, end)
+    rise, fall = _at(v, 3, 0.0) or edge, _at(v, 4, 0.0) or edge
+    if not (rise > 0.0 and fall > 0.0 and width >= 0.0):
+        raise Unreadable("PULSE: times of rising, falling and between them from 0 s on are wanted")
+    whole = rise + width + fall
+    period = _at(v, 6, 0.0) or 2.0 * end + whole
+    period = max(period, whole) if delay + period >= end else period
     s = {"rise": rise, "fall": fall, "width": width, "period": period, "delay": delay}
-    if unit == "V":
+    if unit == "V" and period >= whole * (1.0 - EXACT):
         times = ", ".join(f"{name} = {quantity(value, 's')}" for name, value in s.items() if value or name != "delay")
-        return Shape(low, "", "pulse", f"lo = {quantity(low, 'V')}, hi = {quantity(high, 'V')}, {times}")
+        return Shape("", "pulse", f"lo = {quantity(low, 'V')}, hi = {quantity(high, 'V')}, {times}")
     at = f"mod(t - {quantity(delay, 's')}, {quantity(period, 's')})"
-    down = f"({quantity(rise + width + fall, 's')} - {at})/({quantity(fall, 's')})"
+    down = f"({quantity(whole, 's')} - {at})/({quantity(fall, 's')})"
     shape = f"clip(min({at}/({quantity(rise, 's')}), {down}), 0, 1)"
-    whole = f"{quantity(low, unit)} + {_held(quantity(high - low, unit))}*{shape}"
-    return Shape(low, f"if t < {quantity(delay, 's')} then {quantity(low, unit)} else {whole}" if delay else whole)
+    moving = f"{quantity(low, unit)} + {_held(quantity(high - low, unit))}*{shape}"
+    return Shape(f"if t < {quantity(delay, 's')} then {quantity(low, unit)} else {moving}" if delay else moving)
 
 
 def _exponential(v: list[float], asked: Asked) -> Shape:
     """EXP(V1 V2 TD1 TAU1 TD2 TAU2)."""
     unit, step, _ = asked
+    _known(v, 6, "EXP(V1 V2 TD1 TAU1 TD2 TAU2)")
     low, high = _at(v, 0, 0.0), _at(v, 1, 0.0)
-    one, tau = _at(v, 2, 0.0), _at(v, 3, step)
-    two, fade = _at(v, 4, one + step), _at(v, 5, step)
+    one, tau = _at(v, 2, 0.0), _at(v, 3, 0.0) or step
+    two, fade = _at(v, 4, 0.0) or one + step, _at(v, 5, 0.0) or step
+    if not (tau > 0.0 and fade > 0.0):
+        raise Unreadable("EXP: time constants above 0 s are wanted")
     size = _held(quantity(high - low, unit))
 
     def side(delay: float, time: float, sign: str) -> str:
         behind = f"max(t - {quantity(delay, 's')}, 0 s)" if delay else "t"
         return f"{sign} {size}*(1 - exp(-{behind}/({quantity(time, 's')})))"
 
-    return Shape(low, f"{quantity(low, unit)} {side(one, tau, '+')} {side(two, fade, '-')}")
+    return Shape(f"{quantity(low, unit)} {side(one, tau, '+')} {side(two, fade, '-')}")
 
 
 def _lines(v: list[float], asked: Asked) -> Shape:
@@ -99,14 +119,9 @@ def _lines(v: list[float], asked: Asked) -> Shape:
     times, values = v[0::2], v[1::2]
     if len(times) != len(values) or len(times) < 2 or any(b <= a for a, b in pairwise(times)):
         raise Unreadable("PWL(T1 V1 T2 V2 ...): at least two points at ascending instants")
-    if unit == "V":
-        at = ", ".join(quantity(x, "s") for x in times)
-        levels = ", ".join(quantity(x, "V") for x in values)
-        return Shape(values[0], "", "piecewise_voltage", f"n = {len(times)}, at = [{at}], v = [{levels}]")
-    text = quantity(values[0], unit)
-    for a, b, x, y in zip(times, times[1:], values, values[1:], strict=False):
-        text += f" + {_held(quantity(y - x, unit))}*clip((t - {quantity(a, 's')})/({quantity(b - a, 's')}), 0, 1)"
-    return Shape(values[0], text)
+    kind, letter = ("piecewise_voltage", "v") if unit == "V" else ("piecewise_current", "i")
+    at, levels = (", ".join(quantity(x, u) for x in w) for w, u in ((times, "s"), (values, unit)))
+    return Shape("", kind, f"n = {len(times)}, at = [{at}], {letter} = [{levels}]", unit != "V")
 
 
 SHAPES: dict[str, Callable[[list[float], Asked], Shape]] = {

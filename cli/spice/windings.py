@@ -6,8 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 
-from sysdyn.cli.spice.circuit import pairs
-from sysdyn.cli.spice.devices import Element, Scope, enough, number_of
+from sysdyn.cli.spice.devices import Element, Scope, details, enough, number_of
 from sysdyn.cli.spice.netlist import Card, Unreadable, value
 from sysdyn.cli.spice.writing import plain, quantity
 
@@ -101,14 +100,15 @@ def coupled(card: Card, scope: Scope, cores: Cores) -> Element:
     place = {coil: k for k, coil in enumerate(names, 1)}
     for (i, j), k in sorted((sorted(place[coil] for coil in two), k) for two, k in strength.items()):
         given.append(f"{'k' if pair else f'k{i}_{j}'} = {plain(k)}")
-    ends, initial, currents = [], [], []
+    ends, initial, currents, left = [], [], [], list[str]()
     for k, words in enumerate(cards_of):
         branch = _branch(k, size)
         ends.append(f"{branch} = {scope.node(words[1])} -> {scope.node(words[2])}")
-        at = dict(pairs(words[4:])) if "=" in words[4:] else {}
-        currents.append(value(at.get("ic", "0"), scope.known))
-        said = f"f {'~' if whole else '='} {quantity(currents[-1], 'A')}" if scope.uic else "e = 0 V"
-        initial.append(f"init {name}.{branch}.{said}")
+        said = details(words[4:], scope, areas=False)
+        left += [*said.left(), *(n for n in ("m", "temp", "dtemp") if n in said.given)]
+        currents.append(said.number("ic", scope))
+        at = f"f {'~' if whole else '='} {quantity(currents[-1], 'A')}" if scope.uic else "e = 0 V"
+        initial.append(f"init {name}.{branch}.{at}")
     if scope.uic and whole and size == 2:
         sizes = [value(words[3], scope.known) for words in cards_of]
         mutual = next(iter(strength.values())) * math.sqrt(math.prod(sizes))
@@ -117,7 +117,7 @@ def coupled(card: Card, scope: Scope, cores: Cores) -> Element:
     kind = "coupled_inductors" if pair else f"coils_{size}"
     line = f"{name}: {kind}({', '.join(given)}) {', '.join(ends)}"
     uses, local = ((kind,), ()) if pair else ((), (kind,))
-    return Element((line,), uses, local, tuple(initial))
+    return Element((line,), uses, local, tuple(initial), tuple(dict.fromkeys(left)))
 
 
 def component(size: int) -> str:

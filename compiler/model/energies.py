@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
-from sysdyn.compiler.model.mirror import PRIMAL, Mirror
+from sysdyn.compiler.model.mirror import PRIMAL, Mirror, function_name, lettered
 from sysdyn.compiler.model.terms import Nest, Term, canonical, counter, local_variables, split, without_nested
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.dimensions import TIME
@@ -313,17 +313,26 @@ def tangible(model: EnergyModel) -> dict[str, Place]:
     return found
 
 
-def show(model: EnergyModel) -> str:
-    """The energy model as text, for --dump energies."""
-    lines = [f"coordinate {c.name}{_extent(c.shape)}{' tangible' if c.tangible else ''}" for c in model.coordinates]
+def show(model: EnergyModel, formulation: str = "lagrangian") -> str:
+    """The energy model as text in the letters of the formulation's family, for --dump energies.
+
+    What golden traces compare is in the letters of the reflection, which no release has changed.
+    """
+
+    def text(root: Node) -> str:
+        return repr(lettered(formulation, root))
+
+    kind = "cocoordinate" if formulation.startswith("co_") else "coordinate"
+    lines = [f"{kind} {c.name}{_extent(c.shape)}{' tangible' if c.tangible else ''}" for c in model.coordinates]
     lines += [f"implicit {u.name}{_extent(u.shape)}" for u in model.unknowns]
     lines += [f"state {s.name}{_extent(s.shape)}" for s in model.states]
     for name in model.functions:
-        lines += [f"{name} += {over(t.loops)}{t.expression!r}" for t in model.function(name)]
-    lines += [f"work {over(w.loops)}({w.effort!r}) on {w.on!r}" for w in model.works]
+        shown = function_name(formulation, name)
+        lines += [f"{shown} += {over(t.loops)}{text(t.expression)}" for t in model.function(name)]
+    lines += [f"work {over(w.loops)}({text(w.effort)}) on {text(w.on)}" for w in model.works]
     for row in model.rows:
         at = f"[{', '.join(map(repr, row.at))}]" if row.at else ""
-        body = " + ".join(f"{over(t.loops[len(row.nest) :])}({t.expression!r})" for t in row.terms) or "0"
+        body = " + ".join(f"{over(t.loops[len(row.nest) :])}({text(t.expression)})" for t in row.terms) or "0"
         lines.append(f"{row.kind} {row.name}{at}: {over(row.nest)}{body}")
     return "\n".join(lines) + "\n"
 

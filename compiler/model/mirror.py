@@ -37,6 +37,15 @@ def letter(formulation: str, kind: str) -> str:
     return _REFLECTED.get(kind, kind) if formulation.startswith("co_") else kind
 
 
+_FUNCTIONS = {"T*": "V*", "T": "V", "V": "T", "V*": "T*", "D": "G", "G": "D"}
+"""Names of state functions of the complementary family for those of the reflection."""
+
+
+def function_name(formulation: str, name: str) -> str:
+    """The name of a state function in its family: the T* of co_lagrangian's reflection is V*."""
+    return _FUNCTIONS.get(name, name) if formulation.startswith("co_") else name
+
+
 def spelled(formulation: str, name: str, kind: str) -> str:
     """A name with its family's letter: x.p of the reflection is x.q, law.e law.f."""
     own = formulation.startswith("co_") and kind in ("p", "e") and name.endswith(f".{kind}")

@@ -36,11 +36,7 @@ def format_expression(expr: s.Expr | s.Range) -> str:
 
 def format_unit(unit: s.Unit) -> str:
     """The canonical text of a unit: as written, without spaces."""
-    out = []
-    for number, factor in enumerate(unit.factors):
-        exponent = "" if factor.exponent == 1 else f"^{factor.exponent}"
-        out.append(("" if number == 0 else factor.op) + factor.name + exponent)
-    return "".join(out)
+    return unit.text
 
 
 def pieces(expr: s.Expr | s.Range) -> list[str]:

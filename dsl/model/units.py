@@ -152,7 +152,15 @@ def _rank(item: tuple[str, Fraction | int]) -> tuple[int, str]:
 def _factor(base: str, exponent: Fraction | int) -> str:
     if exponent == 1:
         return base
-    return f"{base}^{exponent}" if exponent.denominator == 1 else f"{base}^({exponent})"
+    return f"{base}^{exponent_text(exponent)}"
+
+
+def exponent_text(exponent: Fraction | int) -> str:
+    """As a unit has it: an integer, a decimal where it is one, thirds, else what the language cannot write."""
+    decimal = format(float(exponent), ".12g")
+    if Fraction(decimal) == exponent:
+        return decimal
+    return str(exponent) if exponent.denominator == 3 else f"({exponent})"
 
 
 def si(dimension: Dimension) -> Unit:

@@ -387,7 +387,16 @@ class Context:
         """What would make two dimensions agree (fitting.py); within: expressions of which the first has the dimension
         `have`, the second `want`; dynamic: the first is the rate of a state.
         """
-        return fitting.missing(Sight(self.scope, self.source, self.whole, dynamic), have, want, *within)
+        sight = Sight(self.scope, self.source, self.whole, dynamic)
+        upside_down = fitting.divided_default(sight, have, want, within)
+        if upside_down is None:
+            return fitting.missing(sight, have, want, *within)
+        parameter, number, quantity = upside_down
+        value, unit = quantity.split(None, 1)
+        message = f"'{parameter.name}' is in {dim.show(parameter.dimension)}, and is read as if it were in {unit}"
+        help_ = f"'{number}/{quantity}' divides by {quantity}; '({number}/{value})*1 {unit}' is that part of a unit"
+        self.report.error("E207", message, parameter.place, help=help_, subject=f"unit of {parameter.name}")
+        return f"'{parameter.name}' is the cause, see there"
 
     def bare(self, expression: syntax.Expr) -> str | None:
         """The name of the one parameter among the factors of an expression that is a bare number."""

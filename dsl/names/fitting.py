@@ -10,7 +10,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension, known, multiply, si_text
 from sysdyn.dsl.names import habits
-from sysdyn.dsl.names.symbols import ParameterSymbol, Scope, UnknownSymbol
+from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Scope, UnknownSymbol
 from sysdyn.dsl.text.source import SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.dsl.tree.walking import children
@@ -108,6 +108,39 @@ def _by_quantities(sight: Sight, have: Dimension, want: Dimension, within: Seque
         off[k] = multiply(multiply(off[k], own), other)
         said = said or f"'{fraction} {unit}' divides by {by.text} {unit}; {part}"
     return said if found and off[0] == off[1] else None
+
+
+def divided_default(
+    sight: Sight, have: Dimension | None, want: Dimension | None, within: Sequence[syntax.Expr]
+) -> tuple[ParameterSymbol, str, str] | None:
+    """A parameter among what is read whose default divides a number by a quantity, `1/12 kg.m^2`, where dimensions
+    would agree if it were that part of the unit; the number and the quantity.
+    """
+    if have is None or want is None:
+        return None
+    factor = dim.quotient(want, have)
+    stack: list[object] = list(within)
+    lets: set[str] = set()
+    while stack:
+        e = stack.pop()
+        symbol = sight.scope.find(e.name) if isinstance(e, syntax.Name) else None
+        if isinstance(symbol, Definition) and symbol.kind == "let" and symbol.name not in lets:
+            lets.add(symbol.name)
+            stack.append(symbol.expression)
+        elif isinstance(symbol, ParameterSymbol) and symbol.dimension and not symbol.shape:
+            twice = multiply(symbol.dimension, symbol.dimension)
+            place = symbol.place
+            found = _DIVIDED.match(place.source.text, place.span.end)
+            if found and factor in (twice, dim.quotient(NONE, twice)):
+                return symbol, found[1], found[2]
+        else:
+            stack += children(e)
+    return None
+
+
+_DIVIDED = re.compile(
+    r"[ \t]*=[ \t]*([0-9][\w.]*)[ \t]*/[ \t]*([0-9][\w.]*[ \t]+[^\W\d][^\s#;}]*)[ \t]*(?=[#;}\r\n]|$)"
+)
 
 
 def _dimension(unit: syntax.Unit) -> Dimension | None:

@@ -50,12 +50,13 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, b
             return None
         power = factor.exponent if factor.op == "." else -factor.exponent
         dimension = multiply(dimension, found[0], power)
-        if abs(power) > 100:
+        if not -100 <= power <= 100:
             report.error(
                 "E201", f"the exponent {factor.exponent} of a unit is out of reason", Place(source, factor.span)
             )
             return None
-        scale *= found[1] ** power
+        # a fractional power of a scale is as exact as a double
+        scale *= found[1] ** power if isinstance(power, int) else Fraction(float(found[1]) ** float(power))
     solved = any(factor.name.startswith("$") for factor in unit.factors)  # what the instance has made of $u
     return Unit(dimension, scale, si_text(dimension) if solved else unit.text)
 

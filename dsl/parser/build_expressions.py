@@ -7,6 +7,7 @@ and the `Notes` for findings.
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from sysdyn.dsl.parser.notes import Notes
@@ -157,6 +158,9 @@ def array(v: Values, span: Span, notes: Notes) -> s.Array:
     return s.Array(items, span)
 
 
+_FRACTION = re.compile(r"\^(-?[0-9]+/[0-9]+)$")
+
+
 def negative_number(v: Values, span: Span, notes: Notes) -> s.Number:
     """`- NUMBER`."""
     return s.Number(-v[0].value, "-" + v[0].text, span)
@@ -164,9 +168,18 @@ def negative_number(v: Values, span: Span, notes: Notes) -> s.Number:
 
 def unit(v: Values, span: Span, notes: Notes) -> s.Unit:
     """`unit_factor ((DOT | SLASH) unit_factor)*`."""
-    factors = [v[0]]
-    for sign, factor in zip(v[1::2], v[2::2], strict=True):
-        factors.append(s.UnitFactor(factor.name, factor.exponent, sign, factor.span))
+    factors: list[s.UnitFactor] = []
+    for sign, factor in zip((".", *v[1::2]), v[0::2], strict=True):
+        if factor.name[0].isdecimal() and factor.name != "1":
+            last = factors.pop() if factors else factor
+            whole = Span(last.span.start, factor.span.end)
+            power = _FRACTION.search("".join(notes.source.text[whole.start : whole.end].split()))
+            if power is None:
+                notes.error("E113", f"a unit has no number {factor.name} in it; only 1 stands for none", factor.span)
+            exponent = last.exponent if power is None else notes.exponent(power[1], whole)
+            factors.append(s.UnitFactor(last.name, exponent, last.op, whole))
+        else:
+            factors.append(s.UnitFactor(factor.name, factor.exponent, sign, factor.span))
     text = "".join(notes.source.text[span.start : span.end].split())
     return s.Unit(tuple(factors), text, span)
 
@@ -184,10 +197,8 @@ def unit_variable(v: Values, span: Span, notes: Notes) -> s.UnitFactor:
 
 
 def unit_one(v: Values, span: Span, notes: Notes) -> s.UnitFactor:
-    """`NUMBER`."""
-    if v[0].text != "1":
-        notes.error("E113", f"a unit has no number {v[0].text} in it; only 1 stands for none", span)
-    return s.UnitFactor("1", 1, ".", span)
+    """`NUMBER`: 1, or the denominator of an exponent, which the unit knows."""
+    return s.UnitFactor(v[0].text, 1, ".", span)
 
 
 def domain_name(v: Values, span: Span, notes: Notes) -> s.Word:

@@ -8,11 +8,15 @@ import unicodedata
 from sysdyn.dsl.model.unit_habits import PREFIXED, TIMES_TIME, UNGROUPED, chained, grouped, respelled, scaled
 from sysdyn.dsl.model.units import known
 from sysdyn.dsl.parser.complaints import Complaint
+from sysdyn.dsl.parser.lexing import EXPONENT
 from sysdyn.dsl.text.source import Span
 from sysdyn.values import dataclass
 
 _DIGITS_BEFORE = re.compile(r"(?<!\w)[0-9]+$")
-_UNIT = re.compile(r"[^\W\d]\w*(?:\^-?[0-9]+)?(?:[./][^\W\d]\w*(?:\^-?[0-9]+)?)*")
+_FACTOR = rf"[^\W\d]\w*(?:\^{EXPONENT})?"
+_UNIT = re.compile(rf"{_FACTOR}(?:[./]{_FACTOR})*")
+_POWER = re.compile(EXPONENT)
+_GROUPED = re.compile(r"\(([^()\r\n]*)\)")
 _DIGITS = re.compile(r"[0-9]+")
 _ARGUMENT = re.compile(r"[(,)]\s*\w+\s*=[^=,()]*[^=,()\s]\s*$")
 _NAMED = re.compile(r"\s*=(?!=)")
@@ -104,6 +108,10 @@ def _known_sign(text: str, span: Span, kind: str, line: str) -> Slip | None:
         return Slip(("E113", f"'/{sign}': a remark is no part of a statement", "a comment begins with '#'"))
     if sign == "*" and line.endswith("*"):
         return Slip(("E113", "'**': a power is written with '^'", "a^b"), "^", Span(span.start - 1, span.end))
+    grouped_ = _GROUPED.match(text, span.start) if sign == "(" and line.endswith("^") else None
+    if grouped_ is not None:  # of a declared unit; one of a quantity is read with it
+        meant = f"^{grouped_.group(1)}" if _POWER.fullmatch(grouped_.group(1)) else "^2, ^1.5 or ^1/3"
+        return Slip(("E115", "the exponent of a unit stands without parentheses", meant))
     found = _element_slip(text, span, line)
     if found is not None:
         return Slip(found)

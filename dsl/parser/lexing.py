@@ -32,7 +32,11 @@ NAME = r"[^\W\d]\w*+"
 COMMENT = r"#[^\r\n]*+"
 TEXT = r"\"[^\"\r\n]*+\""
 BLANK = r"[ \t]"
-_FACTOR = rf"{NAME}(?:\^-?[0-9]++)?"
+EXPONENT = r"-?(?:(?:[13579]/[24]|[124578]/3)(?![\w.])|[0-9]++(?:\.[0-9]++)?)"
+"""Of a unit: an integer, a decimal, or a fraction in lowest terms, for `4 m^4/2` is half of `4 m^4`.  What stands in
+parentheses directly behind the `^` of a unit is taken for one too, and refused (E115).
+"""
+_FACTOR = rf"{NAME}(?:\^(?:{EXPONENT}|\([^()\r\n]*+\)))?"
 _TOKEN = re.compile(
     rf"{BLANK}*+(?:({NAME})|({_NUMBER})|(;|[\r\n][ \t\r\n]*+)|({COMMENT})|({TEXT})"
     r"|(->|:=|==|!=|<=|>=|\.\.|[-+*/^=<>~:,.()\[\]{}'$]))"

@@ -10,7 +10,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import field
+from fractions import Fraction
 
+from sysdyn.dsl.model.units import exponent_text
+from sysdyn.dsl.parser.lexing import EXPONENT
 from sysdyn.dsl.text.diagnostics import Edit, Report
 from sysdyn.dsl.text.source import SourceText, Span
 from sysdyn.dsl.tree.syntax import Decl, Number, Quantity, Unit, UnitFactor, Word
@@ -20,7 +23,10 @@ PREDEFINED = frozenset({"t", "pi", "ground", "audit"})
 """Names that every model has and none may declare."""
 
 MAX_TERMS = 50_000
-_FACTOR = re.compile(r"([./]?)([^\W\d]\w*)(?:\^(-?[0-9]+))?")
+_FACTOR = re.compile(rf"([./]?)([^\W\d]\w*)(?:\^({EXPONENT}|\([^()]*\)))?")
+_EXPONENT = re.compile(EXPONENT)
+_GROUPED = re.compile(r"([-+]?[0-9]{1,2}(?:\.[0-9]{1,3})?)(?:/([1-9][0-9]?))?")
+_WHOLE = "a number, as in m^2, m^1.5 or m^1/3; for a power of the quantity parentheses around it: (2 m)^(n)"
 
 
 @dataclass(slots=True)
@@ -71,20 +77,35 @@ class Notes:
         for match in _FACTOR.finditer(text):
             start = span.start + match.start(2)
             place = Span(start, span.start + match.end())
-            power = 1 if match.group(3) is None else self.exponent(match.group(3), place)
+            written = match.group(3) or "1"
+            power = self._grouped(written, place, span) if written[0] == "(" else self.exponent(written, place)
             factors.append(UnitFactor(match.group(2), power, match.group(1) or ".", place))
         return Unit(tuple(factors), text, span)
 
-    def exponent(self, text: str, span: Span) -> int:
-        """The exponent of a unit: an integer of one or two digits."""
-        digits = text.lstrip("-")
-        if not digits.isdigit():
-            self.error("E113", f"the exponent of a unit is an integer, not {_short(text)}", span)
+    def exponent(self, text: str, span: Span) -> int | Fraction:
+        """The exponent of a unit: an integer of one or two digits, a decimal or a fraction."""
+        if not _EXPONENT.fullmatch(text):
+            message = f"the exponent of a unit is an integer, a decimal or a fraction such as 1/2, not {_short(text)}"
+            self.error("E113", message, span)
             return 1
-        if len(digits) > 2:
+        if len(text.lstrip("-").partition(".")[0]) > 3 or abs(Fraction(text)) > 99:
             self.error("E113", f"the exponent {_short(text)} of a unit is out of range: -99 to 99", span)
             return 1
-        return int(text)
+        exact = Fraction(text).limit_denominator(1000)
+        return int(exact) if exact.denominator == 1 else exact
+
+    def _grouped(self, written: str, place: Span, unit: Span) -> int | Fraction:
+        """E115: an exponent in parentheses, which others would read as one of the whole quantity."""
+        text, inner = self.source.text[unit.start : unit.end], "".join(written[1:-1].split())
+        found = _GROUPED.fullmatch(inner)
+        exact = Fraction(found[1]) / int(found[2] or 1) if found else Fraction(1)
+        power = int(exact) if exact.denominator == 1 else exact
+        meant = text.replace(f"^{written}", f"^{exponent_text(power)}" if power != 1 else "")
+        help_ = f"write '{meant}', or parentheses around the whole quantity whose power is meant"
+        certain = found is not None and _EXPONENT.fullmatch(exponent_text(power)) is not None
+        message = f"the exponent of a unit stands without parentheses, in {_short(text)}"
+        self.error("E115", message, place, help_ if certain else _WHOLE, (unit, meant) if certain else None)
+        return power
 
     def _value(self, text: str, span: Span) -> float:
         """The double nearest to a number's text."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 from sysdyn.dsl.text.source import Span
 from sysdyn.values import dataclass
 
@@ -247,7 +249,7 @@ class UnitFactor:
     """One factor of a unit; op `.` or `/` (the first is `.`); `$u` is a unit variable, `1` is one."""
 
     name: str
-    exponent: int
+    exponent: int | Fraction
     op: str
     span: Span
 

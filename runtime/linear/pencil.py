@@ -10,6 +10,7 @@ from inputs alone.  With S = [E V, A W]^-1 the pencil falls apart (Berger, Ilchm
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,18 +128,29 @@ def parted(
     row, _ = factors(np.hstack([e @ v, a @ w]))
     s = np.linalg.inv(row[:, None] * np.hstack([e @ v, a @ w])) * row
     k = v.shape[1]
-    m, n = (s @ a @ v)[:k], (s @ e @ w)[k:]
-    b1, b2 = (s @ b)[:k], (s @ b)[k:]
+    m, n = (s @ a @ v)[:k], _product(s, e, w)[k:]
+    b1, b2 = (s @ b)[:k], _product(s, b)[k:]
     turn = v[chosen]
     back = np.linalg.inv(turn)
     # x2 = follow[0] u + follow[1] u' + follow[2] u'';  x' = v x1' + w x2'
     follow = [-b2, -n @ b2, -n @ n @ b2]
-    c1, c2, c2d = c @ v + cd @ v @ m, c @ w, cd @ w
+    c1, c2, c2d = c @ v + cd @ v @ m, _product(c, w), _product(cd, w)
     d0 = d + c2 @ follow[0] + cd @ v @ b1
     d1 = c2 @ follow[1] + c2d @ follow[0]
     d2 = c2 @ follow[2] + c2d @ follow[1]
     small = (_clean(part) for part in (turn @ m @ back, turn @ b1, c1 @ back, d0, d1, d2))
     return Reduced(next(small), next(small), next(small), next(small), next(small), next(small), chosen, names)
+
+
+def _product(*factors: Floats) -> Floats:
+    """Of matrices, without entries that are round-off of what cancels in them."""
+    size = np.linalg.multi_dot([np.abs(part) for part in factors])
+    return np.asarray(_cleared(np.linalg.multi_dot(factors), size, 1e-13))
+
+
+def _cleared(found: Any, size: Any, noise: float) -> Any:
+    """Zero where an entry is round-off beside the magnitudes that it is made of."""
+    return np.where(np.abs(found) > noise * size, found, 0 * found)
 
 
 def _turned(spaces: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
@@ -252,11 +264,22 @@ def _parted_widely(matrices: tuple[Floats, ...], chosen: Choice) -> tuple[precis
     inverse = precise.wide(np.eye(n))
     for _ in range(DEEPEST):
         inverse = precise.wide(np.eye(n)) - shift * (nilpotent @ inverse)
-    follow = [-(inverse @ still @ nu)]
+    # magnitudes of what cancels: what is zero but for round-off differentiates no input
+    of_still = np.abs(precise.wide(np.eye(n))) + np.abs(x) @ np.abs(left)
+    sizes = [np.abs(inverse) @ of_still @ np.abs(nu)]
+    follow = [_cleared(-(inverse @ still @ nu), sizes[0], precise.NOTHING)]
     for _ in range(2):
-        follow.append(inverse @ nilpotent @ follow[-1])
+        sizes.append(np.abs(inverse) @ of_still @ np.abs(m) @ sizes[-1])
+        follow.append(_cleared(inverse @ nilpotent @ follow[-1], sizes[-1], precise.NOTHING))
     d0 = d + c @ follow[0] + cd @ x @ b1
-    d1, d2 = (c @ follow[k] + cd @ follow[k - 1] for k in (1, 2))
+    d1, d2 = (
+        _cleared(
+            c @ follow[k] + cd @ follow[k - 1],
+            np.abs(c) @ sizes[k] + np.abs(cd) @ sizes[k - 1],
+            precise.NOTHING,
+        )
+        for k in (1, 2)
+    )
     return own, b1, c @ x + cd @ x @ own, d0, d1, d2
 
 

@@ -215,12 +215,18 @@ def decompose(matrix: Wide) -> Decomposed:
             values_, vectors = np.linalg.eig(narrow(matrix))
             return Decomposed(values_.astype(complex), vectors.astype(complex), np.linalg.pinv(vectors).astype(complex))
         largest = max((abs(x) for x in matrix.ravel()), default=mpmath.mpf(0))
-        values = [v if abs(v) > ZERO * largest else mpmath.mpf(0) for v in found]
+        values = [_rounded(mpmath.mpc(v)) if abs(v) > ZERO * largest else 0j for v in found]
         return Decomposed(
-            np.array([complex(v) for v in values]),
+            np.array(values, dtype=np.complex128),
             np.array([complex(x) for x in right]).reshape(right.rows, right.cols),
             np.array([complex(x) for x in left]).reshape(left.rows, left.cols),
         )
+
+
+def _rounded(value: Any) -> complex:
+    """An eigenvalue in double precision, a part that is round-off of the other zero."""
+    least = ZERO * abs(value)
+    return complex(*(part if abs(part) > least else 0.0 for part in (value.real, value.imag)))
 
 
 def apart(one: Values, other: Values) -> NDArray[np.float64]:

@@ -249,8 +249,8 @@ def test_a_transistor_joined_to_a_diode(kind, tmp_path, capsys):
     code, found, out = imported(path, tmp_path, capsys)
     assert code == 0, found["diagnostics"]
     trace = simulate(out, scene="tran", accuracy=1e-7, output=tmp_path / "t.h5")
-    v = abs(np.asarray(trace["v_a"])[-1])
-    assert (5.0 - v) / 1e3 == pytest.approx(1e-14 * 1.01 * math.expm1(v / 0.025864186), rel=1e-4)
+    v, volt = abs(np.asarray(trace["v_a"])[-1]), 1.380649e-23 * 300.15 / 1.602176634e-19
+    assert (5.0 - v) / 1e3 == pytest.approx(1e-14 * 1.01 * math.expm1(v / volt), rel=1e-4)
 
 
 def test_what_is_left_out_is_said(tmp_path, capsys):

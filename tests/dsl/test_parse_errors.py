@@ -50,6 +50,8 @@ def test_what_a_file_holds_hides_no_predefined_name(text, name):
     assert [d.code for d in parse(source)[1]] == ["E108"]
 
 
+OF_ALL = "or parentheses around the whole quantity whose power is meant"
+NUMBERS = "a number, as in m^2, m^1.5 or m^1/3; for a power of the quantity parentheses around it: (2 m)^(n)"
 CASES = [
     ("time 0 s to 4 s", "E107", 3, "'time' belongs in a scene, not in a model", None),
     ("trace x", "E107", 3, "'trace' belongs in a scene", None),
@@ -94,9 +96,17 @@ CASES = [
     ("coord x", "E113", 10, "expected", None),
     ("when x = 3 { g := 1 }", "E113", 10, "'=' defines", "=="),
     ("when x > 3 { g = 1 }", "E113", 18, "an action assigns with ':='", ":="),
-    ("let y = 3 m^2.5", "E113", 16, "found '.'", None),
+    ("let y = 3 m^2.5.5", "E113", 18, "found '.'", None),
+    ("let y = 3 m^(-2)/s", "E115", 13, "without parentheses, in 'm^(-2)/s'", f"write 'm^-2/s', {OF_ALL}"),
+    ("let y = 3 N/m^(3/2)", "E115", 15, "without parentheses", f"write 'N/m^1.5', {OF_ALL}"),
+    ("let y = 2 kg.m^(4/2)", "E115", 16, "without parentheses", f"write 'kg.m^2', {OF_ALL}"),
+    ("let y = 3 m^(before)", "E115", 13, "without parentheses", NUMBERS),
+    ("param y: m^(2) = 3 m^2", "E115", 14, "without parentheses", "^2"),
+    ("param y: m^(n) = 3 m^2", "E115", 14, "without parentheses", "^2, ^1.5 or ^1/3"),
     ("param y: m^123 = 1", "E113", 14, "out of range", None),
-    ("param y: m^1.5 = 1", "E113", 14, "integer", None),
+    ("param y: m^1/7 = 1", "E113", 12, "an integer, a decimal or a fraction", None),
+    ("param y: m^4/2 = 1", "E113", 12, "an integer, a decimal or a fraction", None),
+    ("param y: m/2 = 1", "E113", 14, "no number 2", None),
     ("param y: 2 = 1", "E113", 12, "no number 2", None),
     ("let y = norm(i in 1..3: x[i])", "E113", 11, "'norm' does not run over an index", "sum"),
     ("C1.e = 0 V", "E113", 3, "no statement begins with 'C1.e'", "init C1.e = ... where it begins"),

@@ -1,5 +1,7 @@
 """What tree a text is: each kind of node by hand, part for part, so that no two of its parts can change places."""
 
+from fractions import Fraction
+
 import pytest
 from sysdyn.dsl.parser import build_expressions, build_scenes, build_statements
 from sysdyn.dsl.parser.notes import Notes
@@ -230,21 +232,23 @@ def test_only_four_operations_run_over_an_index():
     [
         ("-12", -12, None),
         ("100", 1, "the exponent '100' of a unit is out of range: -99 to 99"),
-        ("1.5", 1, "the exponent of a unit is an integer, not '1.5'"),
+        ("1.5", Fraction(3, 2), None),
+        ("-2.0", -2, None),
+        ("1.2345678", Fraction(100, 81), None),  # as exact as an exponent of a quantity
     ],
 )
-def test_exponents_of_units_are_small_integers(power, made, message):
+def test_exponents_of_units_are_small_numbers(power, made, message):
     factor, found = told(build_expressions.unit_variable, [e.Word("u", AT), e.Number(0.0, power, Span(2, 5))])
     assert (factor.name, factor.exponent) == ("$u", made)
     assert [(code, text, at) for code, text, _, at in found] == ([] if message is None else [("E113", message, "234")])
 
 
 def test_a_unit_has_no_number_but_one():
-    assert told(build_expressions.unit_one, [num("1")])[1] == []
-    factor, found = told(build_expressions.unit_one, [num("2")], "2")
-    assert (factor.name, [f[:2] for f in found]) == (
-        "1", [("E113", "a unit has no number 2 in it; only 1 stands for none")]
-    )  # fmt: skip
+    one, found = told(build_expressions.unit_one, [num("1")])
+    assert (one.name, told(build_expressions.unit, [one])[1]) == ("1", [])
+    two, _ = told(build_expressions.unit_one, [num("2")], "2")
+    _, found = told(build_expressions.unit, [two], "2")
+    assert [f[:2] for f in found] == [("E113", "a unit has no number 2 in it; only 1 stands for none")]
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ def command(console: Console, folder: str | None, dump: str | None, explain: boo
             stages = {
                 "reflected": lambda: network_text.show(made.lettered(made.family)),
                 "coordinates": lambda: network_text.show(made.lettered(made.network)),
-                "energies": lambda: energies.show(prepared.compiled.energies),
+                "energies": lambda: energies.show(prepared.compiled.energies, prepared.formulation),
                 "descriptor": lambda: descriptor.show(prepared.compiled.form),
                 "program": lambda: program_text.show(prepared.compiled.program),
             }

@@ -8,9 +8,9 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.spice.circuit import Reader
 from sysdyn.cli.spice.model_text import Writer
-from sysdyn.dsl.format.format import format_text
+from sysdyn.cli.spice.reading import Reader
+from sysdyn.cli.spice.writing import formatted
 from sysdyn.dsl.text.decoding import decode
 from sysdyn.dsl.text.diagnostics import SourceText
 
@@ -21,8 +21,9 @@ from sysdyn.dsl.text.diagnostics import SourceText
 def command(console: Console, file: str, output: str | None) -> int:
     """Write the SPICE netlist FILE as a model text: components for subcircuits, a scene for .tran.
 
-    R, C, L, K, V, I (DC, SIN, PULSE, PWL, EXP), D, Q, M of level 1, E, F, G, H, X; .param, .model, .subckt, .ic, and
-    .include of its own folder. What cannot be said is an error with its line; what a model has beyond it a warning.
+    R, C, L, K, V, I (DC, SIN, PULSE, PWL, EXP), D, Q and M of level 1, E, F, G, H (POLY too), X; .param, .model,
+    .subckt, .global, .ic, .temp, .options, and .include of its own folder. What cannot be said is an error with its
+    line; what a model has beyond it a warning.
     """
     output = None if output == "-" else output
     if output is not None and not output.endswith(".sd"):
@@ -32,7 +33,7 @@ def command(console: Console, file: str, output: str | None) -> int:
     text = Writer(reader.netlist, source, console.report).text()
     if console.report.failed:
         return console.finish(1)
-    text = format_text(text)
+    text = formatted(text)
     console.result = {"text": text, "output": output}
     if output is None:
         console.data(text, verbatim=True)

@@ -1,0 +1,69 @@
+"""Parameters of circuits: texts whose values depend on each other, in any order."""
+
+from __future__ import annotations
+
+import re
+from collections import ChainMap
+from collections.abc import Collection, Mapping
+
+from sysdyn.cli.spice.netlist import Card, Unreadable, value
+from sysdyn.values import dataclass
+
+_NAME = re.compile(r"(?<![\w.])[a-z_]\w*")
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """The text of a value and the card that gives it."""
+
+    text: str
+    card: Card
+
+
+def read(text: str) -> list[str]:
+    """Names that stand in a text."""
+    return _NAME.findall(text)
+
+
+def evaluate(
+    said: Mapping[str, Parameter], outer: Mapping[str, float], given: Mapping[str, float] | None = None
+) -> dict[str, float]:
+    """Values by name; outer: what is known around; given: values that replace texts.  Unreadable, with its card.
+
+    A name in its own text is the one around, as in `r={r}`.
+    """
+    found = dict(given or {})
+    around = ChainMap(found, dict(outer))
+    for first in said:
+        way, on = [first], {first}
+        while way:
+            name = way[-1]
+            needed = () if name in found else _missing(said, found, name)
+            if needed:
+                if needed[0] in on:
+                    raise _at(said[name].card, f"the parameter '{needed[0]}' depends on itself")
+                way.append(needed[0])
+                on.add(needed[0])
+                continue
+            if name not in found:
+                found[name] = _value(said[name], around)
+            on.discard(way.pop())
+    return found
+
+
+def _missing(said: Mapping[str, Parameter], found: Collection[str], name: str) -> list[str]:
+    """What a parameter reads of its own circuit that has no value yet."""
+    return [n for n in read(said[name].text) if n in said and n not in found and n != name]
+
+
+def _value(parameter: Parameter, known: Mapping[str, float]) -> float:
+    try:
+        return value(parameter.text, known)
+    except Unreadable as error:
+        raise _at(parameter.card, str(error)) from None
+
+
+def _at(card: Card, reason: str) -> Unreadable:
+    error = Unreadable(reason)
+    error.card = card
+    return error
