@@ -12,6 +12,7 @@ from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Action, Event, Switch
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.events.plan import Assignment, Condition, Contact, Happened, Kink, Plan, Relation, Sampled, When
+from sysdyn.runtime.events.watching import NOTHING
 from sysdyn.runtime.model.description import RowFamily, position_of
 from sysdyn.runtime.model.system import System
 
@@ -92,13 +93,19 @@ class _Planner:
         if not 0.0 < period < math.inf:
             text = f"the period of 'every' must be a positive constant, it is {period:g} s"
             raise ModelError([Diagnostic("E703", text, event.place)])
+        scene = self.prepared.network.scene
+        span = self.prepared.binding.evaluate(scene.end) - self.prepared.begin if scene and scene.end else math.inf
+        if period <= NOTHING * span < math.inf:
+            text = f"'every {period:g} s' is shorter than instants are told apart in {span:g} s: {NOTHING * span:.1g} s"
+            raise ModelError([Diagnostic("E703", text, event.place)])
         return Sampled(event.name, period, self._assignments(event.actions))
 
     def _condition(self, node: Node) -> Condition:
         if node.op in ("and", "or", "not"):
             return (node.op, *(self._condition(a) for a in node.args))
         watched = node.args[0]
-        self.relations.append(Relation(self.row[watched.data[0]], watched.data[1] == "moves"))
+        name, kind = watched.data[:2]
+        self.relations.append(Relation(self.row[name], kind != "rests", kind == "ticks"))
         return ("relation", len(self.relations) - 1, node.data)
 
     def _assignments(self, actions: tuple[Action, ...]) -> tuple[Assignment, ...]:

@@ -20,12 +20,23 @@ from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.trace.trace import Trace
 
 
-def error_of(test: Trace, reference: Trace, judged: Collection[str], accuracy: float, until: float) -> float:
-    """The largest relative error of the judged quantities up to `until` [s]; infinite where one is no number."""
+def error_of(
+    test: Trace,
+    reference: Trace,
+    judged: Collection[str],
+    accuracy: float,
+    until: float,
+    *,
+    at: Floats | None = None,
+) -> float:
+    """The largest relative error of the judged quantities up to `until` [s]; infinite where one is no number.
+
+    at [s]: instants of the reference at which the other has its rows.
+    """
     if not judged:
         return 0.0
     shift = _shift(test, reference, until)
-    instants = None
+    instants = at
     if shift is not None:
         events = np.array([e.time for trace in (test, reference) for e in trace.events])
         instants = np.intersect1d(test.time, reference.time)

@@ -31,6 +31,7 @@ from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.runtime.accuracy.common_instants import GOLDEN
 from sysdyn.runtime.accuracy.options import Options, choose_index
+from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.trace.trace import Trace
@@ -43,7 +44,10 @@ LARGE = 20_000
 MOST = 32
 """Combinations of levels that are measured."""
 GRID = 200
-"""Intervals of the trace where the scene leaves them to the solver, and a part that no period of samples divides."""
+"""Intervals of the trace of a scene with samples that leaves them to the solver, and a part that no period divides."""
+ROWS = 1000
+"""Rows at most where the scene leaves them to the solver: every so many steps of the reference, which lie where the
+solution varies (an even grid passes over the peaks of a relaxation)."""
 Said = dict[str, Any]
 """A finding in CONTRACT's shape."""
 
@@ -146,7 +150,7 @@ class Bench:
             return None
         sampled = any(event.period is not None for event in prepared.network.events)
         every = None if sampled else options.every  # rows of its own may all be at samples, where nothing is compared
-        every = every or (options.t_end - options.t_start) / (GRID + GOLDEN)
+        every = (options.t_end - options.t_start) / (GRID + GOLDEN) if sampled and every is None else every
         options = replace(options, every=every, watch=None, sampled_at=(), sample_steps=False)
         again = bool(prepared.network.events or prepared.network.switches)
         level = _text((*what.levels, *_chosen(prepared.network)))
@@ -204,11 +208,17 @@ class Bench:
     # --- runs ---------------------------------------------------------------------------------------------------
 
     def trace(
-        self, combination: Combination, tolerance: float, limits: Limits, *, name: str | None = None
+        self,
+        combination: Combination,
+        tolerance: float,
+        limits: Limits,
+        *,
+        name: str | None = None,
+        at: Floats | None = None,
     ) -> tuple[Ran | None, str, Said | None]:
         """One run at the solver's own tolerance: what came of it, why it may not be used, and the finding of that.
 
-        name: of the file of its trace, which else stays in memory.
+        name: of the file of its trace, which else stays in memory; at [s]: its rows alone, None: those of the scene.
         """
         carried, report = self.carry(combination), Report()
         if carried is None:
@@ -225,6 +235,8 @@ class Bench:
             max_steps=min(most, default=None),
             max_wall=limits.wall,
         )
+        if at is not None:
+            options = replace(options, at=tuple(at.tolist()), every=options.t_end - options.t_start)
         try:
             started = begin(carried.prepared, options, report) if carried.again else carried.started
             ran = run_from(self.target, carried.prepared, started, options, report) if started else None
@@ -241,14 +253,16 @@ class Bench:
         self, combination: Combination, tolerance: float, reference: Trace, until: float, limits: Limits
     ) -> Measured | str:
         """One run, compared with the reference; a sentence where there is no such setting."""
-        ran, reason, said = self.trace(combination, tolerance, limits)
+        carried = self.carry(combination)
+        at = None if carried is None or carried.options.every is not None else _thinned(reference.time)
+        ran, reason, said = self.trace(combination, tolerance, limits, at=at)
         if ran is None:
             return reason
         outcome = ran.outcome
         found = outcome.traced
         error = None
         if outcome.final:
-            error = error_of(found, reference, self.judged(reference), self.accuracy, until)
+            error = error_of(found, reference, self.judged(reference), self.accuracy, until, at=at)
             if not math.isfinite(error):
                 numbers = all(np.isfinite(found[name].values).all() for name in found.names)
                 lack = "apart from events it has no instants to compare" if numbers else "a quantity is no number"
@@ -282,6 +296,11 @@ class Bench:
             system = system if system.form.name == form else system.another(form)
             carried.sizes[form] = work.Size(system.unknowns, system.pattern.entries, bent=_bent(system))
         return carried.sizes[form]
+
+
+def _thinned(time: Floats) -> Floats:
+    """Every so many of the instants [s], and the last."""
+    return np.unique(np.append(time[:: -(-time.size // ROWS)], time[-1]))
 
 
 def _bent(system: System) -> bool:

@@ -95,9 +95,9 @@ class Compared:
         late = self._late(rows, quantities) if instants is not None else 0.0
         asked, own = quantities.asked(self.options), quantities.terms_of_run(finished)
         sizes, steps = quantities.of_run(finished), finished.statistics.steps
-        if ((own > 0.0) & (noise > asked * own)).any():  # else noise excuses less than is asked
-            nominal = self._nominal(finished, quantities)
-            sizes, noise = np.minimum(sizes, nominal), np.minimum(noise, asked * nominal)
+        if ((own > 0.0) & (noise > _share(asked, own))).any():  # else noise excuses less than is asked
+            nominal, excused = self._excused(finished, quantities)
+            sizes, noise = np.minimum(sizes, nominal), np.minimum(noise, excused)
         open_ = partial(self._open_quantities, finished, quantities)
         between = self._between(rows, finished, quantities)
         jump = np.append(self._jump[quantities.places], np.full(len(quantities.meters), np.inf))
@@ -183,7 +183,12 @@ class Compared:
         """
         found = self.left_open(finished, quantities.system).quantities[quantities.places]
         found = np.append(found, np.zeros(len(quantities.meters)))
-        return np.minimum(found, quantities.asked(self.options) * self._nominal(finished, quantities))
+        return np.minimum(found, self._excused(finished, quantities)[1])
+
+    def _excused(self, finished: Finished, quantities: Quantities) -> tuple[Floats, Floats]:
+        """Nominal value of each compared quantity, and how much of it may be excused."""
+        nominal, asked = self._nominal(finished, quantities), quantities.asked(self.options)
+        return nominal, _share(asked, nominal)
 
     def _nominal(self, finished: Finished, quantities: Quantities) -> Floats:
         """Nominal value of each compared quantity: its largest value or term, or what the rows that determine the
@@ -220,6 +225,12 @@ class Compared:
         name, at = names[k], int(beyond[0]) if beyond.size else None
         undefined = at is not None and not np.isfinite([one.own[0][at, k], two.values[at, k]]).all()  # or at the edge
         return name, asked[name], None if at is None else float(self._at[at]), undefined
+
+
+def _share(asked: Floats, sizes: Floats) -> Floats:
+    """The accuracy asked times sizes; infinite where nothing is asked."""
+    known = np.isfinite(asked)
+    return np.where(known, np.where(known, asked, 0.0) * sizes, np.inf)
 
 
 def _values(rows: Floats, finished: Finished, quantities: Quantities) -> Floats:

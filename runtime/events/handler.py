@@ -18,6 +18,7 @@ from sysdyn.runtime.events.conditions import Conditions, Round, with_momenta
 from sysdyn.runtime.events.contacts import Standing as Stood
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.kinks import NoBranchError
+from sysdyn.runtime.events.observer import ASSIGNED, ROUNDING
 from sysdyn.runtime.events.pivoting import NoActiveSetError
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.events.succession import Point, Succession
@@ -35,6 +36,13 @@ CASCADE = 100
 """Rounds of events at one instant: more will never end."""
 STALLED = 200
 """Events in a row within NOTHING of the span: they chatter."""
+SOON = 2
+"""Of these, after which the handler is asked about each."""
+RECENT = 64
+"""Entries of what happened, several of which may be of one instant."""
+SHRINKING, NO_TIME = 8, 64.0
+"""Events in a row, each of which follows sooner than the one before, until it does within so many spacings of t: their
+instants have a limit (Zeno), behind which the text says nothing."""
 HELD = 1e-9
 """Of what counts as zero: what has stayed below it for a time is held there."""
 STOPPED = 1e-6
@@ -61,6 +69,7 @@ class Handler(Watching):
         self._gaps = np.array([plan.contacts[k].value for k in self._gap], dtype=np.int64)
         self._bounds = [c for c in plan.contacts if c.kind in BOUNDED]
         self._bound = np.array([c.bound for c in self._bounds], dtype=np.int64)
+        self._assigned = np.zeros(len(plan.relations), dtype=bool)  # whose values an assignment has told
         self._moves = np.array([r.moves for r in plan.relations], dtype=bool)
         self.happened: list[Happened] = []
         self.stalled, self.last = 0, -np.inf
@@ -109,7 +118,7 @@ class Handler(Watching):
         has it; p has the values then.  None where they assign what p does not hold.
         """
         values = self.observer(t, y, yd)
-        self._take_sides(t, values, np.ones_like(self.side))
+        self._take_sides(t, values, np.ones_like(self.side), self.observer.zeros(self._row))
         self.truth, self.rounds = self._conditions.hold(self.side), []
         self._cascade(t, y, yd, range(len(self.plan.sampled)), [])
         assigned = [a for r in self.rounds for group in r.groups for a in group]
@@ -120,7 +129,7 @@ class Handler(Watching):
         it.
         """
         values = self.observer(t, y, yd)
-        self._take_sides(t, values, np.ones_like(self.side))
+        self._take_sides(t, values, np.ones_like(self.side), self.observer.zeros(self._row))
         self._bounded(t, values)
         drives = self.succession.pushed(t, y, yd, values) if self.restart is not None else None
         if drives is not None:
@@ -133,17 +142,16 @@ class Handler(Watching):
             return self.fire(t, y, yd, due)
         return self.settled(t, y, yd, self.contacts.standing()) if anew else None
 
-    def _take_sides(self, t: float, values: Floats, before: Floats) -> None:
-        """The side of each relation, which was `before` [relations]: a value that a jump made zero is on neither, one
-        that was found as the root of a crossing is past it, and one that jumps there.  SolverFailure where one is no
-        number.
+    def _take_sides(self, t: float, values: Floats, before: Floats, zeros: Floats) -> None:
+        """The side of each relation, which was `before` [relations], as that of what moves below `zeros` is: one that a
+        jump made zero is on neither, a root of a crossing and what jumps there is past it.  SolverFailure: no number.
         """
         values = values[self._row]
         if np.isnan(values).any():
             raise SolverFailure("nonfinite", t, 0.0)
         exact = values != 0.0
         exact[self._exact] = True
-        near = exact & (np.abs(values) <= np.where(self._moves, self.observer.zeros(self._row), 0.0))
+        near = exact & (np.abs(values) <= np.where(self._moves, zeros, 0.0))
         side = np.sign(values)
         for k, past in self._jumps.items():
             near[k] |= past == side[k]
@@ -183,7 +191,6 @@ class Handler(Watching):
             if not assigned:
                 return y
             y = self._assign(t, y, yd, assigned)
-            self._renew(t, y, yd)
             self.rounds.append(Round(tuple(group for _, group in assigned), self.side.copy()))
             assigned, crossed = [], []
         raise SolverFailure("chatter", t, 0.0, self._names())
@@ -201,6 +208,8 @@ class Handler(Watching):
         free, lone = self._free("friction"), self._free("friction", "phi")
         self.simple, self.struck, self.rounds, self.soon = True, -1, [], 0.0
         said, stood, flew = self.contacts.standing(), self.kinks.state(), self.bounces
+        self._assigned[:] = self.observer.exact[self._row] == ASSIGNED
+        self.observer.exact[self.observer.exact == ASSIGNED] = 0
         self.kinks.anew()
         which, crossed = self._crossed(t, y, yd, which)
         begun, y, yd = y, y.copy(), yd.copy()
@@ -218,6 +227,8 @@ class Handler(Watching):
         # the point behind it all
         self.struck = touched[0] if lone and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
+        self._again(t, point, crossed)
+        self._next_to_zero(t, point)
         self.turns.seen(t, point)
         self._return(t, begun, point, which)
         thrown = new(self.bounces, flew)
@@ -226,6 +237,22 @@ class Handler(Watching):
         self.happened += self.kinks.happened(t, stood)
         self.passes = self.kinks.passing(stood, self.observer(t, *point)) if self.kinks.peaks else np.inf
         return point
+
+    def _again(self, t: float, point: Point, crossed: list[int]) -> None:
+        """Relations that fall through zero again have their side again."""
+        back = self.returning(t, *point, crossed) if self.plan.relations else np.zeros(0, dtype=bool)
+        if back.any():
+            self.side[back] *= -1.0
+            self._assigned |= back
+            self.truth, self.simple = self._conditions.hold(self.side), False
+
+    def _next_to_zero(self, t: float, point: Point) -> None:
+        """What assignments have put next to zero, or falls again, is known to rounding until it has crossed."""
+        if self._assigned.any():
+            here, zeros = self.observer(t, *point)[self._row], self.observer.zeros(self._row)
+            rounding = ROUNDING * self.observer.terms[self._row]
+            near = self._assigned & self._moves & (self.side * here > rounding) & (np.abs(here) <= zeros)
+            self.observer.exact[self._row[near]] = ASSIGNED
 
     def _hold(self, values: Floats, crossed: Sequence[int]) -> None:
         """What a constraint holds at zero since an event before (a speed that sticks) is on neither side."""
@@ -268,7 +295,6 @@ class Handler(Watching):
                 return point
             self.simple, self.struck, said = False, -1, self.contacts.standing()
             y = self._assign(t, *point, [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired])
-            self._renew(t, y, point[1])
             point = self.settled(t, y, point[1], said)
         raise SolverFailure("chatter", t, 0.0, self._names())
 
@@ -354,6 +380,8 @@ class Handler(Watching):
                 other = set_by.setdefault((a.kind, a.place), k)
                 if other != k:  # elements of one family have a name in common
                     raise SolverFailure("conflict", t, 0.0, f"{a.name} (by '{events[other][0]}' and by '{name}')")
+                if not np.isfinite(values[a.row]):
+                    raise SolverFailure("overflows", t, 0.0, f"{a.name} (= {values[a.row]:g}, by '{name}')")
                 target = self.p if a.kind == "discrete" else y
                 said.append(f"{a.name} = {target[a.place]:.9g}")
                 target[a.place] = values[a.row]
@@ -364,6 +392,7 @@ class Handler(Watching):
         if any(a.kind == "flow" for _, assignments in events for a in assignments):
             settled = self.restart.instant.system if self.restart else self.system
             y = with_momenta(settled, t, y, yd)
+        self._renew(t, y, yd, values)
         return y
 
     def _sink(self, t: float, which: Sequence[Watched]) -> None:
@@ -380,21 +409,32 @@ class Handler(Watching):
         for k in np.flatnonzero(values[self._bound] < -self.observer.zeros(self._bound)):
             raise SolverFailure("drives", t, 0.0, self._bounds[k].name)
 
-    def _renew(self, t: float, y: Floats, yd: Floats) -> None:
-        """Sides after a jump."""
+    def _renew(self, t: float, y: Floats, yd: Floats, was: Floats | None = None) -> None:
+        """Sides after a jump; was: values [observed] before an assignment."""
         values = self.observer(t, y, yd)
         self._bounded(t, values)
-        self._take_sides(t, values, self.side)
+        rounding = self.observer.rounding(self._row, values, values if was is None else was)
+        self._assigned |= rounding < np.inf
+        self._jumps = {k: past for k, past in self._jumps.items() if rounding[k] == np.inf}
+        self._take_sides(t, values, self.side, np.minimum(self.observer.zeros(self._row), rounding))
 
     # -- what never ends -----------------------------------------------------------------------------------------
 
     def _count(self, t: float) -> None:
         near = t - self.last <= self.nothing
         self.stalled, self.last = (self.stalled + 1 if near else 0), t
+        if self.stalled and self._accumulate(t):
+            raise SolverFailure("zeno", t, 0.0, self._names())
         if self.stalled > STALLED:
             raise SolverFailure("chatter", t, 0.0, self._names())
         if self.plan.limit is not None and len(self.happened) > self.plan.limit:
             raise SolverFailure("max_events", t, 0.0, self._names())
+
+    def _accumulate(self, t: float) -> bool:
+        """Whether the instants of what happened have a limit that is not told from t."""
+        times = sorted({h.time for h in self.happened[-RECENT:]} | {t})
+        gaps = np.diff(times[-SHRINKING - 2 :])
+        return gaps.size > SHRINKING and bool((np.diff(gaps) < 0.0).all() and gaps[-1] <= NO_TIME * np.spacing(abs(t)))
 
     def _names(self) -> str:
         return ", ".join(dict.fromkeys(h.name for h in self.happened[-6:]))

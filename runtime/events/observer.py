@@ -14,13 +14,17 @@ from sysdyn.runtime.model.system import System
 
 SMALL = 1e-9
 """Of the largest value and terms met of a row: what is less is zero."""
+ROUNDING = 4.0 * float(np.finfo(float).eps)
+"""Of the terms of a value: what a sum of a few is rounded by.  Unknowns that are solved for are known to SMALL only."""
+TIMED, ASSIGNED = 2, 1
 LEAST = 1e-24
 """In SI units: a value that has never been more has no size yet; round-off of what is held at zero is less still."""
 
 
 class Observer:
     """largest [observed]: of values and of the terms of their expressions, at the points asked for; small [observed]:
-    of it, what counts as zero.
+    of it, what counts as zero, but of what is `exact` [observed]: TIMED, what time alone moves; ASSIGNED, what an
+    assignment has put so close to zero that it would be, until it has crossed or gone away.
     """
 
     def __init__(self, system: System) -> None:
@@ -31,7 +35,7 @@ class Observer:
         self._pointers = [lib.pointer(item) for item in (self._y, self._yd, self._out)]
         self._functions: dict[int, Any] = {}
         self.largest, self.terms = np.full(self._number, LEAST), np.zeros(self._number)
-        self.small = np.full(self._number, SMALL)
+        self.small, self.exact = np.full(self._number, SMALL), np.zeros(self._number + 1, dtype=np.int32)
         families = [system.description.rows[k] for k in system.description.rows_of("observe")]
         self._units = [family.unit for family in families for _ in range(family.size)]
         self.groups: list[NDArray[np.int64]] = []
@@ -71,9 +75,15 @@ class Observer:
 
     def zeros(self, rows: NDArray[np.int64]) -> Floats:
         """Below them values of the rows are zero."""
-        found: Floats = self.small[rows] * self.largest[rows]
+        found: Floats = np.where(self.exact[rows] > 0, ROUNDING, self.small[rows]) * self.largest[rows]
         return found
 
     def zero(self, row: int) -> float:
         """Below it a value of the row is zero."""
-        return float(self.small[row]) * float(self.largest[row])
+        return float(ROUNDING if self.exact[row] else self.small[row]) * float(self.largest[row])
+
+    def rounding(self, rows: NDArray[np.int64], values: Floats, was: Floats) -> Floats:
+        """What rounds the values [observed] asked last of rows, where they are not what they were; else inf."""
+        here = values[rows]
+        found: Floats = ROUNDING * np.maximum(self.terms[rows], np.abs(here))
+        return np.where(np.abs(here - was[rows]) > found, found, np.inf)

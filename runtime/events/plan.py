@@ -16,10 +16,11 @@ Condition = tuple[Any, ...]
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """row - against zero; moves: it does between events, else at events alone."""
+    """row - against zero; moves: it does between events, else at events alone; ticks: by time alone."""
 
     row: int
     moves: bool
+    ticks: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -102,8 +102,8 @@ class Restart:
         # a switch that opens on a coil: the exponential law beside it bears its current, and no store jumps
         if self.settler.system.form.scales and not quickly:
             steep = self._search(t, y, yd, free=False)
-            if steep is not None and self._stays(steep[0], y, magnitude):
-                return *steep, np.zeros(y.size), True
+            if steep is not None and (kept := still(self.settler, t, steep, self.state, magnitude)) is not None:
+                return *kept, np.zeros(y.size), True
         push = None
         if same is None or moved[self.settler.system.kinds == "q"].any():
             y, push = self.instant.displacements(t, y, yd, magnitude, sums=self.sums)

@@ -51,6 +51,7 @@ _CAUSES = {
     "overfull": ("E933", "a store can hold nothing there, and holds something: its effort, or its flow, has no bound"),
     "endless": ("E933", "a pulse meets a finite resistance there: the power has no integral"),
     "pulsed": ("E933", "a dynamic variable that the model reads would jump there: its curved rate has a pulse"),
+    "overflows": ("E933", "what an event assigns is no number"),
     "conflict": ("E704", "two events assign one variable at one instant"),
     "memory": ("E934", "there is no memory left"),
 }
@@ -62,6 +63,7 @@ _OF_EVENTS = (
     "zeno",
     "complementarity",
     "conflict",
+    "overflows",
     "slides",
     "drives",
     "overfull",
@@ -87,6 +89,7 @@ _REMEDIES_OF_CAUSES = {
     "endless": "a ramp in place of the jump, or something that stores between the two",
     "pulsed": "a ramp in place of the jump, or the store's own displacement or momentum in place of the integral",
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",
+    "overflows": "bounds of what is assigned: clip(k, lo, hi); or an earlier end: --until",
     "chatter": "a condition and an action that do not undo each other: hysteresis, or an 'every' in place of a 'when'",
     "zeno": "a constraint in place of the event, which comes to rest: phi floor: h >= 0 m restitution 0.8; or an"
     " earlier end: --until",

@@ -193,9 +193,10 @@ def _watched(frame: ElaborationContext, condition: Node, place: Place) -> Node:
     for node in ex.topological([condition]):
         if node.op == "cmp":
             left, right = node.args
-            moves = "moves" if ex.variables(node) else "rests"
+            read = {n.op for n in ex.variables(node)}
+            kind = "rests" if not read else "ticks" if read == {"time"} else "moves"
             name = watch(frame, ex.sub(left, right), None, place)
-            change[node] = ex.compare(node.data, ex.var(name, moves), ex.const(0.0))
+            change[node] = ex.compare(node.data, ex.var(name, kind), ex.const(0.0))
     return ex.substitute(condition, change)
 
 

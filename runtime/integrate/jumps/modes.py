@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from sysdyn.runtime.events.bounces import Bounce
-from sysdyn.runtime.events.handler import STALLED, Handler
+from sysdyn.runtime.events.handler import SOON, Handler
 from sysdyn.runtime.events.kinks import WORDS
 from sysdyn.runtime.events.observer import SMALL
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
@@ -117,7 +117,7 @@ class Modes:
         self._fixed += [k.hold for k in plan.contacts if k.hold >= 0]
         self._alone = all(k.hold < 0 for k in plan.contacts)
         self.core = lib.Modes(now=-1, last=-np.inf, begin=run.start.t, longest=longest, passed=-np.inf, left=UNLIMITED)
-        self.core.chatters = STALLED
+        self.core.chatters = SOON
         self._sizes(plan)
         self._plan(plan)
         self._run()
@@ -160,6 +160,7 @@ class Modes:
         core.period, core.next = self._array([s.period for s in plan.sampled]), lib.pointer(handler.next)
         core.first, core.nothing = handler.span[0], handler.nothing
         core.small, core.largest = SMALL, lib.pointer(handler.observer.largest)
+        core.known = lib.pointer(handler.observer.exact)
         alike = handler.observer.groups
         core.alikes, core.alike = len(alike), self._array(np.concatenate([*alike, []]), np.int32)
         core.alike_end = self._array(np.cumsum([g.size for g in alike]), np.int32)
@@ -195,6 +196,7 @@ class Modes:
         self._anywhere = np.full(core.contacts + 1, -1, dtype=np.int32)
         core.anywhere = lib.pointer(self._anywhere)
         core.exact = self._array(np.zeros(core.relations + 1), np.int32)
+        core.was = self._array(np.zeros(core.relations + 1))
         core.turning = self._array(np.zeros(core.kinks + 1), np.int32)
         core.own.value = self._array(np.zeros(core.places + 1))
         self._room(len(self.handler.plan.sampled) + 16)

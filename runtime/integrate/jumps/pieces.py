@@ -270,7 +270,7 @@ class Pieces:
         if not asked.any() or step <= handler.nothing:
             return []
         watched, values = handler.watched(), handler.observer(t, *point)
-        near = np.abs(values[watched.row]) <= handler.observer.zeros(watched.row)
+        near = np.abs(values[watched.row]) <= SMALL * handler.observer.largest[watched.row]
         near &= (watched.relation >= 0) & np.append(asked, False)[watched.relation]
         if not near.any():
             return []

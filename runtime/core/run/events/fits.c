@@ -77,10 +77,9 @@ static int kink_fits(const sd_modes *m, const sd_kink *k, const double *v)
     return branch * v[k->value] >= -small && (k->rate < 0 || branch * v[k->rate] >= -sd_mode_zero(m, k->rate));
 }
 
-/* Whether a relation is on the side that the mode says; flipped: where it was. */
-static int relation_fits(const sd_modes *m, int32_t k, double side, double flipped, const double *v)
+/* Whether a relation is on the side that the mode says; flipped: where it was; small: what is zero of it. */
+static int relation_fits(const sd_modes *m, int32_t k, double side, double flipped, double value, double small)
 {
-    double value = v[m->relation_row[k]], small = m->relation_moves[k] ? sd_mode_zero(m, m->relation_row[k]) : 0.0;
     if (fabs(value) <= small && (value != 0.0 || m->exact[k]))
         return side == flipped;
     return side == (double)((value > 0.0) - (value < 0.0));
@@ -88,10 +87,44 @@ static int relation_fits(const sd_modes *m, int32_t k, double side, double flipp
 
 int sd_mode_sides_fit(const sd_modes *m, const double *side, const double *before, const double *v)
 {
-    for (int32_t k = 0; k < m->relations; k++)
-        if (!relation_fits(m, k, side[k], before[k], v))
+    for (int32_t k = 0; k < m->relations; k++) {
+        const int32_t row = m->relation_row[k];
+        if (!relation_fits(m, k, side[k], before[k], v[row], m->relation_moves[k] ? sd_mode_zero(m, row) : 0.0))
             return 0;
+    }
     return 1;
+}
+
+int sd_mode_assigned_fit(const sd_modes *m, const double *side, const double *before, const double *was, const double *v,
+                         const double *terms)
+{
+    for (int32_t k = 0; k < m->relations; k++) {
+        const int32_t row = m->relation_row[k];
+        double small = m->relation_moves[k] ? sd_mode_zero(m, row) : 0.0;
+        const double rounding = ROUNDING * fmax(fabs(terms[row]), fabs(v[row]));
+        if (fabs(v[row] - was[k]) > rounding) {
+            if (fabs(v[row]) > rounding && fabs(v[row]) <= small) /* due again at once: the handler's */
+                return 0;
+            small = fmin(small, rounding);
+        }
+        if (!relation_fits(m, k, side[k], before[k], v[row], small))
+            return 0;
+    }
+    return 1;
+}
+
+int sd_mode_returns(const sd_modes *m, const sd_mode *from, const sd_transition *one, const double *v)
+{
+    const double *side = sd_mode_now(m)->relation;
+    for (int32_t k = 0; k < m->relations; k++) {
+        const int32_t row = m->relation_row[k];
+        int crosses = !m->relation_moves[k] || fabs(v[row]) > sd_mode_zero(m, row);
+        for (int32_t i = 0; i < one->crossed && !crosses; i++)
+            crosses = from->row[one->which[i]] == row;
+        if (!crosses && side[k] * v[row] < -ROUNDING * m->largest[row])
+            return 1;
+    }
+    return 0;
 }
 
 int sd_mode_fits(const sd_modes *m, const double *before, const double *v)

@@ -8,10 +8,12 @@
 
 #define FALLEN 1e-4 /* of what else counts as zero, and of the height of its flight: a gap closes again below it */
 
+#define ROUNDING 8.9e-16 /* of the terms of a value: 4 EPS, what a sum of a few is rounded by (events/observer.py) */
+
 /* what a row is that is zero but for round-off; a gap in flight is open until it ends */
 static inline double sd_mode_zero(const sd_modes *m, int32_t row)
 {
-    return (m->thrown[row] ? FALLEN : 1.0) * m->small * m->largest[row];
+    return (m->known[row] ? ROUNDING : m->thrown[row] ? FALLEN * m->small : m->small) * m->largest[row];
 }
 
 /* what a watched row may fall by unseen: behind an impact nearly nothing, for bounces become small */
@@ -43,6 +45,15 @@ int sd_mode_decided(const sd_modes *m, const sd_mode *from, const sd_transition 
 
 /* Whether every relation is on the side given, coming from `before`. */
 int sd_mode_sides_fit(const sd_modes *m, const double *side, const double *before, const double *v);
+
+/* The same behind an assignment: one whose value it changed, from was[k], has the side of its value but for round-off of its
+ * terms [observed], however small it is. */
+int sd_mode_assigned_fit(const sd_modes *m, const double *side, const double *before, const double *was, const double *v,
+                         const double *terms);
+
+/* Whether a relation that a transition does not cross is back where it was by less than counts: if it falls again, only the
+ * handler sees it. */
+int sd_mode_returns(const sd_modes *m, const sd_mode *from, const sd_transition *one, const double *v);
 
 /* Whether every contact, law and relation is as the present mode says, relations coming from `before`. */
 int sd_mode_fits(const sd_modes *m, const double *before, const double *v);

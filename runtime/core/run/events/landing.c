@@ -68,13 +68,18 @@ static int assign(sd_run *run, const sd_transition *one, double t)
         for (int32_t k = a; k < one->end[r]; k++) { /* all values are read, then all assigned */
             row[2 + 2 * k] = (one->kind[k] ? m->y : m->p)[one->place[k]];
             row[3 + 2 * k] = m->values[one->read[k]];
+            if (!isfinite(row[3 + 2 * k]))
+                return 0; /* the handler says so */
         }
+        for (int32_t k = 0; k < m->relations; k++)
+            m->was[k] = m->values[m->relation_row[k]];
         for (; a < one->end[r]; a++)
             (one->kind[a] ? m->y : m->p)[one->place[a]] = row[3 + 2 * a];
         if (one->momenta && !sd_strike_momenta(run, one->momenta, t))
             return 0;
         sd_landing_look(run, t, m->y, m->yd, m->values);
-        if (!sd_mode_sides_fit(m, one->sides + (r + 1) * m->relations, one->sides + r * m->relations, m->values))
+        const double *sides = one->sides + r * m->relations;
+        if (!sd_mode_assigned_fit(m, sides + m->relations, sides, m->was, m->values, m->high))
             return 0;
     }
     return 1;
@@ -171,7 +176,7 @@ int sd_landing_takes(sd_run *run, const sd_transition *one, double t)
     m->struck = one->strike ? one->strike->contact : -1;
     sd_landing_enter(run, one->to);
     done = done && sd_landing_arrives(run, one->sides + one->rounds * m->relations, t) && sd_mode_ordinary(m) &&
-           sd_mode_decided(m, before, one, m->values);
+           sd_mode_decided(m, before, one, m->values) && !sd_mode_returns(m, before, one, m->values);
     m->struck = -1;
     done = done && sd_strike_throws(run, one->strike, t);
     if (!done) {

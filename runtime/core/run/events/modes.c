@@ -233,12 +233,21 @@ static const sd_transition *anywhere(sd_run *run, double t, int32_t crossed, int
     return NULL;
 }
 
+/* Whether an assignment has put a relation next to zero. */
+static int due_at_once(const sd_modes *m)
+{
+    int32_t k = 0;
+    while (k < m->relations && m->known[m->relation_row[k]] != 1)
+        k++;
+    return k < m->relations;
+}
+
 /* The transition that what crossed, or is due (SD_JUMP: the text jumps), takes at t; the model is then in its mode.
  * NULL: none. */
 static const sd_transition *taken(sd_run *run, double t, int32_t crossed, int32_t due)
 {
     sd_modes *m = run->modes;
-    if (m->logged >= m->room || (near_the_last(m, t) && m->stalled >= m->chatters))
+    if (m->logged >= m->room || (near_the_last(m, t) && m->stalled >= m->chatters) || due_at_once(m))
         return NULL;
     for (int32_t k = sd_mode_now(m)->first; k >= 0; k = m->transition[k].next) {
         const sd_transition *one = &m->transition[k];
@@ -381,7 +390,7 @@ static int met(sd_run *run, int32_t row, double side, int *looked)
 {
     sd_modes *m = run->modes;
     double t = run->stepper->ivp->t, step = (t - run->t_from) / SHORTER;
-    if (!(fabs(m->low[row]) <= sd_mode_zero(m, row)) || step <= m->nothing)
+    if (!(fabs(m->low[row]) <= m->small * m->largest[row]) || step <= m->nothing)
         return 0;
     if (!*looked)
         sd_run_observe(run, t - step, m->high);

@@ -115,6 +115,7 @@ typedef struct sd_modes {
                                        * leads (integrate/jumps/modes.py); s: so soon behind it another one is at once */
     double *t_end, *h_max;            /* of the method */
     double *largest;                  /* [observed] of values and terms, at points asked for */
+    const int32_t *known;             /* [observed] to rounding: 2: time alone moves it; 1: an assignment put it next to zero */
     double small, still;              /* of `largest`: zero; of a magnitude: what a state moves by and has not jumped */
     const int32_t *alike, *alike_end; /* rows of one size, group by group; [alikes] */
     const int32_t *state;             /* [written] 1: keeps its value across an event */
@@ -126,6 +127,7 @@ typedef struct sd_modes {
     double *values, *low, *high;      /* [observed] */
     double *p_before, *p_after;       /* [parameters] */
     int32_t *exact;                   /* [relations] 1: it crosses now, and is zero to the last bit */
+    double *was;                      /* [relations] value before an assignment */
     double *found;                    /* [watches] */
     int32_t *which;                   /* [watches] */
     int32_t *turning;                 /* [kinks] that turn now */
@@ -137,8 +139,8 @@ typedef struct sd_modes {
     sd_watch *watch;                  /* [watches] */
     double *log;                      /* [room][width] t, transition, before and after of what was assigned; t, -1 - kink
                                        * and its branches */
-    int64_t left, stalled, chatters;  /* events that may still be; so many in a row within no time, of which the handler says
-                                       * that they never end */
+    int64_t left, stalled, chatters;  /* events that may still be; so many in a row within no time, of which the handler asks
+                                       * whether they end */
     double differs;                   /* of its size: what a value differs by that has jumped */
     int32_t pieces, at;               /* number of the present piece */
     int32_t struck;                   /* the contact that is thrown by the event at hand, -1: none */
