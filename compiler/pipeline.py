@@ -155,16 +155,16 @@ def compile_network(
     gather: what is written out by hand and alike as families (network/gathered.py).
     traced: where the text traces nothing, every coordinate and every dynamic variable is.
     """
-    with at_rest(), budget.drawn():
-        try:
+    try:
+        with at_rest(), budget.drawn(network.place.source.text):
             families = gathered(network, irregular=not formulation.startswith("co_")) if gather else network
             if families is not network:
                 with suppress(ModelError):  # what is wrong is said of what the author wrote
                     found = _compiled(families, formulation, backend, integrating=integrating, traced=traced)
                     return _authored(found, network)
             return _compiled(network, formulation, backend, integrating=integrating, traced=traced)
-        except budget.SpentError as spent:
-            raise ModelError([spent.diagnostic(network.place)]) from spent
+    except budget.SpentError as spent:
+        raise ModelError([spent.diagnostic(network.place)]) from spent
 
 
 def _compiled(network: Network, formulation: str, backend: str, *, integrating: bool, traced: bool) -> CompiledModel:
