@@ -10,7 +10,7 @@ from typing import Any
 from sysdyn import __version__
 from sysdyn.cli.lsp import completion, findings, hover, outline, positions, wire
 from sysdyn.cli.lsp.checker import Accounts, Checker, shown
-from sysdyn.cli.lsp.documents import Document, Documents
+from sysdyn.cli.lsp.documents import LONGEST, Document, Documents
 from sysdyn.cli.run.check.checking import Checked
 from sysdyn.dsl.text.diagnostics import Diagnostic
 from sysdyn.dsl.text.source import Span
@@ -206,6 +206,8 @@ class Server:
 
     def _formatting(self, params: dict[str, Any]) -> Any:
         document = self._document(params)
+        if document is not None and document.long:
+            raise RefusedError(f"the text is longer than {LONGEST} characters: sysdyn fmt lays it out")
         return None if document is None else findings.formatted(document)
 
     def _actions(self, params: dict[str, Any]) -> Any:
@@ -235,6 +237,8 @@ class Server:
 
     def _renamed(self, params: dict[str, Any]) -> Any:
         at = self._placed(params)
+        if at is not None and at[0].long:
+            raise RefusedError(f"the text is longer than {LONGEST} characters: its names are not looked for")
         try:
             return None if at is None else hover.renamed(*at, str(params["newName"]))
         except ValueError as error:

@@ -138,10 +138,14 @@ def line(name: str, value: Any) -> str:
     """What a name takes (numbers, texts, or one text), as --over says it; UsageError where it is neither."""
     if isinstance(value, str):
         return f"{name} {value}" if value.lstrip().startswith("~") else f"{name} = {value}"
-    some = np.atleast_1d(np.asarray(value, dtype=object)).tolist() if value is not None else []
-    if some and all(isinstance(v, int | float | str | np.number) and not isinstance(v, bool) for v in some):
-        return f"{name} = {', '.join(v if isinstance(v, str) else repr(float(v)) for v in some)}"
-    raise UsageError(f'{name} = {value!r}: a list, or a text as --over takes it: "1 N/m .. 2 N/m : 5"')
+    try:
+        some = np.atleast_1d(np.asarray(value, dtype=object)).tolist() if value is not None else []
+        if some and all(isinstance(v, int | float | str | np.number) and not isinstance(v, bool) for v in some):
+            return f"{name} = {', '.join(v if isinstance(v, str) else repr(float(v)) for v in some)}"
+    except (ValueError, OverflowError):  # no list, no double
+        pass
+    said = f"{value!r:.60}" if value is None else type(value).__name__
+    raise UsageError(f'{name} = {said}: a list, or a text as --over takes it: "1 N/m .. 2 N/m : 5"')
 
 
 def _line(path: str, name: str, value: Any) -> str:

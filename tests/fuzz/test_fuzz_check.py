@@ -8,15 +8,23 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 RUN = Path(__file__).parent / "run.py"
+SIGNALS = Path(__file__).parent / "signals.py"
 KEPT = Path(__file__).parent / "kept"
 LONG = bool(os.environ.get("SYSDYN_LONG"))
 
 
 def fuzz(*options, within):
     """What the runner said, and its exit code."""
+    return script(RUN, *options, within=within)
+
+
+def script(path, *options, within):
+    """What a script said, and its exit code."""
     done = subprocess.run(
-        [sys.executable, str(RUN), *map(str, options)], capture_output=True, text=True, timeout=within, check=False
+        [sys.executable, str(path), *map(str, options)], capture_output=True, text=True, timeout=within, check=False
     )
     return done.returncode, done.stdout + done.stderr
 
@@ -34,3 +42,11 @@ def test_what_failed_once():
     code, said = fuzz(*(option for path in files for option in ("--file", path)), "--jobs", 2, within=200)
     assert code == 0, said
     assert said.endswith(f"{len(files)} texts, 0 failed\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_pairs_of_signals():
+    cases = 100 if LONG else 3
+    code, said = script(SIGNALS, "--cases", cases, "--seed", "ci", within=900)
+    assert code == 0, said
+    assert said == f"{cases} pairs of signals, 0 failed\n"
