@@ -27,6 +27,8 @@ CAPABILITIES = {
     "documentSymbolProvider": True,
     "completionProvider": {"triggerCharacters": [".", ":"]},
 }
+UNREADABLE = (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError)
+"""What parameters that are not those of the protocol raise: told to the client, no fault."""
 Send = Callable[[dict[str, Any]], None]
 
 
@@ -88,6 +90,8 @@ class Server:
         elif method == "exit" or (self._initialized and not self._shut and method in self._notifications):
             try:
                 self._notifications[method](given)
+            except UNREADABLE as error:
+                print(f"sysdyn lsp: parameters of '{method}' that cannot be read: {error!r:.200}", file=sys.stderr)
             except Exception as error:
                 _log(method, error)
 
@@ -104,8 +108,7 @@ class Server:
                 result = self._requests[method](params)
             except RefusedError as error:
                 self._refuse(number, wire.REQUEST_FAILED, str(error))
-            except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-                _log(method, error)
+            except UNREADABLE as error:
                 self._refuse(number, wire.INVALID_PARAMS, f"parameters of '{method}' that cannot be read: {error!r}")
             except Exception as error:
                 _log(method, error)

@@ -50,3 +50,16 @@ def test_pairs_of_signals():
     code, said = script(SIGNALS, "--cases", cases, "--seed", "ci", within=900)
     assert code == 0, said
     assert said == f"{cases} pairs of signals, 0 failed\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="forks")
+@pytest.mark.parametrize("door", ["check", "simulate", "import", "traces", "lsp", "signals"])
+def test_hostile_input_to_every_door(door):
+    cases = (
+        ()
+        if LONG
+        else ("--cases", {"check": 12, "simulate": 4, "import": 8, "traces": 3, "lsp": 4, "signals": 2}[door])
+    )
+    code, said = script(Path(__file__).parent / "campaign.py", door, *cases, "--seed", "ci", within=8 * 3600)
+    assert code == 0, said
+    assert said.endswith(" cases, 0 failed\n")
