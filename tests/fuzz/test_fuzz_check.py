@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 RUN = Path(__file__).parent / "run.py"
-SIGNALS = Path(__file__).parent / "signals.py"
+CAMPAIGN = Path(__file__).parent / "campaign.py"
 KEPT = Path(__file__).parent / "kept"
 LONG = bool(os.environ.get("SYSDYN_LONG"))
 
@@ -44,14 +44,6 @@ def test_what_failed_once():
     assert said.endswith(f"{len(files)} texts, 0 failed\n")
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-def test_pairs_of_signals():
-    cases = 100 if LONG else 3
-    code, said = script(SIGNALS, "--cases", cases, "--seed", "ci", within=900)
-    assert code == 0, said
-    assert said == f"{cases} pairs of signals, 0 failed\n"
-
-
 @pytest.mark.skipif(os.name != "posix", reason="forks")
 @pytest.mark.parametrize("door", ["check", "simulate", "import", "traces", "lsp", "signals"])
 def test_hostile_input_to_every_door(door):
@@ -60,6 +52,6 @@ def test_hostile_input_to_every_door(door):
         if LONG
         else ("--cases", {"check": 12, "simulate": 4, "import": 8, "traces": 3, "lsp": 4, "signals": 2}[door])
     )
-    code, said = script(Path(__file__).parent / "campaign.py", door, *cases, "--seed", "ci", within=8 * 3600)
+    code, said = script(CAMPAIGN, door, *cases, "--seed", "ci", within=8 * 3600)
     assert code == 0, said
     assert said.endswith(" cases, 0 failed\n")

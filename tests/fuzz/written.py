@@ -1,4 +1,4 @@
-"""Texts and netlists that are written from a seed: events, arrays, components, levels, tables, numbers that overflow."""
+"""Texts and netlists that are written from a seed: events, arrays, levels, tables, numbers that overflow."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Writer:
             case 8:
                 return f"{self.any('f', 'g', 'tab')}({inner()})"
             case 9:
-                return f"{self.any('sum', 'prod', 'max', 'min')}(i in {self.number()}..{self.any('n', '3', self.number())}: {inner()})"
+                return f"{self.any('sum', 'prod', 'max', 'min')}(i in {self.number()}..{self.any('n', '3', self.number())}: {inner()})"  # noqa: E501
             case 10:
                 return f"{self.any('a', 'b', 'k', 's', 'd', 't/(1 s)', 'pi', 'n', 'part.a', 'box.x', 'part[1].a')}"
             case _:
@@ -55,12 +55,12 @@ class Writer:
         lines = [
             f"fn f(u: 1) -> 1 = {self.any('u*u', 'sin(u) + u', 'u^3', 'g(u)', '1/u', 'exp(u)')}",
             f"fn g(u: 1) -> 1 = {self.any('u', 'sqrt(u)', 'abs(u)', 'f(u)', 'u^0.5')}",
-            f"table tab(u: 1) -> 1 {self.any('linear', 'pchip', 'cubic', 'hold')} {self.any('clamp', 'extend', 'stop')} "
+            f"table tab(u: 1) -> 1 {self.any('linear', 'pchip', 'cubic', 'hold')} {self.any('clamp', 'extend', 'stop')} "  # noqa: E501
             f"[ ({self.number()}, 0), (1, {self.number()}), (2, 5), ({self.number()}, 7) ]",
             "component part_ {",
             f"  param a = {self.number()}",
             f"  {self.any('branch: translation', 'port p: translation', 'branch: electrical')}",
-            f"  {self.any('law e = (a*1 N.s/m)*f', 'law e = (1 N/m)*q', 'law e = setsign(f/(1 m/s))*(1 N)', 'law f = e*(1 m/N/s)')}",
+            f"  {self.any('law e = (a*1 N.s/m)*f', 'law e = (1 N/m)*q', 'law e = setsign(f/(1 m/s))*(1 N)', 'law f = e*(1 m/N/s)')}",  # noqa: E501
             f"  level one default {{ {self.any('', 'let h = a', 'level two { }')} }}",
             "}",
             "model m {",
@@ -90,7 +90,7 @@ class Writer:
             f"let a = {plain()}",
             f"let b = {plain()}",
             f"work (1 N)*({plain()}) on {self.any('x', 'y', 'w[1]', 'x^2/(1 m)', 'w')}",
-            f"phi c: {self.any('x', 'x^2/(1 m)', 'w[1]')} {self.any('=', '>=', '<=')} (1 m)*({plain(2)}) {self.any('', 'restitution 0.5', 'while d > 0')}",
+            f"phi c: {self.any('x', 'x^2/(1 m)', 'w[1]')} {self.any('=', '>=', '<=')} (1 m)*({plain(2)}) {self.any('', 'restitution 0.5', 'while d > 0')}",  # noqa: E501
             f"psi v: x' = {self.any('y', 'x', 'w[1]')}'*({plain(1)})",
             f"state s: 1 = {self.number()}; dynamic s' = ({plain()})/(1 s)",
             f"discrete d = {self.number()}; when {plain(2)} > {self.number()} {{ d := {plain(2)} }}",
@@ -100,7 +100,7 @@ class Writer:
             f"part: part_(a = {self.number()}) {self.any('x', 'x -> y', 'on x', 'on x - y', 'on w[1]')}",
             f"for i in 1..{self.any('n', '2', '0')} {{ part[i]: part_(a = {self.number()}) on w[i] }}",
             f"expect {self.any('always', 'finally', 'at 0.1 s')}: {plain(2)} {self.any('<=', '>', '==')} {plain(1)}",
-            f"init {self.any('x', 'y', 'w[1]', 's')}{self.any('', chr(39))} = {self.number()} {self.any('m', 'm/s', '')}",
+            f"init {self.any('x', 'y', 'w[1]', 's')}{self.any('', chr(39))} = {self.number()} {self.any('m', 'm/s', '')}",  # noqa: E501
             f"implicit e: N; gamma r: e = (1 N)*({plain(2)}); work e on y",
             f"require {plain(1)} > 0",
             f"box: {self.any('nothing', 'part_', 'm')}({self.any('', 'a = 1')}) {self.any('', 'x')}",
