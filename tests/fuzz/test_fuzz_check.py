@@ -45,13 +45,7 @@ def test_what_failed_once():
 
 
 @pytest.mark.skipif(os.name != "posix", reason="forks")
-@pytest.mark.parametrize("door", ["check", "simulate", "import", "traces", "lsp", "signals"])
-def test_hostile_input_to_every_door(door):
-    cases = (
-        ()
-        if LONG
-        else ("--cases", {"check": 12, "simulate": 4, "import": 8, "traces": 3, "lsp": 4, "signals": 2}[door])
-    )
-    code, said = script(CAMPAIGN, door, *cases, "--seed", "ci", within=8 * 3600)
+def test_hostile_input_to_every_door():
+    code, said = script(CAMPAIGN, *(() if LONG else ("--cases", 2)), "--seed", "ci", within=8 * 3600)
     assert code == 0, said
-    assert said.endswith(" cases, 0 failed\n")
+    assert said.count(" cases, 0 failed\n") == 6
