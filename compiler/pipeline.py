@@ -53,6 +53,7 @@ from sysdyn.compiler.program.emit_numpy import emit_numpy
 from sysdyn.compiler.program.program import Program
 from sysdyn.compiler.program.program_text import verify_program
 from sysdyn.dsl.model import budget
+from sysdyn.dsl.model.calculus import NoDerivativeError
 from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.network import Network, Parameter
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
@@ -163,7 +164,7 @@ def compile_network(
                     found = _compiled(families, formulation, backend, integrating=integrating, traced=traced)
                     return _authored(found, network)
             return _compiled(network, formulation, backend, integrating=integrating, traced=traced)
-    except budget.SpentError as spent:
+    except (budget.SpentError, NoDerivativeError) as spent:
         raise ModelError([spent.diagnostic(network.place)]) from spent
 
 

@@ -17,6 +17,7 @@ from sysdyn.dsl.elaborate.scenes.scenes import SceneReader
 from sysdyn.dsl.elaborate.statements import switches
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import NoDerivativeError
 from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.depth import deep
 from sysdyn.dsl.model.network import Network, Parameter, Scene
@@ -123,7 +124,7 @@ def network(
                 return _judged(elaborator, reader, scene, report, required=required, outputs=outputs)
             finally:
                 report.retold(lambda found: told(elaborator, found))
-    except budget.SpentError as spent:
+    except (budget.SpentError, NoDerivativeError) as spent:
         report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
         return None
 
@@ -244,7 +245,7 @@ def listing(
             kept = {n: p for n, p in parameters.items() if n not in elaborator.parts.discretes}
             inputs = dict.fromkeys(elaborator.parts.inputs)
             return Listing(kept, tuple(inputs), known, readable(elaborator, known), instances(elaborator))
-    except budget.SpentError as spent:
+    except (budget.SpentError, NoDerivativeError) as spent:
         report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
         return None
 

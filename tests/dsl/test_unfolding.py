@@ -36,6 +36,12 @@ UNFOLDING = {
         "E204: the exponent is inf: beyond all numbers",
     ),
     "an exponent that overflows": (HEAD + "  let y = (x/(1 m))^(1e300*1e300)\n}\n", "E204: the exponent is inf"),
+    "a product over a range that is differentiated": (
+        "model m {\n  coord x: translation = 1 m\n  coord w[1..2]: translation = 1 m\n"
+        "  energy T* = (1 kg)*x'^2 + sum(i in 1..2: (1 kg)*w[i]'^2)\n"
+        "  phi a: x >= (1 m)*prod(i in 1..2: w[i]/(1 m))\n}\n",
+        "E608: the derivative of prod(... in ...) is not supported yet",
+    ),
     "an array without its index": (
         "model m {\n  coord x[1..2]: translation = 0 m\n  energy T* = sum(i in 1..2: (1 kg)*x[i]'^2)\n"
         "  expect always: x.f <= 1 m/s\n}\n",
