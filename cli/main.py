@@ -11,8 +11,10 @@ import platform
 import signal
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
+from types import FrameType
 from typing import Any, NoReturn
 
 import click
@@ -146,7 +148,7 @@ def _leave(code: int) -> NoReturn:
 def run(arguments: Sequence[str] | None = None, held: Iterable[int] | None = None) -> int:
     """Run the command line; the exit code.  held: the mask of signals from here on, None: as it is."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    with _ended_like_an_interruption(), standing_streams():
+    with _ended_like_an_interruption(last=held is not None), standing_streams():
         try:
             if held is not None:
                 signal.pthread_sigmask(signal.SIG_SETMASK, held)
@@ -168,32 +170,49 @@ def _defaults(given: Sequence[str]) -> dict[str, Any]:
     return configured(given, COMMANDS)
 
 
+ONCE = 10.0
+"""Seconds in which further signals are taken for the one that was heard: what it began, closing a trace and removing
+what was hidden, is not interrupted itself."""
+
+
 @contextlib.contextmanager
-def _ended_like_an_interruption() -> Iterator[None]:
+def _ended_like_an_interruption(last: bool) -> Iterator[None]:
     """SIGTERM and SIGHUP end a command as Ctrl-C does: what was computed is kept, what was hidden is removed.
 
-    Those that somebody ignores (nohup) or handles already stay so.
+    Those that somebody ignores (nohup) or handles already stay so.  last: nothing follows in this process but its exit,
+    which a signal that comes late does not change.
     """
     mine = threading.current_thread() is threading.main_thread()
-    ends = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]  # Windows has no SIGHUP
-    sent = [s for s in ends if mine and signal.getsignal(s) is signal.SIG_DFL]
-    for one in sent:
-        signal.signal(one, signal.default_int_handler)
-    heard = [s for s in (signal.SIGINT, *sent) if mine and signal.getsignal(s) is signal.default_int_handler]
-    before = sys.unraisablehook
+    names = ("SIGINT", "SIGTERM", "SIGHUP") if mine else ()  # Windows has no SIGHUP
+    known = {number: signal.getsignal(number) for name in names if (number := getattr(signal, name, None)) is not None}
+    own = {
+        s: h for s, h in known.items() if h is (signal.default_int_handler if s == signal.SIGINT else signal.SIG_DFL)
+    }
+    before, until = sys.unraisablehook, 0.0
+
+    def heard(number: int, frame: FrameType | None) -> None:
+        """The first one raises KeyboardInterrupt."""
+        nonlocal until
+        if time.monotonic() >= until:
+            until = time.monotonic() + ONCE
+            raise KeyboardInterrupt
 
     def told(lost: sys.UnraisableHookArgs) -> None:
         """Python drops what is raised where an object is taken apart: the interruption comes again, behind that."""
+        nonlocal until
         interrupted = lost.exc_type is not None and issubclass(lost.exc_type, KeyboardInterrupt)
-        if heard and interrupted and hasattr(signal, "pthread_kill"):  # Windows: it is lost there
-            threading.Timer(0.01, signal.pthread_kill, (threading.get_ident(), heard[0])).start()
+        if own and interrupted and hasattr(signal, "pthread_kill"):  # Windows: it is lost there
+            until = 0.0
+            threading.Timer(0.01, signal.pthread_kill, (threading.get_ident(), next(iter(own)))).start()
         else:
             before(lost)
 
+    for number in own:
+        signal.signal(number, heard)
     sys.unraisablehook = told
     try:
         yield
     finally:
         sys.unraisablehook = before
-        for one in sent:
-            signal.signal(one, signal.SIG_DFL)
+        for number, handler in own.items():
+            signal.signal(number, signal.SIG_IGN if last else handler)

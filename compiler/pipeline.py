@@ -53,6 +53,7 @@ from sysdyn.compiler.program.emit_numpy import emit_numpy
 from sysdyn.compiler.program.program import Program
 from sysdyn.compiler.program.program_text import verify_program
 from sysdyn.dsl.model import budget
+from sysdyn.dsl.model.calculus import NoDerivativeError
 from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.network import Network, Parameter
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
@@ -155,16 +156,16 @@ def compile_network(
     gather: what is written out by hand and alike as families (network/gathered.py).
     traced: where the text traces nothing, every coordinate and every dynamic variable is.
     """
-    with at_rest(), budget.drawn():
-        try:
+    try:
+        with at_rest(), budget.drawn(network.place.source.text):
             families = gathered(network, irregular=not formulation.startswith("co_")) if gather else network
             if families is not network:
                 with suppress(ModelError):  # what is wrong is said of what the author wrote
                     found = _compiled(families, formulation, backend, integrating=integrating, traced=traced)
                     return _authored(found, network)
             return _compiled(network, formulation, backend, integrating=integrating, traced=traced)
-        except budget.SpentError as spent:
-            raise ModelError([spent.diagnostic(network.place)]) from spent
+    except (budget.SpentError, NoDerivativeError) as spent:
+        raise ModelError([spent.diagnostic(network.place)]) from spent
 
 
 def _compiled(network: Network, formulation: str, backend: str, *, integrating: bool, traced: bool) -> CompiledModel:

@@ -14,8 +14,9 @@ from dataclasses import replace
 
 from sysdyn.dsl.elaborate.parts import declared
 from sysdyn.dsl.load import Document, network
+from sysdyn.dsl.model import budget
 from sysdyn.dsl.model.expression import fresh
-from sysdyn.dsl.text.diagnostics import Diagnostic, Report
+from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Report
 from sysdyn.dsl.text.source import Span
 from sysdyn.dsl.tree import syntax
 from sysdyn.dsl.tree.walking import children
@@ -47,7 +48,17 @@ def judged(document: Document) -> Iterator[tuple[str, Report]]:
     """Of each such component of a file: its name, and what is wrong with it and with what stands outside of all models
     and components.
     """
-    return ((part.name.name, _judged(document, part)) for part in unused(document.file))
+    with budget.drawn(document.file.source.text):  # one for all of them: each may have the others inside
+        for part in unused(document.file):
+            report = Report()
+            try:
+                budget.unfold(budget.NODE * len(document.file.items), "components that no model uses")  # each reads all
+                report = _judged(document, part)
+            except budget.SpentError as spent:
+                report.add(spent.diagnostic(Place(document.file.source, part.name.span)))
+            yield part.name.name, report
+            if any(d.code == "E119" for d in report):  # what follows finds nothing left either
+                return
 
 
 def _judged(document: Document, component: syntax.Component) -> Report:

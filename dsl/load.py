@@ -17,6 +17,7 @@ from sysdyn.dsl.elaborate.scenes.scenes import SceneReader
 from sysdyn.dsl.elaborate.statements import switches
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.calculus import NoDerivativeError
 from sysdyn.dsl.model.collecting import at_rest
 from sysdyn.dsl.model.depth import deep
 from sysdyn.dsl.model.network import Network, Parameter, Scene
@@ -116,16 +117,16 @@ def network(
     None where the report has errors, or N608: a network that lacks a part of the text is none, and where a statement
     could not be read only names and units are judged.  required: parameters and inputs must have values.
     """
-    with deep(), at_rest(), budget.drawn():
-        try:
+    try:
+        with deep(), at_rest(), budget.drawn(document.file.source.text):
             elaborator, reader = _elaborated(document, model, scene, report, settings, levels, moved)
             try:
                 return _judged(elaborator, reader, scene, report, required=required, outputs=outputs)
             finally:
                 report.retold(lambda found: told(elaborator, found))
-        except budget.SpentError as spent:
-            report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
-            return None
+    except (budget.SpentError, NoDerivativeError) as spent:
+        report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
+        return None
 
 
 def _judged(
@@ -206,7 +207,7 @@ def at_authors(network: Network, found: Iterable[Diagnostic]) -> tuple[Diagnosti
         return found
     again = document(source, Report())
     levels = [(choice.path, choice.chosen) for choice in network.levels]
-    with deep(), budget.drawn(), ex.fresh():
+    with deep(), budget.drawn(source.text), ex.fresh():
         elaborator, _ = _elaborated(again, again.models[network.model], None, Report(), (), levels)
         return tuple(told(elaborator, found))
 
@@ -219,7 +220,7 @@ def asked(
     levels: Sequence[tuple[str, str]] = (),
 ) -> Asked:
     """What a text without errors asks of its numbers."""
-    with deep(), budget.drawn():
+    with deep(), budget.drawn(document.file.source.text):
         elaborator, reader = _elaborated(document, model, scene, Report(), settings, levels)
         return Asked(elaborator, reader.elements)
 
@@ -234,8 +235,8 @@ def listing(
     """What a model offers: parameters with values, names that can be read, components; None where it has errors."""
     from sysdyn.dsl.elaborate.scenes.listing import instances, readable  # no run asks for it
 
-    with deep(), budget.drawn():
-        try:
+    try:
+        with deep(), budget.drawn(document.file.source.text):
             elaborator, reader = _elaborated(document, model, scene, report, (), levels)
             if report.failed:
                 return None
@@ -244,9 +245,9 @@ def listing(
             kept = {n: p for n, p in parameters.items() if n not in elaborator.parts.discretes}
             inputs = dict.fromkeys(elaborator.parts.inputs)
             return Listing(kept, tuple(inputs), known, readable(elaborator, known), instances(elaborator))
-        except budget.SpentError as spent:
-            report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
-            return None
+    except (budget.SpentError, NoDerivativeError) as spent:
+        report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
+        return None
 
 
 def _unread(elaborator: Elaborator, scene: syntax.Scene | None) -> bool:

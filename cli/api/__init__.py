@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import tempfile
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.api.compiled import Module, compile_model, known, shown
+from sysdyn.api.compiled import Module, by_name, compile_model, known, shown, written
 from sysdyn.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.analysis.resting import Equilibrium
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.check.checking import checked
-from sysdyn.cli.run.many.loaded import Loaded, text_of
+from sysdyn.cli.run.many.loaded import Loaded, shortly, text_of
 from sysdyn.cli.run.request import targets
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import Ran, run
@@ -77,13 +77,13 @@ def simulate(path: str | Path, *, unmet: str = "raise", **options: Any) -> Trace
     """
     _known(unmet)
     report = Report()
-    ran = run(_request(str(path), options), report)
+    ran = run(_request(path, options), report)
     return _handed(ran, report, unmet)
 
 
 def _known(unmet: str) -> None:
-    if unmet not in ("raise", "warn"):
-        raise UsageError(f"unmet {unmet!r}: raise or warn")
+    if not isinstance(unmet, str) or unmet not in ("raise", "warn"):
+        raise UsageError(f"unmet {shortly(unmet)}: raise or warn")
 
 
 def _handed(ran: Ran | None, report: Report, unmet: str) -> Trace:
@@ -169,10 +169,13 @@ class Model:
 
         request = replace(self._loaded.request, output=None, **_changes({} if until is None else {"until": until}))
         runner = Runner(request, keep, loaded=self._loaded if until is None else None)
-        asked = study(axes_of(runner, tuple(line(name, value) for name, value in over.items())), sample, runs, seed)
+        axes = axes_of(runner, tuple(line(name, value) for name, value in by_name("over", over).items()))
+        counts = {"runs": runs, "seed": seed, "jobs": jobs}
+        counts = {name: n if n is None else int(_number(name, n, int)) for name, n in counts.items()}
+        asked = study(axes, sample, counts["runs"], counts["seed"] or 0)
         with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
             file = Path(output) if output is not None else Path(folder) / "sweep.h5"
-            sweep(request, asked, file, jobs, _silent, timings=True, keep=keep, dask=dask, runner=runner)
+            sweep(request, asked, file, counts["jobs"] or 1, _silent, timings=True, keep=keep, dask=dask, runner=runner)
             return Sweep.open(file)
 
 
@@ -191,9 +194,9 @@ def load(path: str | Path, *, model: str | None = None, scene: str | None = None
     another one some milliseconds.  What a run comes to depends on its own numbers alone.
     """
     given = {"model": model, "scene": scene, **options}
-    if given.get("formulation") == "auto":
+    if isinstance(given.get("formulation"), str) and given["formulation"] == "auto":
         given["formulation"] = None
-    return Model(Loaded(replace(_request(str(path), given), output=None)))
+    return Model(Loaded(replace(_request(path, given), output=None)))
 
 
 def linearize(
@@ -211,18 +214,27 @@ def linearize(
     """
     if at is not None and equilibrium:
         raise UsageError("at together with equilibrium: an instant of a run, or a state of rest")
-    request = _request(str(path), {**options, "until": at})
-    known = (None if names is None else tuple(names) for names in (inputs, outputs))
+    request = _request(path, {**options, "until": at})
+    known = (None if names is None else _names(names) for names in (inputs, outputs))
     return linearised_at(request, *known, rest=equilibrium)
+
+
+def _names(names: Any) -> tuple[str, ...]:
+    found = tuple(names) if isinstance(names, list | tuple | set | dict | Iterator) else (None,)
+    if not all(isinstance(name, str) for name in found):
+        raise UsageError(f"{shortly(names)}: a list of names is wanted")
+    return tuple(map(str, found))
 
 
 def equilibria(path: str | Path, *, tries: int = 40, **options: Any) -> tuple[Equilibrium, ...]:
     """States of rest with their stability, from the guesses and from `tries` points around them; () if none."""
-    return resting(_request(str(path), options), tries)
+    return resting(_request(path, options), int(_number("tries", tries, int)))
 
 
 def check(text: str, name: str = "<text>") -> list[Diagnostic]:
     """What `sysdyn check` finds in a text: every finding, of every model, scene and component; [] where it is clean."""
+    if not isinstance(text, str) or not isinstance(name, str):
+        raise UsageError(f"{shortly(name if isinstance(text, str) else text)}: a text is wanted")
     report = Report()
     document = load_.document(SourceText(name, text), report)
     for target in targets.all_targets(document, report):
@@ -233,9 +245,11 @@ def check(text: str, name: str = "<text>") -> list[Diagnostic]:
     return list(report.diagnostics)
 
 
-def _request(path: str, options: dict[str, Any]) -> Request:
+def _request(path: object, options: dict[str, Any]) -> Request:
+    path = written("path", path)
     given = dict(options)
-    settings = given.pop("set", None) or given.pop("settings", ())
+    settings = given.pop("set", given.pop("settings", None))
+    settings = () if settings is None else settings
     given["settings"] = tuple((name, text_of(value)) for name, value in _settings(settings).items())
     return _made(Request, path, **_changes(given))
 
@@ -243,9 +257,12 @@ def _request(path: str, options: dict[str, Any]) -> Request:
 def _settings(settings: Any) -> dict[str, Any]:
     """Values by name, of a mapping or of pairs."""
     try:
-        return dict(settings)
+        found = dict(settings)
     except (TypeError, ValueError):
-        raise UsageError(f"set {settings!r}: names with their values, such as {{'R.R': '10 ohm'}}") from None
+        found = {None: None}
+    if not all(isinstance(name, str) for name in found):
+        raise UsageError(f"set {shortly(settings)}: names with their values, such as {{'R.R': '10 ohm'}}")
+    return found
 
 
 def _made(make: Any, *arguments: Any, **options: Any) -> Request:
@@ -264,16 +281,37 @@ def _number(name: str, value: Any, kind: type[float] | type[int]) -> float | int
     """As the command reads a text."""
     try:
         return kind(value)
-    except (TypeError, ValueError):
-        raise UsageError(f"{name} {value!r}: a number") from None
+    except (TypeError, ValueError, OverflowError):
+        raise UsageError(f"{name} {shortly(value)}: a number") from None
+
+
+_TEXTS = frozenset(("model", "scene", "formulation", "method", "index", "backend", "redundancy", "output", "o"))
+
+
+def _instants(at: Any) -> Iterable[Any]:
+    """Instants, or one."""
+    try:
+        return np.atleast_1d(at)
+    except ValueError:
+        raise UsageError(f"at {shortly(at)}: instants [s]") from None
 
 
 def _changes(options: dict[str, Any]) -> dict[str, Any]:
     """Options as a request has them."""
     given = dict(options)
+    given |= {name: written(name, given[name]) for name in _TEXTS & given.keys() if given[name] is not None}
     level = given.pop("level", None)
     if level is not None:
-        given["levels"] = tuple(level.items() if isinstance(level, Mapping) else level)
+        pairs = (
+            list(level.items())
+            if isinstance(level, Mapping)
+            else list(level)
+            if isinstance(level, list | tuple)
+            else [()]
+        )
+        if any(not isinstance(p, tuple) or list(map(type, p)) != [str, str] for p in pairs):
+            raise UsageError(f"level {shortly(level)}: paths with the names of their levels")
+        given["levels"] = tuple(pairs)
     for name in ("until", "max_wall", "step"):
         if given.get(name) is not None:
             given[name] = text_of(given[name])
@@ -282,13 +320,9 @@ def _changes(options: dict[str, Any]) -> dict[str, Any]:
             given[name] = _number(name, given[name], kind)
     at = given.get("at")
     if at is not None and not isinstance(at, str):
-        given["at"] = ",".join(text_of(t) for t in np.atleast_1d(at))
-    if isinstance(given.get("index"), int):
-        given["index"] = str(given["index"])
+        given["at"] = ",".join(text_of(t) for t in _instants(at))
     if "o" in given:
         given["output"] = given.pop("o")
     if "no_timings" in given:
         given["timings"] = not given.pop("no_timings")
-    if given.get("output") is not None:
-        given["output"] = str(given["output"])
     return given

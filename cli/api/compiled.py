@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from sysdyn.cli.export.layout import AUDIT, Formed, state_jacobian, tables
 from sysdyn.cli.export.naming import elements
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import BACKENDS, FORMULATIONS, INDICES
-from sysdyn.cli.run.many.loaded import KEPT, place_of
+from sysdyn.cli.run.many.loaded import KEPT, place_of, shortly
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.dsl.model import expression as ex
@@ -23,6 +23,35 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
+
+
+def numbers(name: str, value: object) -> NDArray[np.float64]:
+    """An array of doubles; UsageError where a value is none."""
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise UsageError(f"{name} {shortly(value)}: numbers are wanted") from None
+
+
+def written(name: str, value: object) -> str:
+    """A value that is a text, a path or a small number, as a text; UsageError where it is none."""
+    if isinstance(value, str | int | PurePath) and not isinstance(value, bool):
+        try:
+            text = str(value)
+            text.encode()
+            if "\0" not in text:
+                return text
+        except ValueError:  # thousands of digits, half a character
+            pass
+    raise UsageError(f"{name} {shortly(value)}: a text is wanted")
+
+
+def by_name(what: str, given: object) -> Mapping[str, Any]:
+    """Values by name, of which there may be none; UsageError where it is another thing."""
+    found = {} if given is None else given
+    if not isinstance(found, Mapping) or not all(isinstance(name, str) for name in found):
+        raise UsageError(f"{what} {shortly(given)}: names with their values")
+    return found
 
 
 class Module:
@@ -49,13 +78,13 @@ class Module:
 
     def _system(self, parameters: Mapping[str, Any] | None) -> System:
         """The system with other values of parameters."""
-        said = sorted((parameters or {}).items())
-        key = tuple((name, np.asarray(value, dtype=float).tobytes()) for name, value in said)
+        said = sorted((name, numbers(name, value)) for name, value in by_name("parameters", parameters).items())
+        key = tuple((name, value.tobytes()) for name, value in said)
         if key not in self._systems:
             prepared, system = self._formed.prepared, self._formed.system
             fixed = prepared.network.branches or self._numbers.state is not None  # y0 says which unknowns are the state
             sizes = {p.name for p in prepared.network.parameters if p.whole} if fixed else set()
-            given = {place_of(name): np.asarray(value, dtype=float) for name, value in said}
+            given = {place_of(name): value for name, value in said}
             for name in sizes & given.keys():  # which elements are alike depends on where ranges meet
                 where = "where elements sit between nodes" if prepared.network.branches else "in index form 0"
                 message = f"the size '{name}' is part of the text {where}"
@@ -68,15 +97,20 @@ class Module:
             self._systems[key] = made.without(system.left_out) if system.left_out else made
         return self._systems[key]
 
-    def _at(self, parameters: Mapping[str, Any] | None, *given: NDArray[np.float64]) -> tuple[System, Any, Any]:
-        """The system with these parameters, and y, ydot as it takes them.  ValueError where one has another shape."""
+    def _at(
+        self, t: float, parameters: Mapping[str, Any] | None, *given: NDArray[np.float64]
+    ) -> tuple[float, System, Any, Any]:
+        """t, the system with these parameters, y and ydot as it takes them.  ValueError: one has another shape."""
+        instant = numbers("t", t)
+        if instant.ndim:
+            raise UsageError(f"t {shortly(t)}: one number is wanted")
         system = self._system(parameters)
         number = system.unknowns if self._numbers.state is None else self.y0.size
-        y, ydot = (np.ascontiguousarray(vector, dtype=float) for vector in given)
+        y, ydot = (np.ascontiguousarray(numbers("y and ydot", vector)) for vector in given)
         for vector in (y, ydot):
             if vector.shape != (number,):
                 raise ValueError(f"y and ydot have {number} unknowns: an array of shape {vector.shape} was given")
-        return system, y, ydot
+        return float(instant), system, y, ydot
 
     def residual(
         self,
@@ -86,7 +120,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """F(t, y, ydot) [rows]; parameters: values that replace the model's."""
-        system, y, ydot = self._at(parameters, y, ydot)
+        t, system, y, ydot = self._at(t, parameters, y, ydot)
         if self._numbers.state is None:
             return system.residual(t, y, ydot)
         return np.asarray(ydot - self._slopes(system, t, y)[1][self._numbers.state.places])
@@ -100,7 +134,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """Entries of dF/dy + cj dF/dydot on the pattern: scipy.sparse.csc_array((values, indices, indptr))."""
-        system, y, ydot = self._at(parameters, y, ydot)
+        t, system, y, ydot = self._at(t, parameters, y, ydot)
         if self._numbers.state is not None:
             inside, rates = self._slopes(system, t, y)
             return state_jacobian(self._numbers, system, t, inside, rates, cj)
@@ -115,7 +149,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """Entries of dF/dydot on the pattern."""
-        system, y, ydot = self._at(parameters, y, ydot)
+        t, system, y, ydot = self._at(t, parameters, y, ydot)
         if self._numbers.state is not None:
             columns = np.repeat(np.arange(self.y0.size), np.diff(self.indptr))
             return np.asarray(self.indices == columns, dtype=float)
@@ -129,7 +163,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """What the scene traces at a point; not a number where it reads a ledger of a whole run."""
-        system, y, ydot = self._at(parameters, y, ydot)
+        t, system, y, ydot = self._at(t, parameters, y, ydot)
         if self._numbers.state is not None:
             y, ydot = self._slopes(system, t, y)
         kinetic, potential = system.audit(t, y, ydot)[:2]
@@ -170,9 +204,14 @@ def compile_model(
 
     index: 3 as written, 2 stabilised, 2v, 1, 0 (yd - F(t, y)); auto: the one that `simulate` takes by radau.
     """
-    index = str(index)
+    index, formulation, backend = (
+        written("index", index),
+        written("formulation", formulation),
+        written("backend", backend),
+    )
     known(formulation, backend, index)
-    report, request = Report(), Request(str(path), scene, model, backend=backend, no_prune=no_prune)
+    scene, model = (name if name is None else written("scene or model", name) for name in (scene, model))
+    report, request = Report(), Request(written("path", path), scene, model, backend=backend, no_prune=no_prune)
     with ex.fresh():
         network = network_of(request, report)
         report.raise_if_failed()

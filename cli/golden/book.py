@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Sequence
 from dataclasses import field
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.failures import UsageError, instead
+from sysdyn.cli.plain_files import UnfitError, inside, project, tables
 from sysdyn.cli.whole_files import toml_text
 from sysdyn.values import dataclass
 
@@ -81,13 +81,15 @@ def read(folder: Path) -> tuple[Golden, ...]:
     """All goldens of one model's folder.  Raises Unreadable, OSError."""
     path = folder / BOOK
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise Unreadable(f"{path}: {error}") from error
+        data = tables(path)
+    except UnfitError as error:
+        raise Unreadable(str(error)) from error
     try:
         if data["version"] != VERSION:
             raise Unreadable(f"{path}: version {data['version']!r} is not known: a newer sysdyn wrote it")
         model = Path(os.path.normpath(folder / str(data["model"])))
+        if not inside(folder / str(data["model"]), project(folder.parent)):
+            raise Unreadable(f"{path}: its model {data['model']!r} is outside of the project, {project(folder.parent)}")
         return tuple(_entry(folder, model, name, item) for name, item in data["scenes"].items())
     except KeyError as error:
         raise Unreadable(f"{path}: {error} is missing: sysdyn golden record writes it") from error

@@ -6,6 +6,7 @@ import contextlib
 import multiprocessing
 import os
 import sys
+import threading
 import time
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -119,6 +120,7 @@ class Checker:
 
 def serve(pipe: Connection) -> None:
     """What the process does: answer each text with its findings until nobody asks any more."""
+    threading.Thread(target=_end_with_the_server, daemon=True).start()
     os.dup2(2, 1)  # standard output belongs to the protocol
     sys.stdout = sys.stderr
     from sysdyn.cli.run.start import starting  # noqa: F401 (nobody waits for them yet)
@@ -129,6 +131,14 @@ def serve(pipe: Connection) -> None:
             checked = found(name, unsaved)
             pipe.send(checked)
             pipe.send({} if any(d.code == SPENT for d in checked.found) else accounts(name))
+
+
+def _end_with_the_server() -> None:
+    """A server that is killed closes no pipe that a check would notice: the process ends in the midst of it."""
+    server = multiprocessing.parent_process()
+    if server is not None:
+        server.join()
+        os._exit(1)
 
 
 def found(name: str, unsaved: dict[str, str]) -> Checked:

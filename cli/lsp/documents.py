@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,10 @@ from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.diagnostics import Diagnostic
 from sysdyn.dsl.text.source import UNSAVED, SourceText, real
 from sysdyn.dsl.tree import syntax
+
+LONGEST = 300_000
+"""Characters of a text that the server itself reads (a second); of longer ones the check tells, in its process."""
+_IMPORT = re.compile(r"^\s*from\s+([\w.]+)\s+import\b", re.MULTILINE)
 
 
 class Document:
@@ -41,8 +46,13 @@ class Document:
 
     @cached_property
     def parsed(self) -> tuple[syntax.File, tuple[Diagnostic, ...]]:
-        """The tree, and what is wrong with its syntax."""
-        return parse(self.source)
+        """The tree, and what is wrong with its syntax; of a text that is too long an empty one."""
+        return parse(SourceText(self.name, "") if self.long else self.source)
+
+    @property
+    def long(self) -> bool:
+        """Whether the server leaves the text to the check."""
+        return len(self.source.text) > LONGEST
 
     @property
     def tree(self) -> syntax.File:
@@ -56,9 +66,10 @@ class Document:
 
     def imports(self) -> Iterator[str]:
         """The real paths of the files of the author's that it imports."""
-        for item in self.tree.items:
-            if isinstance(item, syntax.Import) and item.module.names[0] != "std":
-                yield str(real(Path(self.name).parent.joinpath(*item.module.names).with_suffix(".sd")))
+        for found in _IMPORT.finditer(self.source.text):
+            names = [name for name in found[1].split(".") if name]
+            if names and names[0] != "std":
+                yield str(real(Path(self.name).parent.joinpath(*names).with_suffix(".sd")))
 
 
 class Documents:

@@ -14,6 +14,7 @@ from sysdyn.dsl.model import units
 from sysdyn.dsl.model.functions import FUNCTIONS
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
 from sysdyn.dsl.parser.automaton import words
+from sysdyn.dsl.parser.notes import PREDEFINED
 from sysdyn.dsl.text import codes
 from sysdyn.dsl.text.diagnostics import Diagnostic
 from sysdyn.dsl.text.source import Place, Span
@@ -181,6 +182,8 @@ def renamed(document: Document, offset: int, name: str) -> dict[str, Any]:
         raise ValueError(f"'{word.name}' is declared in {declared[0].place.file}")
     if not name.isidentifier() or name in words():
         raise ValueError(f"'{name[:60]}' cannot be a name")
+    if name in PREDEFINED:
+        raise ValueError(f"'{name}' cannot be a name: the language has it already")
     other = sight.Word(word.path, name, declared[0].place.span.start, declared[0].place.span.start)
     if sight.find(document, other):
         raise ValueError(f"'{name}' is declared already")

@@ -10,7 +10,7 @@ from typing import Any
 from sysdyn import __version__
 from sysdyn.cli.lsp import completion, findings, hover, outline, positions, wire
 from sysdyn.cli.lsp.checker import Accounts, Checker, shown
-from sysdyn.cli.lsp.documents import Document, Documents
+from sysdyn.cli.lsp.documents import LONGEST, Document, Documents
 from sysdyn.cli.run.check.checking import Checked
 from sysdyn.dsl.text.diagnostics import Diagnostic
 from sysdyn.dsl.text.source import Span
@@ -27,6 +27,8 @@ CAPABILITIES = {
     "documentSymbolProvider": True,
     "completionProvider": {"triggerCharacters": [".", ":"]},
 }
+UNREADABLE = (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError)
+"""What parameters that are not those of the protocol raise: told to the client, no fault."""
 Send = Callable[[dict[str, Any]], None]
 
 
@@ -88,6 +90,8 @@ class Server:
         elif method == "exit" or (self._initialized and not self._shut and method in self._notifications):
             try:
                 self._notifications[method](given)
+            except UNREADABLE as error:
+                print(f"sysdyn lsp: parameters of '{method}' that cannot be read: {error!r:.200}", file=sys.stderr)
             except Exception as error:
                 _log(method, error)
 
@@ -104,8 +108,7 @@ class Server:
                 result = self._requests[method](params)
             except RefusedError as error:
                 self._refuse(number, wire.REQUEST_FAILED, str(error))
-            except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-                _log(method, error)
+            except UNREADABLE as error:
                 self._refuse(number, wire.INVALID_PARAMS, f"parameters of '{method}' that cannot be read: {error!r}")
             except Exception as error:
                 _log(method, error)
@@ -206,6 +209,8 @@ class Server:
 
     def _formatting(self, params: dict[str, Any]) -> Any:
         document = self._document(params)
+        if document is not None and document.long:
+            raise RefusedError(f"the text is longer than {LONGEST} characters: sysdyn fmt lays it out")
         return None if document is None else findings.formatted(document)
 
     def _actions(self, params: dict[str, Any]) -> Any:
@@ -235,6 +240,8 @@ class Server:
 
     def _renamed(self, params: dict[str, Any]) -> Any:
         at = self._placed(params)
+        if at is not None and at[0].long:
+            raise RefusedError(f"the text is longer than {LONGEST} characters: its names are not looked for")
         try:
             return None if at is None else hover.renamed(*at, str(params["newName"]))
         except ValueError as error:

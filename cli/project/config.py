@@ -6,13 +6,15 @@ the first that has one counts. What a scene says (accuracy, formulation, ...) is
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import glob
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from sysdyn.cli.console import WHEN
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import BACKENDS, FORMATS
+from sysdyn.cli.plain_files import UnfitError, inside, tables, text_of
 from sysdyn.dsl.text.source import real
 
 FILES = ("sysdyn.toml", "pyproject.toml")
@@ -96,9 +98,11 @@ def _found(arguments: Sequence[str]) -> tuple[Path, Mapping[str, Any]] | None:
         for name in FILES:
             path = level / name
             try:
-                text = path.read_text(encoding="utf-8")
-            except (OSError, UnicodeDecodeError):
+                text = text_of(path)
+            except OSError:
                 continue
+            except UnfitError as error:
+                raise UsageError(str(error)) from None
             if name == "pyproject.toml" and "[tool.sysdyn" not in text:
                 continue
             return path, _table(path, text)
@@ -106,14 +110,12 @@ def _found(arguments: Sequence[str]) -> tuple[Path, Mapping[str, Any]] | None:
 
 
 def _table(path: Path, text: str) -> Mapping[str, Any]:
-    import tomllib
-
     try:
-        whole = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise UsageError(f"{path}: {error}") from None
-    if path.name == "pyproject.toml":
-        whole = whole.get("tool", {}).get("sysdyn", {})
+        whole: Any = tables(path, text)
+    except UnfitError as error:
+        raise UsageError(str(error)) from None
+    for key in ("tool", "sysdyn") if path.name == "pyproject.toml" else ():
+        whole = whole.get(key, {}) if isinstance(whole, Mapping) else None
     if not isinstance(whole, Mapping):
         raise UsageError(f"{path}: [tool.sysdyn] is a table")
     return whole
@@ -133,13 +135,30 @@ def _read(path: Path, table: str, key: str, value: Any) -> tuple[str, Any]:
     elif kind is list:
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise UsageError(f"{where} {key} = {value!r}: a list of texts")
-        value = [str(_relative(path.parent / item)) for item in value]
+        value = [item for said in value for item in _files(path.parent, said, f"{where} {key}")]
     elif key == "folder" and isinstance(value, str):
+        if "\0" in value:
+            raise UsageError(f"{where} {key} = {value!r}: no name of a folder")
         value = str(_relative(path.parent / value))
     elif isinstance(value, bool) != (kind is bool) or not isinstance(value, (kind, int) if kind is float else kind):
         names = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
         raise UsageError(f"{where} {key} = {value!r}: {names[kind]}")
     return name, value
+
+
+def _files(project: Path, said: str, where: str) -> Iterator[str]:
+    """What an item of `files` names, inside the project's folder, links followed; UsageError where it is outside."""
+    found = [project / said] if "\0" not in said else []
+    if any(sign in said for sign in "*?[") and found and not found[0].exists():
+        found = [Path(name) for name in sorted(glob.glob(str(found[0]), recursive=True))]  # noqa: PTH207
+        found = found or [project / said]  # nothing fits: the command says so
+    elif found and found[0].is_dir():
+        links = (p for p in sorted(found[0].rglob("*.sd")) if p.is_symlink())
+        found += [p for p in links if not inside(p, project)]
+    outside = next((p for p in found if not inside(p, project)), None)
+    if outside is not None or not found:
+        raise UsageError(f"{where}: {str(outside or said)!r} is outside of {project}, the project's folder")
+    return (str(_relative(p)) for p in found)
 
 
 def _instead(table: str, key: str) -> str:

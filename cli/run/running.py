@@ -140,6 +140,10 @@ def begin(prepared: Prepared, options: Options, report: Report, *, checked: bool
         text = f"a run of {number} unknowns needs {need}, and there are {most}"
         report.error("E119", text, prepared.network.place, help="fewer elements")
         return None
+    if number == 0 and not started.system.description.rows_of("observe"):
+        message = "nothing is unknown in the model, and nothing is traced: a run would hold nothing"
+        report.error("E607", message, prepared.network.place, help="coord, state or node; or a quantity that is traced")
+        return None
     if not checked:
         check_module(prepared, started, options.t_end)
     return started

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -24,6 +25,8 @@ class Journal:
     def __init__(self, output: Path, digest: str) -> None:
         self.path = output.with_name(f".{output.name}.runs")
         self.done = Done()
+        if os.path.lexists(self.path) and (self.path.is_symlink() or not self.path.is_file()):
+            raise UsageError(f"{self.path} is no file of a sweep: remove it, or give -o another name")
         self._read(digest)
         self._file = self.path.open("a", encoding="utf-8")
         if not self.path.stat().st_size:
@@ -37,7 +40,8 @@ class Journal:
         whole = text[: text.rfind(b"\n") + 1]
         with self._damaged():
             lines = [json.loads(line) for line in whole.splitlines()]
-            other = bool(lines) and lines[0].get("study") != digest
+            begun = json.dumps({"study": digest}).encode().startswith(text)  # the first line, or a part of it
+            other = not begun and (lines[0].get("study") if lines else None) != digest
         if other:
             raise UsageError(
                 f"{self.path} holds runs of another study, or of another text: remove it, or give -o another name"

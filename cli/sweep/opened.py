@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.opening import opened
 
 
 class Sweep(Mapping[str, NDArray[Any]]):
@@ -23,10 +24,10 @@ class Sweep(Mapping[str, NDArray[Any]]):
 
     @classmethod
     def open(cls, file: str | Path) -> Sweep:
-        """Of a file that `sysdyn sweep` wrote.  TraceError where it is none, OSError where it cannot be read."""
-        import h5py
-
-        with h5py.File(file, "r") as found:
+        """Of a file that `sysdyn sweep` wrote.  TraceError where it is none, OSError where it cannot be read, or where
+        it names other files.
+        """
+        with opened(file) as found:
             if "run" not in found or "exit" not in found:
                 raise TraceError(f"{file} holds no runs of a sweep")
             arrays = {name: _read(found[name]) for name in found}

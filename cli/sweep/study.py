@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-import tomllib
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.plain_files import UnfitError, tables
 from sysdyn.cli.sweep.axes import MOST, Axis, Numbers
 from sysdyn.values import dataclass
 
@@ -117,9 +117,9 @@ _KEYS: dict[str, type] = {**dict.fromkeys(_TEXTS, str), **dict.fromkeys(_NUMBERS
 def read(path: str) -> StudyFile:
     """A study file; the model stands relative to it."""
     try:
-        text = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: {error}") from None
+        text = tables(Path(path))
+    except UnfitError as error:
+        raise UsageError(str(error)) from None
     said, over = text.get("study", {}), text.get("over", {})
     wrong = sorted({*text} - {"study", "over"}) + sorted({*said} - {*_KEYS})
     if wrong or not isinstance(said, dict) or not isinstance(over, dict):
@@ -138,10 +138,14 @@ def line(name: str, value: Any) -> str:
     """What a name takes (numbers, texts, or one text), as --over says it; UsageError where it is neither."""
     if isinstance(value, str):
         return f"{name} {value}" if value.lstrip().startswith("~") else f"{name} = {value}"
-    some = np.atleast_1d(np.asarray(value, dtype=object)).tolist() if value is not None else []
-    if some and all(isinstance(v, int | float | str | np.number) and not isinstance(v, bool) for v in some):
-        return f"{name} = {', '.join(v if isinstance(v, str) else repr(float(v)) for v in some)}"
-    raise UsageError(f'{name} = {value!r}: a list, or a text as --over takes it: "1 N/m .. 2 N/m : 5"')
+    try:
+        some = np.atleast_1d(np.asarray(value, dtype=object)).tolist() if value is not None else []
+        if some and all(isinstance(v, int | float | str | np.number) and not isinstance(v, bool) for v in some):
+            return f"{name} = {', '.join(v if isinstance(v, str) else repr(float(v)) for v in some)}"
+    except (ValueError, OverflowError):  # no list, no double
+        pass
+    said = f"{value!r:.60}" if value is None else type(value).__name__
+    raise UsageError(f'{name} = {said}: a list, or a text as --over takes it: "1 N/m .. 2 N/m : 5"')
 
 
 def _line(path: str, name: str, value: Any) -> str:

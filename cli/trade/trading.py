@@ -89,7 +89,7 @@ def trade(
     def measure(combination: Combination, tolerance: float, most: float) -> Measured | str:
         left = wall()
         step = work.step(bench.size(combination), combination.method)
-        steps = max(math.ceil(most / step), LEAST) if math.isfinite(most) else None
+        steps = max(math.ceil(most / step), LEAST) if math.isfinite(most) and step > 0.0 else None
         made = made_before.get((combination, tolerance))
         if made is None or (isinstance(made, Measured) and steps is not None and made.steps >= steps):
             made = bench.measure(combination, tolerance, kept, known.until, Limits(steps, left))

@@ -13,16 +13,26 @@ import os
 import platform
 import shlex
 import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cache
 from itertools import takewhile
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from sysdyn.compiler.program import cache as cache_
+
+if TYPE_CHECKING:
+    import subprocess
 
 # -O1: code as fast as -O2 on the benchmarks (Andrews 0.32 us a residual either way), compiled in 2/3 of the time
 FLAGS = ("-O1", "-std=c11", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno", "-fno-plt")
 
 
+PATIENCE = 600.0
+"""Seconds after which a compiler is taken for one that hangs: the largest models take two minutes."""
+MOST_SAID = 1 << 20
+"""Bytes of a compiler's words that are read."""
 FEW = 4096
 """Bytes of /proc/cpuinfo that hold the first processor."""
 
@@ -57,17 +67,49 @@ def compiler() -> tuple[tuple[str, ...], tuple[str, ...]]:
     raise NoCompilerError(f"there is no C compiler ({wanted or 'cc, gcc, clang'})")
 
 
-def _runs(command: tuple[str, ...]) -> None:
-    """Raises NoCompilerError where what is called a compiler is none."""
+@contextmanager
+def _group(command: tuple[str, ...], streams: Mapping[str, Any]) -> Iterator[subprocess.Popen[bytes]]:
+    """A process in a group of its own, where there are groups; what is left of the group at the end is killed."""
+    import signal
     import subprocess
 
-    name = " ".join(command)
+    run = subprocess.Popen(command, **streams, start_new_session=True)
     try:
-        run = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=60, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise NoCompilerError(f"{name} cannot be run: {error}") from error
-    if run.returncode:
-        raise NoCompilerError(f"{name} --version fails with status {run.returncode}", run.stderr)
+        yield run
+    finally:
+        with suppress(OSError):  # nobody is left
+            if hasattr(os, "killpg"):
+                os.killpg(run.pid, signal.SIGKILL)
+            else:
+                run.kill()
+        run.wait()
+
+
+def _said(command: tuple[str, ...]) -> tuple[int, str]:
+    """The status of a compiler's command and what it said; NoCompilerError where it cannot be run, or does not end.
+
+    Its words go to a file: what it leaves running holds no pipe open that would be waited for.  They may be in any
+    encoding, and only their beginning is read.  It has a group of processes of its own, which ends with it.
+    """
+    import subprocess
+    import tempfile
+
+    with tempfile.TemporaryFile() as words:
+        streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": words, "stderr": words}
+        try:
+            with _group(command, streams) as run:
+                status = run.wait(PATIENCE)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise NoCompilerError(f"{' '.join(command[:1])} cannot be run: {error}") from error
+        words.seek(0)
+        return status, words.read(MOST_SAID).decode("utf-8", "replace")
+
+
+def _runs(command: tuple[str, ...]) -> None:
+    """Raises NoCompilerError where what is called a compiler is none."""
+    status, said = _said((*command, "--version"))
+    if status:
+        raise NoCompilerError(f"{' '.join(command)} --version fails with status {status}", said)
 
 
 def _identity(path: str) -> str:
@@ -109,22 +151,12 @@ def build(text: str, flags: tuple[str, ...] = FLAGS) -> Path:
 
 
 def _compile(command: tuple[str, ...], text: str, folder: Path, key: str) -> Path:
-    import subprocess
     import tempfile
 
     with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as place:
         source, output = Path(place) / "model.c", Path(place) / "model.so"
         source.write_text(text, encoding="ascii")
-        try:
-            run = subprocess.run(
-                [*command, "-o", str(output), str(source), "-lm"],
-                capture_output=True,
-                text=True,
-                check=False,
-                stdin=subprocess.DEVNULL,
-            )
-        except OSError as error:
-            raise NoCompilerError(f"{command[0]} cannot be run: {error}") from error
-        if run.returncode:
-            raise BuildError(f"the C compiler failed with status {run.returncode}", run.stderr)
+        status, said = _said((*command, "-o", str(output), str(source), "-lm"))
+        if status:
+            raise BuildError(f"the C compiler failed with status {status}", said)
         return cache_.put(output, key)

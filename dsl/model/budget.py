@@ -33,6 +33,14 @@ STEPPED = 2 << 10
 """Bytes that an unknown takes in a run, with its share of the factors (measured: 2500 in that line)."""
 TERM = 1 << 10
 """Bytes charged for each term of a sum that is added up while the text is read: it takes a microsecond or two."""
+UNFOLDED = 100_000
+"""Nodes that a text of any length may unfold to, each some 50 us in all stages (models that people wrote: below 4000);
+an expansion or an instance counts as many as its bytes do."""
+FOLLOWING = 4
+"""More of them for each character of the text, since what is written out is long by right (a line of a netlist: 1)."""
+DEEPEST = 1000
+"""Definitions that read each other, or components in each other: each level takes some ten frames of Python's stack, of
+which `depth.FRAMES` may be (chains in models that people wrote: below 30)."""
 NUMBER = 16
 """Bytes of an element of a parameter."""
 
@@ -40,10 +48,11 @@ _GROUP = Path("/sys/fs/cgroup/memory.max")
 
 
 class _Budget(threading.local):
-    """What is left of it in a thread (bytes)."""
+    """What is left of it in a thread: bytes, and what a text may unfold to."""
 
     def __init__(self) -> None:
         self.left = math.inf
+        self.pieces = math.inf
 
 
 _budget = _Budget()
@@ -61,6 +70,28 @@ class SpentError(Exception):
         """E119, at the statement or at `place`."""
         message = f"{self.what}: more than the {shown(granted())} that one model may take"
         return Diagnostic("E119", message, self.place or place, help="fewer of them, or a loop over an array")
+
+
+class TooManyError(SpentError):
+    """A text unfolds to more than one of its length may."""
+
+    def diagnostic(self, place: Place) -> Diagnostic:
+        """E119, at the statement or at `place`."""
+        message = (
+            f"{self.what}: more than the {UNFOLDED} pieces, and {FOLLOWING} a character, that a text may unfold to"
+        )
+        help_ = "values that are used again as states or implicit unknowns, a loop over an array"
+        return Diagnostic("E119", message, self.place or place, help=help_)
+
+
+class TooDeepError(SpentError):
+    """What a text asks for lies within each other deeper than it can be unfolded."""
+
+    def diagnostic(self, place: Place) -> Diagnostic:
+        """E119, at the statement or at `place`."""
+        help_ = "fewer of them in a row; elements of an array that follow each other are a loop"
+        message = f"{self.what} within each other more than {DEEPEST} deep"
+        return Diagnostic("E119", message, self.place or place, help=help_)
 
 
 def granted() -> int:
@@ -94,15 +125,26 @@ def shown(amount: float) -> str:
 
 
 @contextmanager
-def drawn() -> Iterator[None]:
-    """A stage that draws on the budget; a stage inside another draws on that one's."""
-    before = _budget.left
-    if before == math.inf:
-        _budget.left = granted()
+def drawn(text: str) -> Iterator[None]:
+    """A stage that draws on the budget of a text; a stage inside another draws on that one's.
+
+    Where Python's stack ends the budget has ended too: the one place that hears of it.
+    """
+    before = _budget.left, _budget.pieces
+    if before[0] == math.inf:
+        _budget.left, _budget.pieces = granted(), UNFOLDED + FOLLOWING * len(text)
     try:
         yield
+    except RecursionError:  # expressions in definitions: together deeper than either may be
+        raise TooDeepError("definitions, expressions and components are") from None
     finally:
-        _budget.left = before
+        _budget.left, _budget.pieces = before
+
+
+def within(depth: int, what: str) -> None:
+    """Count a level before it unfolds; TooDeepError where it is too deep."""
+    if depth > DEEPEST:
+        raise TooDeepError(what)
 
 
 def charge(amount: float, what: str) -> None:
@@ -110,3 +152,11 @@ def charge(amount: float, what: str) -> None:
     _budget.left = left = _budget.left - amount
     if left < 0:
         raise SpentError(what)
+
+
+def unfold(amount: float, what: str) -> None:
+    """Draw for what a text unfolds to: its nodes, and their bytes; SpentError where either is more than is left."""
+    _budget.pieces = pieces = _budget.pieces - amount / NODE
+    if pieces < 0:
+        raise TooManyError(what)
+    charge(amount, what)

@@ -37,6 +37,7 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.model.expression_text import to_text
+from sysdyn.dsl.text.diagnostics import Diagnostic, Place
 
 _ONE_ARGUMENT: Mapping[str, Callable[[Node], Node]] = {
     "signal": lambda x: const(1.0),
@@ -62,6 +63,16 @@ _ONE_ARGUMENT: Mapping[str, Callable[[Node], Node]] = {
     "ceil": lambda x: const(0.0),
     "step": lambda x: const(0.0),
 }
+
+
+class NoDerivativeError(ValueError):
+    """An operation whose derivative is asked for and cannot be written; place: of the statement, where known."""
+
+    place: Place | None = None
+
+    def diagnostic(self, place: Place) -> Diagnostic:
+        """E608, at the statement or at `place`."""
+        return Diagnostic("E608", str(self), self.place or place, "its elements written out: w[1]*w[2]*w[3]")
 
 
 def _call_partials(node: Node) -> tuple[Node, ...]:
@@ -193,7 +204,7 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
             operator, name = node.data
             if operator == "sum":
                 return reduction("sum", name, node.args[0], node.args[1], dots[2])
-            raise ValueError(f"the derivative of {operator}(... in ...) is not defined")
+            raise NoDerivativeError(f"the derivative of {operator}(... in ...) is not supported yet")
     raise AssertionError(node.op)
 
 

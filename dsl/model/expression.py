@@ -82,7 +82,7 @@ def _make(op: str, data: Any, args: tuple[Node, ...], key: Any = None) -> Node:
     nodes = _interned.nodes
     node = nodes.get(full)
     if node is None:
-        budget.charge(budget.NODE, "its expressions")
+        budget.unfold(budget.NODE, "its expressions")
         nodes[full] = node = Node(op, data, args)
     return node
 
@@ -218,6 +218,8 @@ def product(constant: float, factors: Iterable[tuple[float, Node]]) -> Node:
     if total == 0.0:
         return const(0.0)
     kept = [(e, n) for n, e in found.items() if e != 0.0]
+    if any(not math.isfinite(e) for e, _ in kept):  # exponents that multiply to more than a number: powers of their own
+        kept = [(e, n) if math.isfinite(e) else (1.0, _make("pow", None, (n, const(e)))) for e, n in kept]
     if not kept:
         return const(total)
     if len(kept) == 1 and kept[0][0] == 1.0:

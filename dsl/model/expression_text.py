@@ -7,12 +7,19 @@ from typing import Any
 from sysdyn.dsl.model.expression import Node, topological
 from sysdyn.dsl.model.functions import is_whole
 
+LONGEST = 10_000
+"""Characters of an expression that are written: one whose parts are shared doubles its text with each level (f(f(x)) of
+`x + x^2`, forty deep, is a terabyte)."""
+
 
 def to_text(root: Node) -> str:
-    """The expression in the language's own notation, for dumps and messages (f is x', its derivative x'')."""
+    """The expression in the language's own notation, for dumps and messages (f is x', its derivative x''); what is
+    longer than LONGEST ends in an ellipsis.
+    """
     text: dict[Node, str] = {}
     for node in topological([root]):
-        text[node] = _show(node, [text[a] for a in node.args])
+        said = _show(node, [text[a] for a in node.args])
+        text[node] = said if len(said) <= LONGEST else said[:LONGEST] + "..."
     return text[root]
 
 

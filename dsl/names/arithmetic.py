@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -100,6 +101,9 @@ class Arithmetic(Context):
                 number, unit = e.exponent.text, e.exponent.unit.text
                 help_ = f"factors are joined by '*': ^{number}*{unit}; '{number} {unit}' is a quantity"
             raise self.fail("E204", f"the exponent is in {dim.show(exponent.dimension)}", e.exponent.span, help=help_)
+        if ex.is_const(exponent.node) and not math.isfinite(exponent.node.data):
+            message = f"the exponent is {exponent.node.data}: beyond all numbers"
+            raise self.fail("E204", message, e.exponent.span, help="a finite exponent")
         if not base.dimension:
             return Typed(ex.power(base.node, exponent.node), base.dimension if exponent.dimension else NONE)
         if not ex.is_const(exponent.node):

@@ -248,7 +248,7 @@ class Calls(Context):
             raise self.fail("E105", f"circular definition: {name} -> {name}", e.span)
         key = definition, _nodes(values)
         if key not in self._applied:
-            budget.charge(budget.EXPANSION, f"what function '{name}' is expanded to")
+            budget.unfold(budget.EXPANSION, f"what function '{name}' is expanded to")
             self._applied[key] = None
             self._applied[key] = self._body(symbol, values, result.dimension)
         node = self._applied[key]

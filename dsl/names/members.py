@@ -132,7 +132,7 @@ class Members(Ports):
             case NodeSymbol():
                 at = (
                     *symbol.family.prefix,
-                    *self.indices(symbol.name, symbol.family.shape, self._all(base, symbol, e)),
+                    *self.indices(symbol.name, symbol.family.shape, base.indices, e.span),
                 )
                 end = End(symbol, at, symbol.domain)
                 if e.name == ("e" if end.domain.common == "flow" else "f") and self.of_ports(e.base):
@@ -145,7 +145,7 @@ class Members(Ports):
                     return self.taken_in(symbol.end, e)
                 return self._changed(self.node_quantity(symbol.end, e), base.change)
             case BranchSymbol():
-                at = self.indices(symbol.name, symbol.family.shape, self._all(base, symbol, e))
+                at = self.indices(symbol.name, symbol.family.shape, base.indices, e.span)
                 return self._changed(self.branch_quantity(symbol, at, e.name, e), base.change)
             case TwoPortSymbol():
                 return self._two_port(symbol, base, e)
@@ -170,14 +170,9 @@ class Members(Ports):
         found = [n for n in names if isinstance(scope.find(n), _ELEMENTS)]
         return f"elements that have members: {', '.join(found[:10])}" if found else None
 
-    def _all(self, base: Located, symbol: NodeSymbol | BranchSymbol, e: syntax.Member) -> tuple[syntax.Index, ...]:
-        if len(base.indices) != len(symbol.family.shape):
-            raise self.index_count(symbol.name, len(symbol.family.shape), len(base.indices), e.span)
-        return base.indices
-
     def _coordinate(self, symbol: UnknownSymbol, base: Located, e: syntax.Member) -> Value:
         """e, f, p or q of a coordinate."""
-        at = (*symbol.family.prefix, *self.indices(symbol.name, symbol.shape, base.indices))
+        at = (*symbol.family.prefix, *self.indices(symbol.name, symbol.shape, base.indices, e.span))
         return self._changed(self.coordinate_quantity(symbol, at, e), base.change)
 
     def _two_port(self, symbol: TwoPortSymbol, base: Located, e: syntax.Member) -> Value:
@@ -185,7 +180,7 @@ class Members(Ports):
         if e.name in ("power", "energy"):  # what both sides absorb: zero, but for what a run leaves of it
             both = []
             for branch in symbol.branches:
-                at = self.indices(symbol.name, branch.family.shape, self._all(base, branch, e))
+                at = self.indices(symbol.name, branch.family.shape, base.indices, e.span)
                 both.append(self.branch_quantity(branch, at, e.name, e))
             whole = Typed(ex.add(*(side.node for side in both)), both[0].dimension)
             return self._changed(whole, base.change)
@@ -193,7 +188,7 @@ class Members(Ports):
             raise self.no_member(symbol.name, e, (*members, "power", "energy"))
         letter, k = members[e.name]
         branch = symbol.branches[k - 1]
-        at = self.indices(symbol.name, branch.family.shape, self._all(base, branch, e))
+        at = self.indices(symbol.name, branch.family.shape, base.indices, e.span)
         return self._changed(self.branch_quantity(branch, at, letter, e), base.change)
 
     def _instance(self, symbol: InstanceSymbol, base: Located, e: syntax.Member) -> Value:

@@ -283,6 +283,7 @@ class Names(Context):
             loops = symbol.loops or symbol.space.loops
             sight = {**symbol.space.bound, **dict(symbol.bound), **placeholders}
             around = self.space(symbol.space), self.inside(loops, sight), self.aside()
+            budget.within(len(self._active), "definitions are")
             with around[0], around[1], around[2] as self._derived[key]:
                 value = self.resolve(symbol.expression)
                 value = self._declared(symbol, value)
@@ -369,13 +370,11 @@ class Names(Context):
         self, symbol: ParameterSymbol | UnknownSymbol, indices: tuple[syntax.Index, ...], span: syntax.Span
     ) -> Value:
         """`x[i]` of a parameter or unknown."""
-        if len(indices) != len(symbol.shape):
-            raise self.index_count(symbol.name, len(symbol.shape), len(indices), span)
-        if any(isinstance(i, syntax.Range) for i in indices):
+        if any(isinstance(i, syntax.Range) for i in indices) and len(indices) == len(symbol.shape):
             if len(indices) == 1 and isinstance(indices[0], syntax.Range):
                 return self._part(symbol, indices[0], span)
             raise self.fail("E806", "a slice of an array with several indices", span)
-        return self.element(symbol, self.indices(symbol.name, symbol.shape, indices))
+        return self.element(symbol, self.indices(symbol.name, symbol.shape, indices, span))
 
     def _part(self, symbol: ParameterSymbol | UnknownSymbol, index: syntax.Range, span: syntax.Span) -> Vector:
         """`x[1..3]`: the elements between two numbers, whatever size the array has."""
@@ -389,9 +388,11 @@ class Names(Context):
         return self._elements(symbol, bounds)
 
     def indices(
-        self, name: str, shape: tuple[tuple[Node, Node], ...], indices: tuple[syntax.Index, ...]
+        self, name: str, shape: tuple[tuple[Node, Node], ...], indices: tuple[syntax.Index, ...], span: syntax.Span
     ) -> tuple[Node, ...]:
-        """Affine indices of a family, remembered for the check against its shape."""
+        """Affine indices of a family, as many as it has (E805), remembered for the check against its shape."""
+        if len(indices) != len(shape):
+            raise self.index_count(name, len(shape), len(indices), span)
         at = tuple(self.index(i) for i in indices)
         for node, bounds, index in zip(at, shape, indices, strict=True):
             self.uses.append(Use(bounds, node, self.loops, name, self.place(index.span)))

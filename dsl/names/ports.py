@@ -89,7 +89,7 @@ class Ports(Quantities):
             raise self.fail("E102", f"'{self._shown(e)}' is a bundle of ports", e.span, help=f"one of {each}")
         array, end = _array_of(space, name), None
         if array is not None:
-            own = (*array.family.prefix, *self.indices(name, array.family.shape, indices))
+            own = (*array.family.prefix, *self.indices(name, array.family.shape, indices, e.span))
             end = End(array, own, array.domain)
         elif isinstance(port, PortSymbol) and inner is e:
             end = port.end

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.interruptions import uninterrupted
 from sysdyn.runtime.trace.locks import lock as locked
 
 _OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)  # Windows has neither
@@ -19,19 +20,22 @@ def claimed(path: Path) -> Iterator[None]:
 
     A lock dies with its process, so a killed run leaves none; where locks do not work nothing is refused.
     """
-    lock = _lock_of(path)
+    lock, handle = _lock_of(path), None
     try:
-        handle = _locked(lock)
-    except BlockingIOError as error:
-        raise TraceError(f"{path}: another run is writing this trace: wait for it, or give -o another name") from error
-    except OSError as error:
-        raise TraceError(f"{path}: {error.strerror or error}") from error
-    try:
+        try:
+            with uninterrupted():
+                handle = _locked(lock)
+        except BlockingIOError as error:
+            said = "another run is writing this trace: wait for it, or give -o another name"
+            raise TraceError(f"{path}: {said}") from error
+        except OSError as error:
+            raise TraceError(f"{path}: {error.strerror or error}") from error
         yield
     finally:
-        with contextlib.suppress(OSError):
-            lock.unlink()
-        os.close(handle)
+        if handle is not None:
+            with contextlib.suppress(OSError):
+                lock.unlink()
+            os.close(handle)
 
 
 def being_written(path: Path) -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.trace.claim import claimed
+from sysdyn.runtime.trace.interruptions import uninterrupted
 from sysdyn.runtime.trace.opening import destination
 from sysdyn.runtime.trace.trace import Quantity, Trace
 from sysdyn.runtime.trace.trace_store import BEFORE, Layout, clear, input_output
@@ -151,9 +152,16 @@ class Files:
     def claimed(self) -> Iterator[None]:
         """Holds the trace for this process, without what killed runs left beside it."""
         with claimed(self._target):
-            for place in (self._target, self._part):
-                clear(place)
-            yield
+            self._clear()
+            try:
+                yield
+            finally:  # of a writer that was interrupted while it was made nobody else knows
+                with uninterrupted():
+                    self._clear()
+
+    def _clear(self) -> None:
+        for place in (self._target, self._part):
+            clear(place)
 
     def writer(self, layout: Layout, first: bool) -> TraceWriter:
         """Of the next run; first: into the trace itself."""

@@ -15,6 +15,12 @@ from typing import Any
 
 from sysdyn.runtime.trace.claim import being_written
 
+PACKED = 100
+"""Bytes that one byte of a file may stand for: rows that are packed take a third to a twentieth, while a kilobyte can
+claim a data set of a terabyte, which HDF5 fills in as it is read."""
+SMALL = 1 << 26
+"""Bytes that are never too many."""
+
 
 def opened(path: str | Path, **options: Any) -> Any:
     """The h5py file, open for reading.  OSError where it is no regular file, or names others."""
@@ -23,7 +29,7 @@ def opened(path: str | Path, **options: Any) -> Any:
     regular(path)
     file = h5py.File(path, "r", **options)
     try:
-        _alone(file)
+        _alone(file, os.stat(path).st_size)  # noqa: PTH116
     except BaseException:
         file.close()
         raise
@@ -87,30 +93,38 @@ def _outside_but_parameters(file: Any) -> str | None:
     for name in file.id:
         kind = file.id.links.get_info(name).type
         item = h5o.open(file.id, name) if kind == h5l.TYPE_HARD and name != b"parameters" else None
-        inner = _outside(item) if isinstance(item, h5g.GroupID) else None
+        inner = _outside(item, [0]) if isinstance(item, h5g.GroupID) else None
         own = kind not in (h5l.TYPE_HARD, h5l.TYPE_SOFT) or (isinstance(item, h5d.DatasetID) and _elsewhere(item))
         if inner or own:
             return inner or _shown(name)
     return None
 
 
-def _alone(file: Any) -> None:
-    """OSError where a link or a data set leads out of the file; nothing is followed on the way."""
-    outside = _outside(file.id)
+def _alone(file: Any, size: int) -> None:
+    """OSError where a link or a data set leads out of the file, or where its data sets claim far more numbers than a
+    file of this size [bytes] holds; nothing is followed or read on the way.
+    """
+    claimed = [0]
+    outside = _outside(file.id, claimed)
     if outside is not None:
         raise OSError(f"'{outside}' leads to another file: not followed")
+    if claimed[0] > PACKED * size + SMALL:
+        raise OSError(f"its {size} bytes claim to hold {claimed[0]:.3g}: it is damaged")
 
 
-def _outside(group: Any) -> str | None:
-    """The first link or data set below a group that leads out of the file."""
+def _outside(group: Any, claimed: list[int]) -> str | None:
+    """The first link or data set below a group that leads out of the file; claimed: grows by the bytes of the data."""
     from h5py import h5l, h5o
 
     def link(name: bytes, info: Any) -> str | None:
         return None if info.type in (h5l.TYPE_HARD, h5l.TYPE_SOFT) else _shown(name)
 
     def data(name: bytes, info: Any) -> str | None:
-        is_data = info.type == h5o.TYPE_DATASET
-        return _shown(name) if is_data and _elsewhere(h5o.open(group, name)) else None
+        if info.type != h5o.TYPE_DATASET:
+            return None
+        found = h5o.open(group, name)
+        claimed[0] += int(found.get_space().get_simple_extent_npoints()) * int(found.get_type().get_size())
+        return _shown(name) if _elsewhere(found) else None
 
     linked: str | None = group.links.visit(link, info=True)
     stored: str | None = linked or h5o.visit(group, data, info=True)

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import contextlib
 import os
-import signal
-import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
+from sysdyn.runtime.trace.interruptions import uninterrupted
 from sysdyn.runtime.trace.opening import destination
 from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Store, input_output
 
@@ -30,22 +28,6 @@ FLUSH_SECONDS = 0.8
 """Flushed at least every second of wall time: rows arrive about every 50 ms."""
 MANY = 1 << 20
 """Numbers that may wait in memory."""
-
-
-@contextlib.contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Ctrl-C inside the block counts at its end; in other threads than the main one there is none."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    held: list[tuple[int, FrameType | None]] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: held.append((number, frame)))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before if before is not None else signal.default_int_handler)
-        if held and callable(before):
-            before(*held[0])
 
 
 class Met:

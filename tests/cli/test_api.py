@@ -122,3 +122,46 @@ def test_a_trace_says_what_it_holds(tmp_path):
     assert "audit/energy" in trace
     assert "/audit/energy" in trace
     assert 0 not in trace
+
+
+HOSTILE = {
+    "beyond doubles": 10**400,
+    "thousands of digits": 10**5000,
+    "nothing": None,
+    "an object": object(),
+    "a ragged list": [1, [2, 3]],
+    "bytes": b"x",
+    "complex": 1 + 2j,
+    "half a character": "\ud800",
+}
+CALLS = {
+    "set": lambda path, value: api.simulate(path, set={"m": value}),
+    "all of set": lambda path, value: api.simulate(path, set=10**400 if value is None else value),
+    "run": lambda path, value: api.load(path).run({"m": value}),
+    "at": lambda path, value: api.load(path).run(at=[value]),
+    "a number": lambda path, value: api.load(path).run(accuracy=-1 if value is None else value),
+    "a name": lambda path, value: api.load(path, level={"x": value}),
+    "names": lambda path, value: api.linearize(path, inputs=10**400 if value is None else value),
+    "over": lambda path, value: api.load(path).sweep({"m": [value]}),
+    "residual": lambda path, value: _residual(path, parameters={"m": value}),
+    "t": lambda path, value: _residual(path, t="x" if value is None else value),
+    "a text": lambda path, value: api.check(value if value != "\ud800" else None),
+    "a path": lambda path, value: api.load(None if isinstance(value, int) else value),
+}
+
+
+def _residual(path, t=0.0, parameters=None):
+    module = api.compile_model(path, backend="numpy")
+    found = module.residual(t, module.y0, module.yd0, parameters)
+    if np.isnan(found).any():
+        raise api.UsageError("None is not a number, as NumPy says")
+
+
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_value_that_is_none_raises_the_errors_of_this_interface(call, kind, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = write(tmp_path, PENDULUM)
+    with pytest.raises((api.UsageError, api.ModelError)) as caught:
+        CALLS[call](path, HOSTILE[kind])
+    assert 0 < len(str(caught.value)) < 300

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -494,3 +495,50 @@ def test_words_that_the_grammar_allows():
 def _ascii(message):
     body = json.dumps({"jsonrpc": "2.0", **message}).encode()
     return b"Content-Length: %d\r\n\r\n" % len(body) + body
+
+
+@pytest.mark.parametrize("name", ["t", "pi", "ground", "audit", "if", "true"])
+def test_no_name_becomes_one_that_the_language_has(client, name):
+    client.open("s.sd", SPRING)
+    given = {"textDocument": {"uri": client.uri("s.sd")}, "position": {"line": 3, "character": 8}, "newName": name}
+    assert "cannot be a name" in client.answer("textDocument/rename", **given)["error"]["message"]
+
+
+def test_nine_megabytes_block_nobody(client):
+    large = SPRING + "# " + "a" * 9_000_000 + "\n" + "model m {\n}\n" * 3
+    client.open("large.sd", large)
+    client.open("s.sd", SPRING)
+    assert "param m = 1.5 kg" in client.at("hover", "s.sd", SPRING, "m = 1.5")["contents"]["value"]
+    assert client.at("hover", "large.sd", SPRING, "m = 1.5") is None
+    given = {"textDocument": {"uri": client.uri("large.sd")}}
+    assert "longer than" in client.answer("textDocument/formatting", **given)["error"]["message"]
+    client.change("large.sd", {"text": SPRING})  # the newer text ends the check of the older one
+    assert client.findings("large.sd", 2) == []
+
+
+def test_a_killed_server_leaves_no_checker(tmp_path):
+    rows = "".join(f"  let a{k} = {'sin(' * 60}x/(1 m){')' * 60}\n" for k in range(3000))
+    with editor(tmp_path) as one:
+        one.begin()
+        one.open("s.sd", SPRING)
+        one.findings("s.sd")
+        (children,) = Path(f"/proc/{one.process.pid}/task").glob("*/children")
+        checkers = [int(pid) for pid in children.read_text().split()]
+        one.open("busy.sd", SPRING.replace("  coord x", f"{rows}  coord x"))
+        one.ask("textDocument/documentSymbol", textDocument={"uri": one.uri("s.sd")})
+        one.process.kill()
+        one.process.wait(10)
+        assert checkers
+        for _ in range(1000):
+            if not any(_alive(pid) for pid in checkers):
+                break
+            time.sleep(0.02)
+        assert not any(_alive(pid) for pid in checkers)
+
+
+def _alive(pid):
+    stat = Path(f"/proc/{pid}/stat")
+    try:
+        return stat.read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False

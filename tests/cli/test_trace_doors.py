@@ -13,6 +13,8 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
+from sysdyn.cli.sweep.opened import Sweep
+from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.trace.claim import claimed
 from sysdyn.runtime.trace.opening import replaceable
 from sysdyn.runtime.trace.trace import Trace
@@ -71,8 +73,9 @@ LEADING_OUT = (_external_link, _external_link_in_a_group, _raw_storage, _virtual
         ["plot", "bad.h5"],
         ["diff", "good.h5", "bad.h5"],
         ["diff", "bad.h5", "good.h5"],
+        ["animate", "bad.h5", "-o", "bad.html"],
     ],
-    ids=["plot html", "plot", "diff test", "diff reference"],
+    ids=["plot html", "plot", "diff test", "diff reference", "animate"],
 )
 def test_a_trace_that_leads_to_another_file_is_refused(trace, capsys, plant, command):
     Path("bad.h5").write_bytes(trace.read_bytes())
@@ -83,6 +86,91 @@ def test_a_trace_that_leads_to_another_file_is_refused(trace, capsys, plant, com
     assert "leads to another file" in said.err
     assert not Path("bad.html").exists()
     assert not Path("bad.png").exists()
+
+
+@pytest.mark.parametrize("plant", LEADING_OUT, ids=lambda plant: plant.__name__.strip("_"))
+def test_the_interface_refuses_it_too(trace, plant):
+    Path("bad.h5").write_bytes(trace.read_bytes())
+    with h5py.File("bad.h5", "a") as file:
+        plant(file)
+        file["run"], file["exit"] = np.arange(3), np.zeros(3)
+    with pytest.raises(TraceError, match="leads to another file"):
+        Trace.open("bad.h5")
+    with pytest.raises(OSError, match="leads to another file"):
+        Sweep.open("bad.h5")
+
+
+@pytest.mark.parametrize("plant", LEADING_OUT, ids=lambda plant: plant.__name__.strip("_"))
+@pytest.mark.one_in(2)
+def test_a_golden_and_a_scene_that_expects_one_refuse_it_too(trace, capsys, plant):
+    assert run(["golden", "record", "-q", "model.sd"]) == 0
+    (golden,) = Path("golden").glob("*/*.h5")
+    with h5py.File(golden, "a") as file:
+        plant(file)
+    assert run(["golden", "check"]) == 5
+    assert "leads to another file" in capsys.readouterr().err
+    text = Path("model.sd").read_text()
+    end = text.rindex("}")
+    Path("model.sd").write_text(f'{text[:end]}  expect golden "{golden}" within 1e-2\n{text[end:]}')
+    assert run(["simulate", "model.sd"]) in (1, 5)
+    assert "leads to another file" in capsys.readouterr().err
+
+
+def test_a_file_that_claims_more_than_it_can_hold_is_damaged(trace, capsys):
+    with h5py.File("good.h5", "a") as file:
+        file.create_dataset("huge", shape=(10**9,), dtype="f8", chunks=(1024,))
+    for command in (["plot", "good.h5"], ["diff", "good.h5", "good.h5"], ["animate", "good.h5", "-o", "a.html"]):
+        assert run(command) == 5
+        assert "claim to hold" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["link", "empty link", "pipe", "words"])
+def test_the_journal_of_a_sweep_is_its_own(trace, capsys, kind):
+    journal, foreign = Path(".s.h5.runs"), Path("foreign")
+    foreign.write_bytes(b"" if kind == "empty link" else b"words without a line")
+    if kind == "pipe":
+        os.mkfifo(journal)
+    elif kind == "words":
+        journal.write_bytes(foreign.read_bytes())
+    else:
+        journal.symlink_to(foreign)
+    before = foreign.read_bytes()
+    assert run(["sweep", "model.sd", "--over", "m=1,2", "-o", "s.h5"]) == 2
+    assert "remove it, or give -o another name" in capsys.readouterr().err
+    assert foreign.read_bytes() == before
+    assert kind != "words" or journal.read_bytes() == before
+
+
+FOREIGN = ("residual.c", "binding.c", "manifest.json", "binding.json", "sysdyn_model.h")
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+@pytest.mark.parametrize("kind", ["file", "link", "dangling link", "folder", "pipe"])
+def test_compile_overwrites_nothing_that_it_did_not_write(trace, capsys, kind, name):
+    target, foreign = Path("out") / name, Path("foreign.c")
+    target.parent.mkdir()
+    if kind == "file":
+        target.write_text("int theirs;\n")
+    elif kind == "folder":
+        target.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(target)
+    else:
+        target.symlink_to(foreign.absolute())
+    if kind == "link":
+        foreign.write_text("int theirs;\n")
+    assert run(["compile", "model.sd", "-o", "out"]) == 2
+    assert f"out/{name} was not written by sysdyn" in capsys.readouterr().err
+    assert kind != "file" or target.read_text() == "int theirs;\n"
+    assert kind != "link" or foreign.read_text() == "int theirs;\n"
+    assert kind != "dangling link" or not foreign.exists()
+    assert [path.name for path in target.parent.iterdir()] == [name]
+
+
+def test_compile_overwrites_its_own(trace):
+    for _ in range(2):
+        assert run(["compile", "-q", "model.sd", "-o", "out"]) == 0
+        assert run(["compile", "-q", "model.sd", "-o", "out", "--backend", "numpy"]) == 0
 
 
 def test_soft_links_inside_a_trace_are_its_own(trace):

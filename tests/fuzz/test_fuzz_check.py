@@ -8,15 +8,23 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 RUN = Path(__file__).parent / "run.py"
+CAMPAIGN = Path(__file__).parent / "campaign.py"
 KEPT = Path(__file__).parent / "kept"
 LONG = bool(os.environ.get("SYSDYN_LONG"))
 
 
 def fuzz(*options, within):
     """What the runner said, and its exit code."""
+    return script(RUN, *options, within=within)
+
+
+def script(path, *options, within):
+    """What a script said, and its exit code."""
     done = subprocess.run(
-        [sys.executable, str(RUN), *map(str, options)], capture_output=True, text=True, timeout=within, check=False
+        [sys.executable, str(path), *map(str, options)], capture_output=True, text=True, timeout=within, check=False
     )
     return done.returncode, done.stdout + done.stderr
 
@@ -34,3 +42,10 @@ def test_what_failed_once():
     code, said = fuzz(*(option for path in files for option in ("--file", path)), "--jobs", 2, within=200)
     assert code == 0, said
     assert said.endswith(f"{len(files)} texts, 0 failed\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="forks")
+def test_hostile_input_to_every_door():
+    code, said = script(CAMPAIGN, *(() if LONG else ("--cases", 2)), "--seed", "ci", within=8 * 3600)
+    assert code == 0, said
+    assert said.count(" cases, 0 failed\n") == 6

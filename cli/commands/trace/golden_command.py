@@ -15,6 +15,7 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, USAGE, UsageError, worst
 from sysdyn.cli.options import BACKENDS, FORMULATIONS, Setting, of_file, side_by_side
 from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.plain_files import inside, project
 from sysdyn.dsl.text.source import real
 
 if TYPE_CHECKING:
@@ -96,6 +97,8 @@ def record(
     label, file = scene or model, Path(request.file)
     place = Path(folder) / (name or file.stem)
     known = read(place) if (place / BOOK).is_file() else ()
+    if not inside(file, project(Path(folder))):
+        raise UsageError(f"{file} is outside of the project, {project(Path(folder))}: --folder gives its own")
     if any(real(g.model) != real(file) for g in known):
         raise UsageError(f"{place} is of {known[0].model}: --name gives another folder")
     if any(g.name == label for g in known):

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.many.in_core import InCore
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
@@ -122,10 +123,27 @@ def place_of(name: str) -> str | tuple[str | int, ...]:
 
 
 def text_of(value: Any) -> str:
-    """A value as --set takes it."""
-    if np.ndim(value):
-        return f"[{', '.join(repr(float(v)) for v in value)}]"
-    return value if isinstance(value, str) else repr(float(value))
+    """A value as --set takes it; UsageError where it is neither a number that is a double, nor some, nor a text."""
+    try:
+        if isinstance(value, str):
+            value.encode()
+            return value
+        if np.iscomplexobj(value):
+            raise TypeError
+        if np.ndim(value):
+            return f"[{', '.join(repr(float(v)) for v in value)}]"
+        return repr(float(value))
+    except (TypeError, ValueError, OverflowError):
+        raise UsageError(f"{shortly(value)}: a number, a list of numbers or a text is wanted") from None
+
+
+def shortly(value: object) -> str:
+    """A value for a message: those of thousands of digits are not written."""
+    try:
+        text = ascii(value)
+    except Exception:  # whatever a class of somebody's own does
+        text = type(value).__name__
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 class Loaded:
@@ -242,7 +260,10 @@ class Loaded:
             if parameter is None or number is None or isinstance(number, str) or plain in self.sizes:
                 texts.append((name, text_of(value)))
             else:
-                numbers[key] = np.asarray(number, dtype=float)
+                try:
+                    numbers[key] = np.asarray(number, dtype=float)
+                except (TypeError, ValueError, OverflowError):
+                    raise UsageError(f"{name} {shortly(value)}: numbers or a text are wanted") from None
         if texts:  # a list fits the sizes that are set with it, not those of the text
             whole = [name for name in numbers if np.ndim(numbers[name])]
             texts += [(name, text_of(numbers.pop(name).tolist())) for name in whole]

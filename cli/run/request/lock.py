@@ -15,6 +15,7 @@ from typing import Any
 
 from sysdyn.cli import whole_files
 from sysdyn.cli.options import FORMULATIONS, INDICES
+from sysdyn.cli.plain_files import tables
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.whole_files import toml_text
 from sysdyn.dsl.parser.parse import parse
@@ -104,10 +105,8 @@ def read(file: str, target: Target, version: str, report: Report) -> Lock | None
     path = path_of(file)
     if file == "-" or not path.is_file():
         return None
-    import tomllib
-
     try:
-        held = tomllib.loads(path.read_text(encoding="utf-8"))
+        held = tables(path)
         stale = _stale(held, target, version)
         found = None if stale else _scene(held, target)
     except UNREADABLE as error:
@@ -197,10 +196,8 @@ def write(file: str, target: Target, lock: Lock, version: str) -> Path:
     path = path_of(file)
     held: dict[str, Any] = {}
     if path.is_file():
-        import tomllib
-
         try:
-            held = tomllib.loads(path.read_text(encoding="utf-8"))
+            held = tables(path)
             held = {} if _stale(held, target, version) else held
         except UNREADABLE:
             held = {}

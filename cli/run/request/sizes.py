@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 from sysdyn.cli.failures import UsageError
+from sysdyn.cli.plain_files import UnfitError, tables
 from sysdyn.dsl.text.source import real
 
 NAME = "ci.toml"
@@ -21,9 +21,9 @@ def sizes(file: str) -> tuple[Path, tuple[tuple[str, str], ...]]:
     if file == "-" or not path.is_file():
         return path, ()
     try:
-        listed = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: {error}") from error
+        listed = tables(path)
+    except UnfitError as error:
+        raise UsageError(str(error)) from error
     here = listed.get(model.parent.name, {})
     found = here.get(model.stem, {}) if isinstance(here, dict) else {}
     if not isinstance(found, dict):

@@ -199,11 +199,9 @@ class Connections(Statements):
     def _node_end(
         self, symbol: NodeSymbol, indices: tuple[syntax.Index, ...], change: dict[Node, Node], e: syntax.Expr
     ) -> End:
-        if len(indices) != len(symbol.family.shape):
-            raise self.resolver.index_count(symbol.name, len(symbol.family.shape), len(indices), e.span)
-        if not indices and not symbol.family.prefix:
+        if not indices and not symbol.family.shape and not symbol.family.prefix:
             return End(symbol, (), symbol.domain)
-        at = (*symbol.family.prefix, *self.resolver.indices(symbol.name, symbol.family.shape, indices))
+        at = (*symbol.family.prefix, *self.resolver.indices(symbol.name, symbol.family.shape, indices, e.span))
         return End(symbol, tuple(ex.substitute(a, change) for a in at), symbol.domain)
 
     def _text(self, e: syntax.Expr) -> str:

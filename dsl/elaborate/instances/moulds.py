@@ -197,7 +197,8 @@ class Moulds:
 def charge(it: Instances, s: syntax.Instance, component: ComponentSymbol) -> None:
     """An instance counts, whichever way it takes."""
     try:
-        budget.charge(budget.INSTANCE, f"instances of component '{component.name}'")
+        budget.within(len(it.current.chain), "components are")
+        budget.unfold(budget.INSTANCE, f"instances of component '{component.name}'")
     except budget.SpentError as spent:
         spent.place = spent.place or it.place(s.span)
         raise

@@ -8,7 +8,7 @@ from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.elaborate.statements.events import Draft, event_of, watch
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.calculus import time_derivative
+from sysdyn.dsl.model.calculus import NoDerivativeError, time_derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Loop, Switch
 from sysdyn.dsl.model.units import NONE
@@ -22,7 +22,11 @@ def expanded(frame: ElaborationContext, known: Values) -> None:
             frame.parts.events.append(event_of(frame, event, change))
     for draft in frame.parts.drafts:
         for change in _iterations(draft.loops, known):
-            frame.parts.switches.append(_switch(frame, draft, change, known))
+            try:
+                frame.parts.switches.append(_switch(frame, draft, change, known))
+            except NoDerivativeError as none:
+                none.place = draft.place
+                raise
 
 
 def _bounds(draft: Draft) -> tuple[Node | None, Node | None, Node | None]:

@@ -122,6 +122,7 @@ static inline __attribute__((always_inline)) int little_factor_of(const sd_linea
 static int little_factor(const sd_linear *linear, const sd_number *values, const double *scale)
 {
     switch (linear->n) {
+    case 0: return 1;
     case 1: return little_factor_of(linear, 1, values, scale);
     case 2: return little_factor_of(linear, 2, values, scale);
     case 3: return little_factor_of(linear, 3, values, scale);
@@ -159,6 +160,7 @@ static inline __attribute__((always_inline)) void little_solve_of(const sd_littl
 static void little_solve(const sd_little *lu, int32_t n, sd_number *x)
 {
     switch (n) {
+    case 0: break;
     case 1: little_solve_of(lu, 1, x); break;
     case 2: little_solve_of(lu, 2, x); break;
     case 3: little_solve_of(lu, 3, x); break;
