@@ -241,16 +241,30 @@ def _unlike(above: Node, below: Node) -> tuple[Node, Node]:
 
 
 def _ends(sides: tuple[Node, Node], u: Node, slope: Node, moved: Node) -> bool:
-    """Whether one of the branches (above, below) is no number beyond u = 0 where it is one on its own side."""
+    """Whether one of the branches (above, below) is no number beyond u = 0 where it is one on its own side, with other
+    conditions held as they are there, as a step holds them.
+    """
     values = _on_surface(u, slope, moved, _drawn((u,), 0))
     if values is None:
         return False
     up = math.copysign(1.0, evaluate((slope,), lambda node: _look(node, values))[0])
     for branch, own in zip(sides, (up, -up), strict=True):
         within, beyond = ({**values, moved: values[moved] + away} for away in (own * NEAR, -own * NEAR))
-        if _finite(branch, within) and not _finite(branch, beyond):
+        if _finite(branch, within) and not _finite(_held(branch, within), beyond):
             return True
     return False
+
+
+def _held(root: Node, values: Mapping[Node, float]) -> Node:
+    """An expression with every operation on the branch that it has at these values."""
+    done: dict[Node, Node] = {}
+    for node in topological([root]):
+        found = sided(node)
+        if found is None:
+            done[node] = rebuild(node, tuple(done[a] for a in node.args))
+        else:
+            done[node] = done_of(found.above if _values((found.u,), values)[0] > 0.0 else found.below, done)
+    return done[root]
 
 
 def _finite(node: Node, values: Mapping[Node, float]) -> bool:

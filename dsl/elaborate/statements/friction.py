@@ -177,23 +177,24 @@ def _steady(u: Node) -> bool:
 
 def has_friction(root: Node) -> bool:
     """Whether a size of flows stands in it."""
-    return any(
-        n.op == "call" and n.data in ("abs", "hypot") and any(map(_rates, n.args)) for n in ex.topological([root])
-    )
+    named = ("abs", "hypot", "max", "min")
+    return any(n.op == "call" and n.data in named and any(map(_rates, n.args)) for n in ex.topological([root]))
 
 
 def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], place: Place) -> Node:
-    """A content D with its terms c*abs(u) of flows as those of set-valued friction (decision 7 of the language)."""
+    """A content D with its terms c*abs(u) of flows as those of set-valued friction (decision 7 of the language), and
+    c*max(u, v), which is c*(u + v + abs(u - v))/2.
+    """
     at = loop_indices(loops)
+    root = _by_sizes(root)
     for node in ex.topological([root]):
         if node.op != "call" or node.data not in ("abs", "hypot") or not any(map(_rates, node.args)):
             continue
         if any(n.op == "reduce" and node in ex.topological([n.args[2]]) for n in ex.topological([root])):
             continue
-        mark = ex.var("#abs", "s")
-        bound = ex.substitute(derivative(ex.substitute(root, {node: mark}), mark), {mark: ex.const(0.0)})
-        if bound.op == "const" and (bound.data == 0.0 or not math.isfinite(bound.data)):
-            continue  # no corner at rest: abs(f)^3 is smooth
+        bound = _factor(root, node)
+        if bound is None:
+            continue
         name = f"content of line {place.start[0]}" + (f" ({len(frame.parts.drafts)})" if frame.parts.drafts else "")
         sense = _sense(frame, f"{name} sense", at, loops, place)
         if node.data == "abs":
@@ -202,6 +203,25 @@ def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], p
         else:
             speed = _stick_in_plane(frame, name, (at, loops), (node, bound, sense), place)
             root = ex.substitute(root, {node: ex.mul(sense, speed)})
+    return root
+
+
+def _factor(root: Node, node: Node) -> Node | None:
+    """What the size of a flow is multiplied by at rest; None where there is no corner: abs(f)^3 is smooth."""
+    mark = ex.var("#abs", "s")
+    found = ex.substitute(derivative(ex.substitute(root, {node: mark}), mark), {mark: ex.const(0.0)})
+    return None if found.op == "const" and (found.data == 0.0 or not math.isfinite(found.data)) else found
+
+
+def _by_sizes(root: Node) -> Node:
+    """A content with max and min of flows, where they have a corner, by abs of the difference."""
+    for node in ex.topological([root]):
+        if node.op == "call" and node.data in ("max", "min") and any(map(_rates, node.args)):
+            a, b = node.args
+            size = ex.call("abs", ex.sub(a, b))
+            total = ex.add(a, b, size) if node.data == "max" else ex.sub(ex.add(a, b), size)
+            if _factor(root, node) is not None:
+                root = ex.substitute(root, {node: ex.scale(0.5, total)})
     return root
 
 
