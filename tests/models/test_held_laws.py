@@ -7,7 +7,8 @@ from scipy.integrate import solve_ivp
 
 VALVE = """model held_branch {
   state p: 1 = %g
-  dynamic p' = (if p <= 2 then sqrt(max(1 - (p/2)^2, 1e-12)) else -sqrt(max(1 - (2/p)^2, 1e-12)))/(1 s) - %g*sin(t/(1 s))/(1 s)
+  let law = if p <= 2 then sqrt(max(1 - (p/2)^2, 1e-12)) else -sqrt(max(1 - (2/p)^2, 1e-12))
+  dynamic p' = (law - %g*sin(t/(1 s)))/(1 s)
 }
 scene s of held_branch {
   time 0 s to 12 s
