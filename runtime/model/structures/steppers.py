@@ -143,7 +143,7 @@ class Radau(c.Structure):
         *[(name, D) for name in ["error_accepted", "theta", "state_size", "growth", "longest", "follows"]],
         *[(name, I) for name in ["behind", "balances", "pressed", "ready", "old_jacobian", "rejected", "lasting"]],
         *[(name, P) for name in ["method", "used"]],
-        *[(name, I) for name in ["since", "hold", "creeping", "strained", "turned"]],
+        *[(name, I) for name in ["since", "hold", "creeping"]],
         ("lead", (D * STAGES) * STAGES),
         ("h_lead", D),
         ("of_lead", P),
@@ -160,7 +160,7 @@ class Radau(c.Structure):
         ("in_place", I),
         ("beside", P),
         ("twice", P * 2),
-        *[(name, P) for name in ["point_y", "point_rate", "coupled"]],
+        *[(name, P) for name in ["point_y", "point_rate"]],
     ]
 
 
