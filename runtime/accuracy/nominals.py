@@ -3,8 +3,11 @@
 A quantity may be zero by symmetry: then it has no size of its own, and what round-off leaves of it is nobody's error.
 How much may be excused so is bounded by the accuracy asked times its nominal value.  That is not the largest value of
 its unit, which can be 1e61 A in a diode across a source while the quantity is 1 mA: each unknown is paired with one
-row, by a matching on the largest entries (Duff and Koster 2001), and its nominal value is its own peak, or what the
-other terms of that row make of it where they are larger.
+row, by a matching on the largest entries (Duff and Koster 2001), and its nominal value is the largest of
+- its own peak, and what the other terms of its row make of it;
+- the peaks of its like among all that it depends on by such rows: what is left of a signal behind many stages answers
+  to the signal;
+- where it is zero whatever acts (a velocity that friction holds), what all rows make of it in which it stands.
 
 Received: a system, its last point, peaks of its unknowns; returned: nominal values, in SI units.
 """
@@ -12,8 +15,10 @@ Received: a system, its last point, peaks of its unknowns; returned: nominal val
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern
+from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.matching import matched
@@ -42,13 +47,62 @@ def nominals_of_unknowns(system: System, point: tuple[float, Floats, Floats], pe
     own = rows == row_of[columns]  # the entry at which an unknown meets its row
     pivot = np.zeros(system.unknowns)
     pivot[columns[own]] = entry[own]
+    zero = _zero(system, point[0], np.abs(jy), entry, row_of)[columns] & (entry > 0.0)
     for _ in range(HOPS):
         terms = np.zeros(system.rows)
         with np.errstate(over="ignore"):
-            np.maximum.at(terms, rows[~own], (entry * nominal[columns])[~own])
+            term = entry * nominal[columns]
+            np.maximum.at(terms, rows[~own], term[~own])
             made = np.divide(terms[row_of], pivot, out=np.zeros(system.unknowns), where=paired & (pivot > 0.0))
+            np.maximum.at(terms, rows, term)
+            np.maximum.at(made, columns[zero], (terms[rows] / np.where(zero, entry, 1.0))[zero])
         np.fmax(nominal, np.where(np.isfinite(made), made, 0.0), out=nominal)
-    return nominal
+    return np.fmax(nominal, _of_its_like(system, entry > 0.0, row_of, nominal))
+
+
+def _of_its_like(system: System, there: NDArray[np.bool_], row_of: Ints, nominal: Floats) -> Floats:
+    """Largest nominal value of the same kind and unit among those that an unknown depends on [unknowns]."""
+    from scipy.sparse import coo_matrix  # 60 ms, which few runs need
+    from scipy.sparse.csgraph import connected_components
+
+    rows, columns = system.pattern.row, system.pattern.columns_of()
+    of_row = np.full(system.rows, -1, dtype=np.int32)
+    of_row[row_of[row_of >= 0]] = np.flatnonzero(row_of >= 0)
+    joins = there & (of_row[rows] >= 0)
+    to, since = of_row[rows[joins]], columns[joins]
+    graph = coo_matrix((np.ones(to.size), (since, to)), shape=(system.unknowns,) * 2)
+    count, part = connected_components(graph, connection="strong")
+    kind = alike(system)
+    largest = np.zeros((count, int(kind.max(initial=0)) + 1))
+    np.maximum.at(largest, (part, kind), nominal)
+    between = np.unique(np.stack([part[since], part[to]])[:, part[since] != part[to]], axis=1)
+    while between.size:
+        before = largest.copy()
+        np.maximum.at(largest, between[1], before[between[0]])
+        if np.array_equal(before, largest):
+            break
+    return largest[part, kind]
+
+
+def _zero(system: System, t: float, algebraic: Floats, entry: Floats, row_of: Ints) -> NDArray[np.bool_]:
+    """Unknowns [unknowns] that are zero whatever acts: the row of each is homogeneous, reads its value, and no others
+    stand in it but such as are zero themselves.
+    """
+    rows, columns = system.pattern.row, system.pattern.columns_of()
+    nothing = np.zeros(system.unknowns)
+    with np.errstate(all="ignore"):
+        homogeneous = system.residual(t, nothing, nothing) == 0.0
+    own = rows == row_of[columns]
+    reads = np.zeros(system.unknowns, bool)
+    reads[columns[own]] = (algebraic[own] > 0.0) & homogeneous[rows[own]]
+    there = (entry > 0.0) & ~own
+    zero = np.zeros(system.unknowns, bool)
+    while True:
+        others = np.bincount(rows[there & ~zero[columns]], minlength=system.rows)
+        more = reads & ~zero & (others[row_of] == 0)
+        if not more.any():
+            return zero
+        zero |= more
 
 
 def _pair(system: System, entry: Floats) -> Ints:

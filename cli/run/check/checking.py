@@ -113,8 +113,9 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
     facts = started.facts
     if prepared.formulation == "kane":  # it leaves out the rows of flow constraints
         facts = counted_as(prepared, t0, facts)
-    runs = facts.index is None or facts.index <= HIGHEST
-    if not runs:
+    runs = True
+    if facts.index is not None and facts.index > HIGHEST:
+        runs = False
         report.note("N608", above_highest(facts.index), prepared.network.place)
     judged = certificate(prepared.network, prepared.binding)
     return {
