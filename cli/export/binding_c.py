@@ -24,14 +24,13 @@ CORE = Path(core.__path__[0])
 ASSEMBLY = ("system/model.h", "linear/lanes.h", "system/assembly.h", "system/assembly.c")
 ALGEBRA = (
     "linear/number.h", "linear/sums.h", "linear/elimination/elimination.h", "linear/elimination/machine_code.h",
-    "linear/linear.h", "linear/sparse/matrix.h", "linear/sparse/sparse.h", "linear/sparse/fronts.h",
-    "linear/sparse/front_lanes.h", "system/settle.h", "steppers/stepper.h", "steppers/explicit/underlying.h",
+    "linear/linear.h", "linear/sparse/matrix.h", "linear/sparse/sparse.h", "system/settle.h",
+    "steppers/stepper.h", "steppers/explicit/underlying.h",
     "linear/sums.c", "linear/elimination/machine_code.c", "linear/elimination/elimination_order.c",
     "linear/elimination/elimination.c", "linear/dense/dense_lu.h", "linear/dense/little_lu.h", "linear/null_space.h",
     "linear/linear.c",
     "linear/sparse/blocks.h", "linear/sparse/dense_rest.h", "linear/sparse/told.h", "linear/sparse/chains.h",
     "linear/sparse/substitute.h", "linear/sparse/pivots.h", "linear/sparse/sparse.c",
-    "linear/sparse/front_pattern.c", "linear/sparse/fronts.c",
     "steppers/explicit/straight_slopes.c", "steppers/explicit/underlying.c",
 )  # fmt: skip
 A_LINE = 16

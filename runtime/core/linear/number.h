@@ -1,6 +1,6 @@
 /* The numbers of a factorisation: double, or double complex where SD_COMPLEX is defined.
  *
- * linear.c, elimination/elimination.c, sparse/sparse.c and sparse/fronts.c are written once and compiled twice; complex_linear.c gives the complex ones
+ * linear.c, elimination/elimination.c and sparse/sparse.c are written once and compiled twice; complex_linear.c gives the complex ones
  * names of their own.
  */
 #ifndef SYSDYN_NUMBER_H
@@ -82,14 +82,6 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_linear_effort sd_linear_z_effort
 #define sd_sparse_rest sd_sparse_z_rest
 #define sd_matrix sd_matrix_z
-#define sd_fronts sd_fronts_z
-#define sd_entry_of sd_entry_z_of
-#define sd_fronts_new sd_fronts_z_new
-#define sd_fronts_free sd_fronts_z_free
-#define sd_fronts_provide sd_fronts_z_provide
-#define sd_fronts_rest sd_fronts_z_rest
-#define sd_fronts_factor sd_fronts_z_factor
-#define sd_fronts_solve sd_fronts_z_solve
 #else
 
 typedef double sd_number;

@@ -1,6 +1,5 @@
 /* Left-looking sparse LU (Gilbert & Peierls, SIAM J. Sci. Stat. Comput. 9, 1988) with threshold pivoting. */
 #include "linear/sparse/sparse.h"
-#include "linear/sparse/fronts.h"
 #include "linear/sparse/pivots.h"
 #include "linear/sparse/substitute.h"
 
@@ -8,15 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FADED 0.01      /* fronts bear later pivots down to this part: inverses of triangles grow, substitution does not */
-
 void sd_sparse_free(sd_sparse *lu)
 {
     if (!lu)
         return;
     leave_chains(lu);
     leave_told(lu);
-    sd_fronts_free(lu->fronts);
     free(lu->pivots);
     free(lu->first);
     free(lu->room);
@@ -63,8 +59,6 @@ void sd_sparse_rest(sd_sparse *lu)
 {
     free(lu->l_value), free(lu->u_value), free(lu->inverse);
     lu->l_value = lu->u_value = lu->inverse = NULL;
-    if (lu->fronts)
-        sd_fronts_rest(lu->fronts);
 }
 
 /* the numbers of factors that have rested; 0: no memory */
@@ -81,46 +75,8 @@ static int provide_numbers(sd_sparse *lu)
     return 0;
 }
 
-/* 1: factors by fronts, whose pivots are no less than this part of what is left of their columns */
-static int factor_fronts(sd_sparse *lu, const sd_matrix *matrix, double least)
-{
-    if (!sd_fronts_provide(lu->fronts))
-        return 0;
-    unsigned before = sd_no_subnormals();
-    lu->smallest = sd_fronts_factor(lu->fronts, matrix);
-    sd_subnormals(before);
-    return lu->pivoted = lu->smallest >= least;
-}
-
-/* fronts that do not serve, or are worth nothing, are never made again */
-static void leave_fronts(sd_sparse *lu)
-{
-    sd_fronts_free(lu->fronts);
-    lu->fronts = NULL;
-    lu->no_fronts = 1;
-}
-
-/* factor_fronts where rows pivot in their own columns, if the factors fill and that is right */
-static int by_fronts(sd_sparse *lu, const sd_matrix *matrix)
-{
-    if (lu->no_fronts || lu->paired != 1 || lu->idle || lu->null_pivot != 0.0 || lu->dropped != 0.0)
-        return 0;
-    if (!lu->fronts)
-        lu->fronts = sd_fronts_new(lu->n, matrix, lu->order, lu->own, lu->most);
-    if (lu->fronts && factor_fronts(lu, matrix, THRESHOLD)) {
-        lu->rank = lu->n;
-        lu->products = lu->fronts->products;
-        lu->entries = lu->fronts->entries;
-        return 1;
-    }
-    leave_fronts(lu);
-    return 0;
-}
-
 int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
 {
-    if (by_fronts(lu, matrix))
-        return 0;
     return provide_numbers(lu) ? search_pivots(lu, matrix) : 2;
 }
 
@@ -210,12 +166,6 @@ static int renew_rest(sd_sparse *lu, const sd_matrix *matrix)
 
 int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 {
-    if (lu->fronts && factor_fronts(lu, matrix, FADED))
-        return 0;
-    if (lu->fronts) {
-        leave_fronts(lu);
-        return 1;
-    }
     if (!provide_numbers(lu))
         return 1;
     int failed = 0;
@@ -238,10 +188,6 @@ int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
 {
     int32_t n = lu->n;
-    if (lu->fronts) {
-        sd_fronts_solve(lu->fronts, x, work, row_scale, column_scale);
-        return;
-    }
     if (lu->lowers) {
         descend_chains(lu, x, row_scale, work);
         ascend_chains(lu, x, column_scale, work);

@@ -16,7 +16,6 @@ typedef struct sd_chain {
 } sd_chain;
 
 typedef struct sd_told sd_told;
-typedef struct sd_fronts sd_fronts;
 
 typedef struct sd_sparse {
     int32_t n, rows;             /* columns; rows, as many or more */
@@ -28,8 +27,6 @@ typedef struct sd_sparse {
     int32_t *first;              /* [n + 1] of the columns of L that fill alike (blocks.h): the first one; NULL: none do */
     int32_t *l_start, *u_start;  /* [n + 1]; NULL, like the rows: they are told */
     int32_t *l_row, *u_row;      /* pivot positions; u in the order of elimination, diagonal apart */
-    sd_fronts *fronts;           /* fronts.h: whose numbers serve instead of those here; NULL: there are none */
-    int no_fronts;               /* 1: they did not serve, or are worth nothing */
     sd_told *told;               /* told.h: of a long line's factors instead of their pattern; NULL: it stands there */
     sd_number *l_value, *u_value, *inverse; /* inverse [n]: of the diagonal of U */
     int64_t l_room, u_room;
