@@ -330,8 +330,6 @@ int sd_run_drain(sd_run *run)
             emit(run, instant, instant, kind, 0);
             continue;
         }
-        if (run->carried)
-            sd_run_carried(run, t);
         double kind = kind_here(run, asked);
         if (t == run->stepper->ivp->t_end || t < run->stepper->ivp->t)
             kind = (double)((int32_t)kind | run->end_kind);

@@ -24,8 +24,6 @@
 #define SD_TRACE 1    /* kinds of a row (integrate/request.py): of the trace, */
 #define SD_SAMPLE 2   /* of a step, which is watched alone, */
 #define SD_COMPARED 4 /* that runs are compared by */
-#define SD_CARRIED 16 /* of the estimate along a run, at the ends of its steps: what is observed there, and in the place of its
-                       * rates the same at the point without the error carried to it */
 #define SD_RELAXING 8 /* of these: where something relaxes at once within the first step behind a restart */
 #define SD_PARTS 4    /* of a step, at whose ends what is watched is looked at */
 #define SD_PAST 3     /* steps before the last one whose powers are known */
@@ -52,7 +50,6 @@ typedef struct sd_run {
     int32_t instants, every_step;
     int32_t glances, glanced;         /* instants of a step that are watched, at even parts of it, its end among them; those
                                        * within it that are written */
-    int32_t carried;                  /* at the end of each step there is a row of SD_CARRIED */
     int32_t sizes_at_steps;           /* largest is over the ends of all steps, not of those with a row alone */
     int32_t bare;                     /* what is observed follows from the state: rows for comparison alone are not settled */
     int32_t told;                     /* it does by the settler's `told` rows: one that meets these is not settled; falls to

@@ -215,7 +215,6 @@ class Run(c.Structure):
         ("every_step", I),
         ("glances", I),
         ("glanced", I),
-        ("carried", I),
         ("sizes_at_steps", I),
         ("bare", I),
         ("told", I),

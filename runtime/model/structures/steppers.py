@@ -34,7 +34,6 @@ class Stepper(c.Structure):
         ("values", P),
         ("onto", P),
         ("spare", P),
-        ("less_error", P),
     ]
 
 
@@ -66,16 +65,6 @@ class Ivp(c.Structure):
     ]
 
 
-class Carried(c.Structure):
-    """sd_bdf_carried."""
-
-    _fields_ = [
-        *[(name, I) for name in ["wanted", "shown"]],
-        ("phi", P * (MAX_ORDER + 2)),
-        *[(name, P) for name in ["e", "ed", "ee", "source", "memory"]],
-    ]
-
-
 class Bdf(c.Structure):
     """sd_bdf."""
 
@@ -101,7 +90,6 @@ class Bdf(c.Structure):
         ("aparts", I),
         ("error_next", D),
         ("orders", L),
-        ("carried", Carried),
     ]
 
 
@@ -133,7 +121,6 @@ class Radau(c.Structure):
         ("linear", P),
         ("complex_linear", P * PAIRS),
         *[(name, I) for name in ["stages", "most_stages"]],
-        ("begins", D),
         *[(name, P) for name in ["smooth", "common_from", "common"]],
         ("commons", I),
         ("tolerance", D),

@@ -111,8 +111,7 @@ void sd_radau_start(void *self, double t, const double *y, const double *yd, dou
     sd_weigh(&radau->ivp, radau->tolerance, radau->phi);
     if (!(h > 0.0)) { /* local error (h y'/y)^(s+1) within tolerance, with y' / y for the rate of all derivatives */
         double change = sd_radau_norm(radau, yd) * radau->tolerance, power = power_of(radau);
-        double longest = radau->begins > 0.0 ? radau->begins * radau->ivp.h_max : FIRST * (radau->ivp.t_end - t);
-        longest *= fmin(1.0, pow(1e3 * radau->tolerance, power)); /* runs that are compared begin apart */
+        double longest = FIRST * (radau->ivp.t_end - t) * fmin(1.0, pow(1e3 * radau->tolerance, power)); /* runs that are compared begin apart */
         h = sd_first_step(&radau->ivp, longest, 0.1 * pow(radau->tolerance, power), change);
     }
     radau->ivp.h = fmin(radau->ivp.fixed_h > 0.0 ? radau->ivp.fixed_h : h, radau->ivp.h_max);

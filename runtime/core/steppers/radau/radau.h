@@ -58,7 +58,6 @@ typedef struct sd_radau {
     sd_linear *linear;
     sd_linear_z *complex_linear[SD_PAIRS]; /* NULL for those that no method needs */
     int32_t stages, most_stages; /* of the first step; at most */
-    double begins;            /* step at most, as part of the longest; 0: FIRST of the span */
     const int8_t *smooth;     /* [n] 1 where yd is the derivative, SD_UNPULLED: and is interpolated whatever pulls */
     const int32_t *common_from, *common; /* as in bdf/bdf.h: groups that are tested with h but for what they have in common */
     int32_t commons;
