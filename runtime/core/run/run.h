@@ -99,12 +99,9 @@ typedef struct sd_run {
     double node[SD_NODES];            /* parts of the last step behind its start, negative ones of steps before it */
     double node_power[SD_NODES][2];   /* dissipated, supplied */
     double difference[SD_NODES + 1][2]; /* of the powers from the start on, divided, if `divided` (Newton) */
-    double *spanning;                 /* settled points at nodes of the last step (spanned.h); NULL: none are kept */
-    int32_t spanned;                  /* so many nodes tell its rows; -1: none do; 0: nobody asked yet */
     int32_t told_here;                /* a row within the last step met its sums, and so do all there */
     int32_t divided;                  /* differences are of the last step */
     int32_t by_past;                  /* the integrals over the last step, all of it, are those by the powers of steps before */
-    int32_t strayed, skipped;         /* steps of late that no nodes told; since then not tried */
 } sd_run;
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,

@@ -262,8 +262,7 @@ class Run(c.Structure):
         ("node", D * NODES),
         ("node_power", D * (2 * NODES)),
         ("difference", D * (2 * NODES + 2)),
-        ("spanning", P),
-        *[(name, I) for name in ["spanned", "told_here", "divided", "by_past", "strayed", "skipped"]],
+        *[(name, I) for name in ["told_here", "divided", "by_past"]],
     ]
 
 
