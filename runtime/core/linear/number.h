@@ -54,7 +54,6 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_linear_ordered sd_linear_z_ordered
 #define sd_linear_replayed sd_linear_z_replayed
 #define sd_linear_often sd_linear_z_often
-#define sd_linear_in_cells sd_linear_z_in_cells
 #define sd_linear_again sd_linear_z_again
 #define sd_linear_left sd_linear_z_left
 #define sd_elimination sd_elimination_z
@@ -65,8 +64,6 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_elimination_learn sd_elimination_z_learn
 #define sd_elimination_factor sd_elimination_z_factor
 #define sd_elimination_solve sd_elimination_z_solve
-#define sd_elimination_healthy sd_elimination_z_healthy
-#define sd_elimination_worn sd_elimination_z_worn
 #define sd_sparse sd_sparse_z
 #define sd_sparse_new sd_sparse_z_new
 #define sd_sparse_free sd_sparse_z_free

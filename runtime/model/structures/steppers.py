@@ -161,11 +161,10 @@ class Underlying(c.Structure):
         *[(name, P) for name in ["goal_position", "goal_velocity"]],
         ("tolerance", D),
         *[(name, P) for name in ["values", "r", "step", "rest", "memory", "place_y", "place_yd", "list"]],
-        *[(name, P) for name in ["written", "from", "more", "straight"]],
-        *[(name, I) for name in ["lists", "mores", "flows", "writes", "ready", "placed", "bad_row", "bad_column"]],
+        *[(name, P) for name in ["written", "from", "more"]],
+        *[(name, I) for name in ["lists", "mores", "flows", "ready", "placed", "bad_row", "bad_column"]],
         ("factored", P),
         ("factored_at", c.c_int64),
-        ("spared", I),
         ("drift", D),
     ]
 
