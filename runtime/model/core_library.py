@@ -223,8 +223,6 @@ def _load() -> Any:
         "sd_column_order": (c.c_int, [_I, _I, _P, _P, _P, _P, _P, _P]),
         "sd_both_ends": (c.c_int, [_I, _P, _P, _P]),
         "sd_trim": (None, [c.c_int]),
-        "sd_threads": (c.c_int, []),
-        "sd_threads_use": (None, [c.c_int]),
         "sd_determined": (c.c_int, [_I, _I, *[_P] * 5, _D, _L, _P, _P, _P]),
         "sd_miss": (None, [_I, _I, *[_P] * 6]),
         "sd_substituted": (c.c_int, [_I, _I, *[_P] * 3, _D, _P, _P]),

@@ -1,7 +1,6 @@
 """What large models ask for."""
 
 import ctypes
-import os
 import subprocess
 import sys
 
@@ -116,8 +115,7 @@ def _bytes(program, tmp_path, model, *options, sections):
     def said(number):
         asked = [str(item) for item in ("simulate", model, *options, "--quiet", "--set", f"n={number}")]
         command = [sys.executable, "-c", program, *asked, "-o", str(tmp_path / "t.h5")]
-        environment = {**os.environ, "SYSDYN_THREADS": "1"}
-        done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
         return next(int(word) for word in reversed(done.stdout.split()) if word.isdigit())
 
     return (said(sections[1]) - said(sections[0])) / (sections[1] - sections[0])

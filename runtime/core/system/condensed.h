@@ -60,13 +60,6 @@ typedef struct sd_condensed {
 /* the functions of assembly.h read `system` through it, with the numbers that it has now */
 void sd_condensed_bind(sd_condensed *condensed, sd_system *system);
 
-/* `system` twice, for two threads that ask for residuals at the same time.  Of a condensed one each has rates of its own,
- * of which blocks read few; the second has its point where rates else stand.  free() lets go of it; NULL: no memory. */
-typedef struct sd_beside sd_beside;
-sd_beside *sd_beside_new(const sd_system *system);
-/* of what the system is now (its held rows change) */
-void sd_beside_as(sd_beside *beside, const sd_system *system, sd_system *twice[2]);
-
 /* A residual in parts: the point z in y, then the rates zd in yd as far as blocks read them, then its rows.  in_place: these may
  * stand where zd does (each row q' - f is that of its own unknown). */
 void sd_condensed_place(const sd_condensed *condensed, const double *z);

@@ -145,9 +145,6 @@ class Radau(c.Structure):
         *[(name, P) for name in ["newton_weight", "scale", "powered"]],
         ("w", P * PAIRS),
         ("in_place", I),
-        ("beside", P),
-        ("twice", P * 2),
-        *[(name, P) for name in ["point_y", "point_rate"]],
     ]
 
 

@@ -2,7 +2,6 @@
 #include "linear/lanes.h"
 #include "steppers/groups.h"
 #include "steppers/radau/radau.h"
-#include "steppers/threads.h"
 #include "system/condensed.h"
 
 #include <float.h>

@@ -108,9 +108,6 @@ typedef struct sd_radau {
     double complex *w[SD_PAIRS]; /* right sides and solutions */
     int32_t in_place;         /* the point of a stage, its rates and its residual take turns in d; y and rate stand there too,
                                * w where the point of the whole system does */
-    struct sd_beside *beside; /* condensed.h: for two threads; made when first needed */
-    sd_system *twice[2];          /* their systems */
-    double *point_y, *point_rate; /* [n]; y of a system with all its unknowns alone */
 } sd_radau;
 
 /* stages: at most; complex_linear [(stages - 1) / 2] */
