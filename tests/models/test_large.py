@@ -95,8 +95,9 @@ from sysdyn.runtime.integrate.integrate import Integration
 advance, whole = Integration._advance, Integration.run
 
 def noted(self, *given):
-    advance(self, *given)
+    found = advance(self, *given)
     tracemalloc.reset_peak()
+    return found
 
 def ran(self, *given):
     found = whole(self, *given)

@@ -6,7 +6,7 @@
 #ifndef SYSDYN_CHAINS_H
 #define SYSDYN_CHAINS_H
 
-#include "linear/sparse/told.h"
+#include "linear/sparse/dense_rest.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -161,8 +161,8 @@ static inline __attribute__((always_inline)) void descend_chain(const sd_sparse 
 static inline void descend_columns(const sd_sparse *lu, int32_t from, int32_t to, sd_number *work)
 {
     for (int32_t k = from; k < to; k++)
-        for (int32_t l = l_begin(lu, k), end = l_begin(lu, k + 1); l < end && !(lu->pulled[k] & SD_BEHIND); l++)
-            work[l_row_at(lu, l)] -= lu->l_value[l] * work[k];
+        for (int32_t l = lu->l_start[k], end = lu->l_start[k + 1]; l < end && !(lu->pulled[k] & SD_BEHIND); l++)
+            work[lu->l_row[l]] -= lu->l_value[l] * work[k];
 }
 
 static void descend_chains(const sd_sparse *lu, const sd_number *x, const double *row_scale, sd_number *work)
@@ -210,8 +210,8 @@ static inline void ascend_columns(const sd_sparse *lu, int32_t from, int32_t to,
             work[k] *= lu->inverse[k];
             x[lu->order[k]] = column_scale ? work[k] * column_scale[lu->order[k]] : work[k];
         }
-        for (int32_t p = u_begin(lu, k), end = u_begin(lu, k + 1); p < end && !(lu->pulled[k] & SD_BEFORE); p++)
-            work[u_row_at(lu, p)] -= lu->u_value[p] * work[k];
+        for (int32_t p = lu->u_start[k], end = lu->u_start[k + 1]; p < end && !(lu->pulled[k] & SD_BEFORE); p++)
+            work[lu->u_row[p]] -= lu->u_value[p] * work[k];
     }
 }
 

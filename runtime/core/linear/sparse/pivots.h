@@ -7,7 +7,6 @@
 #include "linear/sparse/chains.h"
 #include "linear/sparse/dense_rest.h"
 #include "linear/sparse/substitute.h"
-#include "linear/sparse/told.h"
 
 #define THRESHOLD 0.1    /* a sparser row may pivot if its entry is this close to the largest */
 #define ROOM 2           /* entries of a factor for each of the matrix: room for them */
@@ -376,7 +375,7 @@ static int search_pivots(sd_sparse *lu, const sd_matrix *matrix)
     lu->block = malloc((rows + 1) * sizeof(sd_number));
     lu->among = calloc((size_t)lu->n / 64 + 1, sizeof(uint64_t));
     lu->first = lu->first ? lu->first : malloc(((size_t)lu->n + 1) * sizeof *lu->first);
-    if (!lu->stack || !lu->block || !lu->among || !lu->first || !provide_pattern(lu) || !provide_pivots(lu)) {
+    if (!lu->stack || !lu->block || !lu->among || !lu->first || !provide_pivots(lu)) {
         leave_search(lu);
         return 2;
     }
@@ -406,8 +405,6 @@ static int search_pivots(sd_sparse *lu, const sd_matrix *matrix)
         find_chains(lu);
         count_products(lu);
     }
-    if (!failed && lu->lowers && is_long(lu) && !lu->widest && lu->rest == lu->n)
-        tell(lu);
     return failed;
 }
 

@@ -12,7 +12,6 @@ void sd_sparse_free(sd_sparse *lu)
     if (!lu)
         return;
     leave_chains(lu);
-    leave_told(lu);
     free(lu->pivots);
     free(lu->first);
     free(lu->room);
@@ -97,8 +96,8 @@ static int divide_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
     double largest = sd_size(diagonal);
     x[k] = 0.0;
     lu->inverse[k] = inverse;
-    for (int32_t l = l_begin(lu, k), end = l_begin(lu, k + 1); l < end; l++) {
-        int32_t row = l_row_at(lu, l);
+    for (int32_t l = lu->l_start[k], end = lu->l_start[k + 1]; l < end; l++) {
+        int32_t row = lu->l_row[l];
         sd_number v = x[row];
         x[row] = 0.0;
         lu->l_value[l] = v * inverse;
@@ -111,40 +110,6 @@ static int refactor_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
 {
     renewed(lu, matrix, k, lu->u_start[k + 1] - lu->u_start[k]);
     return divide_column(lu, matrix, k);
-}
-
-/* the same where the pattern is told */
-static int refactor_told_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
-{
-    int32_t c = lu->order[k], first = matrix->column[c], entries = matrix->column[c + 1] - first;
-    const sd_number *value = sd_column_of(matrix, c);
-    for (int32_t e = 0; e < entries; e++)
-        lu->x[lu->place[matrix->row[first + e]]] += value[e];
-    for (int32_t u = u_begin(lu, k), end = u_begin(lu, k + 1); u < end; u++) {
-        int32_t j = u_row_at(lu, u);
-        sd_number v = lu->u_value[u] = lu->x[j];
-        lu->x[j] = 0.0;
-        for (int32_t l = l_begin(lu, j), last = l_begin(lu, j + 1); l < last; l++)
-            lu->x[l_row_at(lu, l)] -= lu->l_value[l] * v;
-    }
-    return divide_column(lu, matrix, k);
-}
-
-/* all columns where the pattern is told: 1: a pivot became unhealthy */
-static int refactor_told(sd_sparse *lu, const sd_matrix *matrix)
-{
-    const sd_links *link = lu->told->link, *end = link + lu->told->links;
-    int failed = 0;
-    for (int32_t k = 0; k < lu->n && !failed;) {
-        if (link == end || k < link->from) {
-            failed = refactor_told_column(lu, matrix, k++);
-            continue;
-        }
-        for (int32_t i = 0; k < link->to && !failed; i++, k++)
-            failed = renew_link(lu, matrix, k, k - link->step, link->u + i, link->before + i, link->l + i);
-        link++;
-    }
-    return failed;
 }
 
 /* the columns of the rest, which are full: 1: a pivot became unhealthy, or there is no memory */
@@ -172,9 +137,7 @@ int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
     lu->smallest = 1.0;
     memset(lu->x, 0, ((size_t)lu->n + 1) * sizeof *lu->x);
     unsigned before = sd_no_subnormals();
-    if (lu->told)
-        failed = refactor_told(lu, matrix);
-    for (int32_t k = 0; k < lu->rest && !failed && !lu->told; k++)
+    for (int32_t k = 0; k < lu->rest && !failed; k++)
         failed = is_link(lu, k) ? refactor_link(lu, matrix, k)
                                 : lu->source[k] >= 0 && refactor_column(lu, matrix, k);
     if (!failed && lu->rest < lu->n)
