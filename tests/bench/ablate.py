@@ -51,7 +51,91 @@ class Mechanism:
         return sum(len((ROOT / file).read_text().splitlines()) for file in self.files)
 
 
-MECHANISMS: tuple[Mechanism, ...] = ()
+_LINEAR, _RUN = "runtime/core/linear", "runtime/core/run"
+MECHANISMS = (
+    Mechanism(
+        "condensing",
+        tuple(
+            f"runtime/condense/{name}.py" for name in ("composition", "condensed", "condenser", "elimination", "sums")
+        ),
+        (("runtime/integrate/request.py", "    condense: bool = True\n", "    condense: bool = False\n"),),
+        "tests/runtime/test_condense.py, tests/models/test_condensed.py",
+        "1.16 / 1.07; a grid of 60 x 60 nodes 38 times: stays",
+    ),
+    Mechanism(
+        "kept orders",
+        tuple(f"{_LINEAR}/elimination/{name}.c" for name in ("elimination", "elimination_order")),
+        (
+            (
+                f"{_LINEAR}/linear.c",
+                "    if (!linear->elimination || linear->null_pivot",
+                "    if (1 || linear->null_pivot",
+            ),
+        ),
+        "tests/runtime/test_replays.py, tests/runtime/test_elimination.py",
+        "with little LU 1.45 / 1.16, as machine code: stays",
+    ),
+    Mechanism(
+        "little LU",
+        (f"{_LINEAR}/dense/little_lu.h",),
+        ((f"{_LINEAR}/linear.c", "    if (!linear->little || linear->null_pivot", "    if (1 || linear->null_pivot"),),
+        "tests/runtime/test_little.py",
+        "not measured by itself",
+    ),
+    Mechanism(
+        "chains",
+        (f"{_LINEAR}/sparse/chains.h",),
+        ((f"{_LINEAR}/sparse/chains.h", "    if (lu->rank < n || lu->rows > n ||", "    if (1 || lu->rows > n ||"),),
+        "tests/runtime/test_sparse_factors.py",
+        "not measured by itself",
+    ),
+    Mechanism(
+        "dense rest",
+        (f"{_LINEAR}/sparse/dense_rest.h",),
+        ((f"{_LINEAR}/sparse/dense_rest.h", "    if (lu->idle || lu->null_pivot != 0.0 ||", "    if (1 ||"),),
+        "tests/runtime/test_sparse_factors.py",
+        "not measured by itself",
+    ),
+    Mechanism(
+        "rows told unsettled",
+        ("runtime/core/system/settle_shown.c",),
+        ((f"{_RUN}/rows.c", "(!stays(run, kind) && !meets(run, t))", "!stays(run, kind)"),),
+        "tests/runtime/test_settled_rows.py",
+        "not measured by itself",
+    ),
+    Mechanism(
+        "powers by past steps",
+        (),
+        ((f"{_RUN}/meters/quadratures.c", "    run->by_past = known && run->sampled;", "    run->by_past = 0;"),),
+        "tests/runtime/test_powers_summed.py",
+        "not measured by itself",
+    ),
+    Mechanism(
+        "rosenbrock in auto",
+        tuple(f"runtime/core/steppers/rosenbrock/rosenbrock{part}.c" for part in ("", "_error", "_stages")),
+        (
+            (
+                "runtime/accuracy/alternatives.py",
+                '    return (replace(way, method="rosenbrock"),) if serves else ()\n',
+                "    return ()\n",
+            ),
+        ),
+        "tests/runtime/test_rosenbrock.py",
+        "1.11; tube 2.8 to 15, van der Pol 3.2: stays",
+    ),
+    Mechanism(
+        "search in C",
+        ("runtime/core/start/search.c",),
+        (("runtime/numerics/gauss_newton.py", "\nSMALL = 64\n", "\nSMALL = -1\n"),),
+        "tests/runtime/test_starter.py",
+        "1.02 / 1.12, netlists 1.07 / 1.60: stays",
+    ),
+)
+"""What is optional and stays, and why.  Left out by the rule, with what their absence cost:
+a matrix of all stages of radau (250 lines), fronts (780): 1.00 / 1.02; one-run accuracies (620): 1.03 / 1.01, grids
+1.98, ladders 1.39; rows told from nodes (290), machine code (890): with these 1.19 / 1.01; threads of large steps (320),
+the pattern of a line's factors told by what changes (190): no CPU.
+"""
 
 
 @dataclass(frozen=True, slots=True)
