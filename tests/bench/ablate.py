@@ -133,7 +133,7 @@ MECHANISMS = (
 )
 """What is optional and stays, and why.  Left out by the rule, with what their absence cost:
 a matrix of all stages of radau (250 lines), fronts (780): 1.00 / 1.02; one-run accuracies (620): 1.03 / 1.01, grids
-1.98, ladders 1.39; rows told from nodes (290), machine code (890): with these 1.19 / 1.01; threads of large steps (320),
+1.98, ladders 1.39; rows told from nodes (290), machine code (890): with these 1.19 / 1.01; threads of radau (320),
 the pattern of a line's factors told by what changes (190): no CPU.
 """
 
