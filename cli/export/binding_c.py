@@ -29,7 +29,7 @@ ALGEBRA = (
     "linear/sums.c", "linear/elimination/elimination_order.c",
     "linear/elimination/elimination.c", "linear/dense/dense_lu.h", "linear/dense/little_lu.h", "linear/null_space.h",
     "linear/linear.c",
-    "linear/sparse/blocks.h", "linear/sparse/dense_rest.h", "linear/sparse/chains.h",
+    "linear/sparse/blocks.h", "linear/sparse/dense_rest.h",
     "linear/sparse/substitute.h", "linear/sparse/pivots.h", "linear/sparse/sparse.c",
     "steppers/explicit/underlying.c",
 )  # fmt: skip

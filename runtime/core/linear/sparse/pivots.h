@@ -4,7 +4,6 @@
 #define SYSDYN_PIVOTS_H
 
 #include "linear/sparse/blocks.h"
-#include "linear/sparse/chains.h"
 #include "linear/sparse/dense_rest.h"
 #include "linear/sparse/substitute.h"
 
@@ -355,7 +354,7 @@ static void count_products(sd_sparse *lu)
 {
     lu->products = 0;
     lu->entries = (int64_t)lu->l_start[lu->n] + lu->u_start[lu->n] + lu->n;
-    for (int32_t p = 0; p < lu->u_start[lu->n] && !lu->lowers; p++)
+    for (int32_t p = 0; p < lu->u_start[lu->n] && !is_line(lu); p++)
         lu->products += lu->l_start[lu->u_row[p] + 1] - lu->l_start[lu->u_row[p]];
 }
 
@@ -402,7 +401,6 @@ static int search_pivots(sd_sparse *lu, const sd_matrix *matrix)
     }
     if (!failed) {
         leave_pivots(lu);
-        find_chains(lu);
         count_products(lu);
     }
     return failed;

@@ -11,7 +11,6 @@ void sd_sparse_free(sd_sparse *lu)
 {
     if (!lu)
         return;
-    leave_chains(lu);
     free(lu->pivots);
     free(lu->first);
     free(lu->room);
@@ -138,8 +137,7 @@ int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
     memset(lu->x, 0, ((size_t)lu->n + 1) * sizeof *lu->x);
     unsigned before = sd_no_subnormals();
     for (int32_t k = 0; k < lu->rest && !failed; k++)
-        failed = is_link(lu, k) ? refactor_link(lu, matrix, k)
-                                : lu->source[k] >= 0 && refactor_column(lu, matrix, k);
+        failed = lu->source[k] >= 0 && refactor_column(lu, matrix, k);
     if (!failed && lu->rest < lu->n)
         failed = renew_rest(lu, matrix);
     sd_subnormals(before);
@@ -151,16 +149,11 @@ int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
 {
     int32_t n = lu->n;
-    if (lu->lowers) {
-        descend_chains(lu, x, row_scale, work);
-        ascend_chains(lu, x, column_scale, work);
-        return;
-    }
     for (int32_t k = 0; k < n; k++) {
         int32_t r = lu->source[k];
         work[k] = r < 0 ? 0.0 : row_scale ? x[r] * row_scale[r] : x[r];
     }
-    if ((int64_t)lu->l_start[n] + lu->u_start[n] <= NARROW * (int64_t)n)
+    if (is_line(lu))
         substitute_line(lu, x, work, column_scale);
     else
         substitute_blocks(lu, x, work, column_scale);

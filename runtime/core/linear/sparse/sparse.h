@@ -9,12 +9,6 @@
 
 #include <stdint.h>
 
-/* positions [from, to) of a factor that wait for the one `step` before (behind) them alone; step 0: for any (chains.h); first:
- * where the entry stands that the first of L (the last of U) waits with */
-typedef struct sd_chain {
-    int32_t from, to, step, first;
-} sd_chain;
-
 typedef struct sd_sparse {
     int32_t n, rows;             /* columns; rows, as many or more */
     const int32_t *order;        /* [n] column of the matrix that is eliminated k-th; of the caller */
@@ -33,9 +27,6 @@ typedef struct sd_sparse {
     int32_t rest;                /* the position from which the factors are full (dense_rest.h); n: none */
     int32_t widest;              /* numbers that the widest block touches; 0: there is none */
     sd_number *room;             /* [widest] */
-    sd_chain *lower, *upper;     /* [lowers], [uppers] of L and of U; none: the factors are no line's */
-    int32_t lowers, uppers;
-    char *pulled;                /* [n] which substitutions take what a column makes of another position within a chain */
     sd_number *x;                /* [the larger of n and rows, + 1] work, of solutions by these factors too */
     int lent;                    /* 1: x is the caller's */
     int pivoted;                 /* a valid pattern exists */
