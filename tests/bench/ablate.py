@@ -94,7 +94,7 @@ MECHANISMS = (
         ("runtime/core/system/settle_shown.c",),
         ((f"{_RUN}/rows.c", "(!stays(run, kind) && !meets(run, t))", "!stays(run, kind)"),),
         "tests/runtime/test_settled_rows.py",
-        "not measured by itself",
+        "netlists 1.32 / 1.05: stays",
     ),
     Mechanism(
         "powers by past steps",
