@@ -9,7 +9,6 @@ worker.
 from __future__ import annotations
 
 import importlib
-import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -39,7 +38,6 @@ _one = threading.Lock()
 
 def work(request: Request, keep: str, chunk: Chunk) -> tuple[Answer, float]:
     """On a worker: what came of a chunk, and how long it took [s].  One at a time, however many threads it has."""
-    os.environ.setdefault("SYSDYN_THREADS", "1")  # other workers have the other cores
     with _one:
         began = time.monotonic()
         runner = _runners.setdefault((request, keep), Runner(request, keep))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.accuracy.options import Options, instants
-from sysdyn.runtime.integrate.request import COMPARED, TRACE
+from sysdyn.runtime.integrate.request import COMPARED
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.numerics.points import distinct
 from sysdyn.values import dataclass
@@ -31,8 +31,6 @@ GOLDEN = 0.6180339887498949
 """Multiples of it modulo 1 fill an interval evenly and never regularly (Weyl's sequence)."""
 NEAR = 1e-9
 """Of the span: nearer to an instant at which the text jumps nothing is compared, for sides may differ by round-off."""
-EARLY = 10.0 ** np.arange(-3.0, 0.0, 0.25)
-"""Parts of the span at which a run that passes over what relaxes has rows, beside those at its steps."""
 KEPT = 10_000
 """Instants of rows up to which they are kept for the next run."""
 APART = 0.1
@@ -206,14 +204,8 @@ class Instants:
         """The next run is compared at these (s) of a run's own rows: steps are shorter than those of the draft."""
         self.common = self.known if self.known is not None and np.array_equal(own, self.known) else own
 
-    def rows(self, *, compared: bool, draft: bool, early: bool = False) -> tuple[Floats, Ints]:
-        """Instants and kinds of a run's rows; compared: with those of comparison, of a draft these alone; early: whose
-        steps pass over what relaxes at once, and which has rows within them.
-        """
-        if early and draft and self.common is None:
-            begin, end = self.times[0], self.times[-1]
-            times = distinct(np.append(self.times, begin + (end - begin) * EARLY))
-            return times, np.full(times.size, TRACE, dtype=np.int32)
+    def rows(self, *, compared: bool, draft: bool) -> tuple[Floats, Ints]:
+        """Instants and kinds of a run's rows; compared: with those of comparison, of a draft these alone."""
         if not compared or self.common is None:
             return self.times, self.kinds
         if self._joined is None or self._joined.compared is not self.common:

@@ -2,7 +2,7 @@
 
 A draft with longer steps is followed by a run at the tolerance that should do, a fifth to a thirtieth of it or, where
 the draft took many steps, less, and both are compared at instants of the draft's own rows; a run behind them at
-instants of the last one's.  Where little happens in a draft of radau, the run behind it is one of the bdf.
+instants of the last one's.
 Where the estimate (estimate.py) misses what was asked, a finer run follows and is compared with the last one.  The
 finest run is handed back with its estimate; laws.py says what tolerances promise.
 Each run finds the magnitudes of its unknowns for itself, though none larger than the run before has met: those that it
@@ -18,7 +18,6 @@ import numpy as np
 from sysdyn.runtime.accuracy.estimate import DEAR, LENGTHY, STRETCH, Estimate, is_held
 from sysdyn.runtime.accuracy.laws import Law
 from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, parted
-from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -40,14 +39,8 @@ holds both runs, what no step can see differs by more than the safety.  CPU of a
 TAME = 1e-6
 """Tolerance of the next run at most where the first two ran away alike (Robertson's falls through zero), and of a
 draft where Newton's failures say so before."""
-QUIET, AGREE = 5, 2.0
-"""Steps of a draft beyond those of its longest step, up to which little happens in it: a lighter method follows, and
-a run of its own differs from the draft by its own error, AGREE times of which is the estimate (on 175 runs of eleven
-models the estimate was 1 to 13 times the error, mostly 2).  With one step more two of three such runs came to nothing;
-CPU of 36 rows of drafts with 11 to 13 steps over that with 7: with 6 0.98, with 5 1.01, with 4 1.24; with 6 the voice
-coil at 1e-2, whose run of the bdf comes to nothing, is dearer by a third."""
-LIGHTLY = 1e-5
-"""Of accuracies below a method of low order is not tried: at 1e-6 every second model takes it too many steps."""
+QUIET = 5
+"""Steps of a draft beyond those of its longest step, up to which that length holds them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +59,6 @@ class Achieved:
     def below_round_off(self) -> bool:
         """The estimate is less than double precision resolves."""
         return self.error_estimate is not None and bool(self.error_estimate < ROUND_OFF)
-
-
-@dataclass(frozen=True, slots=True)
-class Lighter:
-    """A method whose runs cost less where little happens.  law: how its errors follow its tolerance; take: the runs go
-    on with it; leave: they go on with the method before, compared with the run before; way: of it, where it is known.
-    """
-
-    law: Law
-    take: Callable[[], None]
-    leave: Callable[[], None]
-    way: Way | None = None
 
 
 Run = Callable[[float, float], Sampled]
@@ -121,31 +102,6 @@ def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
                 tolerance = min(tolerance, TAME * law.ratio / RETRIED[tried])
 
 
-def _quiet(draft: Sampled) -> bool:
-    """Whether little happens in a draft."""
-    return draft.steps <= 1.0 / (DRAFT * LONGEST) + QUIET
-
-
-def _agreed(run: Run, draft: Sampled, lighter: Lighter, target: Floats, wanted: float) -> Achieved | None:
-    """What a run of the lighter method is worth behind a draft in which little happens: a pair of two methods, whose
-    errors have nothing in common.  None where much happens, or where it fails or misses: the method before goes on.
-    """
-    if not _quiet(draft):
-        return None
-    lighter.take()
-    try:
-        now = run(lighter.law.tolerance(wanted), LONGEST)
-    except SolverFailure as failure:
-        if failure.cause == "max_wall":
-            raise
-    else:
-        apart, over = difference(draft, now, target)
-        if AGREE * over <= 1.0 and not parted(draft, now, target):
-            return _achieved(AGREE * apart, True, 2, now.tolerance)
-    lighter.leave()
-    return None
-
-
 def control(
     run: Run,
     target: Floats,
@@ -154,32 +110,26 @@ def control(
     doubted: bool = False,
     tame: bool = False,
     first: float | None = None,
-    lighter: Lighter | None = None,
-    draft: Sampled | None = None,
 ) -> Achieved:
     """Runs until the last one's estimated error meets `target` [quantities], at most RUNS times.
 
     doubted: another method failed here, and a pair of runs is not believed on its own; tame: loose runs are
     known to have nothing in common here; first: the tolerance of the run behind the draft, where one is known that
-    does; lighter: takes over where little happens; draft: a run to begin with (None: one of its own).
+    does.
 
     Raises SolverFailure where the first runs fail.
     """
     wanted = float(np.min(target, initial=1.0))
     tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
-    last = draft or _draft(run, min(tolerance, TAME * law.ratio) if tame else tolerance, law)
+    last = _draft(run, min(tolerance, TAME * law.ratio) if tame else tolerance, law)
     estimate, longest = Estimate(law, target), LONGEST
-    still = _quiet(last)
+    still = last.steps <= 1.0 / (DRAFT * LONGEST) + QUIET
     shorter: float | None = None
     number, away = 1, False
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
     ratio = max(law.ratio, TENTH) if last.tolerance >= law.loosest else law.ratio
     tolerance = max(min(tolerance, ratio * last.tolerance), law.far * last.tolerance, law.finest)
-    usual = first is None and draft is None and LIGHTLY <= wanted < 1.0 and not doubted
-    light = _agreed(run, last, lighter, target, wanted) if lighter is not None and usual else None
-    if light is not None:
-        return light
     while number < RUNS:
         number += 1
         now = _finer(run, last, tolerance, longest, law, compared=bool(np.isfinite(estimate.over)))

@@ -9,9 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.accuracy.by_steps import by_steps
-from sysdyn.runtime.accuracy.carried import carried, serves
-from sysdyn.runtime.accuracy.control import Achieved, Lighter, control
+from sysdyn.runtime.accuracy.control import Achieved, control
 from sysdyn.runtime.accuracy.options import Options, own_tolerances
 from sysdyn.runtime.accuracy.round_off import blurred
 from sysdyn.runtime.accuracy.runs import Runs
@@ -25,10 +23,6 @@ NO_FURTHER = 1.0 + 1e-6
 REFINED, REFINE, HELPS = 4, 0.3, 0.5
 """Runs with shorter steps for the sake of the ledgers, how long they are beside those before, and what of the balance
 is left of one that a step spoils."""
-LITTLE_HAPPENS = "little happens"
-"""Why method auto goes on with the bdf behind a draft of radau."""
-LIGHT = 200
-"""Steps of the bdf there, beyond which they are no cheaper than radau's."""
 PATIENCE = {"bdf": (LONG, LONG_STEEP), "rosenbrock": (BRIEF, BRIEF_STEEP)}
 """Steps after which the next method is tried, of laws that are not steep and of those that are."""
 
@@ -77,33 +71,11 @@ def _achieved(
     last: bool = True,
     doubted: bool = False,
     tame: bool = False,
-    lighter: Lighter | None = None,
 ) -> Achieved:
     """Runs by one method; last: no other takes over, so that it goes on where it would be left to the next."""
     target, first = runs.quantities.asked(options), options.first
-    trusted = first is None and not (doubted or tame)
-    if trusted and lighter is not None and lighter.way is not None and serves(runs, options, target):
-        achieved = carried(runs, lighter.way, target)
-        if achieved is not None:
-            return achieved
-    relaxed = by_steps(runs, options, target) if trusted else None
-    if isinstance(relaxed, Achieved):
-        return relaxed
     law = replace(runs.way.law, brief=False) if last else runs.way.law
-    return control(runs.sampled, target, law, doubted=doubted, tame=tame, first=first, lighter=lighter, draft=relaxed)
-
-
-def _lighter(runs: Runs, options: Options, others: tuple[Way, ...]) -> Lighter | None:
-    """The bdf behind a draft of radau: where so little happens that the longest step holds the steps, its steps cost a
-    third of radau's and its rows less (CPU over eleven seed models: 0.81 of two runs of radau; over ladders of 100 to
-    10 000 sections at 1e-1 to 1e-4: 0.75).
-    """
-    way = runs.way
-    bent = options.events or way.system.form.scales
-    if way.method != "radau" or bent or not others or others[0].method != "bdf":
-        return None
-    light = replace(others[0], reason=LITTLE_HAPPENS)
-    return Lighter(light.law, lambda: runs.take(light, LIGHT), lambda: runs.take_back(way), light)
+    return control(runs.sampled, target, law, doubted=doubted, tame=tame, first=first)
 
 
 def _unbalanced(runs: Runs, options: Options) -> float:
@@ -168,8 +140,7 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
         runs.patience = PATIENCE.get(runs.method, (None, None))[steep] if others else None
         runs.patience_with_draft = explicit[1] if explicit is not None and others else None
         try:
-            lighter = _lighter(runs, options, others)
-            achieved = _achieved(runs, options, last=not others, doubted=doubted, tame=tame, lighter=lighter)
+            achieved = _achieved(runs, options, last=not others, doubted=doubted, tame=tame)
         except SolverFailure as failure:
             if not others or _bounded(failure, runs):
                 if missed is None:

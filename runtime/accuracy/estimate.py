@@ -33,6 +33,8 @@ HOLDS, SHORTEN = 1.2, 1.0 / 32.0
 """Steps of a run over those of the longest length, up to which that length holds them and the tolerance does not (what
 algebra alone determines has no error that a step could test), in both runs of a pair; the least that the next run's is
 of it."""
+BY_STEPS = 2.0
+"""Power with which errors fall at least where the longest step holds both runs."""
 TOWARDS, ENOUGH = 2.5, 20_000
 """The power of the steps with which such errors mostly fall (rates of what is interpolated: 2.3 to 3); steps of a run
 behind which none is shortened."""
@@ -155,7 +157,7 @@ class Estimate:
         credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
         credit *= ROOT if self.root else 1.0
         if shorter is not None:
-            part = shorter ** (self.law.by_steps * (ROOT if self.root else 1.0))
+            part = shorter ** (BY_STEPS * (ROOT if self.root else 1.0))
             shrink = self.law.safety * part / (1.0 - part)
         elif self._before is not None:
             over_before, step_before = self._before

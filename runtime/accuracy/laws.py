@@ -36,7 +36,6 @@ class Law:
     order: power of the steps with which errors fall at least, as far as is credited (0: they are not counted);
     fronts: at most that of runs of less than LENGTHY steps, whose error a few fronts may be;
     damps: it passes over a fast mode in silence, where an explicit method is held by it;
-    by_steps: power with which errors fall at least where the longest step holds both runs;
     fastest: power beyond which differences fall by chance alone;
     brief: runs of less than LENGTHY steps that have nothing in common, or would have to be as fine as DEAR, are left to
     the next method, where there is one.
@@ -61,7 +60,6 @@ class Law:
     fronts: float = np.inf
     fastest: float = np.inf
     damps: bool = True
-    by_steps: float = 2.0
 
     def tolerance(self, wanted: float, steps: int = FEW_STEPS) -> float:
         """The tolerance that should do for an accuracy, of a motion whose draft took this many steps."""
@@ -119,13 +117,6 @@ power 4.0 of the steps, between two runs with 3.4: met, and 1.7 times what was a
 LONG_MOTION = Law(400.0, 1.0, 0.6, 1e-17, ratio=0.03, loosest=1e-5, little=0.1, safety=1.8)
 """Of radau, with all its stages, on a motion that is long and smooth however steep its laws: a loose draft has nothing
 in common with the run behind it, and is not cheaper."""
-
-
-RELAXING = Law(1.0, 1.0, 1.0, 1e-17, safety=1.8, by_steps=2.5)
-"""Of radau on what can but relax (by_steps.py): the power is the stage order of three stages, 3, less half a one: where
-a pulse comes in the midst of rest the tolerance holds the steps (of 70 lines, grids and chains with 3 one was 7 times
-further off than was asked, with this none).
-"""
 
 
 REDUCED = Law(200.0, 1.0, 0.6, 1e-10, ratio=0.02, loosest=0.01, little=0.2, safety=1.8, sure=0.5)

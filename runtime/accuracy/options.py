@@ -131,7 +131,7 @@ def choose_method(options: Options) -> str:
     """The method of the core, or euler, with which a simulation begins; WrongOption for what does not exist.
 
     auto: radau, with the solver's own tolerances bdf; the underlying equation (index 0) is begun with dopri.  (The
-    explicit method may come first: `alternatives`; the bdf go on: `_lighter` of controlled.py.)  CPU of
+    explicit method may come first: `alternatives`.)  CPU of
     radau over that of bdf at equal error, geometric mean over the 23 seed and benchmark models without the explicit
     method: 1.17 at 1e-3, 1.09 at 1e-4, 1.02 at 1e-6.
     """

@@ -20,7 +20,7 @@ from sysdyn.runtime.accuracy.way import FACTORED, HELD, SPARE, STIFF, Way
 from sysdyn.runtime.events.kinks import LIVE
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.origin import Origin
-from sysdyn.runtime.integrate.request import CARRIED, LONGEST, STEP, TRACE, Finished, Request
+from sysdyn.runtime.integrate.request import LONGEST, STEP, TRACE, Finished, Request
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
@@ -36,8 +36,6 @@ ROUGH = 1e-2
 APART = 0.1
 """Of a step: rows of a draft are no nearer to each other.  With one a step the rows between the steps of others are not
 seen: an amplifier then was estimated 500 times too good."""
-FIRST = 0.15
-"""Of the longest step: the first one of what relaxes, at most, so that runs that are compared begin apart."""
 BRIEFLY, LONGER = 24, 200
 """Steps of the windows in which Newton may fail in part of them: of a draft, of a run on steep laws."""
 
@@ -81,7 +79,6 @@ class Runs:
         self.writer: Writer | None = None
         self.finished: Finished | None = None
         self.samples: list[Floats] = []
-        self.carried: list[Floats] = []
         self.done: tuple[Finished, list[Floats], Writer] | None = None
         self.controlled = False
 
@@ -103,15 +100,8 @@ class Runs:
         self.opening = 0.0
         if before.system is not way.system:
             self.ceiling = None
-        self._compared_before = self.instants.common
         if before is way or (before.system, before.index) != (way.system, way.index):
             self._origin: Origin | None = None
-
-    def take_back(self, way: Way) -> None:
-        """Goes on as before the last `take`: the next run is compared where that of the method before it was."""
-        instants = self._compared_before
-        self.take(way)
-        self.instants.common = instants
 
     @property
     def origin(self) -> Origin | None:
@@ -126,8 +116,7 @@ class Runs:
         """One integration's request; longest: step, as part of the span."""
         options, draft = self.options, self.controlled and self.done is None
         tried = options.method == "auto" and not self.way.lasting
-        early = self.way.stages == (3, 3)
-        instants, kinds = self.instants.rows(compared=self.controlled, draft=draft, early=early)
+        instants, kinds = self.instants.rows(compared=self.controlled, draft=draft)
         return Request(
             t_end=options.t_end,
             instants=instants,
@@ -144,7 +133,6 @@ class Runs:
             stops=options.stops,
             method="bdf" if self.method == "euler" else self.method,
             stages=self._stages,
-            begins=FIRST if early else 0.0,
             stiff_steps=HELD if tried else STIFF,
             spare_steps=SPARE if draft and tried and self.system.unknowns <= FACTORED else 0.0,
             # of steep laws points that settle as loosely would count as failed
@@ -155,8 +143,7 @@ class Runs:
             audited=bool(self.quantities.meters),
             opening=self.opening,
             ceiling=self.ceiling,
-            carried=self.way.carried,
-            apart=APART if draft and (self.instants.open or early) else 0.0,
+            apart=APART if draft and self.instants.open else 0.0,
             events=options.events or None,
             begin=self.begin,
             least_norm=options.redundancy == "minimum_norm" and self.system.leaves_out,
@@ -177,7 +164,7 @@ class Runs:
         """Of radau, in the first step and at most; None: chosen.  The order of s stages is 2 s - 1."""
         if self.method == "radau" and self.options.order is not None:
             return (self.options.order + 1) // 2, (self.options.order + 1) // 2
-        return (3, lib.STAGES) if self.way.smooth else self.way.stages
+        return (3, lib.STAGES) if self.way.smooth else None
 
     @property
     def most_steps(self) -> int | None:
@@ -187,9 +174,6 @@ class Runs:
 
     def _write(self, rows: Floats) -> None:
         kind = rows[:, 1].astype(np.int32)
-        if self.way.carried:
-            self.carried.append(rows[kind == CARRIED])
-            rows, kind = rows[kind != CARRIED], kind[kind != CARRIED]
         traced = rows[(kind & TRACE) > 0]
         self.compared.take(rows, kind)
         assert self.writer is not None
@@ -222,7 +206,7 @@ class Runs:
     def run(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Finished:
         """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
         first = self.done is None
-        self.samples, self.carried = [], []
+        self.samples = []
         self.watched = self.options.watch(self.names) if self.options.watch is not None else None
         self.writer = self.keeping.writer(self.layout(rtol, atol), first)
         integration = Integration(self.system, self.start, self.request(rtol, atol, longest), self.origin)

@@ -27,8 +27,7 @@ system of which radau's factors are cheap enough for it to take over."""
 class Way:
     """A method on a form of the model; index: of the form as the error test takes it, name: as the trace names it;
     reason: why method auto takes it; lasting: stability may hold its steps, for those of another are no longer; smooth:
-    the motion is long and smooth, however steep its laws; reduced: equations of index 2 taken at index 1; stages: of
-    radau, in the first step and at most (None: chosen); carried: its error is carried along the run.
+    the motion is long and smooth, however steep its laws; reduced: equations of index 2 taken at index 1.
     """
 
     method: str
@@ -39,8 +38,6 @@ class Way:
     lasting: bool = False
     smooth: bool = False
     reduced: bool = False
-    stages: tuple[int, int] | None = None
-    carried: bool = False
 
     @property
     def law(self) -> Law:

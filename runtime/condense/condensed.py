@@ -339,10 +339,6 @@ class Condensed:
         condensed.slope = None if room.large else condensed.r
         lib.core.sd_condensed_bind(c.byref(condensed), c.byref(self.core))
 
-    def __del__(self) -> None:
-        if hasattr(self, "condensed"):
-            lib.core.sd_condensed_leave(c.byref(self.condensed))
-
     def _told_products(self) -> dict[str, int | None]:
         """The products as the core has them: of a large system by stretches, where these are few."""
         found = None

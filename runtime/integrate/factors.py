@@ -1,6 +1,6 @@
 """Factorisations of the matrices that a method steps with, handed on from run to run of one start.
 
-What a run learns of small matrices, the order of their pivots and its machine code
+What a run learns of small matrices, the order of their pivots
 (core/linear/elimination/elimination.h), serves the next run as well.  Where there is no
 next run they go with the run that took them.
 """

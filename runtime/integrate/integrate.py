@@ -222,10 +222,10 @@ class Integration:
         method.fixed_h = request.fixed_step or 0.0
         self._tell()
         if request.method == "bdf":
-            method.max_order, method.carried.wanted = request.max_order, int(request.carried)
+            method.max_order = request.max_order
         elif request.method == "radau":
             steep = any(scale.block == "dynamics_scale" for scale in self.system.form.scales)
-            method.stages, method.balances, method.begins = first, int(steep), self.request.begins
+            method.stages, method.balances = first, int(steep)
         elif self.underlying is not None:
             method.patience = request.stiff_steps
         if request.method == "dopri":

@@ -22,10 +22,9 @@ ON_UNDERLYING = ("dopri", "energy")
 OF_INDEX_ONE = ("rosenbrock",)
 """Methods that integrate equations of index 1 alone, as written or with constraints differentiated twice (form 1)."""
 
-TRACE, STEP, COMPARED, RELAXING, CARRIED = 1, 2, 4, 8, 16
+TRACE, STEP, COMPARED, RELAXING = 1, 2, 4, 8
 """Kinds of rows (their second column, a sum); RELAXING: compared, where something relaxes at once behind a
-restart; in the place of energies these have what core/run/compared.c (`relaxes`) tells; CARRIED: of the ends of
-steps, in the place of rates what is observed there without the error carried along the run."""
+restart; in the place of energies these have what core/run/compared.c (`relaxes`) tells."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,15 +44,13 @@ class Request:
     by which runs are compared and nothing else, of a draft for all, 0: round-off; audited: they are compared by the
     audit's members too;
     condense: what constant sums define leaves the system (condense/);
-    stages: of radau, in the first step and at most, None: chosen; begins: its first step at most, as part of the
-    longest, 0: chosen;
+    stages: of radau, in the first step and at most, None: chosen;
     opening: of dopri, rosenbrock: first step as an earlier run found it fit (steppers/explicit/dopri.h), 0: chosen;
     ceiling [unknowns]: what guessed sizes of states are no larger than, as an earlier run met them, None: any;
     unstrained: steps, with a quarter of those before, in which Newton may not fail in nearly every second one, else it
     is given up (cause strained); 0: it goes on whatever fails; tried: another method follows where it creeps;
     apart: part of a step; instants within it that are nearer to the row before are passed over;
-    extrema: what is observed is looked at within steps for its least and largest values;
-    carried: the bdf carries its error along, of which each step has a row (core/steppers/bdf/bdf_transport.c).
+    extrema: what is observed is looked at within steps for its least and largest values.
     """
 
     t_end: float
@@ -84,12 +81,10 @@ class Request:
     condense: bool = True
     valued: bool = True
     stages: tuple[int, int] | None = None
-    begins: float = 0.0
     unstrained: int = 0
     tried: bool = False
     opening: float = 0.0
     ceiling: Floats | None = None
-    carried: bool = False
 
     @property
     def tolerance(self) -> float:

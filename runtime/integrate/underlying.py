@@ -215,7 +215,7 @@ class Accelerations:
 
 
 class _Core:
-    """The core's structure on one factorisation, kept with it from run to run: tables and machine code stay as they are
+    """The core's structure on one factorisation, kept with it from run to run: tables stay as they are
     for the system and the rows that it holds.
     """
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES, Mask, in_order, least_norm
-from sysdyn.runtime.numerics.products import add_product, add_sizes, pieces
+from sysdyn.runtime.numerics.products import add_product, add_sizes, norm_of, pieces
 from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
 from sysdyn.runtime.numerics.work import Work
 from sysdyn.values import dataclass
@@ -31,6 +31,8 @@ _FOLDS = 709
 """Iterations that an exponential, falling by e in each, takes from the largest number: as long as rows shrink as fast
 as their terms do none is counted."""
 _HALVINGS, _FLATTEST = 12, 1023
+STRAIGHT = 1e-9
+"""Of rows at the middle of a way: what they may be off the mean of those at its ends and count as linear along it."""
 _LOST = 3
 """Directions one after the other along which no step makes the rows smaller: the next ones do not either."""
 _ROUND_OFF = 2e-15
@@ -71,7 +73,7 @@ class Problem:
     def distances(self, x: Floats) -> tuple[float, ...]:
         """How far x is from the guess in each level, in units of its moves; those nearest to it first."""
         moved = np.abs(x - self.guess) * self.weight / self.scale
-        return tuple(float(np.linalg.norm(moved[level])) for level in self.levels)
+        return tuple(norm_of(moved[level]) for level in self.levels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,7 +303,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
         if problem.work.done:
             break
         # the nearest point at which the linear rows hold
-        norm, rows = float(np.linalg.norm(scaled)), [scaled[problem.use]]
+        norm, rows = norm_of(scaled), [scaled[problem.use]]
         del scaled
         try:
             target = linear.nearest(x, rows.pop(), beside=size < _BESIDE and stale > 1)
@@ -314,22 +316,28 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
         step, tried, move = 1.0, x, np.subtract(target, linear.moved(x), out=target)
         move *= linear.unit
 
-        def on(part: float, x: Floats = x, move: Floats = move, measure: Any = measure) -> tuple[float, Floats]:
+        def on(part: float, x: Floats = x, move: Floats = move, measure: Any = measure) -> tuple[Floats, Floats]:
             there = x.copy()
             there[problem.free] += part * move
-            return float(np.linalg.norm(measure(there)[1])), there
+            return measure(there)[1], there
 
+        ends: list[Floats] = []
         for _ in range(_HALVINGS):
-            now, tried = on(step)
+            there, tried = on(step)
+            now = norm_of(there)
             if np.isfinite(now) and now <= max((1.0 - 0.1 * step) * norm, 1e-11):
                 lost = 0
                 break
+            if step >= 0.5:
+                ends = [*(ends or [measure(x)[1]]), there]
+            if step == 0.5 and _ascends(*ends):
+                return best
             step *= 0.5
         else:
             flat = _flat(on, norm)
             lost = 0 if flat[0] < norm else lost + 1
             now, tried = flat if not lost else (now, tried)
-        del on
+        del on, ends, there
         if best.residual >= 1e-12 and now <= 0.5 * norm:
             stale, taken = 0, taken - 1  # rows that shrink as fast as their terms do (a junction far above its voltage)
         del linear, measure, target, move  # of a large one the room counts
@@ -339,15 +347,25 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
     return best
 
 
-def _flat(on: Callable[[float], tuple[float, Floats]], norm: float) -> tuple[float, Floats]:
+def _ascends(begun: Floats, end: Floats, middle: Floats) -> bool:
+    """Whether scaled rows are linear along a way on which they do not fall by a tenth: what is nearest to the solution
+    of linear rows that contradict is all that there is.
+    """
+    if norm_of(middle - 0.5 * (begun + end)) > STRAIGHT * norm_of(middle):
+        return False
+    return bool(np.einsum("i,i->", begun, end - 0.9 * begun) > 0.0)
+
+
+def _flat(on: Callable[[float], tuple[Floats, Floats]], norm: float) -> tuple[float, Floats]:
     """About where rows stop to shrink on the first of a way that is too long by powers of ten, by bisection of the
     exponent: that of a law that is flat (a junction that blocks, and shall conduct).
     """
     above, below = _HALVINGS, _FLATTEST
     while below - above > 1:
         halvings = (above + below) // 2
-        above, below = (above, halvings) if on(2.0**-halvings)[0] <= norm else (halvings, below)
-    return on(2.0**-below)
+        above, below = (above, halvings) if norm_of(on(2.0**-halvings)[0]) <= norm else (halvings, below)
+    there, tried = on(2.0**-below)
+    return norm_of(there), tried
 
 
 def stepped(problem: Problem, x: Floats) -> Floats:

@@ -37,6 +37,11 @@ def largest_product(x: Floats, y: Floats) -> float:
     return float(np.max(np.fromiter(found, dtype=np.float64), initial=0.0))
 
 
+def norm_of(x: Floats) -> float:
+    """The 2-norm, by one thread: those of BLAS wait for each other longer than a vector of some thousands takes."""
+    return float(np.sqrt(np.einsum("i,i->", x, x)))
+
+
 def pieces(size: int) -> Iterator[slice]:
     """Of an array of a large model, worked through without a second one as long."""
     return (slice(k, k + PIECE) for k in range(0, size, PIECE))

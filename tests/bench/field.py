@@ -87,7 +87,7 @@ NETLISTS = tuple(f"{path.stem}.cir" for path in sorted(netlists.NETLISTS.glob("*
 def on_own_text(problem: str, folder: Path) -> Family:
     """A ladder or grid beside IDA with KLU on a text of one unknown a node, the nonlinear line alone."""
     name, _, n = problem.partition(":")
-    written = GRID if name == "grid" else (MODELS / "benchmark" / f"{name}.sd").read_text()
+    written = GRID.read_text() if name == "grid" else (MODELS / "benchmark" / f"{name}.sd").read_text()
     (folder / f"{name}.sd").write_text(written.replace(*REACHED) if name == "nltl" else written)
     text, size = SIZES.get(name, (None, 0.0))
     bench = Bench(str(folder / name), folder, settings=(("n", n),))

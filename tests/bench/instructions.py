@@ -30,7 +30,6 @@ def counted(function: str, command: list[str]) -> tuple[int, str]:
     """Instructions within a function and what it calls, and what the command printed."""
     with tempfile.TemporaryDirectory() as folder:
         tool = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={folder}/out", f"--toggle-collect={function}"]
-        tool.append("--smc-check=all")  # machine code is written again on pages that it knows
         done = subprocess.run([*tool, *command], capture_output=True, text=True, check=True)
     found = re.search(r"Collected : (\d+)", done.stderr)
     assert found, done.stderr[-500:]

@@ -32,7 +32,7 @@ def cpu(command: list[str], folder: Path, environment: dict[str, str]) -> float:
 
 def instructions(command: list[str], folder: Path, environment: dict[str, str]) -> int:
     """Instructions outside the kernel, for one seed of Python's hashes."""
-    tool = ["valgrind", "--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null", "--smc-check=all"]
+    tool = ["valgrind", "--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"]
     done = subprocess.run(
         [*tool, *command],
         cwd=folder,

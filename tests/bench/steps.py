@@ -41,29 +41,7 @@ INSTANTS = 0.1 * np.arange(1, 11)
 TARGETS = (1e-3, 1e-4, 1e-5)
 SIZES = {"rc_ladder": ("ladder", 0.2), "grid": ("grid", 0.05)}
 """Of each model that has one its peer, and the largest voltage of the last node (V): what errors are relative to."""
-GRID = """from std.electrical import resistor, capacitor, voltage
-
-model grid {
-  param n = 100
-  node v[1..n, 1..n]: electrical
-  source: voltage(v = 1 V*sin(2*pi*2 Hz*t)) v[1, 1] -> ground
-  for i in 1..n {
-    for j in 1..n - 1 {
-      across[i, j]: resistor(R = 1 ohm) v[i, j] -> v[i, j + 1]
-      down[j, i]: resistor(R = 1 ohm) v[j, i] -> v[j + 1, i]
-    }
-    for j in 1..n {
-      C[i, j]: capacitor(C = 1 F / n^2) v[i, j] -> ground
-      init C[i, j].e = 0 V
-    }
-  }
-}
-
-scene reference of grid {
-  time 0 s to 1 s
-  trace v[n, n].e as y_end
-}
-"""
+GRID = Path(__file__).parent / "peers" / "grid.sd"
 REPEATED, FIRST = 5, 200
 """Runs of which the fastest counts; steps that are timed."""
 LONG = 100_000
@@ -201,7 +179,7 @@ def main() -> None:
             made, size = SIZES.get(name, (None, 1.0))
             peer = Peer(made, Path(folder)) if made is not None else None
             if name == "grid":
-                (Path(folder) / "grid.sd").write_text(GRID)
+                (Path(folder) / "grid.sd").write_text(GRID.read_text())
             for n in map(int, asked.sizes.split(",")):
                 line = Line(Path(folder) / "grid.sd" if name == "grid" else name, n, Path(folder))
                 for method in ("bdf", "radau"):

@@ -27,14 +27,13 @@ def later_first(item):
         raise ValueError("13")
     if item == 14:
         os.kill(os.getpid(), signal.SIGKILL)
-    return item * item, os.getpid(), os.environ.get("SYSDYN_THREADS")
+    return item * item, os.getpid()
 
 
 def test_answers_come_in_the_order_of_the_items_whatever_is_ready_first():
     found = list(crew.each(later_first, range(6), 2))
-    assert [square for square, _, _ in found] == [k * k for k in range(6)]
-    assert os.getpid() not in {process for _, process, _ in found}
-    assert {threads for _, _, threads in found} == {"1"}, "the cores are taken"
+    assert [square for square, _ in found] == [k * k for k in range(6)]
+    assert os.getpid() not in {process for _, process in found}
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -42,7 +41,7 @@ def test_answers_come_in_the_order_of_the_items_whatever_is_ready_first():
 def test_a_fault_is_raised_in_its_turn(jobs):
     seen: list[int] = []
     with pytest.raises(ValueError, match="13"):
-        seen.extend(square for square, _, _ in crew.each(later_first, [0, 1, 13, 2, 13], jobs))
+        seen.extend(square for square, _ in crew.each(later_first, [0, 1, 13, 2, 13], jobs))
     made = crew.each(later_first, [0, 1, 13], jobs)
     assert [next(made)[0], next(made)[0]] == [0, 1]
     made.close()
@@ -57,13 +56,13 @@ def test_an_item_that_kills_its_process_costs_its_own_answer():
 def test_processes_begin_where_what_is_left_foreseeably_pays(monkeypatch):
     monkeypatch.setattr(crew, "PAYS", 3.0)
     monkeypatch.setattr(crew, "cores", lambda: 2)
-    assert {p for _, p, _ in crew.each(later_first, [2, 3, 4], None)} == {os.getpid()}, "too small"
-    first, *others = (p for _, p, _ in crew.each(later_first, [0, *[2] * 28], None))
+    assert {p for _, p in crew.each(later_first, [2, 3, 4], None)} == {os.getpid()}, "too small"
+    first, *others = (p for _, p in crew.each(later_first, [0, *[2] * 28], None))
     assert first == os.getpid()
     assert os.getpid() not in others
-    assert os.getpid() not in {p for _, p, _ in crew.each(later_first, [2, 3], None, like=9.0)}
+    assert os.getpid() not in {p for _, p in crew.each(later_first, [2, 3], None, like=9.0)}
     monkeypatch.setattr(crew, "cores", lambda: 1)
-    assert {p for _, p, _ in crew.each(later_first, [2, 3], None, like=9.0)} == {os.getpid()}
+    assert {p for _, p in crew.each(later_first, [2, 3], None, like=9.0)} == {os.getpid()}
 
 
 def test_what_is_called_here_stands_for_what_is_called_elsewhere():

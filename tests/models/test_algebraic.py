@@ -119,7 +119,7 @@ def test_a_root_of_a_law_that_follows_its_source(tmp_path, accuracy):
 
 
 def test_a_ledger_is_balanced_however_light_the_method(tmp_path):
-    """Behind a draft in which little happens the bdf had 200 steps for its ledger, too: E921 by 1.03 of the limit."""
+    """The ledger of a run in which little happens: E921 by 1.03 of the limit with 200 steps of the bdf."""
     text = """
     model light {
       param C0 = 0 F

@@ -1,7 +1,6 @@
 """What large models ask for."""
 
 import ctypes
-import os
 import subprocess
 import sys
 
@@ -96,8 +95,9 @@ from sysdyn.runtime.integrate.integrate import Integration
 advance, whole = Integration._advance, Integration.run
 
 def noted(self, *given):
-    advance(self, *given)
+    found = advance(self, *given)
     tracemalloc.reset_peak()
+    return found
 
 def ran(self, *given):
     found = whole(self, *given)
@@ -116,8 +116,7 @@ def _bytes(program, tmp_path, model, *options, sections):
     def said(number):
         asked = [str(item) for item in ("simulate", model, *options, "--quiet", "--set", f"n={number}")]
         command = [sys.executable, "-c", program, *asked, "-o", str(tmp_path / "t.h5")]
-        environment = {**os.environ, "SYSDYN_THREADS": "1"}
-        done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
         return next(int(word) for word in reversed(done.stdout.split()) if word.isdigit())
 
     return (said(sections[1]) - said(sections[0])) / (sections[1] - sections[0])

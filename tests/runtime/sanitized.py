@@ -1,5 +1,4 @@
-"""The core under the address and the undefined-behaviour sanitizer: `python tests/runtime/sanitized.py [PYTEST ARGS]`;
-with `--threads` first under that of threads.
+"""The core under the address and the undefined-behaviour sanitizer: `python tests/runtime/sanitized.py [PYTEST ARGS]`.
 
 The sources are built as pyproject.toml names them, with the sanitizers, into a folder of their own; a Python that has
 the sanitizer's library before all others then runs the tests of the core with that build in place of the installed one.
@@ -21,11 +20,9 @@ PLAIN = ("-O0", "-g1", "-std=c11", "-fPIC")
 FLAGS = (*PLAIN, "-fsanitize=address,undefined", "-fno-sanitize-recover=undefined")
 SOONER = (*FLAGS, "-fno-sanitize=null,alignment,pointer-overflow")
 """In half the time: what leaves an array, or is read through NULL, the address sanitizer sees as well."""
-THREADS = (*PLAIN, "-fsanitize=thread")
 OPTIONS = {
     "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1",  # CPython keeps what it has to its end
     "UBSAN_OPTIONS": "print_stacktrace=1",
-    "TSAN_OPTIONS": "halt_on_error=1",
 }
 PRELUDE = """
 import importlib.util, sys
@@ -61,21 +58,17 @@ def build(folder, flags=FLAGS):
     return library
 
 
-def run(library, arguments, sanitizer="asan"):
+def run(library, arguments):
     """The exit code of pytest with the library in place of the installed core, and what it said."""
-    name = f"-print-file-name=lib{sanitizer}.so"
-    found = subprocess.run(["gcc", name], check=True, capture_output=True, text=True).stdout
+    found = subprocess.run(["gcc", "-print-file-name=libasan.so"], check=True, capture_output=True, text=True).stdout
     env = {**os.environ, **OPTIONS, "LD_PRELOAD": str(Path(found.strip()).resolve())}
-    shown = ["-s"] if sanitizer == "tsan" else []  # what it says goes lost in pytest's capture
-    command = [sys.executable, "-c", PRELUDE, str(library), "-q", *shown, "-p", "no:cacheprovider", *arguments]
+    command = [sys.executable, "-c", PRELUDE, str(library), "-q", "-p", "no:cacheprovider", *arguments]
     found = subprocess.run(command, check=False, env=env, cwd=ROOT, capture_output=True, text=True)
     return found.returncode, found.stdout + found.stderr
 
 
 if __name__ == "__main__":
-    threads = sys.argv[1:2] == ["--threads"]
-    chosen = (THREADS, "tsan") if threads else (FLAGS, "asan")
     with tempfile.TemporaryDirectory() as made:
-        code, said = run(build(Path(made), chosen[0]), sys.argv[1 + threads :] or ["tests/runtime"], chosen[1])
+        code, said = run(build(Path(made)), sys.argv[1:] or ["tests/runtime"])
     print(said)
     sys.exit(code)

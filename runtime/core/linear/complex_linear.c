@@ -1,10 +1,6 @@
-/* The factorisation of linear.c, elimination/elimination.c, sparse/sparse.c and sparse/fronts.c for complex matrices. */
+/* The factorisation of linear.c, elimination/elimination.c and sparse/sparse.c for complex matrices. */
 #define SD_COMPLEX
 #include "linear/sparse/sparse.c"
-
-#include "linear/sparse/front_pattern.c"
-
-#include "linear/sparse/fronts.c"
 
 #include "linear/elimination/elimination_order.c"
 

@@ -17,7 +17,7 @@
 typedef double sd_lanes __attribute__((vector_size(8 * SD_LANES), aligned(8), may_alias));
 typedef int64_t sd_bits __attribute__((vector_size(8 * SD_LANES), aligned(8), may_alias));
 
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && !defined(SD_INTERPRETED)
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && !defined(SD_NARROW)
 #define SD_WIDE __attribute__((target_clones("avx2", "default")))
 #else
 #define SD_WIDE

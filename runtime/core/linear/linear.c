@@ -139,16 +139,6 @@ static int replay(sd_linear *linear, const sd_number *values, const double *scal
     return serve_replayed(linear);
 }
 
-int sd_linear_in_cells(sd_linear *linear)
-{
-    sd_elimination *e = linear->elimination;
-    if (!sd_elimination_healthy(e))
-        return 0;
-    linear->factorisations++;
-    e->served = ++e->tries;
-    return serve_replayed(linear);
-}
-
 /* by dense factors of little ones, where they are wanted and serve; 0: not */
 static int by_little(sd_linear *linear, const sd_number *values, const double *scale)
 {

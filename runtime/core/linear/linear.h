@@ -96,9 +96,6 @@ int32_t *sd_linear_pivoted(sd_linear *linear);
 void sd_linear_replayed(sd_linear *linear);
 /* the same, but for little ones, whose dense factors are unrolled */
 void sd_linear_often(sd_linear *linear);
-/* The cells of `elimination` (which keeps one order) hold new factors, made by who runs its lists himself.  1: they are healthy, and
- * serve; 0: nothing changes. */
-int sd_linear_in_cells(sd_linear *linear);
 /* as new, but for the lists that served: for another run on matrices of the same kind */
 void sd_linear_again(sd_linear *linear);
 

@@ -1,6 +1,6 @@
 /* The numbers of a factorisation: double, or double complex where SD_COMPLEX is defined.
  *
- * linear.c, elimination/elimination.c, sparse/sparse.c and sparse/fronts.c are written once and compiled twice; complex_linear.c gives the complex ones
+ * linear.c, elimination/elimination.c and sparse/sparse.c are written once and compiled twice; complex_linear.c gives the complex ones
  * names of their own.
  */
 #ifndef SYSDYN_NUMBER_H
@@ -54,7 +54,6 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_linear_ordered sd_linear_z_ordered
 #define sd_linear_replayed sd_linear_z_replayed
 #define sd_linear_often sd_linear_z_often
-#define sd_linear_in_cells sd_linear_z_in_cells
 #define sd_linear_again sd_linear_z_again
 #define sd_linear_left sd_linear_z_left
 #define sd_elimination sd_elimination_z
@@ -65,8 +64,6 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_elimination_learn sd_elimination_z_learn
 #define sd_elimination_factor sd_elimination_z_factor
 #define sd_elimination_solve sd_elimination_z_solve
-#define sd_elimination_healthy sd_elimination_z_healthy
-#define sd_elimination_worn sd_elimination_z_worn
 #define sd_sparse sd_sparse_z
 #define sd_sparse_new sd_sparse_z_new
 #define sd_sparse_free sd_sparse_z_free
@@ -82,14 +79,6 @@ static inline sd_number sd_inverse(sd_number x)
 #define sd_linear_effort sd_linear_z_effort
 #define sd_sparse_rest sd_sparse_z_rest
 #define sd_matrix sd_matrix_z
-#define sd_fronts sd_fronts_z
-#define sd_entry_of sd_entry_z_of
-#define sd_fronts_new sd_fronts_z_new
-#define sd_fronts_free sd_fronts_z_free
-#define sd_fronts_provide sd_fronts_z_provide
-#define sd_fronts_rest sd_fronts_z_rest
-#define sd_fronts_factor sd_fronts_z_factor
-#define sd_fronts_solve sd_fronts_z_solve
 #else
 
 typedef double sd_number;

@@ -36,16 +36,6 @@ int sd_list_sum(sd_list *list, enum sd_sum_kind kind, int32_t target, int32_t so
     return 0;
 }
 
-void sd_list_begin(sd_list *list, const int32_t *places)
-{
-    int32_t before = 0;
-    list->sums = list->pairs = 0;
-    for (int k = 0; k < SD_ARRAYS - 1; k++) {
-        before = before < INT32_MAX && places[k] > 0 ? before + places[k] : INT32_MAX;
-        list->end[k] = before;
-    }
-}
-
 void sd_list_clear(sd_list *list)
 {
     free(list->sum);

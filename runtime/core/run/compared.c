@@ -39,25 +39,3 @@ void sd_run_compare(sd_run *run, double t, double *row, int begun)
     row[1] = SD_COMPARED | (begun && relaxes(run, t, row) ? SD_RELAXING : 0);
     memcpy(row + SD_ROW_HEAD + run->observed, run->slope, (size_t)run->observed * sizeof *row);
 }
-
-/* what is observed at the end of a step with the error carried there, or without it */
-static void write_end(sd_run *run, double t, int32_t without, double *values)
-{
-    *run->stepper->less_error = without;
-    run->stepper->dense(run->stepper->self, t, run->point, run->point_d);
-    sd_run_settle_row(run, t, SD_COMPARED, 0);
-    *run->stepper->less_error = 0;
-    sd_run_quantities(run, t, values);
-}
-
-void sd_run_carried(sd_run *run, double t)
-{
-    double *row = run->row + (size_t)run->rows * (size_t)(SD_ROW_HEAD + 2 * run->observed);
-    memset(row, 0, SD_ROW_HEAD * sizeof *row);
-    row[0] = t;
-    row[1] = SD_CARRIED;
-    write_end(run, t, 1, row + SD_ROW_HEAD + run->observed);
-    write_end(run, t, 0, row + SD_ROW_HEAD);
-    run->rows++;
-    run->rows_written++;
-}

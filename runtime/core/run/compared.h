@@ -6,8 +6,6 @@
 
 /* the row just written at t, once more for the comparison alone; begun: of the first step behind a restart */
 void sd_run_compare(sd_run *run, double t, double *row, int begun);
-/* the row of SD_CARRIED of the step that ends at t */
-void sd_run_carried(sd_run *run, double t);
 /* rows.c: the point of a row moved there, roughly where only runs are compared by it; rated: its rates are wanted too */
 void sd_run_settle_row(sd_run *run, double t, int32_t kind, int rated);
 

@@ -6,7 +6,6 @@
 
 #include "run/compared.h"
 #include "run/meters/quadratures.h"
-#include "run/spanned.h"
 #include "linear/lanes.h"
 #include "system/settle_shown.h"
 
@@ -217,15 +216,6 @@ static void write_quantities(sd_run *run, double t, int rates, double *row)
     note_sizes(run);
 }
 
-/* the point of a row among many of its step, settled, and the sum of the powers */
-static void span_row(sd_run *run, double t, int32_t kind, int summed, double sum[2])
-{
-    if (summed)
-        sd_run_sum(run, t, sum); /* before: it takes the room of the point */
-    if (!sd_run_span(run, t))
-        sd_run_settle_row(run, t, kind, 0);
-}
-
 /* one output row at an instant of the last step, written as of `label`; two where it is compared too */
 static void emit(sd_run *run, double t, double label, double kind, int at_step)
 {
@@ -235,15 +225,10 @@ static void emit(sd_run *run, double t, double label, double kind, int at_step)
     const int unsummed = run->unsummed > 1 || (run->unsummed && alone);
     const int compared = !at_step && (int32_t)kind & SD_COMPARED && run->observe_rate;
     const int begun = compared && run->t_from == run->t_begun;
-    const int many = !at_step && !compared && !run->told && !stays(run, (int32_t)kind) && sd_run_spans(run, (int32_t)kind);
-    if (many) {
-        span_row(run, t, (int32_t)kind, !unsummed, sum);
-    } else {
-        find_point(run, t, !at_step && !unsummed, sum);
-        if (compared)
-            find_slopes(run, t);
-        sd_run_settle_row(run, t, (int32_t)kind, begun);
-    }
+    find_point(run, t, !at_step && !unsummed, sum);
+    if (compared)
+        find_slopes(run, t);
+    sd_run_settle_row(run, t, (int32_t)kind, begun);
     if (run->magnitude && !at_step)
         note_beyond(run);
     if (run->unsummed && alone)
@@ -330,8 +315,6 @@ int sd_run_drain(sd_run *run)
             emit(run, instant, instant, kind, 0);
             continue;
         }
-        if (run->carried)
-            sd_run_carried(run, t);
         double kind = kind_here(run, asked);
         if (t == run->stepper->ivp->t_end || t < run->stepper->ivp->t)
             kind = (double)((int32_t)kind | run->end_kind);

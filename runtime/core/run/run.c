@@ -10,7 +10,6 @@
 #include "run/events/corners.h"
 #include "run/meters/quadratures.h"
 #include "run/events/watched.h"
-#include "run/spanned.h"
 #include "linear/lanes.h"
 #include "system/condensed.h"
 
@@ -32,8 +31,6 @@ sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int3
         free(run);
         return NULL;
     }
-    if (settle && settle->unknowns <= SD_SPANNED_MOST) /* without the room rows are settled one by one */
-        run->spanning = calloc((size_t)(SD_SPANNING + 3) * 2 * (size_t)sd_whole_lanes(settle->unknowns) + 1, sizeof(double));
     run->stepper = stepper;
     run->settle = settle;
     run->written = written;
@@ -61,7 +58,6 @@ void sd_run_free(sd_run *run)
     if (!run)
         return;
     free(run->memory);
-    free(run->spanning);
     free(run->looked);
     free(run);
 }
@@ -147,7 +143,7 @@ static void measure(sd_run *run, double from, double t)
 {
     run->t_from = from;
     run->t_to = t;
-    run->sampled = run->noded = run->divided = run->by_past = run->spanned = run->told_here = 0;
+    run->sampled = run->noded = run->divided = run->by_past = run->told_here = 0;
     run->step_dissipated = run->dissipated;
     run->step_supplied = run->supplied;
     if (run->unsummed > 1)
@@ -210,7 +206,7 @@ static int advance(sd_run *run)
     if (run->stepper->step(run->stepper->self))
         return SD_FAILED;
     run->t_from = from;
-    run->told_here = run->spanned = 0; /* before events are looked for, which have rows too */
+    run->told_here = 0; /* before events are looked for, which have rows too */
     if (run->settle)
         run->settle->within = from > run->t_begun ? run->stepper->ivp->t - from : 0.0;
     if (run->modes)

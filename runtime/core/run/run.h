@@ -24,8 +24,6 @@
 #define SD_TRACE 1    /* kinds of a row (integrate/request.py): of the trace, */
 #define SD_SAMPLE 2   /* of a step, which is watched alone, */
 #define SD_COMPARED 4 /* that runs are compared by */
-#define SD_CARRIED 16 /* of the estimate along a run, at the ends of its steps: what is observed there, and in the place of its
-                       * rates the same at the point without the error carried to it */
 #define SD_RELAXING 8 /* of these: where something relaxes at once within the first step behind a restart */
 #define SD_PARTS 4    /* of a step, at whose ends what is watched is looked at */
 #define SD_PAST 3     /* steps before the last one whose powers are known */
@@ -52,7 +50,6 @@ typedef struct sd_run {
     int32_t instants, every_step;
     int32_t glances, glanced;         /* instants of a step that are watched, at even parts of it, its end among them; those
                                        * within it that are written */
-    int32_t carried;                  /* at the end of each step there is a row of SD_CARRIED */
     int32_t sizes_at_steps;           /* largest is over the ends of all steps, not of those with a row alone */
     int32_t bare;                     /* what is observed follows from the state: rows for comparison alone are not settled */
     int32_t told;                     /* it does by the settler's `told` rows: one that meets these is not settled; falls to
@@ -102,12 +99,9 @@ typedef struct sd_run {
     double node[SD_NODES];            /* parts of the last step behind its start, negative ones of steps before it */
     double node_power[SD_NODES][2];   /* dissipated, supplied */
     double difference[SD_NODES + 1][2]; /* of the powers from the start on, divided, if `divided` (Newton) */
-    double *spanning;                 /* settled points at nodes of the last step (spanned.h); NULL: none are kept */
-    int32_t spanned;                  /* so many nodes tell its rows; -1: none do; 0: nobody asked yet */
     int32_t told_here;                /* a row within the last step met its sums, and so do all there */
     int32_t divided;                  /* differences are of the last step */
     int32_t by_past;                  /* the integrals over the last step, all of it, are those by the powers of steps before */
-    int32_t strayed, skipped;         /* steps of late that no nodes told; since then not tried */
 } sd_run;
 
 sd_run *sd_run_new(sd_stepper *stepper, sd_settle *settle, int32_t written, int32_t extended, int32_t observed,

@@ -59,8 +59,6 @@ typedef struct sd_stepper {
     int (*onto)(void *self, double t, double *y, double *yd, double *moved);
     /* room [numbers] that the method does not read between its steps (NULL: it has none now) */
     double *(*spare)(void *self, size_t *numbers);
-    int32_t *less_error;       /* 1: points of `dense` at the end of the last step are without the error carried there (NULL:
-                                * none is) */
 } sd_stepper;
 
 /* An initial value problem under way: the first member of every method. */

@@ -180,8 +180,6 @@ void sd_condensed_place_rates(const sd_condensed *condensed, const double *zd)
 
 static void place(const sd_condensed *condensed, const double *z, const double *zd)
 {
-    if (sd_unrolled_place(condensed, z, zd))
-        return;
     sd_condensed_place(condensed, z);
     sd_condensed_place_rates(condensed, zd);
 }
@@ -218,13 +216,7 @@ void sd_condensed_rows(const sd_condensed *condensed, double t, const double *zd
 static void residual(const sd_left *left, double t, const double *z, const double *zd, double *r)
 {
     const sd_condensed *condensed = (const sd_condensed *)left;
-    if (sd_unrolled_place(condensed, z, zd)) {
-        sd_add_rows(condensed->full, t, condensed->y, condensed->yd, condensed->r);
-        sd_unrolled_rows(condensed, zd, r);
-        return;
-    }
-    sd_condensed_place(condensed, z);
-    sd_condensed_place_rates(condensed, zd);
+    place(condensed, z, zd);
     sd_condensed_rows(condensed, t, zd, r);
 }
 
@@ -270,55 +262,4 @@ void sd_condensed_bind(sd_condensed *condensed, sd_system *system)
 {
     condensed->left = (sd_left){residual, jacobian, steep};
     system->left = &condensed->left;
-    if (condensed->unrolled)
-        sd_unrolled_renew(condensed->unrolled, condensed);
-    else
-        condensed->unrolled = sd_unrolled_new(condensed);
-}
-
-void sd_condensed_leave(sd_condensed *condensed)
-{
-    sd_unrolled_free(condensed->unrolled);
-    condensed->unrolled = NULL;
-}
-
-struct sd_beside {
-    sd_system system[2], full[2];
-    sd_condensed condensed[2];
-    double *yd[2], *r;
-    double memory[]; /* of which only what blocks read and write takes room */
-};
-
-sd_beside *sd_beside_new(const sd_system *system)
-{
-    const sd_system *full = system->left ? ((const sd_condensed *)system->left)->full : NULL;
-    size_t n = full ? (size_t)full->unknowns + 8 : 0, rows = full ? (size_t)full->rows + 1 : 0;
-    sd_beside *beside = calloc(1, sizeof *beside + (2 * n + rows) * sizeof(double));
-    if (!beside)
-        return NULL;
-    beside->yd[0] = beside->memory;
-    beside->yd[1] = beside->yd[0] + n;
-    beside->r = beside->yd[1] + n;
-    return beside;
-}
-
-void sd_beside_as(sd_beside *beside, const sd_system *system, sd_system *twice[2])
-{
-    for (int k = 0; k < 2; k++) {
-        twice[k] = &beside->system[k];
-        *twice[k] = *system;
-        if (!system->left)
-            continue;
-        const sd_condensed *given = (const sd_condensed *)system->left;
-        sd_condensed *condensed = &beside->condensed[k];
-        *condensed = *given;
-        beside->full[k] = *given->full;
-        condensed->full = &beside->full[k];
-        condensed->y = k ? given->yd : given->y;
-        condensed->yd = beside->yd[k];
-        condensed->r = k ? beside->r : given->r;
-        condensed->slope = NULL;
-        condensed->unrolled = NULL;
-        twice[k]->left = &condensed->left;
-    }
 }

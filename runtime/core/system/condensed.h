@@ -41,8 +41,6 @@ typedef struct sd_shares {
     const double *share;
 } sd_shares;
 
-typedef struct sd_unrolled sd_unrolled;
-
 typedef struct sd_condensed {
     sd_left left;
     sd_system *full;
@@ -57,30 +55,10 @@ typedef struct sd_condensed {
     int64_t stretches;
     const sd_shares *shares;
     double *y, *yd, *r, *slope;
-    sd_unrolled *unrolled; /* NULL: loops are as good */
 } sd_condensed;
 
 /* the functions of assembly.h read `system` through it, with the numbers that it has now */
 void sd_condensed_bind(sd_condensed *condensed, sd_system *system);
-/* what binding made */
-void sd_condensed_leave(sd_condensed *condensed);
-
-/* unrolled.c: what stands before and behind the blocks in a residual of a small system, as machine code; NULL: loops are as good */
-sd_unrolled *sd_unrolled_new(const sd_condensed *condensed);
-void sd_unrolled_free(sd_unrolled *unrolled);
-/* takes the numbers that the system has now */
-void sd_unrolled_renew(sd_unrolled *unrolled, const sd_condensed *condensed);
-/* y and yd of (z, zd), rows := 0.  0: nothing is done: there is no code, or it has not been asked for often enough */
-int sd_unrolled_place(const sd_condensed *condensed, const double *z, const double *zd);
-/* r [kept rows] of the rows, behind the blocks */
-void sd_unrolled_rows(const sd_condensed *condensed, const double *zd, double *r);
-
-/* `system` twice, for two threads that ask for residuals at the same time.  Of a condensed one each has rates of its own,
- * of which blocks read few; the second has its point where rates else stand.  free() lets go of it; NULL: no memory. */
-typedef struct sd_beside sd_beside;
-sd_beside *sd_beside_new(const sd_system *system);
-/* of what the system is now (its held rows change) */
-void sd_beside_as(sd_beside *beside, const sd_system *system, sd_system *twice[2]);
 
 /* A residual in parts: the point z in y, then the rates zd in yd as far as blocks read them, then its rows.  in_place: these may
  * stand where zd does (each row q' - f is that of its own unknown). */

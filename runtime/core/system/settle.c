@@ -352,11 +352,6 @@ static int settle_whole(sd_settle *settle, double t, double *y, double *yd)
     return failed;
 }
 
-int sd_settle_kept(sd_settle *settle, double t, double *z, double *zd)
-{
-    return !sd_settle_provide_point(settle) || settle_unknowns(settle, t, z, zd);
-}
-
 int sd_settle_holds(sd_settle *settle, double t, double *y, double *yd)
 {
     if (settle->calls == settle->failures || settle->seen || settle->system->left || !sd_settle_provide_point(settle))

@@ -91,8 +91,6 @@ void sd_settle_rest(sd_settle *settle);
 void sd_settle_free(sd_settle *settle);
 /* y, yd [unknowns] moved in place; 0 done, 1 it did not converge (they are unchanged) */
 int sd_settle_point(sd_settle *settle, double t, double *y, double *yd);
-/* the same with the unknowns of the settler's system: of a condensed one the kept ones */
-int sd_settle_kept(sd_settle *settle, double t, double *z, double *zd);
 /* z, zd [unknowns of the settler's system] := those of y, yd, of a condensed system the kept ones */
 void sd_settle_take_point(const sd_settle *settle, const double *y, const double *yd, double *z, double *zd);
 /* 1: the point holds as far as round-off lets it, in the scales of the last one that was moved (none yet: 0) */

@@ -7,8 +7,6 @@
 #include <string.h>
 
 #define TOLD 1e-10    /* scaled residual of a row that points between steps keep */
-#define DRIFT 3e-13   /* norm of constraints of a point between settled ones: a trace is to keep them within 1e-12 */
-#define BETWEEN 1e-11 /* ... of all rows of a point between settled ones: of these too where no move takes it away */
 
 /* y, yd := what the kept unknowns z, zd make of all, as far as rows show them: their rows were just evaluated */
 static void show(const sd_settle *settle, const double *z, const double *zd, double *y, double *yd)
@@ -54,19 +52,4 @@ void sd_settle_as_met(const sd_settle *settle, double *y, double *yd)
         return;
     sd_follow_flows(settle->k_span, settle->k_spans, y, yd);
     sd_condensed_shown_rates(left, yd);
-}
-
-int sd_settle_between(sd_settle *settle, double t, const double *z, const double *zd, double *y, double *yd)
-{
-    if (!sd_settle_provide_point(settle))
-        return 0;
-    sd_settle_measure(settle, t, z, zd);
-    settle->drift = settle->constraints;
-    if (settle->system->left) {
-        show(settle, z, zd, y, yd);
-    } else {
-        memcpy(y, z, (size_t)settle->unknowns * sizeof *y);
-        memcpy(yd, zd, (size_t)settle->unknowns * sizeof *yd);
-    }
-    return settle->residual <= fmax(BETWEEN, settle->enough) && settle->constraints <= fmax(DRIFT, settle->enough);
 }

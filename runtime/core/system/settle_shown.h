@@ -10,8 +10,5 @@ int sd_settle_meets(sd_settle *settle, double t, double *y, double *yd);
 int sd_settle_sums_alone(const sd_settle *settle);
 /* y, yd as sd_settle_meets would leave them, of a point that meets such rows; what it measured stays */
 void sd_settle_as_met(const sd_settle *settle, double *y, double *yd);
-/* y, yd := the point of z, zd, which settled ones on both sides tell; of rates those that are shown.  1: it holds as far as
- * round-off lets it, in the scales of the last point that was moved */
-int sd_settle_between(sd_settle *settle, double t, const double *z, const double *zd, double *y, double *yd);
 
 #endif

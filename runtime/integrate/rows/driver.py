@@ -119,7 +119,7 @@ class Driver:
         self._kinds = np.ascontiguousarray(kinds, dtype=np.int32)
         run.instant, run.instant_kind = lib.pointer(self._instants), lib.pointer(self._kinds)
         run.instants, run.every_step = self._instants.size, int(request.every_step)
-        run.sizes_at_steps, run.carried = 1, int(request.carried)
+        run.sizes_at_steps = 1
         run.glances, run.apart = GLANCES * request.sample_steps, request.apart
         self.rows = np.empty((ROOM if width < ROOM else 64, width))
         run.row, run.room = lib.pointer(self.rows), self.rows.shape[0]

@@ -216,7 +216,6 @@ class Run(c.Structure):
         ("every_step", I),
         ("glances", I),
         ("glanced", I),
-        ("carried", I),
         ("sizes_at_steps", I),
         ("bare", I),
         ("told", I),
@@ -264,8 +263,7 @@ class Run(c.Structure):
         ("node", D * NODES),
         ("node_power", D * (2 * NODES)),
         ("difference", D * (2 * NODES + 2)),
-        ("spanning", P),
-        *[(name, I) for name in ["spanned", "told_here", "divided", "by_past", "strayed", "skipped"]],
+        *[(name, I) for name in ["told_here", "divided", "by_past"]],
     ]
 
 

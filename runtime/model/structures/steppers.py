@@ -34,7 +34,6 @@ class Stepper(c.Structure):
         ("values", P),
         ("onto", P),
         ("spare", P),
-        ("less_error", P),
     ]
 
 
@@ -66,16 +65,6 @@ class Ivp(c.Structure):
     ]
 
 
-class Carried(c.Structure):
-    """sd_bdf_carried."""
-
-    _fields_ = [
-        *[(name, I) for name in ["wanted", "shown"]],
-        ("phi", P * (MAX_ORDER + 2)),
-        *[(name, P) for name in ["e", "ed", "ee", "source", "memory"]],
-    ]
-
-
 class Bdf(c.Structure):
     """sd_bdf."""
 
@@ -101,7 +90,6 @@ class Bdf(c.Structure):
         ("aparts", I),
         ("error_next", D),
         ("orders", L),
-        ("carried", Carried),
     ]
 
 
@@ -133,7 +121,6 @@ class Radau(c.Structure):
         ("linear", P),
         ("complex_linear", P * PAIRS),
         *[(name, I) for name in ["stages", "most_stages"]],
-        ("begins", D),
         *[(name, P) for name in ["smooth", "common_from", "common"]],
         ("commons", I),
         ("tolerance", D),
@@ -143,7 +130,7 @@ class Radau(c.Structure):
         *[(name, D) for name in ["error_accepted", "theta", "state_size", "growth", "longest", "follows"]],
         *[(name, I) for name in ["behind", "balances", "pressed", "ready", "old_jacobian", "rejected", "lasting"]],
         *[(name, P) for name in ["method", "used"]],
-        *[(name, I) for name in ["since", "hold", "creeping", "strained", "turned"]],
+        *[(name, I) for name in ["since", "hold", "creeping"]],
         ("lead", (D * STAGES) * STAGES),
         ("h_lead", D),
         ("of_lead", P),
@@ -158,9 +145,6 @@ class Radau(c.Structure):
         *[(name, P) for name in ["newton_weight", "scale", "powered"]],
         ("w", P * PAIRS),
         ("in_place", I),
-        ("beside", P),
-        ("twice", P * 2),
-        *[(name, P) for name in ["point_y", "point_rate", "coupled"]],
     ]
 
 
@@ -174,11 +158,10 @@ class Underlying(c.Structure):
         *[(name, P) for name in ["goal_position", "goal_velocity"]],
         ("tolerance", D),
         *[(name, P) for name in ["values", "r", "step", "rest", "memory", "place_y", "place_yd", "list"]],
-        *[(name, P) for name in ["written", "from", "more", "straight"]],
-        *[(name, I) for name in ["lists", "mores", "flows", "writes", "ready", "placed", "bad_row", "bad_column"]],
+        *[(name, P) for name in ["written", "from", "more"]],
+        *[(name, I) for name in ["lists", "mores", "flows", "ready", "placed", "bad_row", "bad_column"]],
         ("factored", P),
         ("factored_at", c.c_int64),
-        ("spared", I),
         ("drift", D),
     ]
 

@@ -120,7 +120,7 @@ class Condensed(c.Structure):
         ("products", L),
         *[(name, P) for name in ["from_", "to", "share"]],
         ("stretches", L),
-        *[(name, P) for name in ["shares", "y", "yd", "r", "slope", "unrolled"]],
+        *[(name, P) for name in ["shares", "y", "yd", "r", "slope"]],
     ]
 
 

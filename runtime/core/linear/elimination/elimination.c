@@ -2,7 +2,6 @@
 #include "linear/elimination/elimination.h"
 
 #include "linear/lanes.h"
-#include "linear/elimination/machine_code.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,25 +12,16 @@
 #define FIRST 3            /* matrices seen before an order is looked for, if nobody says more: one-off systems do not pay, */
 #define SHARE 8            /* nor do large ones before this part of n */
 #define MISSES 3           /* matrices that an order did not serve, each of which costs a fortieth of a search, before another is */
-#ifdef SD_COMPLEX
-#define NUMBERS SD_COMPLEX_NUMBERS
-#else
-#define NUMBERS SD_REAL_NUMBERS
-#endif
-#define TWICE 2            /* times that each operation is interpreted before machine code is made: those that come once do not pay */
 #define PAIRS 8000         /* longer lists are no longer straight: they leave the nearest cache */
 
 static int32_t right(const sd_elimination *e, int32_t k) { return e->factors + k; }
 static int32_t magnitude(const sd_elimination *e, int32_t k) { return e->factors + e->n + k; }
 static int32_t size_of(const sd_elimination *e, int32_t k) { return e->factors + 2 * e->n + k; }
 static int32_t growth_of(const sd_elimination *e, int32_t k) { return e->factors + 3 * e->n + k; }
-static int32_t constants(const sd_elimination *e) { return e->factors + 4 * e->n; }
 
 static void drop_order(sd_elimination *e)
 {
     e->ready = 0;
-    sd_code_free(e->code);
-    e->code = NULL;
     sd_list_clear(&e->factor);
     sd_list_clear(&e->solve);
     free(e->cell);
@@ -158,7 +148,7 @@ static void number_cells(sd_elimination *e, const char *entry, int32_t *cell, in
     for (int32_t i = 0; i < n; i++)
         for (int32_t k = 0; k < n; k++)
             cell[i * n + k] = k == i ? k : entry[e->pivot_column[k] * n + e->pivot_row[i]] ? e->factors++ : -1;
-    e->inside = constants(e) + 2;
+    e->inside = e->factors + 4 * n;
     memset(source, -1, (size_t)n * (size_t)n * sizeof *source);
     for (int32_t i = 0; i < n; i++)
         place[e->pivot_row[i]] = i;
@@ -186,28 +176,12 @@ static int write_lists(sd_elimination *e, const char *entry)
     if (!cell)
         return 2;
     number_cells(e, entry, cell, source, work);
-    sd_list_begin(&e->factor, (const int32_t[SD_ARRAYS - 1]){e->inside});
-    sd_list_begin(&e->solve, (const int32_t[SD_ARRAYS - 1]){e->inside});
     e->cell = calloc((size_t)(e->inside + (e->entries > e->n ? e->entries : e->n)), sizeof(sd_number));
     for (int32_t i = 0; i < e->n && !failed; i++)
         failed = list_row(e, cell, source, work, i);
     failed = failed || !e->cell || list_solution(e, cell) || e->factor.pairs + e->solve.pairs > PAIRS;
     free(cell);
     return failed;
-}
-
-/* the two constants of machine_code.h */
-static void write_constants(sd_number *cell)
-{
-    const uint64_t magnitude = UINT64_MAX >> 1, sign = ~magnitude;
-#ifdef SD_COMPLEX
-    const uint64_t bits[4] = {0, sign, magnitude, magnitude};
-#else
-    const double one = 1.0;
-    uint64_t bits[2] = {sign, magnitude};
-    memcpy(bits, &one, sizeof one);
-#endif
-    memcpy(cell, bits, sizeof bits);
 }
 
 /* an order for the newest matrix and as many of those before it as one order fits */
@@ -231,33 +205,6 @@ static void prepare(sd_elimination *e)
     measure_columns(e);
     e->prepared++;
     e->ready = e->scaled = 1; /* its magnitudes are still to be written */
-    write_constants(e->cell + constants(e));
-    e->interpreted = 0;
-}
-
-static int64_t operations(const sd_list *list)
-{
-    return list->sums + list->pairs;
-}
-
-/* interpreted operations from which on machine code is written */
-static int64_t due(const sd_elimination *e)
-{
-    return sd_code_early() ? 0 : TWICE * (operations(&e->factor) + operations(&e->solve));
-}
-
-int sd_elimination_worn(const sd_elimination *e)
-{
-    return sd_code_possible() && e->interpreted >= due(e);
-}
-
-/* machine code behind the first times that the lists are interpreted, and this one is about to be */
-static SD_APART void write_code(sd_elimination *e, const sd_list *list)
-{
-    int64_t before = e->interpreted;
-    e->interpreted += operations(list);
-    if (before <= due(e) && e->interpreted > due(e))
-        e->code = sd_code_new(&e->factor, &e->solve, NUMBERS);
 }
 
 /* Who learns of a matrix that no order served: one that has none yet, or that served longest ago. */
@@ -328,7 +275,8 @@ static void interpret(sd_elimination *e, const sd_list *list, const sd_number *o
         cell[sum->target] = sum_of(sum, list->pair, cell);
 }
 
-int sd_elimination_healthy(const sd_elimination *e)
+/* multipliers of the newest factors are moderate, and what is left of each pivot's column is more than round-off */
+static int is_healthy(const sd_elimination *e)
 {
     const sd_number *inverse = e->cell, *size = e->cell + size_of(e, 0), *growth = e->cell + growth_of(e, 0);
     const sd_number *scale = e->cell + magnitude(e, 0);
@@ -364,13 +312,8 @@ static int factor(sd_elimination *e, const sd_number *values, const double *scal
         return 0;
     if (scale || e->scaled)
         measure(e, scale);
-    if (!e->code)
-        write_code(e, &e->factor);
-    if (e->code)
-        e->code->first(e->cell, (sd_number *)values, NULL, NULL, NULL, NULL);
-    else
-        interpret(e, &e->factor, values, e->entries);
-    return sd_elimination_healthy(e);
+    interpret(e, &e->factor, values, e->entries);
+    return is_healthy(e);
 }
 
 int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale)
@@ -389,12 +332,6 @@ int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, 
 void sd_elimination_solve(sd_elimination *elimination, sd_number *x)
 {
     sd_elimination *e = elimination->serves;
-    if (!e->code)
-        write_code(e, &e->solve);
-    if (e->code) {
-        e->code->second(e->cell, x, NULL, NULL, NULL, NULL);
-        return;
-    }
     interpret(e, &e->solve, x, e->n);
     memcpy(x, e->cell + e->inside, (size_t)e->n * sizeof *x);
 }

@@ -1,8 +1,7 @@
 /* Elimination of a small matrix by a list of operations: found once, replayed with new values.
  *
  * The order of pivots is Markowitz's (1957) with threshold pivoting, on several matrices at once that the same run has
- * met; no row is exchanged later.  What is done then is a list of sums over fixed cells, which an interpreter runs, or
- * straight machine code (machine_code.h).  Values are not scaled: a factorisation without exchanges is the same under any
+ * met; no row is exchanged later.  What is done then is a list of sums over fixed cells, which an interpreter runs.  Values are not scaled: a factorisation without exchanges is the same under any
  * scaling of rows and columns.  Its growth is judged in scaled terms: columns by magnitudes of the unknowns, rows by their
  * largest entry; multipliers and pivots beyond the limits say that another order is wanted.  Of laws that switch (diodes) one
  * order serves the matrices of some states: up to SD_ORDERS are kept, and the one that served last is tried first.
@@ -31,13 +30,11 @@ struct sd_elimination {
     int32_t wait, missed;        /* matrices from one order to the next at least; that it did not serve since the last */
     sd_number *sample;           /* [SD_SAMPLES][entries] scaled matrices, the newest last */
     sd_number *cell;             /* inverse pivots, other factors; then n each: right side, magnitudes, sizes of rows, their
-                                    growth; constants */
+                                    growth */
     int32_t *pivot_row, *pivot_column; /* [n] */
     double growth;               /* largest multiplier that is borne, in scaled terms: it costs that many digits */
     double *weak;                /* [n] least size of each pivot, scaled, as its column was when the order was found */
     sd_list factor, solve;
-    int64_t interpreted;         /* operations so far */
-    struct sd_code *code;        /* NULL: interpreted */
     sd_elimination *other;       /* with another order; NULL: there is none */
     int32_t first;               /* of the first: matrices seen before an order is looked for */
     int32_t orders;              /* of the first: that it keeps at most, SD_ORDERS or as its owner says */
@@ -56,11 +53,6 @@ void sd_elimination_learn(sd_elimination *elimination, const sd_number *scaled);
 int sd_elimination_factor(sd_elimination *elimination, const sd_number *values, const double *scale);
 /* x [n]: right side in, solution out */
 void sd_elimination_solve(sd_elimination *elimination, sd_number *x);
-
-/* multipliers of the newest factors are moderate, and what is left of each pivot's column is more than round-off */
-int sd_elimination_healthy(const sd_elimination *elimination);
-/* 1: its lists were interpreted so often that machine code is worth writing */
-int sd_elimination_worn(const sd_elimination *elimination);
 
 /* elimination_order.c: pivots of the newest `samples` matrices, and the filled pattern: entry [n][n] by columns, of the
  * caller.  0: found; 1: there is no such order; 2: no memory */

@@ -18,6 +18,7 @@
 #define PANEL 32        /* columns that are applied to all behind them together */
 #define REST_LEAST 64   /* columns of a rest that is worth it */
 #define REST_MOST 4096  /* and those whose numbers have room */
+#define NARROW 4        /* entries of both factors a column, or rows that it touches, up to which they are a line's */
 #define REST_FILLED 0.8 /* of the rest that the last column before it reaches: so dense it is */
 
 /* whether all from the k-th column on may be taken as dense, with so many entries of factors before */
@@ -110,6 +111,12 @@ static int factor_rest(sd_sparse *lu, const sd_matrix *matrix, int32_t k, int32_
     return 0;
 }
 
+/* entries of both factors are those of a line */
+static inline int is_line(const sd_sparse *lu)
+{
+    return (int64_t)lu->l_start[lu->n] + lu->u_start[lu->n] <= NARROW * (int64_t)lu->n;
+}
+
 static inline int is_long(const sd_sparse *lu)
 {
     return lu->paired && lu->n > LONG;
@@ -122,7 +129,7 @@ static int keeps_pivot(sd_sparse *lu, const sd_matrix *matrix, int32_t k, sd_num
     if (lu->null_pivot > 0.0 && largest < lu->null_pivot * column_size(matrix, lu->order[k])) /* it may be left out now */
         relative = 0.0;
     lu->smallest = relative < lu->smallest ? relative : lu->smallest;
-    const double least = lu->paired > 1 ? FAINT_PIVOT : lu->lowers && is_long(lu) ? GROWN : UNHEALTHY;
+    const double least = lu->paired > 1 ? FAINT_PIVOT : is_line(lu) && is_long(lu) ? GROWN : UNHEALTHY;
     return relative >= least && isfinite(sd_size(pivot));
 }
 

@@ -26,15 +26,6 @@ static inline sd_number sd_entry_of_sum(const sd_matrix *matrix, int32_t place, 
     return (matrix->a[place] + matrix->c * matrix->b[place]) * s;
 }
 
-/* entry e, which stands in column c */
-static inline sd_number sd_entry_of(const sd_matrix *matrix, int32_t e, int32_t c)
-{
-    if (matrix->value)
-        return matrix->value[e];
-    const int32_t place = matrix->at[c] + e - matrix->column[c];
-    return sd_entry_of_sum(matrix, place, matrix->column_scale[c]) * matrix->row_scale[matrix->row[e]];
-}
-
 /* the entries of column c from its first one on, until the next column is asked for */
 static inline const sd_number *sd_column_of(const sd_matrix *matrix, int32_t c)
 {

@@ -4,10 +4,8 @@
 #define SYSDYN_PIVOTS_H
 
 #include "linear/sparse/blocks.h"
-#include "linear/sparse/chains.h"
 #include "linear/sparse/dense_rest.h"
 #include "linear/sparse/substitute.h"
-#include "linear/sparse/told.h"
 
 #define THRESHOLD 0.1    /* a sparser row may pivot if its entry is this close to the largest */
 #define ROOM 2           /* entries of a factor for each of the matrix: room for them */
@@ -356,7 +354,7 @@ static void count_products(sd_sparse *lu)
 {
     lu->products = 0;
     lu->entries = (int64_t)lu->l_start[lu->n] + lu->u_start[lu->n] + lu->n;
-    for (int32_t p = 0; p < lu->u_start[lu->n] && !lu->lowers; p++)
+    for (int32_t p = 0; p < lu->u_start[lu->n] && !is_line(lu); p++)
         lu->products += lu->l_start[lu->u_row[p] + 1] - lu->l_start[lu->u_row[p]];
 }
 
@@ -376,7 +374,7 @@ static int search_pivots(sd_sparse *lu, const sd_matrix *matrix)
     lu->block = malloc((rows + 1) * sizeof(sd_number));
     lu->among = calloc((size_t)lu->n / 64 + 1, sizeof(uint64_t));
     lu->first = lu->first ? lu->first : malloc(((size_t)lu->n + 1) * sizeof *lu->first);
-    if (!lu->stack || !lu->block || !lu->among || !lu->first || !provide_pattern(lu) || !provide_pivots(lu)) {
+    if (!lu->stack || !lu->block || !lu->among || !lu->first || !provide_pivots(lu)) {
         leave_search(lu);
         return 2;
     }
@@ -403,11 +401,8 @@ static int search_pivots(sd_sparse *lu, const sd_matrix *matrix)
     }
     if (!failed) {
         leave_pivots(lu);
-        find_chains(lu);
         count_products(lu);
     }
-    if (!failed && lu->lowers && is_long(lu) && !lu->widest && lu->rest == lu->n)
-        tell(lu);
     return failed;
 }
 

@@ -1,6 +1,5 @@
 /* Left-looking sparse LU (Gilbert & Peierls, SIAM J. Sci. Stat. Comput. 9, 1988) with threshold pivoting. */
 #include "linear/sparse/sparse.h"
-#include "linear/sparse/fronts.h"
 #include "linear/sparse/pivots.h"
 #include "linear/sparse/substitute.h"
 
@@ -8,15 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FADED 0.01      /* fronts bear later pivots down to this part: inverses of triangles grow, substitution does not */
-
 void sd_sparse_free(sd_sparse *lu)
 {
     if (!lu)
         return;
-    leave_chains(lu);
-    leave_told(lu);
-    sd_fronts_free(lu->fronts);
     free(lu->pivots);
     free(lu->first);
     free(lu->room);
@@ -63,8 +57,6 @@ void sd_sparse_rest(sd_sparse *lu)
 {
     free(lu->l_value), free(lu->u_value), free(lu->inverse);
     lu->l_value = lu->u_value = lu->inverse = NULL;
-    if (lu->fronts)
-        sd_fronts_rest(lu->fronts);
 }
 
 /* the numbers of factors that have rested; 0: no memory */
@@ -81,46 +73,8 @@ static int provide_numbers(sd_sparse *lu)
     return 0;
 }
 
-/* 1: factors by fronts, whose pivots are no less than this part of what is left of their columns */
-static int factor_fronts(sd_sparse *lu, const sd_matrix *matrix, double least)
-{
-    if (!sd_fronts_provide(lu->fronts))
-        return 0;
-    unsigned before = sd_no_subnormals();
-    lu->smallest = sd_fronts_factor(lu->fronts, matrix);
-    sd_subnormals(before);
-    return lu->pivoted = lu->smallest >= least;
-}
-
-/* fronts that do not serve, or are worth nothing, are never made again */
-static void leave_fronts(sd_sparse *lu)
-{
-    sd_fronts_free(lu->fronts);
-    lu->fronts = NULL;
-    lu->no_fronts = 1;
-}
-
-/* factor_fronts where rows pivot in their own columns, if the factors fill and that is right */
-static int by_fronts(sd_sparse *lu, const sd_matrix *matrix)
-{
-    if (lu->no_fronts || lu->paired != 1 || lu->idle || lu->null_pivot != 0.0 || lu->dropped != 0.0)
-        return 0;
-    if (!lu->fronts)
-        lu->fronts = sd_fronts_new(lu->n, matrix, lu->order, lu->own, lu->most);
-    if (lu->fronts && factor_fronts(lu, matrix, THRESHOLD)) {
-        lu->rank = lu->n;
-        lu->products = lu->fronts->products;
-        lu->entries = lu->fronts->entries;
-        return 1;
-    }
-    leave_fronts(lu);
-    return 0;
-}
-
 int sd_sparse_pivot(sd_sparse *lu, const sd_matrix *matrix)
 {
-    if (by_fronts(lu, matrix))
-        return 0;
     return provide_numbers(lu) ? search_pivots(lu, matrix) : 2;
 }
 
@@ -141,8 +95,8 @@ static int divide_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
     double largest = sd_size(diagonal);
     x[k] = 0.0;
     lu->inverse[k] = inverse;
-    for (int32_t l = l_begin(lu, k), end = l_begin(lu, k + 1); l < end; l++) {
-        int32_t row = l_row_at(lu, l);
+    for (int32_t l = lu->l_start[k], end = lu->l_start[k + 1]; l < end; l++) {
+        int32_t row = lu->l_row[l];
         sd_number v = x[row];
         x[row] = 0.0;
         lu->l_value[l] = v * inverse;
@@ -155,40 +109,6 @@ static int refactor_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
 {
     renewed(lu, matrix, k, lu->u_start[k + 1] - lu->u_start[k]);
     return divide_column(lu, matrix, k);
-}
-
-/* the same where the pattern is told */
-static int refactor_told_column(sd_sparse *lu, const sd_matrix *matrix, int32_t k)
-{
-    int32_t c = lu->order[k], first = matrix->column[c], entries = matrix->column[c + 1] - first;
-    const sd_number *value = sd_column_of(matrix, c);
-    for (int32_t e = 0; e < entries; e++)
-        lu->x[lu->place[matrix->row[first + e]]] += value[e];
-    for (int32_t u = u_begin(lu, k), end = u_begin(lu, k + 1); u < end; u++) {
-        int32_t j = u_row_at(lu, u);
-        sd_number v = lu->u_value[u] = lu->x[j];
-        lu->x[j] = 0.0;
-        for (int32_t l = l_begin(lu, j), last = l_begin(lu, j + 1); l < last; l++)
-            lu->x[l_row_at(lu, l)] -= lu->l_value[l] * v;
-    }
-    return divide_column(lu, matrix, k);
-}
-
-/* all columns where the pattern is told: 1: a pivot became unhealthy */
-static int refactor_told(sd_sparse *lu, const sd_matrix *matrix)
-{
-    const sd_links *link = lu->told->link, *end = link + lu->told->links;
-    int failed = 0;
-    for (int32_t k = 0; k < lu->n && !failed;) {
-        if (link == end || k < link->from) {
-            failed = refactor_told_column(lu, matrix, k++);
-            continue;
-        }
-        for (int32_t i = 0; k < link->to && !failed; i++, k++)
-            failed = renew_link(lu, matrix, k, k - link->step, link->u + i, link->before + i, link->l + i);
-        link++;
-    }
-    return failed;
 }
 
 /* the columns of the rest, which are full: 1: a pivot became unhealthy, or there is no memory */
@@ -210,23 +130,14 @@ static int renew_rest(sd_sparse *lu, const sd_matrix *matrix)
 
 int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 {
-    if (lu->fronts && factor_fronts(lu, matrix, FADED))
-        return 0;
-    if (lu->fronts) {
-        leave_fronts(lu);
-        return 1;
-    }
     if (!provide_numbers(lu))
         return 1;
     int failed = 0;
     lu->smallest = 1.0;
     memset(lu->x, 0, ((size_t)lu->n + 1) * sizeof *lu->x);
     unsigned before = sd_no_subnormals();
-    if (lu->told)
-        failed = refactor_told(lu, matrix);
-    for (int32_t k = 0; k < lu->rest && !failed && !lu->told; k++)
-        failed = is_link(lu, k) ? refactor_link(lu, matrix, k)
-                                : lu->source[k] >= 0 && refactor_column(lu, matrix, k);
+    for (int32_t k = 0; k < lu->rest && !failed; k++)
+        failed = lu->source[k] >= 0 && refactor_column(lu, matrix, k);
     if (!failed && lu->rest < lu->n)
         failed = renew_rest(lu, matrix);
     sd_subnormals(before);
@@ -238,20 +149,11 @@ int sd_sparse_refactor(sd_sparse *lu, const sd_matrix *matrix)
 void sd_sparse_solve(sd_sparse *lu, sd_number *x, sd_number *work, const double *row_scale, const double *column_scale)
 {
     int32_t n = lu->n;
-    if (lu->fronts) {
-        sd_fronts_solve(lu->fronts, x, work, row_scale, column_scale);
-        return;
-    }
-    if (lu->lowers) {
-        descend_chains(lu, x, row_scale, work);
-        ascend_chains(lu, x, column_scale, work);
-        return;
-    }
     for (int32_t k = 0; k < n; k++) {
         int32_t r = lu->source[k];
         work[k] = r < 0 ? 0.0 : row_scale ? x[r] * row_scale[r] : x[r];
     }
-    if ((int64_t)lu->l_start[n] + lu->u_start[n] <= NARROW * (int64_t)n)
+    if (is_line(lu))
         substitute_line(lu, x, work, column_scale);
     else
         substitute_blocks(lu, x, work, column_scale);

@@ -9,15 +9,6 @@
 
 #include <stdint.h>
 
-/* positions [from, to) of a factor that wait for the one `step` before (behind) them alone; step 0: for any (chains.h); first:
- * where the entry stands that the first of L (the last of U) waits with */
-typedef struct sd_chain {
-    int32_t from, to, step, first;
-} sd_chain;
-
-typedef struct sd_told sd_told;
-typedef struct sd_fronts sd_fronts;
-
 typedef struct sd_sparse {
     int32_t n, rows;             /* columns; rows, as many or more */
     const int32_t *order;        /* [n] column of the matrix that is eliminated k-th; of the caller */
@@ -26,11 +17,8 @@ typedef struct sd_sparse {
                                     -1 of a column that was left out; those of the caller where each row pivots in its column */
     int32_t *pivots;             /* [n + rows] source and place where they are its own; NULL: they are the caller's */
     int32_t *first;              /* [n + 1] of the columns of L that fill alike (blocks.h): the first one; NULL: none do */
-    int32_t *l_start, *u_start;  /* [n + 1]; NULL, like the rows: they are told */
+    int32_t *l_start, *u_start;  /* [n + 1] */
     int32_t *l_row, *u_row;      /* pivot positions; u in the order of elimination, diagonal apart */
-    sd_fronts *fronts;           /* fronts.h: whose numbers serve instead of those here; NULL: there are none */
-    int no_fronts;               /* 1: they did not serve, or are worth nothing */
-    sd_told *told;               /* told.h: of a long line's factors instead of their pattern; NULL: it stands there */
     sd_number *l_value, *u_value, *inverse; /* inverse [n]: of the diagonal of U */
     int64_t l_room, u_room;
     int32_t *stack, *head, *mark, *count; /* [rows] search, while pivots are chosen */
@@ -39,9 +27,6 @@ typedef struct sd_sparse {
     int32_t rest;                /* the position from which the factors are full (dense_rest.h); n: none */
     int32_t widest;              /* numbers that the widest block touches; 0: there is none */
     sd_number *room;             /* [widest] */
-    sd_chain *lower, *upper;     /* [lowers], [uppers] of L and of U; none: the factors are no line's */
-    int32_t lowers, uppers;
-    char *pulled;                /* [n] which substitutions take what a column makes of another position within a chain */
     sd_number *x;                /* [the larger of n and rows, + 1] work, of solutions by these factors too */
     int lent;                    /* 1: x is the caller's */
     int pivoted;                 /* a valid pattern exists */
@@ -51,7 +36,7 @@ typedef struct sd_sparse {
     double smallest, null_pivot; /* least pivot as part of its column; below null_pivot a column is left out */
     const int32_t *idle;         /* [n] 1: which may be, of the caller; NULL: any */
     int32_t rank;                /* columns that were not left out */
-    int64_t products, entries;   /* that the factors take on this pattern (0: not counted, of a long line), and have */
+    int64_t products, entries;   /* that the factors take on this pattern, and have */
     double dropped;              /* entries of L up to this size are left out, rows in excess that agree with it; 0: none.
                                     The factors serve once: no refactorising on such a pattern */
     int64_t most;                /* entries of the factors beyond which pivoting is given up; 0: none */

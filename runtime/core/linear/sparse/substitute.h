@@ -4,7 +4,6 @@
 
 #include "linear/sparse/blocks.h"
 
-#define NARROW 4 /* entries of both factors a column, or rows that it touches, up to which they are a line's */
 
 /* work less `many` columns of one block from the k-th on, which stand there too */
 static void substitute_block(const sd_sparse *lu, int32_t k, int32_t many, sd_number *work)

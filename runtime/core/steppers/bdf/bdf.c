@@ -69,8 +69,7 @@ sd_bdf *sd_bdf_new(sd_system *system, sd_linear *linear)
     bdf->ivp.n = system->unknowns;
     bdf->max_order = SD_MAX_ORDER;
     bdf->ivp.stepper = (sd_stepper){.self = bdf, .ivp = &bdf->ivp, .n = bdf->ivp.n, .y = bdf->phi[0], .yd = bdf->yd,
-                                    .step = sd_bdf_step, .dense = sd_bdf_dense, .values = values, .start = sd_bdf_start,
-                                    .less_error = &bdf->carried.shown};
+                                    .step = sd_bdf_step, .dense = sd_bdf_dense, .values = values, .start = sd_bdf_start};
     return bdf;
 }
 
@@ -79,7 +78,6 @@ void sd_bdf_free(sd_bdf *bdf)
     if (!bdf)
         return;
     free(bdf->memory);
-    free(bdf->carried.memory);
     free(bdf->powered);
     free(bdf);
 }
@@ -108,7 +106,6 @@ void sd_bdf_start(void *self, double t, const double *y, const double *yd, doubl
     bdf->rising = bdf->max_order > 1;
     bdf->contraction = UNKNOWN;
     bdf->ready = 0;
-    sd_bdf_transport_begin(bdf);
 }
 
 /* G := dF/dy + cj dF/dyd and its factors; a fresh Jacobian where asked */
@@ -371,9 +368,7 @@ int sd_bdf_step(void *self)
         project(bdf);
         sd_bdf_orders(bdf, norm);
     }
-    sd_bdf_transport(bdf);
     sd_bdf_accept(bdf, norm, order_next);
-    sd_bdf_transport_shift(bdf);
     return SD_FINE;
 }
 
@@ -392,5 +387,4 @@ void sd_bdf_dense(const void *self, double t, double *y, double *yd)
     sd_bdf_interpolate(bdf, k, value, rate, y, yd);
     if (bdf->ivp.taken == 0 && yd)
         memcpy(yd, bdf->yd, (size_t)bdf->ivp.n * sizeof *yd);
-    sd_bdf_without(bdf, y, yd);
 }

@@ -22,13 +22,6 @@
 
 #define SD_MAX_ORDER 5
 
-/* The global error e (bdf_transport.c), of which the run tells where `wanted` */
-typedef struct sd_bdf_carried {
-    int32_t wanted, shown;   /* shown: points at the end of the last step are without it */
-    double *phi[SD_MAX_ORDER + 2];
-    double *e, *ed, *ee, *source, *memory; /* [n] e and its rate at the end of the last step; its correction; work */
-} sd_bdf_carried;
-
 typedef struct sd_bdf {
     sd_ivp ivp;
     sd_linear *linear;
@@ -49,7 +42,6 @@ typedef struct sd_bdf {
     double error_next;        /* estimate of the local error at the order chosen next */
     /* what happened */
     int64_t orders;           /* sum of the orders of all steps */
-    sd_bdf_carried carried;
 } sd_bdf;
 
 /* A stepper without its problem set; the caller fills the public fields, then calls sd_bdf_start. */
@@ -78,12 +70,6 @@ void sd_bdf_interpolate(const sd_bdf *bdf, int32_t order, const double *value, c
                         double *yd);
 void sd_bdf_shift(sd_bdf *bdf);
 void sd_bdf_balance(const sd_bdf *bdf, double *d);
-/* bdf_transport.c, where e is wanted: room for it (without memory it is not), and it goes on where it was; e at the end of a
- * step that passed; its differences behind it; y, yd [n] of that end less e, where that is shown */
-void sd_bdf_transport_begin(sd_bdf *bdf);
-void sd_bdf_transport(sd_bdf *bdf);
-void sd_bdf_transport_shift(sd_bdf *bdf);
-void sd_bdf_without(const sd_bdf *bdf, double *y, double *yd);
 /* controller.c */
 int sd_bdf_test(sd_bdf *bdf, double ck, double *norm, double *error, int32_t *order_next);
 void sd_bdf_accept(sd_bdf *bdf, const double *norm, int32_t order_next);

@@ -15,7 +15,6 @@
 #define CLOSE 1e-12     /* move with which a projection, or an iteration, that stagnates is content */
 #define FRESH 1e-9       /* the same by factors of this very point, which contract: round-off of what is nearly zero */
 #define STAGNANT 0.3
-#define SPARED 300       /* factorisations of what is factored already that are spared in a run */
 #define BORNE 1e3       /* of multipliers: slopes are solved for once, nothing corrects their digits */
 
 sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear)
@@ -55,7 +54,6 @@ void sd_underlying_free(sd_underlying *underlying)
     if (!underlying)
         return;
     free(underlying->place_y);
-    sd_straight_free(underlying->straight);
     free(underlying->r);
     free(underlying->list);
     free(underlying->from);
@@ -106,13 +104,12 @@ static int find_places(sd_underlying *u)
 {
     const sd_system *system = u->matrix;
     const int32_t none = written_by(system), entries = u->linear->entries;
-    u->r = calloc((size_t)(u->system->rows + 1 + none + SD_ENTRY_SUMS + entries), sizeof *u->r);
+    u->r = calloc((size_t)(u->system->rows + 2 + none), sizeof *u->r);
     u->from = malloc(((size_t)entries + 2 * (size_t)none + 1) * sizeof *u->from);
     u->list = malloc((2 * (size_t)system->calls + 1) * sizeof *u->list);
     if (!u->r || !u->from || !u->list)
         return SD_MEMORY;
     u->written = u->r + u->system->rows + 1;
-    u->writes = none;
     u->more = u->from + entries;
     for (int32_t e = 0; e < system->entries; e++)
         u->place_y[e] = u->place_yd[e] = entries;
@@ -158,15 +155,12 @@ static void evaluate_matrix(sd_underlying *u, double t, const double *y, const d
     }
 }
 
-/* Whether the factors are those of these very values, as where the inertia is constant: of short runs alone, for long ones
- * an order of elimination is learnt from factors, and written as code. */
+/* Whether the factors are those of these very values, as where the inertia is constant */
 static int is_factored(sd_underlying *u)
 {
     const size_t size = (size_t)u->linear->entries * sizeof *u->values;
-    if (u->factored_at == u->linear->factorisations && u->spared < SPARED && !memcmp(u->values, u->factored, size)) {
-        u->spared++;
+    if (u->factored_at == u->linear->factorisations && !memcmp(u->values, u->factored, size))
         return 1;
-    }
     memcpy(u->factored, u->values, size);
     return 0;
 }
@@ -247,34 +241,13 @@ static void clear(const sd_underlying *u, double *y, double *yd)
     kinematics(u, y, yd);
 }
 
-/* the same as machine code, of which the rows at z = 0 are known.  0: it does not serve here */
-static int straight_on(sd_underlying *u, const sd_straight *straight, double t, double *y, double *yd)
-{
-    u->matrix->jacobian_evaluations++;
-    u->factored_at = -1;
-    write_entries(u, t, y, yd);
-    if (!*u->system->stop && sd_straight_solve(straight, u, y, yd))
-        return u->ready = 1;
-    clear(u, y, yd);
-    return 0;
-}
-
 /* slopes where z is linear: of the rows at z = 0 */
 static int at_once(sd_underlying *u, double t, double *y, double *yd)
 {
-    const sd_straight *straight = sd_straight_of(u);
-    if (straight) {
-        sd_straight_clear(straight, u, y, yd);
-        u->applied->residual_evaluations++;
-        sd_add_rows(u->applied, t, y, yd, u->r);
-    } else {
-        clear(u, y, yd);
-        sd_residual(u->applied, t, y, yd, u->r);
-    }
+    clear(u, y, yd);
+    sd_residual(u->applied, t, y, yd, u->r);
     if (*u->system->stop)
         return SD_STOPPED;
-    if (straight && straight_on(u, straight, t, y, yd))
-        return SD_FINE;
     int cause = factorise(u, t, y, yd);
     const double *off = cause ? NULL : solve(u);
     if (!off)
@@ -287,8 +260,6 @@ static int at_once(sd_underlying *u, double t, double *y, double *yd)
 
 void sd_underlying_switched(sd_underlying *u)
 {
-    sd_straight_free(u->straight);
-    u->straight = NULL;
     u->ready = 0;
     u->factored_at = -1;
 }

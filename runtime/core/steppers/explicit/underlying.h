@@ -19,10 +19,6 @@
 #include "linear/linear.h"
 
 typedef struct sd_written sd_written;
-typedef struct sd_straight sd_straight;
-
-/* behind what the blocks write: a zero; then, of straight_slopes.c, minus one, a check, and sums of entries */
-enum sd_behind_written { SD_ZERO, SD_MINUS_ONE, SD_CHECK, SD_ENTRY_SUMS };
 
 typedef struct sd_underlying {
     sd_system *system;           /* form 0 */
@@ -43,21 +39,18 @@ typedef struct sd_underlying {
     double *values, *r, *step, *rest, *memory;
     int32_t *place_y, *place_yd; /* [entries of system] place of dF/dy, dF/dyd in the matrix, one behind it where they have none */
     sd_written *list;            /* [lists] the blocks of the matrix */
-    double *written;             /* behind the rows r: what they write, one behind the other, and sd_behind_written */
+    double *written;             /* behind the rows r: what they write, one behind the other, and a zero */
     int32_t *from, *more;        /* [entries of linear] which of these each is; [mores][2]: entry, another that is added to it */
-    sd_straight *straight;       /* NULL: there was no need of it yet */
     int32_t lists, mores, flows; /* flows: some are solved for themselves */
-    int32_t writes;              /* numbers that they write */
     int32_t ready, placed, bad_row, bad_column; /* placed: the tables above are there */
     double *factored;            /* [entries of linear] whose factors the linear system had, */
     int64_t factored_at;         /* when it had made so many; -1: it has others */
-    int32_t spared;              /* factorisations that were none, for they were made already */
     double drift;                /* how far the last projection moved first, in magnitudes */
 } sd_underlying;
 
 sd_underlying *sd_underlying_new(sd_system *system, sd_linear *linear);
 void sd_underlying_free(sd_underlying *underlying);
-/* other rows are held: code that was written for those of before goes */
+/* other rows are held: factors of those of before go */
 void sd_underlying_switched(sd_underlying *underlying);
 /* before a start: Newton's tolerance; what is solved for itself has no slope in yd [n] */
 void sd_underlying_begin(sd_underlying *underlying, double tolerance, double *yd);
@@ -68,14 +61,5 @@ int sd_underlying_slopes(sd_underlying *underlying, double t, double *y, double 
 void sd_underlying_constraints(sd_underlying *underlying, double t, const double *y, double *position, double *velocity);
 /* x in y [n] moved onto the constraints at t, by the factors of the last slopes or fresh ones; 0 or a cause */
 int sd_underlying_project(sd_underlying *underlying, double t, double *y, const double *yd);
-
-/* straight_slopes.c: what stands around the blocks where z is linear, as machine code.  NULL: the matrix has none yet, or there
- * is none here */
-const sd_straight *sd_straight_of(sd_underlying *underlying);
-/* the rows r and z [solved] in y, yd := 0, q' := f */
-void sd_straight_clear(const sd_straight *straight, const sd_underlying *underlying, double *y, double *yd);
-/* z solved for from the rows and from what the blocks of the matrix wrote; factors as of the matrix.  0: no good ones */
-int sd_straight_solve(const sd_straight *straight, const sd_underlying *underlying, double *y, double *yd);
-void sd_straight_free(sd_straight *straight);
 
 #endif

@@ -43,14 +43,11 @@ static void leave_room(sd_radau *radau)
     free(radau->jy);
     free(radau->at);
     free(radau->work);
-    free(radau->beside);
-    free(radau->point_y);
     free(radau->led);
-    radau->work = radau->ivp.ee = radau->ivp.weight = radau->last = radau->point_y = NULL;
+    radau->work = radau->ivp.ee = radau->ivp.weight = radau->last = NULL;
     radau->jy = NULL;
     radau->at = NULL;
     radau->led = NULL;
-    radau->beside = NULL;
 }
 
 int sd_radau_room_for_slopes(sd_radau *radau)
@@ -216,6 +213,5 @@ void sd_radau_free(sd_radau *radau)
     free(radau->gap);
     free(radau->at_zero);
     free(radau->open);
-    sd_radau_free_coupled(radau->coupled);
     free(radau);
 }

@@ -1,15 +1,14 @@
-/* The systems of a Newton step of Radau IIA: matrices and factors, residuals of the stages, corrections; those of large
- * models are whole tasks for threads (see radau.h). */
+/* The systems of a Newton step of Radau IIA: matrices and factors, residuals of the stages, corrections. */
 #include "system/condensed.h"
 #include "linear/lanes.h"
 #include "steppers/combine.h"
 #include "steppers/radau/radau.h"
-#include "steppers/threads.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#define LARGE 10000 /* unknowns from which on the room of matrices counts */
 #define LEAN 0.01 /* part of the slope at zero that a faint one gets */
 
 SD_WIDE void sd_radau_combine(int stages, int32_t n, const double *weight, double *const *v, double *out)
@@ -22,21 +21,10 @@ SD_WIDE void sd_radau_combine(int stages, int32_t n, const double *weight, doubl
         sd_combine(7, n, weight, v, out);
 }
 
-/* whether the systems of a step are taken at once: a matter of their size, not of the machine */
-static int large(const sd_radau *radau)
-{
-    return radau->ivp.n >= SD_LARGE;
-}
-
 int sd_radau_sparing(const sd_radau *radau)
 {
-    return large(radau) && radau->ivp.system->scales == 0 && radau->linear->sparse;
+    return radau->ivp.n >= LARGE && radau->ivp.system->scales == 0 && radau->linear->sparse;
 }
-
-typedef struct factoring {
-    sd_radau *radau;
-    int failed[SD_PAIRS + 1];
-} factoring;
 
 /* of columns: where pivots are left out they are small or not beside the unknowns themselves, as large as they are at the
  * stages (`terms`), whatever the step */
@@ -58,29 +46,24 @@ static void size_columns(sd_radau *radau)
 }
 
 /* part 0: J + gamma/h E and its factors; part k: those of J + lambda/h E of pair k - 1 */
-static void factorise_one(void *context, int part)
+static int factorise_one(sd_radau *radau, int part)
 {
-    factoring *all = context;
-    sd_radau *radau = all->radau;
     const sd_radau_method *method = radau->method;
     int32_t entries = radau->ivp.system->entries;
     const double *scale = column_scale(radau);
-    if (sd_radau_sparing(radau)) {
-        all->failed[part] = part ? sd_linear_z_factor_sum(radau->complex_linear[part - 1]) : sd_linear_factor_sum(radau->linear);
-        return;
-    }
+    if (sd_radau_sparing(radau))
+        return part ? sd_linear_z_factor_sum(radau->complex_linear[part - 1]) : sd_linear_factor_sum(radau->linear);
     if (part == 0) {
         double real = method->gamma / radau->ivp.h;
         for (int32_t e = 0; e < entries; e++)
             radau->g[e] = radau->jy[e] + real * radau->jyd[e];
-        all->failed[0] = sd_linear_factor(radau->linear, radau->g, scale);
-        return;
+        return sd_linear_factor(radau->linear, radau->g, scale);
     }
     double complex both = method->lambda[part - 1] / radau->ivp.h;
     double complex *gz = sd_linear_z_values(radau->complex_linear[part - 1]);
     for (int32_t e = 0; e < entries; e++)
         gz[e] = radau->jy[e] + both * radau->jyd[e];
-    all->failed[part] = sd_linear_z_factor(radau->complex_linear[part - 1], gz, scale);
+    return sd_linear_z_factor(radau->complex_linear[part - 1], gz, scale);
 }
 
 /* the same scales for all matrices of a step, which nobody changes while they are factorised */
@@ -95,22 +78,16 @@ static void scale_all(sd_radau *radau)
     }
 }
 
-/* The factors of all matrices of a step; the failure of the first that has none.  Large ones are all made in any case: what
- * they leave behind must not depend on how many threads there are. */
+/* The factors of all matrices of a step; the failure of the first that has none. */
 static int factorise_all(sd_radau *radau)
 {
-    factoring all = {radau, {0}};
     int failed = 0;
     if (column_scale(radau) != radau->scale)
         size_columns(radau);
     if (sd_radau_sparing(radau))
         scale_all(radau);
-    if (large(radau))
-        sd_side_by_side(radau->method->pairs + 1, factorise_one, &all);
     for (int part = 0; part <= radau->method->pairs && !failed; part++) {
-        if (!large(radau))
-            factorise_one(&all, part);
-        failed = all.failed[part];
+        failed = factorise_one(radau, part);
         if (part == 0) {
             radau->ivp.bad_row = radau->linear->bad_row;
             radau->ivp.bad_column = radau->linear->bad_column;
@@ -243,8 +220,9 @@ int sd_radau_lean(sd_radau *radau, int where)
     return sd_radau_factorise(radau, 1);
 }
 
-static void residual_in_place(sd_radau *radau, sd_system *system, int s, double t)
+static void residual_in_place(sd_radau *radau, int s, double t)
 {
+    sd_system *system = radau->ivp.system;
     const sd_condensed *left = (const sd_condensed *)system->left;
     double *d = radau->d[s];
     for (int32_t i = 0; i < radau->ivp.n; i++)
@@ -256,50 +234,18 @@ static void residual_in_place(sd_radau *radau, sd_system *system, int s, double 
     system->residual_evaluations++;
 }
 
-/* d of stage s := its residual, of `system`, by way of y and rate */
-static void residual_of(sd_radau *radau, sd_system *system, int s, double *y, double *rate)
+/* d of stage s := its residual, by way of y and rate */
+static void residual_of(sd_radau *radau, int s)
 {
     const double t = radau->ivp.t + radau->method->c[s] * radau->ivp.h;
     if (radau->in_place)
-        residual_in_place(radau, system, s, t);
+        residual_in_place(radau, s, t);
     else {
-        sd_radau_stage(radau, s, y, rate);
-        sd_residual(system, t, y, rate, radau->d[s]);
+        sd_radau_stage(radau, s, radau->y, radau->rate);
+        sd_residual(radau->ivp.system, t, radau->y, radau->rate, radau->d[s]);
     }
     for (int32_t i = radau->ivp.n; i < sd_whole_lanes(radau->ivp.n); i++)
         radau->d[s][i] = 0.0; /* others have worked there */
-}
-
-/* The earlier half of the stages, or the later one.  Where all unknowns follow from kept
- * ones, nobody reads these from where they stand once the rows are made: they stand where those will. */
-static void residual_part(void *context, int part)
-{
-    sd_radau *radau = context;
-    int half = (radau->method->stages + 1) / 2;
-    if (part == 0)
-        for (int s = 0; s < half; s++)
-            residual_of(radau, radau->twice[0], s, radau->y, radau->rate);
-    else
-        for (int s = half; s < radau->method->stages; s++)
-            residual_of(radau, radau->twice[1], s, radau->ivp.system->left ? radau->d[s] : radau->point_y, radau->point_rate);
-}
-
-/* the systems and the point that two threads take residuals with; 0: there are none */
-static int accompanied(sd_radau *radau)
-{
-    if (!large(radau) || !radau->ivp.system->together || sd_threads() < 2)
-        return 0;
-    if (!radau->beside) {
-        radau->beside = sd_beside_new(radau->ivp.system);
-        size_t m = (size_t)sd_whole_lanes(radau->ivp.n + 1);
-        size_t alone = radau->ivp.system->left ? 0 : m, rate = radau->in_place ? 0 : m;
-        radau->point_y = calloc(alone + rate + 1, sizeof(double));
-        radau->point_rate = radau->point_y + alone;
-    }
-    if (!radau->beside || !radau->point_y)
-        return 0;
-    sd_beside_as(radau->beside, radau->ivp.system, radau->twice);
-    return 1;
 }
 
 /* residuals of the stages into d */
@@ -307,13 +253,9 @@ int sd_radau_residuals(sd_radau *radau)
 {
     int32_t n = radau->ivp.n;
     int64_t before = radau->ivp.system->residual_evaluations;
-    int made = accompanied(radau);
-    set_lead(radau); /* before two threads read it */
-    if (made)
-        sd_side_by_side(2, residual_part, radau);
+    set_lead(radau);
     for (int s = 0; s < radau->method->stages; s++) {
-        if (!made)
-            residual_of(radau, radau->ivp.system, s, radau->y, radau->rate);
+        residual_of(radau, s);
         radau->ivp.system->residual_evaluations = before + s + 1; /* those that are looked at */
         if (*radau->ivp.system->stop)
             return SD_STOPPED;
@@ -434,16 +376,6 @@ static SD_WIDE void join_all(sd_radau *radau, double *all, double *state)
     *all = SD_TOTAL(sum);
 }
 
-/* part 0: the real system; part k: that of pair k - 1 */
-static void solve_one(void *context, int part)
-{
-    sd_radau *radau = context;
-    if (part == 0)
-        sd_linear_solve(radau->linear, radau->d[0]);
-    else
-        sd_linear_z_solve(radau->complex_linear[part - 1], radau->w[part - 1]);
-}
-
 double sd_radau_state_moved(const sd_radau *radau)
 {
     const sd_radau_method *method = radau->method;
@@ -465,11 +397,9 @@ double sd_radau_correct(sd_radau *radau)
 {
     double all = 0.0, state = 0.0, number = (double)radau->method->stages * radau->ivp.n;
     split_all(radau);
-    if (large(radau))
-        sd_side_by_side(radau->method->pairs + 1, solve_one, radau);
-    else
-        for (int part = 0; part <= radau->method->pairs; part++)
-            solve_one(radau, part);
+    sd_linear_solve(radau->linear, radau->d[0]);
+    for (int k = 0; k < radau->method->pairs; k++)
+        sd_linear_z_solve(radau->complex_linear[k], radau->w[k]);
     join_all(radau, &all, &state);
     radau->state_size = sqrt(state / number);
     return radau->ivp.n ? sqrt(all / number) : 0.0; /* nothing may move: samples alone */

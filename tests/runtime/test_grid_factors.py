@@ -1,4 +1,4 @@
-"""Factors by fronts (runtime/core/linear/sparse/fronts.h) of grids, which fill: solutions by their residuals."""
+"""Factors (runtime/core/linear/sparse) of grids, which fill: solutions by their residuals."""
 
 import numpy as np
 import pytest
@@ -104,7 +104,7 @@ def test_a_net_at_random_is_solved():
 
 @pytest.mark.parametrize("part", [0.2, 0.03, 0.002, 1e-5])
 def test_pivots_that_fade_cost_no_digits(part):
-    """Inverses of triangles with multipliers of 1/part would grow: columns are factored then."""
+    """Multipliers of 1/part would grow: other pivots are chosen then."""
     matrix = grid(24)
     factors = Factors(matrix)
     assert factors.residual(matrix.data) < ROUND_OFF

@@ -1,4 +1,4 @@
-"""Rows of a step that holds many: settled ones at its nodes tell the others, as exactly as if each was settled."""
+"""Rows of a step that holds many are as exact as single ones."""
 
 from pathlib import Path
 
