@@ -28,8 +28,8 @@ TEXT = """model swing {
   energy V = 1/2*(1e4 N/m)*x^2
 }
 scene s of swing {
-  time 0 s to 1e9 s
-  trace x
+  time 0 s to 1e5 s
+  trace x every 1 s
 }
 """
 SENT = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
