@@ -426,7 +426,7 @@ class Handler(Watching):
         if self.stalled and self._accumulate(t):
             raise SolverFailure("zeno", t, 0.0, self._names())
         if self.stalled > STALLED:
-            raise SolverFailure("chatter", t, 0.0, self._names())
+            raise SolverFailure("fold" if self._turns_alone() else "chatter", t, 0.0, self._names())
         if self.plan.limit is not None and len(self.happened) > self.plan.limit:
             raise SolverFailure("max_events", t, 0.0, self._names())
 
@@ -435,6 +435,11 @@ class Handler(Watching):
         times = sorted({h.time for h in self.happened[-RECENT:]} | {t})
         gaps = np.diff(times[-SHRINKING - 2 :])
         return gaps.size > SHRINKING and bool((np.diff(gaps) < 0.0).all() and gaps[-1] <= NO_TIME * np.spacing(abs(t)))
+
+    def _turns_alone(self) -> bool:
+        """Whether nothing but corners of continuous laws was crossed of late: on neither side of them is a motion."""
+        corners = {(kink.name, kink.element) for kink in self.plan.kinks if not kink.jumps}
+        return {(h.name, h.element) for h in self.happened[-RECENT:]} <= corners
 
     def _names(self) -> str:
         return ", ".join(dict.fromkeys(h.name for h in self.happened[-6:]))

@@ -142,3 +142,28 @@ def test_samples_closer_than_instants_are_refused(tmp_path):
     for period in ("5e-324 s", "1e-13 s"):
         with pytest.raises(api.ModelError, match="E703"):
             run(tmp_path, OVERFLOW % f"every {period}")
+
+
+FOLD = """from std.electrical import resistor, voltage
+model schmitt {
+  node s, a, o: electrical
+  V: voltage(v = 5 V - 10 V/s*t) s -> ground
+  R1: resistor(R = 1 kohm) s -> a
+  R2: resistor(R = %g kohm) a -> o
+  A: effort(e = clip(15000*a.e, -15 V, 15 V)) o -> ground
+}
+scene run of schmitt {
+  time 0 s to 1 s
+  trace o.e every 10 ms
+}
+"""
+
+
+@pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.parametrize("r", [15.0, 30.0])
+def test_a_trigger_without_a_pole_is_told_as_a_fold(tmp_path, r, method):
+    said = refused(tmp_path, FOLD % r, method=method)
+    assert "E930" in said
+    assert "an algebraic loop folds" in said
+    at = 0.5 + 0.1 * (15.0 / r) * (1.0 - (1.0 + 1.0 / r) / 1e3)
+    assert float(said.partition("t = ")[2].split()[0]) == pytest.approx(at, abs=1e-4)

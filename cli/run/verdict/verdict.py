@@ -40,6 +40,10 @@ _CAUSES = {
     "max_wall": ("E934", "the limit of wall time is reached"),
     "max_events": ("E934", "the limit of events is reached"),
     "chatter": ("E930", "events follow each other without end at one instant"),
+    "fold": (
+        "E930",
+        "an algebraic loop folds: at the corner of a law none of its solutions goes on",
+    ),
     "zeno": (
         "E930",
         "events follow each other ever sooner and never pass a later instant, of which the text is silent",
@@ -60,6 +64,7 @@ AT_REST = 1e-8
 _OF_EVENTS = (
     "max_events",
     "chatter",
+    "fold",
     "zeno",
     "complementarity",
     "conflict",
@@ -91,6 +96,8 @@ _REMEDIES_OF_CAUSES = {
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",
     "overflows": "bounds of what is assigned: clip(k, lo, hi); or an earlier end: --until",
     "chatter": "a condition and an action that do not undo each other: hysteresis, or an 'every' in place of a 'when'",
+    "fold": "what it jumps by: a pole in the loop (the output through a resistor onto a capacitor, or as a state that"
+    " follows in 1 us), or a discrete variable that a 'when' turns with hysteresis",
     "zeno": "a constraint in place of the event, which comes to rest: phi floor: h >= 0 m restitution 0.8; or an"
     " earlier end: --until",
     "complementarity": "constraints that do not ask for opposites: a resistance or a clearance between these elements",
