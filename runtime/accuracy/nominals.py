@@ -81,7 +81,8 @@ def _of_its_like(system: System, there: NDArray[np.bool_], row_of: Ints, nominal
         np.maximum.at(largest, between[1], before[between[0]])
         if np.array_equal(before, largest):
             break
-    return largest[part, kind]
+    found: Floats = largest[part, kind]
+    return found
 
 
 def _zero(system: System, t: float, algebraic: Floats, entry: Floats, row_of: Ints) -> NDArray[np.bool_]:

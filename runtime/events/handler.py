@@ -40,7 +40,9 @@ SOON = 2
 """Of these, after which the handler is asked about each."""
 RECENT = 64
 """Entries of what happened, several of which may be of one instant."""
-SHRINKING, NO_TIME = 8, 64.0
+BY_CHANCE = 0.01
+"""Of the gap between two events before: one that is so much shorter has other reasons than theirs."""
+SHRINKING, NO_TIME = 8, 1e5
 """Events in a row, each of which follows sooner than the one before, until it does within so many spacings of t: their
 instants have a limit (Zeno), behind which the text says nothing."""
 HELD = 1e-9
@@ -432,9 +434,11 @@ class Handler(Watching):
 
     def _accumulate(self, t: float) -> bool:
         """Whether the instants of what happened have a limit that is not told from t."""
-        times = sorted({h.time for h in self.happened[-RECENT:]} | {t})
-        gaps = np.diff(times[-SHRINKING - 2 :])
-        return gaps.size > SHRINKING and bool((np.diff(gaps) < 0.0).all() and gaps[-1] <= NO_TIME * np.spacing(abs(t)))
+        gaps = np.diff(sorted({h.time for h in self.happened[-RECENT:]})[-SHRINKING - 2 :])
+        if gaps.size <= SHRINKING or gaps[-1] > NO_TIME * np.spacing(abs(t)):
+            return False
+        ratios = gaps[1:] / gaps[:-1]
+        return bool((ratios < 1.0).all() and (ratios > BY_CHANCE).all())
 
     def _turns_alone(self) -> bool:
         """Whether nothing but corners of continuous laws was crossed of late: on neither side of them is a motion."""
