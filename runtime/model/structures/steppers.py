@@ -130,7 +130,7 @@ class Radau(c.Structure):
         *[(name, D) for name in ["error_accepted", "theta", "state_size", "growth", "longest", "follows"]],
         *[(name, I) for name in ["behind", "balances", "pressed", "ready", "old_jacobian", "rejected", "lasting"]],
         *[(name, P) for name in ["method", "used"]],
-        *[(name, I) for name in ["since", "hold", "creeping"]],
+        *[(name, I) for name in ["since", "hold", "creeping", "strained", "turned"]],
         ("lead", (D * STAGES) * STAGES),
         ("h_lead", D),
         ("of_lead", P),
@@ -145,6 +145,7 @@ class Radau(c.Structure):
         *[(name, P) for name in ["newton_weight", "scale", "powered"]],
         ("w", P * PAIRS),
         ("in_place", I),
+        ("coupled", P),
     ]
 
 

@@ -119,7 +119,7 @@ void sd_radau_start(void *self, double t, const double *y, const double *yd, dou
     radau->longest = radau->follows = 0.0;
     radau->behind = radau->ivp.steps > 0;
     radau->pressed = radau->balances;
-    radau->lasting = radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = 0;
+    radau->lasting = radau->ready = radau->old_jacobian = radau->rejected = radau->creeping = radau->strained = radau->turned = 0;
     sd_radau_leave_below(radau, radau->linear->idle ? SD_LEAST_PIVOT : 0.0);
     radau->theta = 1.0;
 }
@@ -240,16 +240,25 @@ static void project(sd_radau *radau)
             radau->slope[0][i] = radau->yd[i] = radau->rate[i];
 }
 
+/* the stages all at once; the error is then judged by slopes at the end of the step, those at its start having failed */
+static int coupled(sd_radau *radau, int *iterations)
+{
+    int cause = sd_radau_iterate_coupled(radau, iterations);
+    radau->turned = cause == SD_FINE;
+    return cause ? cause : sd_radau_factorise(radau, 1);
+}
+
 /* what has been tried of a step */
 typedef struct trial {
     int iterations;           /* of Newton's */
     int failures, singular;   /* of it; of matrices */
     int fresh;                /* its slopes are of the point that it begins at */
+    int strained;             /* it failed with such slopes */
     int leap;                 /* 1: it is longer than what failed before; 2: so it was, in vain */
     double retry, error;      /* the part of its length that is tried next; of the estimate */
 } trial;
 
-/* stages of the length at hand: by Newton's iteration, or with shortened corrections */
+/* stages of the length at hand: by Newton's iteration, with shortened corrections, or all at once */
 static int find_stages(sd_radau *radau, trial *one)
 {
     const int steep = radau->ivp.system->scales > 0, whole = one->leap == 1;
@@ -275,6 +284,10 @@ static int find_stages(sd_radau *radau, trial *one)
         cause = sd_radau_iterate_damped(radau, &one->iterations);
         one->fresh = 1;
     }
+    one->strained |= cause == SD_NEWTON && one->fresh;
+    /* once it fails in any model: twice in a row it may be for no step's length */
+    if (cause == SD_NEWTON && one->fresh && radau->strained && one->leap == 0 && !steep)
+        cause = coupled(radau, &one->iterations);
     return cause;
 }
 
@@ -358,6 +371,8 @@ int sd_radau_step(void *self)
             return cause;
     }
     radau->ivp.cause = SD_FINE;
+    radau->strained = one.strained;
+    radau->turned = radau->turned && one.strained;
     radau->creeping = one.failures > 0 && one.error < IDLE ? radau->creeping + 1 : 0;
     accept(radau, one.error, one.iterations, one.failures > 0);
     if (radau->ivp.project)

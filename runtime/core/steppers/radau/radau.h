@@ -79,6 +79,8 @@ typedef struct sd_radau {
     int32_t since;                                  /* steps accepted since the method changed */
     int32_t hold;                                   /* steps that still take three stages */
     int32_t creeping;                               /* steps in a row for which Newton failed at first */
+    int32_t strained, turned;                       /* in the last one Newton failed with fresh slopes; all its stages were
+                                                     * solved for at once */
     double lead[SD_STAGES][SD_STAGES], h_lead;      /* A^-1 / h, of the h and the method that they were made for */
     const sd_radau_method *of_lead;
     double *phi, *yd;         /* [n] the last accepted point */
@@ -108,6 +110,7 @@ typedef struct sd_radau {
     double complex *w[SD_PAIRS]; /* right sides and solutions */
     int32_t in_place;         /* the point of a stage, its rates and its residual take turns in d; y and rate stand there too,
                                * w where the point of the whole system does */
+    struct sd_coupled *coupled;   /* radau_coupled.c: all stages at once; made when first needed */
 } sd_radau;
 
 /* stages: at most; complex_linear [(stages - 1) / 2] */
@@ -186,6 +189,11 @@ void sd_radau_leave_below(sd_radau *radau, double null_pivot);
 int sd_radau_iterations(const sd_radau *radau);
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry);
 int sd_radau_iterate_damped(sd_radau *radau, int *used);
+double sd_radau_newton_tolerance(const sd_radau *radau);
+double sd_radau_row_limit(const sd_radau *radau, double newton_tolerance);
+/* radau_coupled.c: where the slopes of the step's start fade or turn within it, in one direction; else SD_NEWTON */
+int sd_radau_iterate_coupled(sd_radau *radau, int *used);
+void sd_radau_free_coupled(struct sd_coupled *coupled);
 /* radau_choice.c: the length that the next step should have, by the error of this one and what Newton's iteration took; perhaps
  * with another number of stages */
 double sd_radau_next_step(sd_radau *radau, double error, int iterations, int troubled);

@@ -77,7 +77,7 @@ static int columns_left(const sd_radau *radau)
 }
 
 /* what a row may be off, of its terms */
-static double row_limit(const sd_radau *radau, double newton_tolerance)
+double sd_radau_row_limit(const sd_radau *radau, double newton_tolerance)
 {
     double limit = fmin(1.0, fmax(FINEST_ROW, LAX * newton_tolerance * radau->tolerance));
     return columns_left(radau) ? fmax(limit, FAINT_ROW) : limit;
@@ -88,7 +88,7 @@ static double row_limit(const sd_radau *radau, double newton_tolerance)
 static int rows_hold(sd_radau *radau, double newton_tolerance, int all)
 {
     int judged = all || columns_left(radau);
-    double limit = row_limit(radau, newton_tolerance);
+    double limit = sd_radau_row_limit(radau, newton_tolerance);
     for (int s = 0; s < radau->method->stages; s++) {
         for (int32_t i = 0; i < radau->ivp.n; i++) {
             radau->y[i] = radau->phi[i] + radau->z[s][i];
@@ -117,7 +117,7 @@ static double left_open(const sd_radau *radau, int s, int32_t i, int before)
 static int rows_at_round_off(sd_radau *radau, double newton_tolerance, int before)
 {
     int all = columns_left(radau);
-    double limit = row_limit(radau, newton_tolerance);
+    double limit = sd_radau_row_limit(radau, newton_tolerance);
     for (int s = 0; s < radau->method->stages; s++) {
         double t = radau->ivp.t + radau->method->c[s] * radau->ivp.h;
         sd_radau_stage(radau, s, radau->y, radau->rate);
@@ -138,15 +138,15 @@ int sd_radau_iterations(const sd_radau *radau)
 }
 
 /* Of Newton's corrections in its weights, with a round-off in units of the unknowns' */
-static double tolerance_above(const sd_radau *radau, double of_unknowns)
+static double newton_tolerance(const sd_radau *radau, double of_unknowns)
 {
     return fmax(of_unknowns * DBL_EPSILON / radau->tolerance, fmin(0.03, sqrt(radau->tolerance)));
 }
 
 /* what is borne; stages of more have larger round-off */
-static double newton_tolerance(const sd_radau *radau)
+double sd_radau_newton_tolerance(const sd_radau *radau)
 {
-    return tolerance_above(radau, round_off[radau->method - sd_radau_methods]);
+    return newton_tolerance(radau, round_off[radau->method - sd_radau_methods]);
 }
 
 /* the stages are kept in base */
@@ -185,8 +185,8 @@ static double whole_power(double x, int k)
 /* Newton's iteration for the stages, with fresh slopes each time where `full`; `retry`: factor of the step where it fails */
 int sd_radau_iterate(sd_radau *radau, int full, int *used, double *retry)
 {
-    double tolerance = newton_tolerance(radau);
-    double aim = tolerance_above(radau, aimed_at[radau->method - sd_radau_methods]);
+    double tolerance = sd_radau_newton_tolerance(radau);
+    double aim = newton_tolerance(radau, aimed_at[radau->method - sd_radau_methods]);
     double before = 0.0, ratio_before = 0.0;
     double trust = radau->ivp.system->steady && sd_radau_factored(radau) ? SOLVED : 1.0;
     int patient = full || radau->ivp.fixed_h > 0.0;
@@ -324,7 +324,7 @@ static double walk(sd_radau *radau, size_t way, double tolerance, int first, int
  * point may lie far up an exponential, from where it is 1/a at a time.) */
 int sd_radau_iterate_damped(sd_radau *radau, int *used)
 {
-    double tolerance = newton_tolerance(radau);
+    double tolerance = sd_radau_newton_tolerance(radau);
     for (int s = 0; s < radau->method->stages; s++)
         memset(radau->z[s], 0, (size_t)radau->ivp.n * sizeof(double));
     for (int m = 1; m <= WALK; m++) {

@@ -213,5 +213,6 @@ void sd_radau_free(sd_radau *radau)
     free(radau->gap);
     free(radau->at_zero);
     free(radau->open);
+    sd_radau_free_coupled(radau->coupled);
     free(radau);
 }
