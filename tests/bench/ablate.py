@@ -138,7 +138,7 @@ MECHANISMS = (
     ),
 )
 """What is optional and stays, and why.  Left out by the rule, with what their absence cost:
-a matrix of all stages of radau (250 lines), fronts (780): 1.00 / 1.02; one-run accuracies (620): 1.03 / 1.01, grids
+fronts (780 lines): 1.00 / 1.02; one-run accuracies (620): 1.03 / 1.01, grids
 1.98, ladders 1.39; rows told from nodes (290), machine code (890): with these 1.19 / 1.01; threads of radau (320),
 the pattern of a line's factors told by what changes (190): no CPU; chains of a line (250): ladders 1.19 / 1.00.
 """
