@@ -29,7 +29,7 @@ from sysdyn.cli.trade.traded import INDICES, Combination, Measured, Refusal
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
-from sysdyn.runtime.accuracy.common_instants import GOLDEN
+from sysdyn.runtime.accuracy.common_instants import GOLDEN, some
 from sysdyn.runtime.accuracy.options import Options, choose_index
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import NoSuchForm, SolverFailure
@@ -254,7 +254,7 @@ class Bench:
     ) -> Measured | str:
         """One run, compared with the reference; a sentence where there is no such setting."""
         carried = self.carry(combination)
-        at = None if carried is None or carried.options.every is not None else _thinned(reference.time)
+        at = None if carried is None or carried.options.every is not None else some(reference.time, ROWS)
         ran, reason, said = self.trace(combination, tolerance, limits, at=at)
         if ran is None:
             return reason
@@ -296,11 +296,6 @@ class Bench:
             system = system if system.form.name == form else system.another(form)
             carried.sizes[form] = work.Size(system.unknowns, system.pattern.entries, bent=_bent(system))
         return carried.sizes[form]
-
-
-def _thinned(time: Floats) -> Floats:
-    """Every so many of the instants [s], and the last."""
-    return np.unique(np.append(time[:: -(-time.size // ROWS)], time[-1]))
 
 
 def _bent(system: System) -> bool:

@@ -89,10 +89,15 @@ def known(times: Floats, options: Options, quantities: int) -> Floats | None:
         return None
     if times.size >= FEW:
         most = min(GRID, max(VALUES // max(quantities, 1), FEW))
-        return distinct(np.append(times[:: -(-times.size // most)], times[-1]))
+        return some(times, most)
     span = options.t_end - options.t_start
     spread = options.t_start + span * (np.arange(1, MOST + 1) * GOLDEN % 1.0)
     return distinct(np.concatenate([spread, times[times > options.t_start], [options.t_end]]))
+
+
+def some(times: Floats, most: int) -> Floats:
+    """Every so many of ascending instants [s], `most` or one more, and the last."""
+    return distinct(np.append(times[:: -(-times.size // most)], times[-1]))
 
 
 def common(stored: Floats, options: Options) -> Floats:

@@ -38,6 +38,7 @@ class Compared:
         self.finished: Finished | None = None
         self._at: Floats | None = None
         self._opened: tuple[Finished, LeftOpen] | None = None
+        self._sized: tuple[Finished, Floats] | None = None
         self._own: list[Floats] = []
         self.begin()
 
@@ -187,8 +188,10 @@ class Compared:
 
     def _excused(self, finished: Finished, quantities: Quantities) -> tuple[Floats, Floats]:
         """Nominal value of each compared quantity, and how much of it may be excused."""
-        nominal, asked = self._nominal(finished, quantities), quantities.asked(self.options)
-        return nominal, _share(asked, nominal)
+        if self._sized is None or self._sized[0] is not finished:
+            self._sized = finished, self._nominal(finished, quantities)
+        nominal = self._sized[1]
+        return nominal, _share(quantities.asked(self.options), nominal)
 
     def _nominal(self, finished: Finished, quantities: Quantities) -> Floats:
         """Nominal value of each compared quantity: its largest value or term, or what the rows that determine the

@@ -12,13 +12,13 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.events.bounces import LEAST, begun, flights, new
+from sysdyn.runtime.events.bounces import LEAST, PART, begun, flights, new
 from sysdyn.runtime.events.choices import Choices
 from sysdyn.runtime.events.conditions import Conditions, Round, with_momenta
 from sysdyn.runtime.events.contacts import Standing as Stood
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.kinks import NoBranchError
-from sysdyn.runtime.events.observer import ASSIGNED, ROUNDING
+from sysdyn.runtime.events.observer import ASSIGNED
 from sysdyn.runtime.events.pivoting import NoActiveSetError
 from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.events.succession import Point, Succession
@@ -229,8 +229,7 @@ class Handler(Watching):
         # the point behind it all
         self.struck = touched[0] if lone and touched and len(which) == 1 and not self.rounds else -1
         point = self._followed(t, self.settled(t, y, yd, said, touched))
-        self._again(t, point, crossed)
-        self._next_to_zero(t, point)
+        self._due_at_once(t, point, crossed)
         self.turns.seen(t, point)
         self._return(t, begun, point, which)
         thrown = new(self.bounces, flew)
@@ -240,21 +239,26 @@ class Handler(Watching):
         self.passes = self.kinks.passing(stood, self.observer(t, *point)) if self.kinks.peaks else np.inf
         return point
 
-    def _again(self, t: float, point: Point, crossed: list[int]) -> None:
-        """Relations that fall through zero again have their side again."""
-        back = self.returning(t, *point, crossed) if self.plan.relations else np.zeros(0, dtype=bool)
+    def _due_at_once(self, t: float, point: Point, crossed: list[int]) -> None:
+        """Relations, but those that cross at t, that have come back through zero by less than counts and fall again
+        from this point on have their side again (tanks that are filled by turns); these, and what assignments have put
+        next to zero, are known to rounding until they have crossed.
+        """
+        if not self.plan.relations:
+            return
+        row, (y, yd) = self._row, point
+        here, zeros = self.observer(t, y, yd)[row], self.observer.zeros(row)
+        near, rounding = np.abs(here) <= zeros, self.observer.rounding(row, here)
+        back = near & (self.side * here < -rounding)
+        back[crossed] = False
+        if back.any():
+            step = PART * self.contacts.time
+            back &= self.side * (self.observer(t + step, y + step * yd, yd)[row] - here) > zeros
         if back.any():
             self.side[back] *= -1.0
-            self._assigned |= back
             self.truth, self.simple = self._conditions.hold(self.side), False
-
-    def _next_to_zero(self, t: float, point: Point) -> None:
-        """What assignments have put next to zero, or falls again, is known to rounding until it has crossed."""
-        if self._assigned.any():
-            here, zeros = self.observer(t, *point)[self._row], self.observer.zeros(self._row)
-            rounding = ROUNDING * self.observer.terms[self._row]
-            near = self._assigned & self._moves & (self.side * here > rounding) & (np.abs(here) <= zeros)
-            self.observer.exact[self._row[near]] = ASSIGNED
+        near &= (self._assigned | back) & self._moves & (self.side * here > rounding)
+        self.observer.exact[row[near]] = ASSIGNED
 
     def _hold(self, values: Floats, crossed: Sequence[int]) -> None:
         """What a constraint holds at zero since an event before (a speed that sticks) is on neither side."""
@@ -415,10 +419,14 @@ class Handler(Watching):
         """Sides after a jump; was: values [observed] before an assignment."""
         values = self.observer(t, y, yd)
         self._bounded(t, values)
-        rounding = self.observer.rounding(self._row, values, values if was is None else was)
-        self._assigned |= rounding < np.inf
-        self._jumps = {k: past for k, past in self._jumps.items() if rounding[k] == np.inf}
-        self._take_sides(t, values, self.side, np.minimum(self.observer.zeros(self._row), rounding))
+        here, zeros = values[self._row], self.observer.zeros(self._row)
+        if was is not None:
+            rounding = self.observer.rounding(self._row, here)
+            assigned = np.abs(here - was[self._row]) > rounding
+            self._assigned |= assigned
+            self._jumps = {k: past for k, past in self._jumps.items() if not assigned[k]}
+            zeros = np.where(assigned, np.minimum(zeros, rounding), zeros)
+        self._take_sides(t, values, self.side, zeros)
 
     # -- what never ends -----------------------------------------------------------------------------------------
 

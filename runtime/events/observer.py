@@ -82,8 +82,7 @@ class Observer:
         """Below it a value of the row is zero."""
         return float(ROUNDING if self.exact[row] else self.small[row]) * float(self.largest[row])
 
-    def rounding(self, rows: NDArray[np.int64], values: Floats, was: Floats) -> Floats:
-        """What rounds the values [observed] asked last of rows, where they are not what they were; else inf."""
-        here = values[rows]
+    def rounding(self, rows: NDArray[np.int64], here: Floats) -> Floats:
+        """What the values of rows that were asked last are rounded by; here [rows]: these."""
         found: Floats = ROUNDING * np.maximum(self.terms[rows], np.abs(here))
-        return np.where(np.abs(here - was[rows]) > found, found, np.inf)
+        return found

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sysdyn.runtime.events.bounces import Bounce
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.kinks import Kinks
 from sysdyn.runtime.events.locate import Dense, Edges, crossing
-from sysdyn.runtime.events.observer import ROUNDING, SMALL, TIMED, Observer
+from sysdyn.runtime.events.observer import SMALL, TIMED, Observer
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.events.watches import Candidates, Watched, Watches
 from sysdyn.runtime.model import core_library as lib
@@ -19,8 +18,6 @@ from sysdyn.runtime.model.system import System
 
 NOTHING = 1e-12
 """Of the span: no time."""
-AHEAD = 1e-3
-"""Of the time in which the unknowns change: by then what falls has fallen by more than counts as zero."""
 FALLEN = 1e-4
 """Of what else counts as zero, and of the height of its flight: a gap that an impact opened closes again below it."""
 
@@ -77,20 +74,6 @@ class Watching:
         values, watched = self.observer(t, y, yd), self.watched()
         other = watched.side * values[watched.row] < -self.observer.zeros(watched.row)
         return watched.each(other & (watched.relation >= 0))
-
-    def returning(self, t: float, y: Floats, yd: Floats, crossed: list[int]) -> NDArray[np.bool_]:
-        """Whether each relation [relations], but those that cross at t, has come back through zero by less than counts
-        and falls again from this point on: unseen, if it had not its side again (tanks that are filled by turns).
-        """
-        row, side = np.array([r.row for r in self.plan.relations], dtype=np.int64), self.side
-        values = self.observer(t, y, yd)
-        here, zeros, rounding = values[row], self.observer.zeros(row), ROUNDING * self.observer.terms[row]
-        found = (side * here < -rounding) & (np.abs(here) <= zeros)
-        found[crossed] = False
-        if found.any():
-            step = AHEAD * self.contacts.time
-            found &= side * (self.observer(t + step, y + step * yd, yd)[row] - here) > zeros
-        return found
 
     def _edges(self, watched: Watches) -> Edges:
         """What each watched value may fall by unseen (behind an impact nearly nothing, for bounces become small), the

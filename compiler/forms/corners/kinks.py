@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import random
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
@@ -146,13 +146,22 @@ def roots(form: DescriptorForm) -> Iterator[tuple[Node, int]]:
 
 def side(root: Node, u: Node, above: bool) -> Node:
     """The branch of an expression on one side of u = 0."""
+
+    def branch(node: Node) -> Node | None:
+        found = watched(node)
+        if found is None or not (found.u is u or found.u is neg(u)):
+            return None
+        return found.above if (found.u is u) == above else found.below
+
+    return _on_branches(root, branch)
+
+
+def _on_branches(root: Node, branch: Callable[[Node], Node | None]) -> Node:
+    """An expression with operations replaced by the branch of each; None: it stays."""
     done: dict[Node, Node] = {}
     for node in topological([root]):
-        found = watched(node)
-        if found is not None and (found.u is u or found.u is neg(u)):
-            done[node] = done_of(found.above if (found.u is u) == above else found.below, done)
-        else:
-            done[node] = rebuild(node, tuple(done[a] for a in node.args))
+        taken = branch(node)
+        done[node] = rebuild(node, tuple(done[a] for a in node.args)) if taken is None else done_of(taken, done)
     return done[root]
 
 
@@ -250,21 +259,21 @@ def _ends(sides: tuple[Node, Node], u: Node, slope: Node, moved: Node) -> bool:
     up = math.copysign(1.0, evaluate((slope,), lambda node: _look(node, values))[0])
     for branch, own in zip(sides, (up, -up), strict=True):
         within, beyond = ({**values, moved: values[moved] + away} for away in (own * NEAR, -own * NEAR))
-        if _finite(branch, within) and not _finite(_held(branch, within), beyond):
+        if _finite(branch, within) and not _finite(_all_on_branches(branch, within), beyond):
             return True
     return False
 
 
-def _held(root: Node, values: Mapping[Node, float]) -> Node:
+def _all_on_branches(root: Node, values: Mapping[Node, float]) -> Node:
     """An expression with every operation on the branch that it has at these values."""
-    done: dict[Node, Node] = {}
-    for node in topological([root]):
+
+    def branch(node: Node) -> Node | None:
         found = sided(node)
         if found is None:
-            done[node] = rebuild(node, tuple(done[a] for a in node.args))
-        else:
-            done[node] = done_of(found.above if _values((found.u,), values)[0] > 0.0 else found.below, done)
-    return done[root]
+            return None
+        return found.above if _values((found.u,), values)[0] > 0.0 else found.below
+
+    return _on_branches(root, branch)
 
 
 def _finite(node: Node, values: Mapping[Node, float]) -> bool:

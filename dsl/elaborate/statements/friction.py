@@ -216,12 +216,12 @@ def _factor(root: Node, node: Node) -> Node | None:
 def _by_sizes(root: Node) -> Node:
     """A content with max and min of flows, where they have a corner, by abs of the difference."""
     for node in ex.topological([root]):
-        if node.op == "call" and node.data in ("max", "min") and any(map(_rates, node.args)):
+        named = node.op == "call" and node.data in ("max", "min") and any(map(_rates, node.args))
+        if named and _factor(root, node) is not None:
             a, b = node.args
             size = ex.call("abs", ex.sub(a, b))
             total = ex.add(a, b, size) if node.data == "max" else ex.sub(ex.add(a, b), size)
-            if _factor(root, node) is not None:
-                root = ex.substitute(root, {node: ex.scale(0.5, total)})
+            root = ex.substitute(root, {node: ex.scale(0.5, total)})
     return root
 
 
