@@ -1,26 +1,24 @@
 """The front end on a bare Python, without an environment: every model's network, and what a slip is told.
 
-Usage: front_end.py TREE.  The language imports the standard library alone, so that it can be tried on any Python that
+Usage: front_end.py WHEEL.  The language imports the standard library alone, so that it can be tried on any Python that
 is at hand: a pattern or a type that one of them does not know is found here.
 """
 
 import sys
 import tempfile
+import zipfile
 from pathlib import Path
 
-tree = Path(sys.argv[1]).resolve()
 with tempfile.TemporaryDirectory() as folder:
-    (Path(folder) / "sysdyn").mkdir()
-    (Path(folder) / "sysdyn" / "dsl").symlink_to(tree / "dsl")
-    for name in ("initials.py", "values.py", "names.py"):
-        (Path(folder) / "sysdyn" / name).symlink_to(tree / "cli" / "sysdyn" / name)
+    with zipfile.ZipFile(sys.argv[1]) as wheel:
+        wheel.extractall(folder)
     sys.path.insert(0, folder)
     sys.dont_write_bytecode = True
     from sysdyn.dsl import load
     from sysdyn.dsl.text.diagnostics import Report
 
     number = 0
-    for path in sorted((tree / "models").glob("*/*.sd")):
+    for path in sorted((Path(folder) / "sysdyn" / "models").glob("*/*.sd")):
         report = Report()
         document = load.read(str(path), report)
         for model in document.models.values():

@@ -15,19 +15,20 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.accuracy.options import Options, own_tolerances
 from sysdyn.runtime.integrate.rows.ledgers import Balance, turned_over
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.values import dataclass
 
-LEAST = 1e-12
+LEAST = tuning.CANCELS
 """Smallest part of what went through a ledger that its balance may be."""
 TIMES = 10.0
 """Of the loosest accuracy asked: what the balance may be."""
 MOST = 0.1
 """Largest part of it that is allowed where the solver's own tolerances are given."""
-CANCELS = 1e-3
+CANCELS = tuning.SMALL
 """Of its terms: a difference that is less has lost more than three digits."""
 EPS = float(np.finfo(np.float64).eps)
 ROUND_OFF = 10.0 * EPS

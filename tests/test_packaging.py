@@ -85,6 +85,7 @@ def _holds_all_data(source, wheel):
         assert name in in_source
         assert f"sysdyn/{name}" in in_wheel
     assert any(name.endswith("LICENSE") for name in in_wheel)
+    assert "sysdyn/dsl/parser/sd.tables" in in_wheel
     assert f"sysdyn/runtime/_core{sysconfig.get_config_var('EXT_SUFFIX')}" in in_wheel
 
 

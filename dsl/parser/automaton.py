@@ -1,6 +1,6 @@
 """The LALR(1) automaton: tokens in, syntax tree out, in one loop without recursion.
 
-The tables come from `table.py`. A reduction calls the rule's function in `build_expressions`,
+The tables come from `grammar.py`. A reduction calls the rule's function in `build_expressions`,
 `build_statements` or `build_scenes`; rules that only hand on their child cost no call, lists grow in place. What is
 to be done about a token that does not fit is decided in `recovery`.
 """
@@ -12,13 +12,17 @@ from functools import cache
 from typing import Any
 
 from sysdyn.dsl.parser import build_expressions, build_scenes, build_statements
+from sysdyn.dsl.parser.grammar import load_tables
 from sysdyn.dsl.parser.lexing import Scanner
 from sysdyn.dsl.parser.notes import MAX_TERMS, Notes
-from sysdyn.dsl.parser.table import FINAL, GOTOS, LOOKAHEADS, ROWS, RULES
 from sysdyn.dsl.text.source import SourceText, Span
 from sysdyn.dsl.tree.syntax import ANY, Broken, Text, Word
 
 Build = Callable[[list[Any], Span, Notes], Any]
+
+_TABLES = load_tables()
+_FINAL = int(_TABLES.final)
+"""The state that has read a whole file."""
 
 MAX_NESTING = 200
 """Deepest nesting of brackets, signs, exponents and conditionals together (E117)."""
@@ -35,7 +39,7 @@ class _Rows(dict[int, dict[str, int]]):
     """For each state the action on each terminal: a state to shift to, or -1 - rule.  Read when a text comes there."""
 
     def __init__(self) -> None:
-        self._sets, self._lines = LOOKAHEADS.splitlines(), ROWS.splitlines()
+        self._sets, self._lines = _TABLES.lookaheads.split("\n"), _TABLES.rows.split("\n")
 
     def __missing__(self, state: int) -> dict[str, int]:
         row = self[state] = {}
@@ -49,7 +53,7 @@ class _Gotos(dict[int, dict[str, int]]):
     """For each state the next state behind each left side."""
 
     def __init__(self) -> None:
-        self._lines = GOTOS.splitlines()
+        self._lines = _TABLES.gotos.split("\n")
 
     def __missing__(self, state: int) -> dict[str, int]:
         entries = (entry.rpartition(":") for entry in self._lines[state].split())
@@ -71,7 +75,7 @@ def _actions() -> tuple[tuple[str, int, Build | None, bool, tuple[tuple[int, boo
     """For each rule: left side, length, function (None: a list), whether it hands on, children."""
     functions: dict[str, Build | None] = {"[]": None, "=": None}
     actions = []
-    for line in RULES.splitlines():
+    for line in _TABLES.rules.split("\n"):
         left, length, name, *children = line.split()
         if name not in functions:
             functions[name] = _build(name)
@@ -88,7 +92,7 @@ _TABLE_RULES = _actions()
 @cache
 def words() -> frozenset[str]:
     """Every word that the language itself has somewhere."""
-    return frozenset(word for word in LOOKAHEADS.split() if word.isidentifier())
+    return frozenset(word for word in _TABLES.lookaheads.split() if word.isidentifier())
 
 
 def action_of(state: int, kind: str) -> int | None:
@@ -136,7 +140,7 @@ class Automaton:
     @property
     def finished(self) -> bool:
         """Whether a whole file has been read."""
-        return self.states[-1] == FINAL
+        return self.states[-1] == _FINAL
 
     def advance(self, kind: str) -> bool:
         """Take one terminal; False where it does not fit (the statement's start stays on the stack)."""
@@ -238,7 +242,7 @@ class Automaton:
                 return True
             del states[len(states) - length :]
             states.append(_TABLE_GOTOS[states[-1]][left])
-        return states[-1] == FINAL
+        return states[-1] == _FINAL
 
     def body(self) -> tuple[int, str]:
         """Size of the stack where the present statement began, and what kind of statement it is."""

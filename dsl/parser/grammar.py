@@ -1,11 +1,9 @@
-"""The grammar `sd.lark` turned into the tables of `table.py`.
+"""The grammar `sd.lark` turned into the tables that the automaton runs: `sd.tables`, written by the build.
 
-lark builds the LALR(1) automaton (strict: no conflict is resolved silently); this module renumbers
-it in the order of a walk from the start state, so that equal grammars give equal tables, and writes
-it as lines of text. Reading a model then needs neither lark nor a cache: the tables load with the
-package. Measured: 0.24 s to build with lark, 75 ms to import lark, 5 ms to load the tables.
-
-Run `python -m sysdyn.dsl.parser.grammar` after a change of `sd.lark`; a test compares the two files.
+lark builds the LALR(1) automaton; this module renumbers it in the order of a walk from the start state, so that equal
+grammars give equal tables, and writes it as lines of text beside the grammar.  Reading a model then needs no lark.
+`load_tables` builds them anew where they are absent or of another text of the grammar (a clone without a build, an
+editable install whose grammar is being changed).
 
 Terminals are named by what the author writes: a keyword or sign by itself (`param`, `->`), a class
 of words by each of its words, and the rest in angle brackets (`<name>`, `<newline>`).
@@ -13,12 +11,15 @@ of words by each of its words, and the rest in angle brackets (`<name>`, `<newli
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Iterable
+import zlib
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-_HERE = Path(__file__).parent
+_GRAMMAR = Path(__file__).parent / "sd.lark"
+_TABLES = Path(__file__).parent / "sd.tables"
 _CLASS_OF_WORDS = re.compile(r"\(([\w|]+)\)\\b")
 _REGULAR = {
     "NAME": "<name>",
@@ -32,17 +33,75 @@ _REGULAR = {
 }
 
 
-def build_lark() -> Any:
-    """Lark's parser of `sd.lark`; raises lark's GrammarError where the grammar has a conflict."""
+class Tables(NamedTuple):
+    """The automaton as lines of text: `automaton` decodes a row where it comes there."""
+
+    final: str
+    """The state that has read a whole file."""
+    lookaheads: str
+    """Sets of terminals, one a line."""
+    rows: str
+    """For each state action:set, where the action is a state to shift to, or -1 - rule to reduce."""
+    gotos: str
+    """For each state left side:state."""
+    rules: str
+    """Left side, length, function, children: see `_rule`."""
+
+
+_BREAK = "\n\f\n"
+"""Between the parts of the file: the fingerprint of the grammar, and the fields of `Tables`."""
+
+
+def load_tables() -> Tables:
+    """The tables of the grammar: those that stand beside it, or built by lark and put there where that can be.
+
+    Raises ImportError where neither they nor lark are there.
+    """
+    grammar = _GRAMMAR.read_text(encoding="utf-8")
+    try:
+        fingerprint, *parts = _TABLES.read_text(encoding="utf-8").split(_BREAK)
+    except OSError:
+        fingerprint, parts = "", []
+    if fingerprint == _fingerprint(grammar):
+        return Tables(*parts)
+    try:
+        tables = build_tables()
+    except ModuleNotFoundError as error:
+        raise ImportError(f"the tables of {_GRAMMAR} are not built, and lark is missing: pip install lark") from error
+    with suppress(OSError):  # a folder that may not be written: the next process builds them again
+        _write(tables)
+    return tables
+
+
+def write_tables() -> None:
+    """Build the tables and put them beside the grammar; raises OSError, and lark's GrammarError."""
+    _write(build_tables())
+
+
+def _write(tables: Tables) -> None:
+    """Whole or not at all: other processes may read meanwhile."""
+    partial = _TABLES.with_suffix(f".{os.getpid()}")
+    fingerprint = _fingerprint(_GRAMMAR.read_text(encoding="utf-8"))
+    partial.write_text(_BREAK.join((fingerprint, *tables)), encoding="utf-8")
+    partial.replace(_TABLES)
+
+
+def _fingerprint(grammar: str) -> str:
+    """By which tables know the grammar that they are of."""
+    return f"{zlib.crc32(grammar.encode()):08x}"
+
+
+def build_lark(*, strict: bool = False) -> Any:
+    """Lark's parser of `sd.lark`; strict (it needs interegular): raises lark's GrammarError where it has a conflict."""
     from lark import Lark
 
-    text = (_HERE / "sd.lark").read_text(encoding="utf-8")
-    return Lark(text, parser="lalr", lexer="contextual", strict=True, start="start", maybe_placeholders=True)
+    text = _GRAMMAR.read_text(encoding="utf-8")
+    return Lark(text, parser="lalr", lexer="contextual", strict=strict, start="start", maybe_placeholders=True)
 
 
-def table_text() -> str:
-    """The text of `table.py`."""
-    lark = build_lark()
+def build_tables(*, strict: bool = False) -> Tables:
+    """The tables, built by lark; strict: as of `build_lark`."""
+    lark = build_lark(strict=strict)
     kinds = {terminal.name: _kinds(terminal) for terminal in lark.terminals}
     kinds["$END"] = ("<end>",)
     # lark has no public view of its automaton
@@ -67,7 +126,13 @@ def table_text() -> str:
             by_action.setdefault(code, set()).update(kinds[symbol])
         states.append(_numbered(by_action, lookaheads))
         gotos.append(tuple(sorted(goto)))
-    return _print(states, gotos, list(rules), lookaheads, number[automaton.end_states["start"]])
+    return Tables(
+        final=str(number[automaton.end_states["start"]]),
+        lookaheads="\n".join(" ".join(terminals) for terminals in lookaheads),
+        rows="\n".join(" ".join(f"{action}:{number}" for action, number in row) for row in states),
+        gotos="\n".join(" ".join(f"{left}:{target}" for left, target in row) for row in gotos),
+        rules="\n".join(map(_rule, rules)),
+    )
 
 
 def _kinds(terminal: Any) -> tuple[str, ...]:
@@ -131,42 +196,3 @@ def _rule(rule: Any) -> str:
     elif rule.alias is None and options.expand1 and len(children) == 1:
         name = "="
     return " ".join((rule.origin.name, str(len(rule.expansion)), name, *children))
-
-
-def _print(states: list[Any], gotos: list[Any], rules: list[Any], lookaheads: dict[Any, int], final: int) -> str:
-    """The module's text."""
-    rows = [" ".join(f"{action}:{number}" for action, number in row) for row in states]
-    moves = [" ".join(f"{left}:{target}" for left, target in row) for row in gotos]
-    lines = [
-        '"""Tables of the parser, generated from `sd.lark` by `grammar.py`: do not edit.',
-        "",
-        "Texts, not tuples, because a text costs nothing to compile; `automaton` decodes them.",
-        '"""',
-        "",
-        "# ruff: noqa: E501",
-        "",
-        f"FINAL = {final}",
-        '"""The state that has read a whole file."""',
-        "",
-        *_block("LOOKAHEADS", [" ".join(terminals) for terminals in lookaheads]),
-        '"""Sets of terminals, one a line."""',
-        "",
-        *_block("ROWS", rows),
-        '"""For each state action:set, where the action is a state to shift to, or -1 - rule to reduce."""',
-        "",
-        *_block("GOTOS", moves),
-        '"""For each state left side:state."""',
-        "",
-        *_block("RULES", [_rule(rule) for rule in rules]),
-        '"""Left side, length, function, children: see `grammar._rule`."""',
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _block(name: str, rows: Iterable[str]) -> list[str]:
-    """A constant of lines."""
-    return [f'{name} = """\\', *rows, '"""']
-
-
-if __name__ == "__main__":
-    (_HERE / "table.py").write_text(table_text(), encoding="utf-8")

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.accuracy.options import Options, instants
 from sysdyn.runtime.integrate.request import COMPARED
 from sysdyn.runtime.model.description import Floats, Ints
@@ -29,7 +30,7 @@ step apart."""
 FEW = 48
 GOLDEN = 0.6180339887498949
 """Multiples of it modulo 1 fill an interval evenly and never regularly (Weyl's sequence)."""
-NEAR = 1e-9
+NEAR = tuning.INSTANT
 """Of the span: nearer to an instant at which the text jumps nothing is compared, for sides may differ by round-off."""
 KEPT = 10_000
 """Instants of rows up to which they are kept for the next run."""

@@ -26,7 +26,7 @@ from sysdyn.values import dataclass
 RUNS = 7
 TENTH = 0.1
 """Of the tolerance of a draft as loose as any: a run with less need not follow."""
-RETRIED = (1.0, 0.1, 1e-2)
+RETRIED = tuple(10.0**-k for k in range(3))
 """Of the tolerance of a first run: the next ones where it fails; the last of a draft is tame."""
 WORTH = 0.3
 """Of the last tolerance: a run with more than that says little beside it."""

@@ -8,6 +8,7 @@ one of the runs is good by chance, and the last is as much better than the first
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.accuracy.laws import Law
 from sysdyn.runtime.accuracy.pairs import Sampled, before_fronts, difference, left_at_rest, passed_over
 from sysdyn.runtime.model.description import Floats
@@ -55,7 +56,7 @@ AT_EVENTS, SLOW, STALLS = 0.2, 0.5, 0.5
 what this does); a power measured, below which no smaller tolerance is credited, for knocks make of errors what they
 make of phases; part of the difference before, from which on a pair does not show that errors fall, and the next is not
 believed on its own (play: 0.17, 0.18, 0.0055 of runs that were 0.016 off), unless it agrees BY_FAR better."""
-BY_FAR = 1e-3
+BY_FAR = tuning.SMALL
 OTHERS, GROWN = 0.1, 1.3
 """Part of the events by which two runs differ, and times the steps that the smaller tolerance asks of the order, from
 which on the finer run has met what the other has not seen: nothing is credited then.  Of 1329 runs of knocks, clutches

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.values import dataclass
 
 COARSEST = 1e-2
@@ -12,7 +13,7 @@ LOOSEST = 1e-1
 """Tolerance of a draft at most."""
 SAFETY = 2.5
 """Of the estimate: the instants of comparison miss some of the largest error."""
-FAR = 1e-2
+FAR = tuning.PERCENT
 """Of a draft's tolerance: a run with less says nothing of itself by its difference from it."""
 SHORT_CREDIT = 0.85
 """What is left of the credit of runs so short that their errors do not follow their tolerances as theory says."""

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.scales import alike
@@ -24,9 +25,9 @@ from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.numerics.points import uniform
 
-PIVOT = 0.1
+PIVOT = tuning.PIVOT
 """Of the largest entry of its column, equilibrated: what may pair an unknown with a row (a usual threshold pivot)."""
-HOPS = 3
+HOPS = tuning.HOPS
 """Pairs in a row along which a nominal value is handed on: balance, momentum, flow."""
 STEP, TRIES = 2.0**-12, 3
 """Of the nominal values: the step of a slope; directions in which it is taken, so that no two moves cancel in all."""

@@ -11,18 +11,19 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.values import dataclass
 
 UNSEEN, ALIKE = 100.0, 0.3
 """A quantity that was so many times larger than at any instant of comparison did something between them: two runs must
 agree on how large it was within this part."""
-TIMING, SHARE = 1e-9, 1e-3
+TIMING, SHARE = tuning.INSTANT, tuning.SMALL
 """Of the span: the time tolerance of comparisons, as that of `diff`; and of the accuracy asked at most."""
 RUNAWAY = 1e3
 """Times the round-off of a run: that of the next one is not believed to be more (a step of 1e-17 s, thrown off by an
 exponential, leaves magnitudes beside which everything is zero)."""
-LOST = 0.01
+LOST = tuning.PERCENT
 """Of what it is: where two runs differ by more they hardly share a digit."""
 FALLS, FAINT = 0.3, 100.0
 """Of a quantity that is zero: of its largest in the run before at most; times what is round-off beside its unit."""

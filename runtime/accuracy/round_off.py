@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.judgement import EPS, Estimate
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import SolverFailure
@@ -25,7 +26,7 @@ Point = tuple[float, Floats, Floats]
 STEPS = (2.0**-26, 2.0**-12)
 """Of the unknowns: what slopes are taken over."""
 TRIES = 3
-FAR = 1e-3
+FAR = tuning.SMALL
 """By chance moves of several unknowns cancel to so little of what they are in other directions hardly ever."""
 ROUNDED = EPS / 4.0
 """Of a number: what rounding it mostly leaves out."""

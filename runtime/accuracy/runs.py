@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.accuracy.accounts import Accounts
 from sysdyn.runtime.accuracy.common_instants import Instants
 from sysdyn.runtime.accuracy.compared import Compared
@@ -31,7 +32,7 @@ from sysdyn.runtime.trace.keeping import Held, Writer, keeping
 from sysdyn.runtime.trace.trace import Column, Layout, Trace, columns_of
 from sysdyn.values import dataclass
 
-ROUGH = 1e-2
+ROUGH = tuning.PERCENT
 """Of the tolerance: scaled residual of rows by which runs are compared."""
 APART = 0.1
 """Of a step: rows of a draft are no nearer to each other.  With one a step the rows between the steps of others are not

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.comparison.curve import (
     Curve,
     Flags,
@@ -33,7 +34,7 @@ BLOCK = 1 << 16
 """Cells at a time: about 30 arrays of half a megabyte."""
 FIRST = 64
 """Cells beyond the limit that are judged by the tube at first: most often they decide."""
-SLIVER = 1e-3
+SLIVER = tuning.SMALL
 """Part of a cell by which cells of both traces differ at most that are one cell."""
 
 

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.comparison.curve import Curve, Floats, Ints, bernstein, whole_cells
 
-CLOSE = 1e-9
+CLOSE = tuning.INSTANT
 """Of the span: rows nearer than this are the two sides of a jump or kink."""
 
 

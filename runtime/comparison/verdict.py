@@ -6,6 +6,7 @@ import math
 from dataclasses import field, replace
 from typing import Protocol
 
+from sysdyn.runtime import tuning
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.values import dataclass
 
@@ -27,7 +28,7 @@ class Tolerance:
         return replace(self, rtol=share * self.rtol, atol=share * self.atol)
 
 
-SHARE = 1e-9
+SHARE = tuning.INSTANT
 """Of the span: the default tau.  Instants of two programs differ by rounding, not by more."""
 
 

@@ -15,6 +15,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.condense.composition import places_of, ranges
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.forms import FORMS
@@ -24,11 +25,11 @@ from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
-HEALTHY = 1e-7
+HEALTHY = tuning.OPEN
 """Least pivot, in the largest entry of its row with equilibrated columns: what it defines has these digits less.  Where
 a row reads one unknown else, which carries the state, and no constant, it is a multiple of that and has all its digits
 (the voltage of a capacitor of 1 pF, whose charge stays)."""
-NOISE = 1e-13
+NOISE = tuning.BY_FACTORS
 """Of the largest term of a row at the start: what is less there may be round-off, and nothing is said by it."""
 OBSERVERS = ("observe", "observe_rate", "observe_scale", "audit", "ledger", "initial")
 LONGEST = 12

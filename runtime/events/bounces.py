@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Contact
 from sysdyn.runtime.model.description import Floats
@@ -19,7 +20,7 @@ from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.start.restart import Restart
 from sysdyn.values import dataclass
 
-PART = 1e-3
+PART = tuning.SMALL
 """Of the time in which the unknowns change: how far ahead a motion is looked at."""
 SEEN = 10.0
 """Times zero: what rises less may be passed over."""

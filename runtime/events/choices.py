@@ -8,13 +8,14 @@ observed of it follows from which: the motion does not.
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.points import normal
 
-SAME = 1e-9
+SAME = tuning.SAME
 """Of what a move anywhere changes: what one along an open direction may change by round-off."""
 
 

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.inequalities import BEYOND, BODIES, Inequalities
 from sysdyn.runtime.events.mates import mates
 from sysdyn.runtime.events.observer import Observer
@@ -21,9 +22,9 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.system import System
 
-FAINT = 1e-3
+FAINT = tuning.SMALL
 """Of the magnitude of an unknown."""
-UNTOLD = 1e-9
+UNTOLD = tuning.SAME
 """Change of a bound by reactions of one that is round-off."""
 
 BESIDE = 1e-20

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting, Settle
 from sysdyn.runtime.model.description import Floats
@@ -22,15 +23,15 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, factors
 from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed, sure_solver
 
-DENSE = 300
+DENSE = tuning.DENSE
 """Unknowns up to which matrices are full; larger models are taken as they come."""
-NOTHING = 1e-9
+NOTHING = tuning.SAME
 """Of a unit vector: a contact's share of what is open."""
-SAME = 1e-4
+SAME = tuning.SLIGHT
 """Of the largest flow, or rate of one: what a point found with another set may differ by, and is the same."""
 ALIKE = 9
 """Digits to which shares are compared."""
-GENERIC = 0.7310585786300049
+GENERIC = tuning.GENERIC
 """Of dF/dyd beside dF/dy: at it a regular pencil is a regular matrix."""
 
 SMALL = 60

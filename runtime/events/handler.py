@@ -12,6 +12,7 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.bounces import LEAST, PART, begun, flights, new
 from sysdyn.runtime.events.choices import Choices
 from sysdyn.runtime.events.conditions import Conditions, Round, with_momenta
@@ -40,14 +41,14 @@ SOON = 2
 """Of these, after which the handler is asked about each."""
 RECENT = 64
 """Entries of what happened, several of which may be of one instant."""
-BY_CHANCE = 0.01
+BY_CHANCE = tuning.PERCENT
 """Of the gap between two events before: one that is so much shorter has other reasons than theirs."""
 SHRINKING, NO_TIME = 8, 1e5
 """Events in a row, each of which follows sooner than the one before, until it does within so many spacings of t: their
 instants have a limit (Zeno), behind which the text says nothing."""
-HELD = 1e-9
+HELD = tuning.SAME
 """Of what counts as zero: what has stayed below it for a time is held there."""
-STOPPED = 1e-6
+STOPPED = tuning.UNSEEN
 """Of what it was: a flow that an event leaves is no flow any more."""
 
 Standing = tuple[Floats, NDArray[np.bool_]]

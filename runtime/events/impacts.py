@@ -16,6 +16,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.pivoting import TRIALS, NoActiveSetError
 from sysdyn.runtime.model.description import Floats
@@ -25,7 +26,7 @@ from sysdyn.runtime.model.system import System
 UNSEEN = 16.0 * float(np.finfo(float).eps)
 """Of the terms of a gap: a flight lower than that."""
 
-FED = 1e-3
+FED = tuning.SMALL
 """Of the work of impulses there and back: more than round-off, and than flows miss their aims by."""
 
 Strike = Callable[[float, Floats, Floats, Floats], tuple[Floats, Floats]]

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import switch_rows
@@ -20,19 +21,19 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import decomposed
 
-DENSE = 300
+DENSE = tuning.DENSE
 """Unknowns up to which matrices are full; of larger models nothing is told."""
 REGULAR = 3e-15
 """The least singular value of a regular matrix, of rows and columns of size 1."""
-PIVOT = 1e-11
+PIVOT = tuning.DEPENDENT
 """Of the largest entry of a column: what is less is no pivot."""
 PIVOTS = 10
 """Of Lemke's method, an inequality."""
-SHARE = 1e-9
+SHARE = tuning.SAME
 """Of a unit vector: a row's part in what is open."""
 ROUND_OFF = 1e-15
 """Of the terms of a value: what is less is nothing."""
-ALIKE = 1e-12
+ALIKE = tuning.CANCELS
 """Of a ratio: two that differ by less are one."""
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.plan import Contact
 from sysdyn.runtime.model.description import Floats
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 BODIES = 4.0
 """Inertias that a contact may stop at once, of the one that its largest multiplier and rate tell."""
-BEYOND = 1e-6
+BEYOND = tuning.UNSEEN
 """Of the largest value of a gap: one that is less than nothing by more has jumped, and does not stay where it is."""
 
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Happened, Kink
 
@@ -24,7 +25,7 @@ LIVE, ABOVE, BELOW, SLIDES, RESTS = 0.0, 1.0, -1.0, 2.0, 3.0
 WORDS = {LIVE: "= 0", ABOVE: "> 0", BELOW: "< 0", SLIDES: "slides", RESTS: "= 0"}
 TURNS = 4
 """Of one kink at one instant: more, and its branches contradict each other."""
-FULL = 1e-9
+FULL = tuning.SAME
 """Of a sense: what it may pass its end by."""
 
 

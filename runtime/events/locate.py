@@ -10,13 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import _core, tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.values import dataclass
 
-PARTS = 4
+PARTS: int = _core.SD_PARTS
 """Of a step, as core/run/run.h looks at it."""
 ITERATIONS = 60
-AT_ONCE = 1e-6
+AT_ONCE = tuning.UNSEEN
 """Of what is searched: a moment."""
 
 Numbers = NDArray[np.int64]

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import switch_rows
@@ -27,9 +28,9 @@ from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
 
 LARGE = 800
 """Unknowns up to which full matrices are decomposed."""
-GENERIC = 0.7310585786300049
+GENERIC = tuning.GENERIC
 """Of dF/dyd beside dF/dy: at it a regular pencil is a regular matrix."""
-SAME = 1e-8
+SAME = tuning.HALF_OF_ITS_DIGITS
 """Of a unit vector: what lies outside a space that it belongs to."""
 ROUNDS = 20
 

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import _core, tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
 
-SMALL = 1e-9
+SMALL = tuning.SAME
 """Of the largest value and terms met of a row: what is less is zero."""
-ROUNDING = 4.0 * float(np.finfo(float).eps)
+ROUNDING: float = _core.ROUNDING
 """Of the terms of a value: what a sum of a few is rounded by.  Unknowns that are solved for are known to SMALL only."""
 TIMED, ASSIGNED = 2, 1
 LEAST = 1e-24

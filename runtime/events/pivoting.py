@@ -26,7 +26,7 @@ MANY = 2
 """Diodes that change at once, at least: fewer are turned one by one."""
 TRIALS = 20
 """Trials a contact, beside TRIALS for all."""
-AHEAD = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
+AHEAD = tuple(10.0**-k for k in range(7, 2, -1))
 """Of the time in which the unknowns change: how long an implicit step is that tells active sets apart, the shortest
 first: what leaks decide about is behind it, what has moved else is less than an error.
 """

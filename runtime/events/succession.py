@@ -22,7 +22,7 @@ from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.start.instant import UnbalancedError
 from sysdyn.runtime.start.restart import Restart
 
-AHEAD = (1e-9, 1e-7, 1e-5, 1e-3)
+AHEAD = tuple(10.0**-k for k in range(9, 1, -2))
 """Of the time in which the unknowns change: how far ahead a tie between active sets is looked at."""
 
 Point = tuple[Floats, Floats]

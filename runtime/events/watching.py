@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime import _core, tuning
 from sysdyn.runtime.events.bounces import Bounce
 from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.kinks import Kinks
@@ -16,9 +17,9 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
 
-NOTHING = 1e-12
+NOTHING = tuning.CANCELS
 """Of the span: no time."""
-FALLEN = 1e-4
+FALLEN: float = _core.FALLEN
 """Of what else counts as zero, and of the height of its flight: a gap that an impact opened closes again below it."""
 
 

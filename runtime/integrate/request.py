@@ -7,6 +7,7 @@ from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import _core
 from sysdyn.runtime.events.plan import Happened, Plan
 from sysdyn.runtime.integrate.rows.ledgers import Balance, Ledgers
 from sysdyn.runtime.model import core_library as lib
@@ -22,7 +23,10 @@ ON_UNDERLYING = ("dopri", "energy")
 OF_INDEX_ONE = ("rosenbrock",)
 """Methods that integrate equations of index 1 alone, as written or with constraints differentiated twice (form 1)."""
 
-TRACE, STEP, COMPARED, RELAXING = 1, 2, 4, 8
+TRACE: int = _core.SD_TRACE
+STEP: int = _core.SD_SAMPLE
+COMPARED: int = _core.SD_COMPARED
+RELAXING: int = _core.SD_RELAXING
 """Kinds of rows (their second column, a sum); RELAXING: compared, where something relaxes at once behind a
 restart; in the place of energies these have what core/run/compared.c (`relaxes`) tells."""
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.integrate.factors import Factors
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
@@ -29,9 +30,9 @@ from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.levels import undifferentiated
 from sysdyn.values import dataclass
 
-SMALL = 32
+SMALL = tuning.IN_THE_CORE
 """Unknowns up to which the core judges the matrix first (core/linear/dense/dense.h)."""
-DENSE = 300
+DENSE = tuning.DENSE
 """Unknowns up to which the matrix is judged by its singular values."""
 NONE = np.zeros(0, dtype=np.int32)
 _DERIVED = {"phi": "phi_acceleration", "phi_rate": "phi_acceleration", "psi": "psi_rate", "momentum": "momentum_rate"}

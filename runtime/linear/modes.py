@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.linear import precise
 from sysdyn.runtime.linear.precise import Decomposed
 from sysdyn.runtime.model.description import Floats
@@ -22,7 +23,7 @@ from sysdyn.runtime.numerics.rank import count, decomposed, singular_values
 from sysdyn.values import dataclass
 
 Complexes = NDArray[np.complex128]
-VANISHING = 1e-11
+VANISHING = tuning.DEPENDENT
 """A Markov parameter below this part of its factors' size is zero."""
 FAINT = 1e-24
 """The same beside the largest of its factors: a product of two round-offs."""

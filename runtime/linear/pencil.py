@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.linear import precise
 from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced, Wide, lost
 from sysdyn.runtime.model.description import Floats
@@ -21,11 +22,11 @@ from sysdyn.runtime.numerics.equilibrate import factors
 from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed, null_space, singular_values
 from sysdyn.values import dataclass
 
-CLOCKS = (0, 3, 6, 9, 12, -3, -6)
+CLOCKS = (*range(0, 15, 3), *range(-3, -9, -3))
 """Powers of ten of the units of time that are tried, 1/s."""
 WIDEST = 60
 """Unknowns up to which the pencil is parted in many digits."""
-SHIFT = 0.7391
+SHIFT = tuning.NO_EIGENVALUE
 """Of the size of rates: a point that is no eigenvalue."""
 DOUBLINGS, DEEPEST = 2, 4
 """M^4 is zero on what follows from inputs: no index is higher."""

@@ -14,6 +14,7 @@ from typing import Any
 import mpmath
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.values import dataclass
 
@@ -26,21 +27,21 @@ COUNTED = 1000.0
 N/m is a number as any other."""
 NOTHING = 1e-80
 """A pivot, in DIGITS: what is below is zero."""
-UNCERTAIN = 1e-2
+UNCERTAIN = tuning.PERCENT
 """Relative change with the round-off of G (ten times a true one) from which a difference is round-off."""
 DEPENDENT = 1e-60
 """Of a row, in DIGITS: what is left of it is round-off."""
 ZERO = 1e-40
 """An eigenvalue relative to the largest entry, in DIGITS."""
-STEADY = 1e-11
+STEADY = tuning.DEPENDENT
 """Relative change with the round-off of G up to which eigenvalues in double precision are believed."""
-DETERMINED = 1e-4
+DETERMINED = tuning.SLIGHT
 """The same of eigenvalues in DIGITS: a threefold root moves by the cube root of round-off."""
-LOST, CROWDED = 1e-6, 1e6
+LOST, CROWDED = tuning.UNSEEN, 1e6
 """Change of an eigenvalue in double precision for which it is refused, where it stands below 1e-4 of the largest."""
-ROUND_OFF = 1e-13
+ROUND_OFF = tuning.BY_FACTORS
 """Of the largest: an eigenvalue at zero that round-off may have moved; the n-th root of it where n of them are."""
-CANCELS = 1e-12
+CANCELS = tuning.CANCELS
 """Relative distance of a zero to a pole, the round-off of G."""
 MOST = 24
 """States up to which modes are taken in DIGITS."""

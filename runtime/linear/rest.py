@@ -19,6 +19,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.linear.states import quadratures
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
@@ -34,13 +35,13 @@ from sysdyn.runtime.start.starter import Starter
 from sysdyn.values import dataclass
 
 Mask = NDArray[np.bool_]
-MET = 1e-9
+MET = tuning.SAME
 """Largest row, relative to its terms, of a state of rest."""
-SAME = 1e-6
+SAME = tuning.UNSEEN
 """Distance of two states of rest, in magnitudes, below which they are one."""
-PIECES, PIECE, SHORTEST = 60, 0.2, 1e-3
+PIECES, PIECE, SHORTEST = 60, 0.2, tuning.SMALL
 """Steps from one state of rest to another along those between; the longest and the shortest of them in magnitudes."""
-NEAR, NOISE = 1e-9, 1e-13
+NEAR, NOISE = tuning.SAME, tuning.BY_FACTORS
 """Parts of a magnitude, and of the largest of its kind and unit, that are tried as zero."""
 FAR = 1e9
 """Times its magnitude: a displacement that is left open and has wandered off."""
@@ -48,7 +49,7 @@ SHARE, SOUGHT = 0.05, 5
 """Of the work that a search for a start may take: that of one search for rest; points that may take all of it while no
 state is known (a twentieth is two iterations of a large model).
 """
-STRAIGHT = 1e-10
+STRAIGHT = tuning.MET
 """Of its terms: by how much a row may miss its tangent at a point that lies on the straight piece of another."""
 MANY = 20_000
 """Unknowns up to which random points are tried: far from the guess factors of a line of 80000 took 6 GB."""

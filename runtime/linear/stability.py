@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.linear.modes import Mode, balanced, modes
 from sysdyn.runtime.linear.tangent import Reduced
 from sysdyn.runtime.model.description import Floats
@@ -22,9 +23,9 @@ from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.values import dataclass
 
-STILL = 1e-7
+STILL = tuning.OPEN
 """Real part of an eigenvalue, relative to the largest one, that decides nothing: half the digits of a double root."""
-FLAT = 1e-9
+FLAT = tuning.SAME
 """Of the largest stiffness: what is below is none."""
 
 

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.linear import precise
 from sysdyn.runtime.linear.states import Mask, candidates_of, chosen_states, pivots, rank_of
 from sysdyn.runtime.model.description import Floats
@@ -48,9 +49,9 @@ WIDEST = 150
 """Unknowns and rates up to which states are chosen in many digits."""
 FEW = 200
 """The same from which on rank is told by factors where these leave no doubt, and by singular values where they do."""
-NOISE = 1e-13
+NOISE = tuning.BY_FACTORS
 """Of the largest variation, in equilibrated unknowns: what is smaller is round-off of the solution."""
-PASSES, MOVES = 2, 1e-13
+PASSES, MOVES = 2, tuning.BY_FACTORS
 """Of the scaling of unknowns; the part of a unit vector that is no round-off."""
 ORDERS = 4
 """Slopes by an input are taken by its integral, itself, its rate and its second rate."""

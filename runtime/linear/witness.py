@@ -15,6 +15,7 @@ from typing import Any
 
 import mpmath
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.linear.precise import DETERMINED, Values, shaken, subtract
 from sysdyn.runtime.model.description import Floats
 from sysdyn.values import dataclass
@@ -26,9 +27,9 @@ FAR = 30
 """Power of ten of the rates (1/s) at which the first and the last term stand alone."""
 CANCELLED = 1e-200
 """Of the terms of a difference: it is zero.  A pencil of index 4 cancels to the fourth power of FAR."""
-AGREE = 1e-6
+AGREE = tuning.UNSEEN
 """Relative difference of the products of eigenvalues."""
-BEYOND, SHIFT = 3, 0.7391
+BEYOND, SHIFT = 3, tuning.NO_EIGENVALUE
 """Decades beyond the eigenvalues in which determinants are compared at each, and their distance farther out; of the
 points, so that none is an eigenvalue."""
 CONTRAST = 1e10

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, stated
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import RANK
@@ -16,9 +17,9 @@ from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.settled import Settler
 
 Mask = NDArray[np.bool_]
-AGREES = 1e-12
+AGREES = tuning.CANCELS
 """Of its magnitude: an initial value that moved by less did not move."""
-OPEN = 1e-7
+OPEN = tuning.OPEN
 """Component of a null vector of unit length from which an unknown is open."""
 LARGEST = 400
 """Unknowns with their rates that are looked at: full matrices."""

@@ -16,7 +16,7 @@ from sysdyn.values import dataclass
 DONE = 0
 WHY = ("", "start", "structure", "stopped", "accuracy", "energy", "claim")
 """What kept a run from a result, by its state."""
-END, EXTREMA, TRACES, ROWS = 0, 1, 2, 3
+END, EXTREMA, TRACES, ROWS = range(4)
 """What is kept of a run: end values alone, least and largest too, some rows of its trace too; all rows of the last one,
 which is then handed back as a trace."""
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.accuracy import pairs
 from sysdyn.runtime.accuracy.control import DRAFT, Achieved
 from sysdyn.runtime.accuracy.laws import FEW_STEPS, Law
@@ -40,7 +41,7 @@ from sysdyn.runtime.trace.trace import Parameter, Trace
 
 MOST = 48
 """Instants of comparison that are taken of a run's steps, at most twice that (core/run/many/many.c)."""
-COUNTS = 1e-9
+COUNTS = tuning.SAME
 """Of the largest entry of a row: what is less is round-off, or may as well vanish."""
 MARGIN, LOOSER = 0.1, 3.0
 """Of the accuracy asked: what the nominal run's estimate may be; how much its tolerances are loosened at most."""

@@ -6,11 +6,13 @@ import ctypes as c
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import _core
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
-LARGEST, CAPPED = 1, 2
-"""SD_LARGEST, SD_CAPPED."""
+LARGEST: int = _core.SD_LARGEST
+CAPPED: int = _core.SD_CAPPED
+"""How proposals of a row are taken (core/start/magnitudes.h)."""
 
 
 class Balance:

@@ -16,12 +16,13 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import _core
 from sysdyn.runtime.model.core_library import ROWS, reader
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import ContractError
 from sysdyn.values import dataclass
 
-CONTRACT = 3
+CONTRACT: int = _core.SD_CONTRACT
 _VIEWS = 256
 """Addresses whose views a callback remembers: a few buffers recur for ever, others are passing."""
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime import _core  # type: ignore[attr-defined]
+from sysdyn.runtime import _core
 from sysdyn.runtime.model.structures.linear import Linear, Order
 from sysdyn.runtime.model.structures.run import (
     COUNTERS,

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints, Places
 from sysdyn.runtime.model.system import System
 
 Entries = tuple[Places, Places, Floats]
 
-CANCELS = 1e-12
+CANCELS = tuning.CANCELS
 """Sum of a column of M over that of its magnitudes that is round-off."""
 
 

@@ -22,6 +22,7 @@ import ctypes as c
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Floats, Ints
@@ -30,11 +31,11 @@ from sysdyn.runtime.model.patterns import Pattern, read_only
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.values import dataclass
 
-ROUND_OFF = 1e-12
+ROUND_OFF = tuning.CANCELS
 """Of the largest quantity of the same unit: smaller ones are what is left of a zero."""
 UNKNOWN = 1.0
 """Magnitude of what is zero with all that could size it."""
-GROUP = 1e-3
+GROUP = tuning.SMALL
 _SAMPLES = 16
 _PARTS = np.array([1e-6, *((np.arange(_SAMPLES) + 0.618) / _SAMPLES)])
 """Of the span: where rows are asked how far they moved, the first to tell how fast."""

@@ -16,7 +16,7 @@ from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
 
-LADDER = (1e-4, 1e-8, 1e-12, 1e-16, 1e-20, 1e-24)
+LADDER = tuple(10.0**-k for k in range(4, 28, 4))
 """Of the largest unknown of its kind and unit: how far beside the point slopes are looked at."""
 FALLS = 0.1
 """Of the slope at one of these distances: what is left of it at the next, at most (of the power 1.25)."""

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 
-SMALL = 32
+SMALL = tuning.IN_THE_CORE
 """Rows and columns up to which the core does it (core/linear/dense/dense.h): calls cost more than arithmetic."""
 SWEEPS = 8
 """The distance to one is halved in its logarithm by each: 1e200 becomes 6."""

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES, Mask, in_order, least_norm
@@ -31,14 +32,14 @@ _FOLDS = 709
 """Iterations that an exponential, falling by e in each, takes from the largest number: as long as rows shrink as fast
 as their terms do none is counted."""
 _HALVINGS, _FLATTEST = 12, 1023
-STRAIGHT = 1e-9
+STRAIGHT = tuning.SAME
 """Of rows at the middle of a way: what they may be off the mean of those at its ends and count as linear along it."""
 _LOST = 3
 """Directions one after the other along which no step makes the rows smaller: the next ones do not either."""
 _ROUND_OFF = 2e-15
 _ROUNDINGS = 8.0
 """Times the unit round-off of its terms by their slopes: what evaluating a row of several operations may be off by."""
-_BESIDE = 1e-8
+_BESIDE = tuning.HALF_OF_ITS_DIGITS
 """Scaled rows below which round-off alone can keep them from shrinking."""
 
 

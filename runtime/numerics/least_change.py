@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors, sparse_factors
@@ -24,15 +25,15 @@ SINGULAR_VALUES = 120
 """Unknowns up to which singular values are used."""
 DENSE = 400
 """Unknowns up to which matrices are full (no SciPy)."""
-RANK = 1e-11
+RANK = tuning.DEPENDENT
 """Singular values below this part of the largest belong to redundant rows."""
-EPS = 1e-13
+EPS = tuning.BY_FACTORS
 """Of redundant rows in the saddle-point system, relative to rows of size one: above the round-off of its pivots."""
 NORM = RANK**2 / EPS
 """Weight of the norm there for rows that leave little.  Singular values below the root of NORM EPS pass for redundant,
 as below RANK, and the system is as well conditioned as the rows, not as their squares (Bjorck, BIT 7, 1967); of the
 least norm it knows seven digits."""
-MET = 1e-10
+MET = tuning.MET
 """Of the aim: what a solution of the linearised rows may miss before another way is tried."""
 FAR = 0.1
 """Part of what the first way misses from which another is taken though it does not meet the rows either."""

@@ -13,14 +13,15 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.numerics.equilibrate import SMALL
 
-TOLERANCE = 1e-9
+TOLERANCE = tuning.SAME
 """Singular values below this part of the largest count as zero."""
-CERTAIN = 1e-12
+CERTAIN = tuning.CANCELS
 """The same where a model is refused for it: what is above may be a true, if bad, conditioning."""
 
 REMEMBERED, DECOMPOSITIONS = 120, 256

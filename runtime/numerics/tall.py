@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
@@ -21,11 +22,11 @@ from sysdyn.runtime.numerics.products import pieces
 from sysdyn.values import dataclass
 
 Entries = tuple[Any, Any, Floats]
-PIVOT = 1e-8
+PIVOT = tuning.HALF_OF_ITS_DIGITS
 """Least pivot, as part of its column, of an unknown that rows determine; with less the least norm has a say."""
 FILLED = 12
 """Entries of factors for one of the matrix from which those of the saddle point are no worse."""
-OPEN = 1e-6
+OPEN = tuning.UNSEEN
 """Of a unit vector: a part of it that is open."""
 MEMORY = 2
 """What the core answers where it has none."""

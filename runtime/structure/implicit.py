@@ -8,6 +8,7 @@ regular beside it.  Of an element's own law that is monotone nothing is asked: a
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.scales import balanced
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
@@ -15,7 +16,7 @@ from sysdyn.runtime.structure.structure import Structure, null_place
 
 DENSE = 600
 """Unknowns up to which null vectors are taken."""
-BESIDE = 1e-6
+BESIDE = tuning.UNSEEN
 """Of its size, how far beside: a slope there is no round-off, and the exponential of a diode notices little."""
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.inertia import inertia, own_inertia
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
 
-DENSE = 300
-NEGATIVE = 1e-9
+DENSE = tuning.DENSE
+NEGATIVE = tuning.SAME
 """Eigenvalues below minus this part of the largest are negative."""
 
 

@@ -14,6 +14,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.switches import Switches
 from sysdyn.runtime.model.system import System
@@ -21,11 +22,11 @@ from sysdyn.runtime.numerics.rank import decomposed
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import nearby, reactions
 
-MOST = 300
+MOST = tuning.DENSE
 """Constraints up to which the choice follows the motion."""
-SOME = 1e-8
+SOME = tuning.HALF_OF_ITS_DIGITS
 """Of a unit vector: a constraint's share of what depends."""
-APART = 1e-3
+APART = tuning.SMALL
 """Singular values of what depends, as part of those of what does not: near where more depends nothing is told."""
 TURNED = 2.0
 """A coefficient of one that holds, of those left out, from which these are chosen anew."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.inertia import with_flows
 from sysdyn.runtime.model.system import System
@@ -18,7 +19,7 @@ from sysdyn.runtime.numerics.points import uniform
 from sysdyn.runtime.numerics.tall import free_unknowns
 from sysdyn.runtime.start.start import ConsistentState
 
-MOVED = 1e-3
+MOVED = tuning.SMALL
 """Relative move of the start: a coefficient that vanishes there by chance does not vanish beside it."""
 
 

@@ -13,6 +13,7 @@ import ctypes as c
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Places, compress
@@ -30,16 +31,16 @@ from sysdyn.values import dataclass
 
 Longs = NDArray[np.int64]
 NONE = np.zeros(0, dtype=np.int32)
-NOISE = 1e-11
+NOISE = tuning.DEPENDENT
 """Entries below this part of the largest of their row are what is left of a zero."""
 POINTS = 3
 AMPLITUDES = (3e-2, 1e-3, 1e-5)
 """Of the displacements, to come to a nearby point."""
-BESIDE = 1e-3
+BESIDE = tuning.SMALL
 """Amplitude of the displacements to points beside the start, off phi."""
 NEAR = 10.0
 """Amplitudes: what the way back onto phi leads farther than this may be another singular point."""
-PIVOT = 1e-3
+PIVOT = tuning.SMALL
 """Of rows scaled to one: an entry that makes a row independent beyond doubt."""
 
 

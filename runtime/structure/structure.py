@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
@@ -26,28 +27,28 @@ from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanished
 from sysdyn.values import dataclass
 
-DENSE = 300
-SMALL = 32
+DENSE = tuning.DENSE
+SMALL = tuning.IN_THE_CORE
 """Unknowns up to which the core looks at a pencil first (core/linear/dense/dense.h)."""
 MAX_INDEX, USUAL = 6, 2
 """An index up to USUAL is believed at once.  Where entries lie far apart ranks come out too small, and it too large
 (operational amplifiers: 4 for 2): then it is the least of that as written and that in sizes of the unknowns.
 """
-ROUSED = 1e-2
+ROUSED = tuning.PERCENT
 """Slopes of steep laws, as part of the largest term of their row, where only structure is asked."""
 
-GENERIC = 0.7310585786300049
+GENERIC = tuning.GENERIC
 POINTS = tuple(GENERIC * 10.0**power for power in (3, -3, 6, -6, 9, -9))
 """At which a pencil is looked at, after equilibration: at GENERIC first."""
-RATES = (1e16, 1e12, 1e8, 1e4)
+RATES = tuple(10.0**k for k in range(16, 0, -4))
 """cj (1/s) at which the growth of the inverse is asked for: the first one that tells."""
 CLEAR = 0.1
 """What a growth may miss a power of cj by, in decades a decade."""
-RESOLVED = 1e-9
+RESOLVED = tuning.SAME
 """Least pivot, as part of its column, of factors that tell: where cj is too large, sums of rows in which the rates
 cancel are round-off."""
 SIDES = 2
-BESIDE = 1e-3
+BESIDE = tuning.SMALL
 """Of their magnitudes: how far beside a point what it leaves open is looked at."""
 WAYS = 6
 SLIDES = 2.0

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.names import stored
+from sysdyn.runtime import _core
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Description, Floats
 from sysdyn.runtime.model.failures import TraceError
@@ -25,7 +26,7 @@ from sysdyn.runtime.trace.locks import lock, unlock
 from sysdyn.values import dataclass
 
 BLOCK = 1024
-BEFORE = 8
+BEFORE: int = _core.SD_ROW_HEAD
 """Numbers of a row before its quantities (core/run/run.h)."""
 HEAD = 1 << 16
 """Bytes for what is not numbers."""

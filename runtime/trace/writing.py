@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
@@ -22,7 +23,7 @@ from sysdyn.runtime.trace.interruptions import uninterrupted
 from sysdyn.runtime.trace.opening import destination
 from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Store, input_output
 
-UNCHANGED = 1e-9
+UNCHANGED = tuning.SAME
 """Part of the stored energy that is no energy turned over: its balance is round-off."""
 FLUSH_SECONDS = 0.8
 """Flushed at least every second of wall time: rows arrive about every 50 ms."""

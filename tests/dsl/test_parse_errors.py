@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from sysdyn.dsl.parser import complaints
+from sysdyn.dsl.parser.grammar import load_tables
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.codes import codes
 from sysdyn.dsl.text.source import SourceText
@@ -252,16 +253,15 @@ def test_a_second_sign_is_no_comment():
 
 
 def test_every_word_of_a_body_is_known_to_the_messages():
-    from sysdyn.dsl.parser.table import GOTOS, LOOKAHEADS, ROWS
-
-    sets = [line.split() for line in LOOKAHEADS.splitlines()]
+    tables = load_tables()
+    sets = [line.split() for line in tables.lookaheads.split("\n")]
     bodies = {
         "item": complaints.ITEM_WORDS,
         "role": complaints.DOMAIN_WORDS,
         "statement": complaints.MODEL_WORDS,
         "scene_statement": complaints.SCENE_WORDS,
     }
-    for row, goto in zip(ROWS.splitlines(), GOTOS.splitlines(), strict=True):
+    for row, goto in zip(tables.rows.split("\n"), tables.gotos.split("\n"), strict=True):
         for left, words in bodies.items():
             if f" {left}:" in f" {goto}":
                 terminals = {word for entry in row.split() for word in sets[int(entry.split(":")[1])]}

@@ -12,7 +12,7 @@
 #include <xmmintrin.h>
 #endif
 
-#define SD_LANES 4
+enum { SD_LANES = 4 };
 
 typedef double sd_lanes __attribute__((vector_size(8 * SD_LANES), aligned(8), may_alias));
 typedef int64_t sd_bits __attribute__((vector_size(8 * SD_LANES), aligned(8), may_alias));

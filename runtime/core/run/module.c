@@ -2,6 +2,15 @@
  * is asked some hundred times a run, and ctypes' own ways take five times as long. */
 #include <Python.h>
 
+#include "run/events/fits.h"
+#include "run/many/many.h"
+#include "start/magnitudes.h"
+#include "steppers/bdf/bdf.h"
+#include "steppers/energy/energy.h"
+#include "steppers/explicit/dopri.h"
+#include "steppers/radau/radau.h"
+#include "steppers/rosenbrock/rosenbrock.h"
+
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -39,9 +48,49 @@ static PyMethodDef functions[] = {
     {NULL, NULL, 0, NULL},
 };
 
+/* the layout of structures and arrays, and codes of kinds, which Python reads here */
+static const struct {
+    const char *name;
+    int value;
+} layout[] = {
+    {"SD_CONTRACT", SD_CONTRACT},
+    {"SD_NODES", SD_NODES},
+    {"SD_PAST", SD_PAST},
+    {"SD_MANY_COUNTERS", SD_MANY_COUNTERS},
+    {"SD_MANY_ROWS", SD_MANY_ROWS},
+    {"SD_ROW_HEAD", SD_ROW_HEAD},
+    {"SD_TRACE", SD_TRACE},
+    {"SD_SAMPLE", SD_SAMPLE},
+    {"SD_COMPARED", SD_COMPARED},
+    {"SD_RELAXING", SD_RELAXING},
+    {"SD_PARTS", SD_PARTS},
+    {"SD_JUMP", SD_JUMP},
+    {"SD_AUDIT_HEAD", SD_AUDIT_HEAD},
+    {"SD_LEDGER_ROWS", SD_LEDGER_ROWS},
+    {"SD_LARGEST", SD_LARGEST},
+    {"SD_CAPPED", SD_CAPPED},
+    {"SD_MAX_ORDER", SD_MAX_ORDER},
+    {"SD_ENERGY_STAGES", SD_ENERGY_STAGES},
+    {"SD_DOPRI_ALL", SD_DOPRI_ALL},
+    {"SD_DOPRI_DENSE", SD_DOPRI_DENSE},
+    {"SD_STAGES", SD_STAGES},
+    {"SD_PAIRS", SD_PAIRS},
+    {"SD_POINTS", SD_POINTS},
+    {"SD_UNPULLED", SD_UNPULLED},
+    {"SD_ROSENBROCK_STAGES", SD_ROSENBROCK_STAGES},
+    {"SD_ROSENBROCK_DENSE", SD_ROSENBROCK_DENSE},
+};
+
 static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "_core", NULL, -1, functions, NULL, NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit__core(void)
 {
-    return PyModule_Create(&definition);
+    PyObject *module = PyModule_Create(&definition);
+    for (size_t i = 0; module != NULL && i < sizeof layout / sizeof *layout; i++)
+        if (PyModule_AddIntConstant(module, layout[i].name, layout[i].value))
+            Py_CLEAR(module);
+    if (module != NULL && (PyModule_AddObject(module, "ROUNDING", PyFloat_FromDouble(ROUNDING)) ||
+                           PyModule_AddObject(module, "FALLEN", PyFloat_FromDouble(FALLEN))))
+        Py_CLEAR(module);
+    return module;
 }

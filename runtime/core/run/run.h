@@ -20,13 +20,13 @@
 #include "system/settle.h"
 #include "steppers/stepper.h"
 
-#define SD_ROW_HEAD 8
-#define SD_TRACE 1    /* kinds of a row (integrate/request.py): of the trace, */
-#define SD_SAMPLE 2   /* of a step, which is watched alone, */
-#define SD_COMPARED 4 /* that runs are compared by */
-#define SD_RELAXING 8 /* of these: where something relaxes at once within the first step behind a restart */
-#define SD_PARTS 4    /* of a step, at whose ends what is watched is looked at */
-#define SD_PAST 3     /* steps before the last one whose powers are known */
+enum { SD_ROW_HEAD = 8 };
+enum { SD_TRACE = 1 }; /* kinds of a row (integrate/request.py): of the trace, */
+enum { SD_SAMPLE = 2 }; /* of a step, which is watched alone, */
+enum { SD_COMPARED = 4 }; /* that runs are compared by */
+enum { SD_RELAXING = 8 }; /* of these: where something relaxes at once within the first step behind a restart */
+enum { SD_PARTS = 4 }; /* of a step, at whose ends what is watched is looked at */
+enum { SD_PAST = 3 }; /* steps before the last one whose powers are known */
 #define SD_FINEST 1024 /* parts of a step that what is watched does not follow in fewer */
 
 enum sd_state { SD_RUNNING = 0, SD_FINISHED = 1, SD_FULL = 2, SD_FAILED = 3, SD_EVENT = 4 };

@@ -13,7 +13,7 @@
 
 #include <float.h>
 
-#define SD_NODES 7
+enum { SD_NODES = 7 };
 
 enum sd_cause {
     SD_FINE = 0,

@@ -5,7 +5,7 @@
 
 #include "system/settle.h"
 
-#define SD_BASIS_OUT (1 << 20) /* refusals of a basis that is not tried any more: it fills too much */
+enum { SD_BASIS_OUT = 1 << 20 }; /* refusals of a basis that is not tried any more: it fills too much */
 
 /* A basis without a pattern yet, the columns of whose matrix, the rows, are in this order; 2: no memory. */
 int sd_settle_basis_new(sd_settle *settle, const int32_t *order);

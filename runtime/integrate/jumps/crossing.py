@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.jumps.segments import Segment
 from sysdyn.runtime.integrate.request import TRACE
@@ -14,7 +15,7 @@ from sysdyn.runtime.model.description import Floats
 if TYPE_CHECKING:
     from sysdyn.runtime.integrate.integrate import Integration
 
-JUMP = 1e-9
+JUMP = tuning.SAME
 """Of the largest value of a quantity: what it differs by less across an instant is no jump."""
 
 

@@ -11,6 +11,7 @@ a force so is its impulse times the mean of the other, of linear stores; of othe
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.facts import Mask
 from sysdyn.runtime.model.failures import SolverFailure
@@ -20,16 +21,16 @@ from sysdyn.runtime.start.integrated import integrated
 from sysdyn.runtime.start.restart import STILL
 from sysdyn.values import dataclass
 
-BROKEN = 1e-9
+BROKEN = tuning.SAME
 """Of the largest terms: what a row is missed by along the straight way, which then is not the rise."""
 GAUSS = tuple(0.5 + sign * np.sqrt(1.0 / 12.0) for sign in (-1.0, 1.0))
 """Points of Gauss's rule of degree 3: exact for powers of linear elements along a straight way."""
-PARTS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
+PARTS = tuple(1 << k for k in range(9))
 """Steps of the classical method of order 4 along a curved way, until two agree within AGREED of the largest gain."""
-AGREED = 1e-8
-AWAY = 1e-6
+AGREED = tuning.HALF_OF_ITS_DIGITS
+AWAY = tuning.UNSEEN
 """Of its magnitude: by how much the end of a curved way may be elsewhere."""
-STEEP = 1e-6
+STEEP = tuning.UNSEEN
 """Of a power: by what it may differ with pulses in the place of finite flows and forces."""
 RISE = 1e-9
 """s: of pulses that are told from what is finite."""

@@ -13,6 +13,7 @@ from dataclasses import astuple, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from sysdyn.runtime import _core
 from sysdyn.runtime.events.bounces import Bounce
 from sysdyn.runtime.events.handler import SOON, Handler
 from sysdyn.runtime.events.kinks import WORDS
@@ -52,7 +53,7 @@ AT_ONCE = 1e3
 UNSEEN = 100.0
 """Times a run's tolerance: of a bounce that rises less, the error test of the bdf hardly sees that it falls."""
 FLIGHT = tuple(field.name for field in fields(Bounce))
-JUMPS = -1
+JUMPS: int = _core.SD_JUMP
 """Samples due where the text jumps (core/run/events/modes.h)."""
 
 

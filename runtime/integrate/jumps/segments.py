@@ -13,11 +13,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.values import dataclass
 
-CLOSE = 1e-13
+CLOSE = tuning.BY_FACTORS
 """Of the span: what happens within is one event (the same instant by two formulas)."""
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import _core
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Ints, RowFamily
 from sysdyn.runtime.model.failures import RowLabel
@@ -15,7 +16,8 @@ from sysdyn.runtime.model.system import System
 from sysdyn.values import dataclass
 
 Signs = NDArray[np.int8]
-HEAD, ROWS = 4, 4
+HEAD: int = _core.SD_AUDIT_HEAD
+ROWS: int = _core.SD_LEDGER_ROWS
 """Rows of block audit before the ledgers', and of each ledger."""
 
 

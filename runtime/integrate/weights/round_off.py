@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints, stated
 from sysdyn.runtime.model.scales import alike, group_maxima, group_maximum
 from sysdyn.runtime.model.system import System
@@ -24,11 +25,11 @@ PROBES = 4
 """Errors of the rows that are tried."""
 MARGIN = 64.0
 """Times what they make of a quantity."""
-BESIDE = 1e-6
+BESIDE = tuning.UNSEEN
 """Of the largest of each unknown: how far beside the end they are asked too."""
-PIVOT = 0.1
+PIVOT = tuning.PIVOT
 """Of the largest of its column: what an elimination takes as a pivot."""
-HOPS = 3
+HOPS = tuning.HOPS
 """Pivots in a row: balance, momentum, flow."""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from sysdyn.runtime import _core
 from sysdyn.runtime.integrate.methods import Method
 from sysdyn.runtime.integrate.request import Request
 from sysdyn.runtime.integrate.weights.sizes import Sizes
@@ -14,7 +15,7 @@ from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.scales import ROUND_OFF
 from sysdyn.runtime.model.system import System
 
-UNPULLED = 2
+UNPULLED: int = _core.SD_UNPULLED
 """Kind of a derivative (core/steppers/radau/radau.h): interpolated whatever pulls at its unknown."""
 
 

@@ -15,6 +15,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
@@ -24,12 +25,12 @@ from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.structure.rates import unique
 from sysdyn.values import dataclass
 
-BALANCED = 1e-12
+BALANCED = tuning.CANCELS
 """Sum of a row of dF/dyd over that of its magnitudes that is round-off."""
 
 Few = NDArray[np.int8]
 Mask = NDArray[np.bool_]
-BESIDE = 1e-3
+BESIDE = tuning.SMALL
 """Relative move of displacements: an inertia that vanishes at the start by chance does not vanish beside it."""
 
 

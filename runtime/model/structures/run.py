@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ctypes as c
 
+from sysdyn.runtime import _core
 from sysdyn.runtime.model.structures.c_types import D, I, L, P
 
-ROW_HEAD = 8
-NODES = 7
+ROW_HEAD: int = _core.SD_ROW_HEAD
+NODES: int = _core.SD_NODES
 """SD_NODES: of a method, at most."""
-PAST = 3
+PAST: int = _core.SD_PAST
 """SD_PAST: steps before the last one whose powers are known."""
 OWN = 2**31 - 1
 """SD_OWN: the mode that the core has found by itself."""
@@ -273,7 +274,7 @@ class Region(c.Structure):
     _fields_ = [("at", P), ("copy", P), ("size", L)]
 
 
-COUNTERS = 8
+COUNTERS: int = _core.SD_MANY_COUNTERS
 """Of the work of a pass."""
 
 

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import ctypes as c
 
+from sysdyn.runtime import _core
 from sysdyn.runtime.model.structures.c_types import D, I, L, P
 
-MAX_ORDER = 5
-STAGES = 7
-PAIRS = 3
-POINTS = 3
-DOPRI_STAGES = 16
-DOPRI_DENSE = 7
-ENERGY_STAGES = 6
-ROSENBROCK_STAGES = 8
-ROSENBROCK_DENSE = 3
+MAX_ORDER: int = _core.SD_MAX_ORDER
+STAGES: int = _core.SD_STAGES
+PAIRS: int = _core.SD_PAIRS
+POINTS: int = _core.SD_POINTS
+DOPRI_STAGES: int = _core.SD_DOPRI_ALL
+DOPRI_DENSE: int = _core.SD_DOPRI_DENSE
+ENERGY_STAGES: int = _core.SD_ENERGY_STAGES
+ROSENBROCK_STAGES: int = _core.SD_ROSENBROCK_STAGES
+ROSENBROCK_DENSE: int = _core.SD_ROSENBROCK_DENSE
 _ORDERS = D * (MAX_ORDER + 2)
 
 

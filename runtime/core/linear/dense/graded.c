@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define NONE (1 << 28)   /* the cost of an entry that is zero: no sum of others reaches it */
+enum { NONE = 1 << 28 }; /* the cost of an entry that is zero: no sum of others reaches it */
 #define AGREES 1e-10     /* of the largest aim: what a row in excess may be missed by */
 #define CERTAIN 1e8      /* bounds of its round-off that a pivot is above: half of its digits are known */
 #define LIKELY 16.0      /* the same, where the step is a correction that is asked for again */

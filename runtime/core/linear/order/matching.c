@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define NONE (-1)
+enum { NONE = -1 };
 
 /* What a matching is made in: column [n + 1], row: the pattern; across [m + 1], of_row: the same by rows; matched [n], of [m]:
  * the partner of each column and row; free_rows [n], free_columns [m]: partners that are left; looks: entries looked at */

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #define DENSE 10.0 /* times the root of their number: rows that long say little of the order, columns that long go last */
-#define NONE (-1)
+enum { NONE = -1 };
 
 /* Rows that are left, the merged ones behind; columns by score in lists that begin at `first`. */
 typedef struct {

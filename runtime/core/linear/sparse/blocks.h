@@ -12,7 +12,7 @@
 #include <math.h>
 #include <stdint.h>
 
-#define SD_COLUMNS 4   /* of a block at a time; fewer are applied one by one */
+enum { SD_COLUMNS = 4 }; /* of a block at a time; fewer are applied one by one */
 #define SD_SCATTERED 32 /* positions up to which they are put in order one by one */
 
 /* w -= a u[0] + b u[1] + c u[2] + d u[3], numbers in that order */

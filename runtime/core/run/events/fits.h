@@ -4,11 +4,12 @@
 
 #include "run/events/modes.h"
 
+#include <float.h>
 #include <math.h>
 
 #define FALLEN 1e-4 /* of what else counts as zero, and of the height of its flight: a gap closes again below it */
 
-#define ROUNDING 8.9e-16 /* of the terms of a value: 4 EPS, what a sum of a few is rounded by (events/observer.py) */
+#define ROUNDING (4.0 * DBL_EPSILON) /* of the terms of a value: what a sum of a few is rounded by */
 
 /* what a row is that is zero but for round-off; a gap in flight is open until it ends */
 static inline double sd_mode_zero(const sd_modes *m, int32_t row)

@@ -17,7 +17,7 @@ struct sd_run;
 struct sd_linear;
 
 #define SD_OWN INT32_MAX /* the mode that the core has found by itself */
-#define SD_JUMP (-1)     /* in place of samples that are due: the text jumps */
+enum { SD_JUMP = -1 }; /* in place of samples that are due: the text jumps */
 
 enum sd_contact_kind { SD_PSI, SD_FRICTION, SD_PHI, SD_GUARDED, SD_FOLLOWS };
 

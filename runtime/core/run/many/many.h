@@ -26,9 +26,9 @@ enum sd_many_state {
     SD_MANY_CLAIM = 6      /* an expectation does not hold */
 };
 
-#define SD_MANY_COUNTERS 8
+enum { SD_MANY_COUNTERS = 8 };
 #define SD_MANY_NOTHING 1e-12 /* of the largest of the same unit: what is left of a zero (model/scales.py) */
-#define SD_MANY_ROWS 3 /* `keep`: all rows of the last integration stay where it wrote them */
+enum { SD_MANY_ROWS = 3 }; /* `keep`: all rows of the last integration stay where it wrote them */
 
 /* a structure as it was set up */
 typedef struct sd_region {

@@ -9,8 +9,8 @@
 
 #include "system/assembly.h"
 
-#define SD_AUDIT_HEAD 4
-#define SD_LEDGER_ROWS 4
+enum { SD_AUDIT_HEAD = 4 };
+enum { SD_LEDGER_ROWS = 4 };
 
 /* one step of a staircase: no balance was larger until t */
 typedef struct sd_record {

@@ -20,7 +20,7 @@
 #include "linear/linear.h"
 #include "steppers/stepper.h"
 
-#define SD_MAX_ORDER 5
+enum { SD_MAX_ORDER = 5 };
 
 typedef struct sd_bdf {
     sd_ivp ivp;

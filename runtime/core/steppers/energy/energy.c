@@ -19,7 +19,7 @@
 #define FAILURES 40      /* of slopes in one step */
 #define FIRST 1e-2       /* of the span */
 #define TWO_PI 6.283185307179586477
-#define VECTORS 21       /* of n, beside the stages */
+enum { VECTORS = 21 }; /* of n, beside the stages */
 
 sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t extended, int32_t audited)
 {

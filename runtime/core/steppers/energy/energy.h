@@ -22,7 +22,7 @@
 #include "steppers/stepper.h"
 #include "steppers/explicit/underlying.h"
 
-#define SD_ENERGY_STAGES 6
+enum { SD_ENERGY_STAGES = 6 };
 
 extern const double sd_energy_c[SD_ENERGY_STAGES], sd_energy_b[SD_ENERGY_STAGES];
 extern const double sd_energy_a[SD_ENERGY_STAGES][SD_ENERGY_STAGES];

@@ -12,15 +12,15 @@
 #include "steppers/stepper.h"
 #include "steppers/explicit/underlying.h"
 
-#define SD_DOPRI_STAGES 12
-#define SD_DOPRI_ALL 16  /* with the slopes at the new point and the stages of the dense output */
-#define SD_DOPRI_DENSE 7
+enum { SD_DOPRI_STAGES = 12 };
+enum { SD_DOPRI_ALL = 16 }; /* with the slopes at the new point and the stages of the dense output */
+enum { SD_DOPRI_DENSE = 7 };
 
 extern const double sd_dopri_c[SD_DOPRI_ALL], sd_dopri_a[SD_DOPRI_ALL][SD_DOPRI_ALL];
 extern const double sd_dopri_e3[SD_DOPRI_STAGES], sd_dopri_e5[SD_DOPRI_STAGES];
 extern const double sd_dopri_d[SD_DOPRI_DENSE - 3][SD_DOPRI_ALL];
 extern const int sd_dopri_next[SD_DOPRI_ALL]; /* of each row of a: the first behind the leading one that is not zero */
-#define SD_DOPRI_NEXT 5                       /* the same of e3, e5 and d */
+enum { SD_DOPRI_NEXT = 5 }; /* the same of e3, e5 and d */
 
 typedef struct sd_dopri {
     sd_ivp ivp;               /* of form 0 */

@@ -26,11 +26,11 @@
 #include "linear/linear.h"
 #include "steppers/stepper.h"
 
-#define SD_METHODS 3
-#define SD_STAGES 7 /* at most */
-#define SD_PAIRS 3
-#define SD_POINTS 3
-#define SD_UNPULLED 2
+enum { SD_METHODS = 3 };
+enum { SD_STAGES = 7 }; /* at most */
+enum { SD_PAIRS = 3 };
+enum { SD_POINTS = 3 };
+enum { SD_UNPULLED = 2 };
 /* columns of sd_radau_lean: those that the factors left, those that may be left */
 enum { SD_WHERE_LEFT = 1, SD_WHERE_IDLE };
 /* of the control of steps */

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define OWN 4              /* vectors that every step hands on to the next one */
+enum { OWN = 4 }; /* vectors that every step hands on to the next one */
 #define SPARE 64           /* numbers behind each set of vectors: two sets are room for what has a few more than they */
 
 /* the stages of the last accepted step, before it was projected; y, yd [n] */

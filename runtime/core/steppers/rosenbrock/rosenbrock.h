@@ -21,8 +21,8 @@
 #include "linear/linear.h"
 #include "steppers/stepper.h"
 
-#define SD_ROSENBROCK_STAGES 8
-#define SD_ROSENBROCK_DENSE 3
+enum { SD_ROSENBROCK_STAGES = 8 };
+enum { SD_ROSENBROCK_DENSE = 3 };
 #define SD_ROSENBROCK_LEAST 1e-10 /* error of a step, for the next one's size */
 
 extern const double sd_rosenbrock_gamma;

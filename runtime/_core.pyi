@@ -1,0 +1,37 @@
+"""What Python sees of the extension module (core/run/module.c)."""
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+def address(array: NDArray[Any], /) -> int:
+    """Address of an array's first element; the caller keeps the array alive."""
+
+FALLEN: float
+ROUNDING: float
+SD_CONTRACT: int
+SD_NODES: int
+SD_PAST: int
+SD_MANY_COUNTERS: int
+SD_MANY_ROWS: int
+SD_ROW_HEAD: int
+SD_TRACE: int
+SD_SAMPLE: int
+SD_COMPARED: int
+SD_RELAXING: int
+SD_PARTS: int
+SD_JUMP: int
+SD_AUDIT_HEAD: int
+SD_LEDGER_ROWS: int
+SD_LARGEST: int
+SD_CAPPED: int
+SD_MAX_ORDER: int
+SD_ENERGY_STAGES: int
+SD_DOPRI_ALL: int
+SD_DOPRI_DENSE: int
+SD_STAGES: int
+SD_PAIRS: int
+SD_POINTS: int
+SD_UNPULLED: int
+SD_ROSENBROCK_STAGES: int
+SD_ROSENBROCK_DENSE: int
