@@ -29,6 +29,8 @@ TIMES = 10.0
 MOST = 0.1
 """Largest part of it that is allowed where the solver's own tolerances are given."""
 CANCELS = tuning.SMALL
+OFFSET, NOISE = 1e-3, 10.0
+"""Of a size: a range below it is that of what rides on an offset; times an error: a range that is none (conserved)."""
 """Of its terms: a difference that is less has lost more than three digits."""
 EPS = float(np.finfo(np.float64).eps)
 ROUND_OFF = 10.0 * EPS
@@ -106,20 +108,27 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Cancelled:
-    """A traced quantity whose rows are much smaller than its terms, or than itself between them.  known, terms: in the
-    quantity's unit, SI.
+    """A traced quantity whose rows are much smaller than its terms, or than itself between them; moves: or whose range
+    is that much smaller than its size, 0: not that.  known, terms, moves: in the quantity's unit, SI.
     """
 
     quantity: str
     known: float
     terms: float
+    moves: float = 0.0
 
 
 def cancelled(
-    nominal: Mapping[str, float], seen: Mapping[str, float], asked: float | None, estimate: float | None
+    nominal: Mapping[str, float],
+    seen: Mapping[str, float],
+    ranges: Mapping[str, float],
+    asked: float | None,
+    estimate: float | None,
 ) -> Iterator[Cancelled]:
     """Quantities whose terms (nominal) cancel so far that the error, relative to the terms, is more than the accuracy
-    asked of the rows (seen) themselves; what is nothing but round-off of its terms is zero by symmetry.
+    asked of the rows (seen) themselves; what is nothing but round-off of its terms is zero by symmetry.  And those that
+    ride on an offset: their range (ranges, of those that are not judged by it) is below OFFSET of their size, but more
+    than their error.
 
     asked, estimate: relative; None where the solver's own tolerances are given.
     """
@@ -128,6 +137,8 @@ def cancelled(
         own = seen.get(name, 0.0)
         if terms * 4.0 * EPS < own < CANCELS * terms and terms * error > (asked or MOST) * own:
             yield Cancelled(name, terms * error, terms)
+        elif NOISE * error * terms < (moves := ranges.get(name, 0.0)) < OFFSET * own:
+            yield Cancelled(name, own * error, own, moves)
 
 
 def allowed(options: Options) -> float:

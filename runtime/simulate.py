@@ -193,7 +193,9 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
         warnings = (*warnings, f"{some} not meet the equations: what stands there is the integrator's own")
     warnings += tuple(_floating(finished.open, written.description))
     estimate = achieved.error_estimate if achieved is not None else None
-    lost = tuple(cancelled(runs.quantities.terms(finished.largest), writer.seen(), options.accuracy, estimate))
+    ranges = {name: moves for name, moves in writer.ranges().items() if name not in options.to_range}
+    terms = runs.quantities.terms(finished.largest)
+    lost = tuple(cancelled(terms, writer.seen(), ranges, options.accuracy, estimate))
     below = achieved is not None and achieved.below_round_off
     told = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
     told |= {"steps": finished.statistics.steps, "extrema": _extrema(runs)}

@@ -180,7 +180,7 @@ def _alias(alias: s.Word | None) -> Pieces:
 
 def _accuracy(n: s.Accuracy) -> Pieces:
     on = [" on ", *_listed(pieces(item) for item in n.on)] if n.on else []
-    return ["accuracy ", *pieces(n.value), *on]
+    return ["accuracy ", *pieces(n.value), *on, *([" relative to range"] if n.to_range else [])]
 
 
 def _level(n: s.Level) -> Pieces:

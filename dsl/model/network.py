@@ -403,6 +403,7 @@ class Scene:
     every: Node | None = None
     accuracy: Node | None = None
     accuracy_on: tuple[tuple[str, Node], ...] = ()
+    to_range: tuple[str, ...] = ()  # of these the accuracy is relative to the largest less the least value
     formulation: str | None = None
     formulation_place: Place | None = None
     solver: str | None = None

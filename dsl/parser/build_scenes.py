@@ -34,8 +34,13 @@ def trace_item(v: Values, span: Span, notes: Notes) -> s.TraceItem:
 
 
 def accuracy(v: Values, span: Span, notes: Notes) -> s.Accuracy:
-    """`accuracy arith [on ariths]`."""
-    return s.Accuracy(v[0], v[1] or (), span, notes.doc(span))
+    """`accuracy arith [on ariths [relative to range]]`."""
+    return s.Accuracy(v[0], v[1] or (), v[2] is not None, span, notes.doc(span))
+
+
+def to_range(v: Values, span: Span, notes: Notes) -> Span:
+    """`relative to range`."""
+    return span
 
 
 def formulation(v: Values, span: Span, notes: Notes) -> s.Formulation:

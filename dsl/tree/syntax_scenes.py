@@ -60,10 +60,11 @@ class Trace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Accuracy:
-    """`accuracy r [on a, b]`."""
+    """`accuracy r [on a, b [relative to range]]`."""
 
     value: Expr
     on: tuple[Expr, ...]
+    to_range: bool
     span: Span
     doc: str | None = None
 

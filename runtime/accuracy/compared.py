@@ -39,6 +39,7 @@ class Compared:
         self._at: Floats | None = None
         self._opened: tuple[Finished, LeftOpen] | None = None
         self._sized: tuple[Finished, Floats] | None = None
+        self._range: Floats = np.zeros(0)  # of quantities whose errors are relative to it
         self._own: list[Floats] = []
         self.begin()
 
@@ -47,6 +48,7 @@ class Compared:
         self._rows: list[Floats] = []
         self._steps: list[Floats] = []
         self._traced: list[Floats] = []
+        self._ends = np.full((2, self._observed), np.nan)  # least and largest values, where ranges are asked for
         self._jump, self._last = np.zeros(self._observed), np.zeros((0, lib.ROW_HEAD + 2 * self._observed))
         self._thinned = Thinned()
         room = VALUES // max(self._observed, 1)
@@ -55,6 +57,10 @@ class Compared:
     def take(self, rows: Floats, kind: Ints) -> None:
         """Keeps what runs are compared by: rows at the instants of the run before, and its own, thinned."""
         self._take_jumps(rows)
+        if self.options.to_range:
+            values = rows[:, lib.ROW_HEAD : lib.ROW_HEAD + self._observed]
+            self._ends[0] = np.fmin(self._ends[0], np.fmin.reduce(values, initial=np.inf))
+            self._ends[1] = np.fmax(self._ends[1], np.fmax.reduce(values, initial=-np.inf))
         if self.options.every is None:
             traced = rows[(kind & TRACE) > 0]
             for thinned in (self._thinned, self._with_events):
@@ -99,6 +105,8 @@ class Compared:
         if ((own > 0.0) & (noise > _share(asked, own))).any():  # else noise excuses less than is asked
             nominal, excused = self._excused(finished, quantities)
             sizes, noise = np.minimum(sizes, nominal), np.minimum(noise, excused)
+        if quantities.to_range.size:
+            sizes, noise = self._by_range(sizes, noise, quantities)
         open_ = partial(self._open_quantities, finished, quantities)
         between = self._between(rows, finished, quantities)
         jump = np.append(self._jump[quantities.places], np.full(len(quantities.meters), np.inf))
@@ -109,6 +117,18 @@ class Compared:
         )  # fmt: skip
         self.samplings, self.finished = (*self.samplings[-1:], found), finished
         return found
+
+    def _by_range(self, sizes: Floats, noise: Floats, quantities: Quantities) -> tuple[Floats, Floats]:
+        """Sizes and noise [compared] where those of some are their ranges over all rows of a run, but no less than
+        round-off of what they ride on; what is excused of these is a share of that.
+        """
+        which, sizes, noise = quantities.to_range, sizes.copy(), noise.copy()
+        with np.errstate(invalid="ignore"):  # of values without bound
+            span = (self._ends[1] - self._ends[0])[quantities.places[which]]
+        span = np.where(np.isfinite(span), span, sizes[which])
+        self._range = sizes[which] = np.maximum(span, pairs.ROUND_OFF * sizes[which])
+        noise[which] = np.minimum(noise[which], quantities.asked(self.options)[which] * self._range)
+        return sizes, noise
 
     def _passed_over(self, finished: Finished, quantities: Quantities) -> Floats | None:
         """How far the compared quantities [compared] are from the run before in what one step of that passes over; None
@@ -191,6 +211,9 @@ class Compared:
         if self._sized is None or self._sized[0] is not finished:
             self._sized = finished, self._nominal(finished, quantities)
         nominal = self._sized[1]
+        if quantities.to_range.size:
+            nominal = nominal.copy()
+            nominal[quantities.to_range] = self._range
         return nominal, _share(quantities.asked(self.options), nominal)
 
     def _nominal(self, finished: Finished, quantities: Quantities) -> Floats:

@@ -35,13 +35,14 @@ class Options:
     output: the trace's file, None: it stays in memory; every: interval of the trace (None: accepted steps); at:
     further instants of the trace; sampled_at: instants of samples alone; accuracy relative to the largest value of
     each traced quantity, accuracy_on: (name, accuracy) of single ones (the others are then free if `accuracy` is
-    None); rtol, atol: the solver's own, switch the control off; accuracy_check: a second run by another method must
-    agree; first: tolerance with which the control of the accuracy begins; euler_step: of method "euler"; longest:
-    step [s]; order: of bdf at most, of radau (5, 9, 13) at every step; stops: ascending instants at which the text
-    jumps or has kinks: a step ends and the integration restarts there; redundancy: what becomes of redundant
-    constraints: drop (the last written of each dependent group is left out), minimum_norm (the least multipliers),
-    error (the caller has seen to it); sample_steps: the watcher sees accepted steps and what is within them too;
-    extrema: least and largest values are sought within steps; watch: what of a run the samples are to hold.
+    None), to_range: of these relative to the largest less the least value; rtol, atol: the solver's own, switch the
+    control off; accuracy_check: a second run by another method must agree; first: tolerance with which the control of
+    the accuracy begins; euler_step: of method "euler"; longest: step [s]; order: of bdf at most, of radau (5, 9, 13)
+    at every step; stops: ascending instants at which the text jumps or has kinks: a step ends and the integration
+    restarts there; redundancy: what becomes of redundant constraints: drop (the last written of each dependent group is
+    left out), minimum_norm (the least multipliers), error (the caller has seen to it); sample_steps: the watcher sees
+    accepted steps and what is within them too; extrema: least and largest values are sought within steps; watch: what
+    of a run the samples are to hold.
     """
 
     output: str | Path | None
@@ -52,6 +53,7 @@ class Options:
     sampled_at: tuple[float, ...] = ()
     accuracy: float | None = 1e-4
     accuracy_on: tuple[tuple[str, float], ...] = ()
+    to_range: tuple[str, ...] = ()
     rtol: float | None = None
     atol: float | None = None
     accuracy_check: bool = False

@@ -30,7 +30,8 @@ METERS = {
 
 class Quantities:
     """places [columns]: of the observed value that each stores; names of columns, meters (members of the audit of which
-    accuracy is asked, though they are not traced) and compared, which are both.
+    accuracy is asked, though they are not traced) and compared, which are both; to_range [k]: columns whose errors are
+    relative to their range.
     """
 
     def __init__(self, system: System, columns: Sequence[Column], options: Options) -> None:
@@ -40,6 +41,7 @@ class Quantities:
         traced = set(self.names)
         self.meters = tuple(name for name, _ in options.accuracy_on if name in METERS and name not in traced)
         self.compared = (*self.names, *self.meters)
+        self.to_range: Ints = np.flatnonzero([name in options.to_range for name in self.names])
         self._beside: tuple[Floats, Floats, Floats] | None = None
 
     @property

@@ -81,6 +81,8 @@ def obstacle(options: Options) -> str | None:
         return "the text jumps or has kinks in time"
     if options.redundancy == "minimum_norm":
         return "redundancy minimum_norm"
+    if options.to_range:
+        return "the accuracy of a quantity is relative to its range"
     if options.accuracy_check:
         return "a second opinion is asked for"
     if options.max_wall is not None:

@@ -39,6 +39,9 @@ class Writer(Protocol):
     def seen(self) -> dict[str, float]:
         """Largest magnitude of each stored quantity."""
 
+    def ranges(self) -> dict[str, float]:
+        """Largest less least value of each stored quantity."""
+
     def undefined(self) -> tuple[str, float] | None:
         """The first quantity that is no number, or infinite, and when [s]."""
 
@@ -72,6 +75,10 @@ class Held:
     def seen(self) -> dict[str, float]:
         """Largest magnitude of each stored quantity."""
         return self._taken().largest()
+
+    def ranges(self) -> dict[str, float]:
+        """Largest less least value of each stored quantity."""
+        return self._taken().ranges()
 
     def undefined(self) -> tuple[str, float] | None:
         """The first quantity that is no number, or infinite, and when [s]."""

@@ -42,12 +42,16 @@ class Met:
         self._energies: Floats | None = None
         self.undefined: tuple[str, float] | None = None
         self._largest = np.zeros(len(self.columns))
+        self._ends = np.full((2, len(self.columns)), np.nan)  # least, largest
         self._places = np.array([BEFORE + column.place for column in self.columns], dtype=np.intp)
 
     def take(self, rows: Floats) -> None:
         """Rows [k, 8 + 2 observed]."""
         self._energy(rows[:, 2:6])
-        size = np.abs(rows[:, self._places])
+        values = rows[:, self._places]
+        size = np.abs(values)
+        self._ends[0] = np.fmin(self._ends[0], np.fmin.reduce(values))
+        self._ends[1] = np.fmax(self._ends[1], np.fmax.reduce(values))
         most = size.max(axis=0)
         self._largest = np.fmax(self._largest, most)
         if self.undefined is None and not np.isfinite(most).all():
@@ -69,6 +73,11 @@ class Met:
     def largest(self) -> dict[str, float]:
         """Largest magnitude of each stored quantity."""
         return {column.name: float(s) for column, s in zip(self.columns, self._largest, strict=True)}
+
+    def ranges(self) -> dict[str, float]:
+        """Largest less least value of each stored quantity."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            return dict(zip((c.name for c in self.columns), (self._ends[1] - self._ends[0]).tolist(), strict=True))
 
 
 class TraceWriter:
@@ -119,6 +128,10 @@ class TraceWriter:
     def seen(self) -> dict[str, float]:
         """Largest magnitude of each stored quantity."""
         return self._met.largest()
+
+    def ranges(self) -> dict[str, float]:
+        """Largest less least value of each stored quantity."""
+        return self._met.ranges()
 
     def undefined(self) -> tuple[str, float] | None:
         """The first quantity that is no number, or infinite, and when [s]."""

@@ -168,6 +168,7 @@ def options_of(
         sampled_at=tuple(t for t in claims if t0 <= t <= t1),
         accuracy=accuracy,
         accuracy_on=on,
+        to_range=_to_range(scene, prepared),
         accuracy_check=request.accuracy_check,
         rtol=request.rtol,
         atol=request.atol,
@@ -276,6 +277,14 @@ def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float
     on = tuple((name, value(wanted)) for name, wanted in scene.accuracy_on)
     rest = None if scene.accuracy is None else value(scene.accuracy)
     return (rest if on or rest is not None else ACCURACY), on
+
+
+def _to_range(scene: Scene, prepared: Prepared) -> tuple[str, ...]:
+    """Quantities whose errors are relative to their range: those that the scene names, and temperatures in units whose
+    zero is not that of the quantity (`in degC`).
+    """
+    offset = [o.name for o in prepared.network.observations if o.unit.offset]
+    return tuple(dict.fromkeys((*scene.to_range, *offset)))
 
 
 def of_these_alone(options: Options, names: Sequence[str]) -> Options:

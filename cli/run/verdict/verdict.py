@@ -229,7 +229,7 @@ def _flat(prepared: Prepared, started: Started, error: SolverFailure) -> tuple[R
 
 def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Report) -> None:
     """N922 for each quantity that is less well known than its accuracy and its rows seem to say: a difference of larger
-    terms, or what was larger between the rows.
+    terms, what rides on an offset, or what was larger between the rows.
     """
     observed = {o.name: o for o in prepared.network.observations}
     for lost in cancelled:
@@ -237,6 +237,10 @@ def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Repo
         unit, place = (f" {said.unit.text}", said.place) if said else ("", prepared.network.place)
         text = f"{lost.quantity} is known to {lost.known:.1g}{unit}: it or its terms reach {lost.terms:.1g}{unit}"
         help_ = "a coordinate for a difference, or an origin nearby; where its rows alone are small, accuracy on it"
+        if lost.moves:
+            share = f"its accuracy is a part of {lost.terms:.1g}{unit}"
+            text = f"{lost.quantity} moves by {lost.moves:.2g}{unit}, and {share}"
+            help_ = f"accuracy 1e-4 on {lost.quantity} relative to range, or an origin nearby"
         report.note("N922", text, place, help=help_)
 
 

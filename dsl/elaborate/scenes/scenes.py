@@ -319,6 +319,8 @@ class SceneReader:
         if twice := [name for k, name in enumerate(names) if name in said or name in names[:k]]:
             raise self.resolver.fail("E106", f"the accuracy of '{twice[0]}' is asked for twice", s.span)
         said |= dict.fromkeys(names, value)
+        if s.to_range:
+            self._found["to_range"] = (*self._found.get("to_range", ()), *names)
         self._found["accuracy_on"] = tuple(said.items())
 
     def _traced_as(self, target: syntax.Expr) -> str | None:

@@ -203,10 +203,16 @@ static int advance(sd_run *run)
     double from = run->stepper->ivp->t;
     if (from >= run->stepper->ivp->t_end)
         return end(run);
+    if (run->branches)
+        sd_branches_leave(run->branches, run->stepper);
     keep_past(run);
     memcpy(run->power, run->after, (size_t)run->audited * sizeof(double));
     if (run->stepper->step(run->stepper->self))
         return SD_FAILED;
+    if (run->branches && !sd_branches_follow(run->branches, run->stepper)) {
+        run->pasts = 0;
+        return SD_RUNNING;
+    }
     run->t_from = from;
     run->told_here = 0; /* before events are looked for, which have rows too */
     if (run->settle)

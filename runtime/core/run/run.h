@@ -15,6 +15,7 @@
 #define SYSDYN_RUN_H
 
 #include "system/least_norm.h"
+#include "run/branches.h"
 #include "run/meters/extrema.h"
 #include "run/meters/ledgers.h"
 #include "run/events/modes.h"
@@ -93,6 +94,7 @@ typedef struct sd_run {
     sd_modes *modes;                  /* NULL: every event goes to its handler */
     struct sd_corners *corners;       /* NULL: every jump of a text without events goes to Python */
     sd_extrema *extrema;              /* NULL: nobody asks for them */
+    sd_branches *branches;            /* NULL: no constraint of displacements has any */
     double t_clear, t_seen;           /* within the last step, between which something watched has been seen to change */
     double turns;                     /* s: in which something that is read turns; 0: nothing does */
     double *looked;                   /* [SD_PARTS + 2][observed] values at the ends of parts, and within one */

@@ -30,6 +30,8 @@ SWIFT = 100.0
 """Of the tolerance: what is observed would move by more of its largest in a step, by the equations beside the dense
 output, where it relaxes at once (smooth motions: up to ten).
 """
+FEW, FEW_ROWS = 400, 40
+"""Unknowns and constraints up to which the branch is watched: a determinant of products of normals a step."""
 CREDIT = 16
 """Rows that are looked at before it shows that few of them meet their sums."""
 
@@ -88,6 +90,7 @@ class Driver:
         self._observers(start_rate)
         self._asked(request)
         self._extrema(request)
+        self._branches(request, method, settler)
         run.rough = request.settled_to
         run.swift = SWIFT * request.rtol
         self._nothing = round_off_beside(system, magnitude)
@@ -123,6 +126,21 @@ class Driver:
         run.glances, run.apart = GLANCES * request.sample_steps, request.apart
         self.rows = np.empty((ROOM if width < ROOM else 64, width))
         run.row, run.room = lib.pointer(self.rows), self.rows.shape[0]
+
+    def _branches(self, request: Request, method: Method, settler: Settler) -> None:
+        """Watches that steps stay on the branch of constraints of displacements that hold throughout."""
+        self.branches: int | None = None
+        contacts = () if request.events is None else request.events.contacts
+        if any(contact.kind == "phi" for contact in contacts) or settler.system.unknowns > FEW:
+            return
+        rows = np.flatnonzero(settler.left_of(settler.system.of_groups("phi"))).astype(np.int32)
+        if not 0 < rows.size <= FEW_ROWS:
+            return
+        self._phi = rows
+        self.branches = lib.core.sd_branches_new(settler.core, method.stepper, lib.pointer(rows), rows.size)
+        if not self.branches:
+            raise MemoryError
+        self.run.branches = self.branches
 
     def _extrema(self, request: Request) -> None:
         """Where they are asked for, and all that is observed has its value at any point: of multipliers that are open
@@ -206,3 +224,5 @@ class Driver:
     def __del__(self) -> None:
         if getattr(self, "core", None):
             lib.core.sd_run_free(self.core)
+        if getattr(self, "branches", None):
+            lib.core.sd_branches_free(self.branches)

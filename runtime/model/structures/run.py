@@ -256,6 +256,7 @@ class Run(c.Structure):
         ("modes", P),
         ("corners", P),
         ("extrema", P),
+        ("branches", P),
         ("t_clear", D),
         ("t_seen", D),
         ("turns", D),
