@@ -4,11 +4,12 @@
 #include <math.h>
 
 #include "run/events/landing.h"
+#include "linear/tuning.h"
 
-#define FULL_SENSE 1e-9  /* of a sense: what it may pass its end by */
+#define FULL_SENSE SD_SAME /* of a sense: what it may pass its end by */
 #define SLIDES 2.0       /* branches, as events/kinks.py names them */
 #define RESTS 3.0
-#define NO_SIZE 1e-9     /* of its magnitude, an unknown of which round-off leaves nothing open */
+#define NO_SIZE SD_SAME /* of its magnitude, an unknown of which round-off leaves nothing open */
 
 /* Whether an inequality, or a friction law, is as the mode says. */
 static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const double *v)

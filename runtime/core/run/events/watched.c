@@ -1,5 +1,6 @@
 /* Whether a step passes over a change of what is watched: see watched.h. */
 #include "run/events/watched.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -15,10 +16,10 @@
 #define GOLDEN 0.6180339887498949 /* of what the bottom lies within: what is kept */
 #define DEEP 70        /* of these: to the spacing of t */
 #define STEEPER 2.0    /* times the slopes met: as steep it may fall between two looks */
-#define AT_ONCE 1e-6   /* of the first part: what begins at zero and falls there may come back within it */
+#define AT_ONCE SD_UNSEEN /* of the first part: what begins at zero and falls there may come back within it */
 #define OFF 0.1        /* of what is met within a step: what is interpolated between its ends may be off by */
 #define SETTLED 2
-#define FAINT 1e-9    /* of the largest value of what is watched: what it is off by unseen */
+#define FAINT SD_SAME /* of the largest value of what is watched: what it is off by unseen */
 
 typedef void look(sd_run *run, double t, double *values);
 
