@@ -27,6 +27,7 @@ class Choices:
         self._contacts, self._determined = contacts, determined
         self._begun: dict[tuple[float, ...], list[int]] = {}
         self._seen = set[tuple[float, ...]]()
+        self._closed = set[tuple[tuple[float, ...], int]]()  # sets and contacts without which nothing is open
         self._observer = Observer(contacts.system)  # its own: no size is met here
 
     def begin(self, t: float, y: Floats, yd: Floats) -> None:
@@ -43,11 +44,15 @@ class Choices:
         begun = self._begun.pop(state, [])
         values = self._observer(t, y, yd) if begun else np.zeros(0)
         for k in set(begun) & set(self._idle(values)) if begun else ():
+            if (state, k) in self._closed:
+                continue
             contacts.active[k] ^= True
             contacts.apply()
             directions, between = self._determined.directions(t, y, yd)
             contacts.become(state)
-            if len(directions) and not all(contacts.idle(i, values) for i in between):
+            if not len(directions):
+                self._closed.add((state, k))
+            elif not all(contacts.idle(i, values) for i in between):
                 self._seen.add(state)
                 self._add(t, (y, yd), directions, tuple(contacts.contacts[i].name for i in between))
 

@@ -21,7 +21,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated, factors
-from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
+from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed, sure_solver
 
 DENSE = tuning.DENSE
 """Unknowns up to which matrices are full; larger models are taken as they come."""
@@ -74,7 +74,8 @@ class Determined:
         if not number:
             return np.zeros((0, 0)), []
         n = self._system.form.written
-        _, _, right, column = _pencil(self._system, *self._system.jacobian(t, y[:n], yd[:n]))
+        scaled, column = _pencil(self._system, *self._system.jacobian(t, y[:n], yd[:n]))
+        right = decomposed(scaled)[2]
         return (right[len(right) - number :] * column)[:, :n], np.flatnonzero(part > NOTHING).tolist()
 
     def _open(self, t: float, y: Floats, yd: Floats) -> tuple[int, Floats, NDArray[np.bool_]]:
@@ -87,7 +88,11 @@ class Determined:
             jy, jyd = system.jacobian(t, y[:n], yd[:n])
             if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
                 return 0, np.zeros(len(key)), np.ones(n, dtype=bool)
-            left, sigma, right, _ = _pencil(system, jy, jyd)
+            scaled, _ = _pencil(system, jy, jyd)
+            if sure_solver(scaled, CERTAIN) is not None:
+                self._regular[key] = 0, np.zeros(len(key)), np.ones(n, dtype=bool)
+                return self._regular[key]
+            left, sigma, right = decomposed(scaled)
             some = count(sigma, CERTAIN)
             part, told = np.zeros(len(key)), np.linalg.norm(right[some:, :n], axis=0) <= NOTHING
             if some < sigma.size:
@@ -232,14 +237,11 @@ def _index_of(e: Floats, b: Floats) -> int:
     return round(float(np.log(near / far) / np.log(CLOSE[1] / CLOSE[0]))) if min(near, far) > 0.0 else FAR
 
 
-def _pencil(system: System, jy: Floats, jyd: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Left vectors, singular values and right ones (`decomposed`) of dF/dy + GENERIC dF/dyd [entries], equilibrated,
-    and the factors of its columns.
-    """
+def _pencil(system: System, jy: Floats, jyd: Floats) -> tuple[Floats, Floats]:
+    """dF/dy + GENERIC dF/dyd [unknowns, unknowns], equilibrated, and the factors of its columns."""
     e, b = system.dense(jyd), system.dense(jy)
     row, column = factors(e, b)
-    scaled = row[:, None] * (b + GENERIC * e) * column[None, :]
-    return *decomposed(scaled), column
+    return row[:, None] * (b + GENERIC * e) * column[None, :], column
 
 
 def _same(a: Floats, b: Floats, which: NDArray[np.bool_], part: float, size: float = 0.0) -> bool:

@@ -207,6 +207,7 @@ def _load() -> Any:
         "sd_linear_pivoted": (_P, [_P]),
         "sd_linear_replayed": (None, [_P]),
         "sd_linear_often": (None, [_P]),
+        "sd_linear_orientation": (c.c_int, [_P]),
         "sd_linear_z_pivoted": (_P, [_P]),
         "sd_linear_again": (None, [_P]),
         "sd_linear_z_replayed": (None, [_P]),

@@ -120,3 +120,25 @@ def test_a_dense_rest_without_a_pivot_names_its_place(equal):
     else:
         assert 0 <= solver.linear.contents.bad_row < n
         assert 0 <= solver.linear.contents.bad_column < n
+
+
+@pytest.mark.parametrize(("n", "often"), [(1, 1), (3, 1), (5, 1), (5, 0), (8, 1), (40, 0), (40, 1), (120, 0), (300, 0)])
+def test_the_sign_of_a_determinant_is_that_of_its_rows_and_columns(n, often):
+    """Of all factors: little ones, replayed orders, dense and sparse ones; two rows exchanged turn it."""
+    seen = set()
+    for seed in range(12):
+        matrix = random_matrix(n, seed, min(1.0, 4.0 / n))
+        solver = Solver(matrix)
+        if often:
+            lib.core.sd_linear_often(solver.linear)
+        rng = np.random.default_rng(seed)
+        for _ in range(12):
+            values = matrix.data * rng.uniform(0.9, 1.1, matrix.data.size) * np.sign(rng.uniform(-0.05, 1.0))
+            full = csc_array((values, matrix.indices, matrix.indptr), shape=(n, n)).toarray()
+            assert solver.factor(values) == 0
+            found = lib.core.sd_linear_orientation(solver.linear)
+            assert found in (np.linalg.slogdet(full)[0], 0)
+            assert found or solver.linear.contents.smallest < 1e-8
+            seen.add((found, solver.linear.contents.replayed))
+    assert {sign for sign, _ in seen} >= {1, -1}
+    assert not often or len({kind for _, kind in seen}) == (1 if n <= 5 else 2)

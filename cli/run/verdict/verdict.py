@@ -44,6 +44,7 @@ _CAUSES = {
         "E930",
         "an algebraic loop folds: at the corner of a law none of its solutions goes on",
     ),
+    "outgrown": ("E930", "solutions beside this one leave it faster than any step resolves: it jumps"),
     "zeno": (
         "E930",
         "events follow each other ever sooner and never pass a later instant, of which the text is silent",
@@ -85,6 +86,10 @@ _REMEDIES = {
     "E934": f"a higher limit, or {LOOSER}",
 }
 
+_JUMP = (
+    "what it jumps by: a pole in the loop (the output through a resistor onto a capacitor, or as a state that"
+    " follows in 1 us), or a discrete variable that a 'when' turns with hysteresis"
+)
 _REMEDIES_OF_CAUSES = {
     "crawl": f"an earlier end (--until), another --method, or {LOOSER}",
     "drives": "a bound of zero or more: abs(c), max(c, 0); the other sign of a reaction (floor.on(y) is the effort"
@@ -96,8 +101,8 @@ _REMEDIES_OF_CAUSES = {
     "slides": "a law that is continuous there (clip of a steep line), set-valued friction (setsign), or hysteresis",
     "overflows": "bounds of what is assigned: clip(k, lo, hi); or an earlier end: --until",
     "chatter": "a condition and an action that do not undo each other: hysteresis, or an 'every' in place of a 'when'",
-    "fold": "what it jumps by: a pole in the loop (the output through a resistor onto a capacitor, or as a state that"
-    " follows in 1 us), or a discrete variable that a 'when' turns with hysteresis",
+    "fold": _JUMP,
+    "outgrown": _JUMP,
     "zeno": "a constraint in place of the event, which comes to rest: phi floor: h >= 0 m restitution 0.8; or an"
     " earlier end: --until",
     "complementarity": "constraints that do not ask for opposites: a resistance or a clearance between these elements",

@@ -374,6 +374,49 @@ void sd_linear_solve(sd_linear *linear, sd_number *x)
         solve_pivoted(linear, x);
 }
 
+#ifndef SD_COMPLEX
+/* 1 or -1: an even or odd number of exchanges makes the permutation [n]; met [n]: work, zeros */
+static int parity(const int32_t *permutation, int32_t n, char *met)
+{
+    int sign = 1;
+    for (int32_t i = 0; i < n; i++) {
+        for (int32_t k = permutation[i]; k != i && !met[i]; k = permutation[k]) {
+            met[k] = 1;
+            sign = -sign;
+        }
+        met[i] = 0;
+    }
+    return sign;
+}
+
+int sd_linear_orientation(const sd_linear *linear)
+{
+    const int32_t n = linear->n, *rows, *columns = NULL;
+    const double *pivot;
+    size_t next = 1; /* from one pivot to the next: n + 1 along the diagonal of dense factors */
+    if (linear->rank < n || linear->smallest < REFINE)
+        return 0;
+    if (linear->replayed == 2)
+        rows = linear->little->row, pivot = linear->little->inverse;
+    else if (linear->replayed) {
+        const sd_elimination *e = linear->elimination->serves;
+        rows = e->pivot_row, columns = e->pivot_column, pivot = e->cell;
+    } else if (linear->sparse)
+        rows = linear->sparse->source, columns = linear->sparse->order, pivot = linear->sparse->inverse;
+    else
+        rows = linear->pivot, columns = linear->place, pivot = linear->dense, next = (size_t)n + 1;
+    char small[SD_REPLAYED] = {0}, *met = n <= SD_REPLAYED ? small : calloc((size_t)n, 1);
+    if (!met)
+        return 0;
+    int sign = parity(rows, n, met) * (columns ? parity(columns, n, met) : 1);
+    for (int32_t k = 0; k < n; k++)
+        sign = pivot[k * next] < 0.0 ? -sign : sign;
+    if (met != small)
+        free(met);
+    return sign;
+}
+#endif
+
 double sd_linear_effort(const sd_linear *linear)
 {
     const sd_sparse *lu = linear->replayed ? NULL : linear->sparse;

@@ -99,6 +99,9 @@ void sd_linear_often(sd_linear *linear);
 /* as new, but for the lists that served: for another run on matrices of the same kind */
 void sd_linear_again(sd_linear *linear);
 
+/* the sign of the determinant of what was factorised last: 1, -1; 0: it is singular, or its sign is that of round-off */
+int sd_linear_orientation(const sd_linear *linear);
+
 /* products of the last factors for each entry of them, of which a solution takes one; 0: few, or not counted */
 double sd_linear_effort(const sd_linear *linear);
 

@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#define INSTANT 1e-10 /* of a step: within it no mode grows */
 #define FEW 100.0 /* steps whose lengths, each rounded, still add up to the span */
 
 void sd_stepper_start(sd_stepper *stepper, double t, const double *y, const double *yd)
@@ -15,6 +16,7 @@ void sd_begin(sd_ivp *ivp, double t)
     ivp->t = t;
     ivp->h_used = 0.0;
     ivp->taken = 0;
+    ivp->outgrown = ivp->resting = 0;
     ivp->tested = 0;
     for (int32_t i = 0; i < ivp->n; i++)
         ivp->tested += ivp->test[i] >= 0;
@@ -71,6 +73,34 @@ int sd_too_small(const sd_ivp *ivp)
     return ivp->h < 4.0 * DBL_EPSILON * fmax(fabs(ivp->t), SD_SHORT * left) && ivp->h < left;
 }
 
+/* g := jy + lead jyd, and its factors */
+static int factorise_at(const sd_ivp *ivp, sd_linear *linear, const double *jy, const double *jyd, double lead, double *g,
+                        const double *scale)
+{
+    for (int32_t e = 0; e < ivp->system->entries; e++)
+        g[e] = jy[e] + lead * jyd[e];
+    return sd_linear_factor(linear, g, scale);
+}
+
+int sd_outgrown(sd_ivp *ivp, sd_linear *linear, const double *jy, const double *jyd, double lead, double *g, const double *scale)
+{
+    const int at_step = sd_linear_orientation(linear);
+    if (!ivp->orientation)
+        ivp->orientation = at_step;
+    if (at_step == ivp->orientation && ivp->resting >= SD_RESTS)
+        ivp->resting = 0;
+    if (!at_step || at_step == ivp->orientation || ivp->resting >= SD_RESTS || ivp->fixed_h > 0.0)
+        return SD_FINE;
+    /* a mode that grows, or rows that others have replaced since the sign was taken (an event) */
+    const int at_once = factorise_at(ivp, linear, jy, jyd, lead / INSTANT, g, scale) ? 0 : sd_linear_orientation(linear);
+    ivp->orientation = at_once ? at_once : at_step;
+    if (at_once && at_once != at_step) {
+        ivp->outgrown = 1;
+        return SD_OUTGROWN;
+    }
+    return factorise_at(ivp, linear, jy, jyd, lead, g, scale) ? SD_SINGULAR : SD_FINE;
+}
+
 int sd_ends(const sd_ivp *ivp, int cause)
 {
     return cause == SD_STOPPED || cause == SD_MEMORY || ivp->fixed_h > 0.0;
@@ -81,6 +111,8 @@ void sd_advance(sd_ivp *ivp)
     double t = ivp->t + ivp->h;
     ivp->t = fabs(ivp->t_end - t) <= SD_SLACK * ivp->h ? ivp->t_end : t;
     ivp->h_used = ivp->h;
+    ivp->resting = ivp->outgrown || ivp->resting >= SD_RESTS ? ivp->resting + 1 : 0;
+    ivp->outgrown = 0;
     ivp->steps++;
     ivp->taken++;
 }

@@ -7,6 +7,7 @@
 #ifndef SYSDYN_STEPPER_H
 #define SYSDYN_STEPPER_H
 
+#include "linear/linear.h"
 #include "system/assembly.h"
 #include "system/settle.h"
 #include "linear/tuning.h"
@@ -24,7 +25,8 @@ enum sd_cause {
     SD_STEP = 5,       /* the step size fell below what t resolves */
     SD_STOPPED = 6,    /* a callback of the caller failed */
     SD_MEMORY = 7,
-    SD_STIFF = 8       /* an explicit method is held to tiny steps by stability */
+    SD_STIFF = 8,      /* an explicit method is held to tiny steps by stability */
+    SD_OUTGROWN = 9    /* a solution beside this one grows by more within the step than the method follows */
 };
 
 typedef struct sd_stepper {
@@ -80,6 +82,8 @@ typedef struct sd_ivp {
     double *ee, *weight;      /* [n] the last local error, and what the error test weighs it by */
     int64_t steps, rejected_steps, newton_failures;
     int64_t taken;            /* steps since the last start */
+    int orientation;          /* sign of det(dF/dy + dF/dyd / h) as h vanishes; 0: nobody asked yet */
+    int outgrown, resting;    /* the step under way was refused as SD_OUTGROWN; accepted steps in a row that had been */
     int32_t cause, bad_row, bad_column; /* of the failure of a step */
     sd_stepper stepper;
 } sd_ivp;
@@ -93,8 +97,9 @@ typedef struct sd_ivp {
 #define SD_OPENING 3   /* steps that tell how long the first might have been */
 
 #define SD_NOISY 10.0  /* times a correction that does not shrink any more: what such ones leave open */
-#define SD_NOISE SD_SAME /* part of an unknown up to which a correction may be that */
+#define SD_NOISE SD_SAME   /* part of an unknown up to which a correction may be that */
 #define SD_SLACK SD_CANCELS /* of a step: what sums of steps may leave of the span */
+#define SD_RESTS 400   /* steps, each of a quarter of an e-fold at least: what round-off moves off a rest has left it by then */
 #define SD_SHORT SD_INSTANT /* of the span: what happens this early is resolved to round-off */
 
 /* What round-off leaves open of an unknown, by the last of corrections that do not shrink any more: rows far from it with
@@ -132,6 +137,11 @@ double sd_fitted(const sd_ivp *ivp, double slack);
 double sd_longest(const sd_ivp *ivp);
 /* t + h is t, or nearly (the last bit of the span is a step nonetheless) */
 int sd_too_small(const sd_ivp *ivp);
+/* SD_OUTGROWN where a step of this length would lead onto a solution that others beside it leave: within it a real mode grows
+ * so much that the method, whose stability function has a pole there, takes it for a decaying one.  An odd number of such modes
+ * turns the sign of the determinant of the step's matrix G = jy + lead jyd, which `linear` has just factorised; g [entries]:
+ * where it stands, scale [n]: of its columns.  What rests on such a solution for SD_RESTS steps is left there. */
+int sd_outgrown(sd_ivp *ivp, sd_linear *linear, const double *jy, const double *jyd, double lead, double *g, const double *scale);
 /* behind a cause no shorter step is tried */
 int sd_ends(const sd_ivp *ivp, int cause);
 /* the step of length h is accepted */

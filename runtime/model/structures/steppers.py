@@ -61,6 +61,7 @@ class Ivp(c.Structure):
         *[(name, D) for name in ["t", "h", "h_used"]],
         *[(name, P) for name in ["ee", "weight"]],
         *[(name, L) for name in ["steps", "rejected_steps", "newton_failures", "taken"]],
+        *[(name, I) for name in ["orientation", "outgrown", "resting"]],
         *[(name, I) for name in ["cause", "bad_row", "bad_column"]],
         ("stepper", Stepper),
     ]

@@ -6,7 +6,9 @@ import ctypes as c
 
 from sysdyn.runtime.model.structures.c_types import D, I, L, P
 
-CAUSES = ("", "newton", "error_test", "singular", "nonfinite", "step_too_small", "stopped", "memory", "stiff")
+CAUSES = (
+    "", "newton", "error_test", "singular", "nonfinite", "step_too_small", "stopped", "memory", "stiff", "outgrown",
+)  # fmt: skip
 
 ROWS = c.CFUNCTYPE(None, c.c_void_p, c.c_double, c.c_void_p, c.c_void_p, c.c_void_p)
 """sd_rows and sd_entries: frame, t, y, yd, out."""

@@ -133,6 +133,9 @@ static int factorise(sd_bdf *bdf, double t, int fresh)
         bdf->ivp.bad_column = bdf->linear->bad_column;
         return failed == 2 ? SD_MEMORY : SD_SINGULAR;
     }
+    failed = sd_outgrown(&bdf->ivp, bdf->linear, bdf->jy, bdf->jyd, bdf->cj, bdf->g, bdf->ivp.magnitude);
+    if (failed)
+        return failed;
     bdf->cj_factored = bdf->cj;
     bdf->extra = 0;
     bdf->contraction = UNKNOWN;

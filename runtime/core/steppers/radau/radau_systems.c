@@ -163,6 +163,9 @@ int sd_radau_factorise(sd_radau *radau, int at_end)
     int failed = factorise_all(radau);
     if (failed)
         return failed == 2 ? SD_MEMORY : SD_SINGULAR;
+    if (!sd_radau_sparing(radau) && (failed = sd_outgrown(&radau->ivp, radau->linear, radau->jy, radau->jyd,
+                                                          radau->method->gamma / radau->ivp.h, radau->g, column_scale(radau))))
+        return failed;
     radau->h_factored = radau->ivp.h;
     radau->ready = 1;
     return SD_FINE;

@@ -67,7 +67,10 @@ int sd_rosenbrock_factorise(sd_rosenbrock *rosenbrock)
     int failed = sd_linear_factor(rosenbrock->linear, rosenbrock->g, rosenbrock->ivp.magnitude);
     rosenbrock->ivp.bad_row = rosenbrock->linear->bad_row;
     rosenbrock->ivp.bad_column = rosenbrock->linear->bad_column;
-    return failed == 2 ? SD_MEMORY : failed ? SD_SINGULAR : SD_FINE;
+    if (failed)
+        return failed == 2 ? SD_MEMORY : SD_SINGULAR;
+    return sd_outgrown(&rosenbrock->ivp, rosenbrock->linear, rosenbrock->jy, rosenbrock->jyd, lead, rosenbrock->g,
+                       rosenbrock->ivp.magnitude);
 }
 
 /* x[i .. i + SD_LANES) of what was just written number by number: loaded whole it would have to wait for that */
