@@ -67,6 +67,9 @@ DENSE = 300
 """Unknowns up to which matrices are full where singular values are asked for:
 a decomposition takes some tenths of a second then."""
 
+NULL_SPACE = 2 * DENSE
+"""Unknowns up to which null vectors are taken, of matrices that are looked at once."""
+
 IN_THE_CORE = 32
 """Unknowns up to which the core does by itself what NumPy does for larger ones: calls cost more than arithmetic
 (core/linear/dense/dense.h)."""

@@ -17,7 +17,6 @@
 #define CLOSE SD_SAME /* scaled residual with which one may live */
 #define SMALL SD_SLIGHT /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
 #define CALM SD_SAME /* the same of a point whose rows are FINE, behind which the next move is none */
-#define HELD 1e8        /* weight of the state in a second attempt */
 #define STILL SD_CANCELS /* move of the state, in magnitudes, that is none */
 #define REFUSALS 3      /* of the basis in a row, behind which it is tried once in AGAIN points alone, and */
 #define AGAIN 16        /* behind SD_BASIS_OUT of them not any more */
@@ -282,7 +281,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     iterate(settle, t, y, yd, ITERATIONS, &best);
     if (best > close) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
         put(settle, settle->x0, y, yd);
-        settle->hold = HELD;
+        settle->hold = SD_HELD;
         settle->ready = 0;
         iterate(settle, t, y, yd, ITERATIONS, &best);
         settle->hold = 1.0;

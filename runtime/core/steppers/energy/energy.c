@@ -16,7 +16,6 @@
 #define LAST_WINDOW ((int64_t)1 << 40)
 #define HELD 500         /* steps that the iteration, and not the error, keeps too short: stiffness, not a kink */
 #define FAILURES 40      /* of slopes in one step */
-#define TWO_PI 6.283185307179586477
 enum { VECTORS = 21 }; /* of n, beside the stages */
 
 sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t extended, int32_t audited)
@@ -212,7 +211,7 @@ static int halved(sd_energy *energy, double *error)
             return cause;
     }
     double span = energy->ivp.t_end - energy->ivp.t;
-    double period = energy->frequency > 0.0 ? fmin(TWO_PI / energy->frequency, span) : span;
+    double period = energy->frequency > 0.0 ? fmin(2.0 * acos(-1.0) / energy->frequency, span) : span;
     for (int32_t i = 0; i < energy->ivp.n; i++)
         energy->ivp.ee[i] = (energy->raw[i] - energy->inner[i]) + (energy->from_rest[i] - energy->inner_d[i]);
     *error = norm(energy, energy->ivp.ee) * fmin(fmax(1.0, period / energy->ivp.h), MOST);
