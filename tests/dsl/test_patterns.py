@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 from sysdyn.dsl.parser import patterns
-from sysdyn.dsl.parser.grammar import load_tables
 from sysdyn.dsl.parser.automaton import Automaton
+from sysdyn.dsl.parser.grammar import load_tables
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.source import SourceText
 
