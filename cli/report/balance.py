@@ -109,7 +109,18 @@ def shares(trace: Trace, parts: Sequence[Part]) -> tuple[Share, ...]:
         found.append(
             Share(part.label, part.role, float(first - last if part.role == "in" else last - first), part.place)
         )
-    return tuple(found)
+    return (*found, *_of_jumps(trace, parts))
+
+
+def _of_jumps(trace: Trace, parts: Sequence[Part]) -> Iterator[Share]:
+    """What is stored less, and more, behind the instants that stand twice: impacts, and what events assign."""
+    held = [trace[part.name].values for part in parts if part.role == "held"]
+    if not held:
+        return
+    gained = np.sum([np.diff(values) for values in held], axis=0)[np.diff(trace.time) == 0.0]
+    for role, energy in (("out", -gained[gained < 0.0].sum()), ("in", gained[gained > 0.0].sum())):
+        if energy > REST * max(np.abs(values).max() for values in held):
+            yield Share("impacts and events", role, float(energy), None)
 
 
 def _of_branches(branches: Sequence[Branch]) -> Iterator[list[Part]]:

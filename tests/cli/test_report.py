@@ -305,3 +305,21 @@ def test_the_charge_of_an_element_is_no_letter_of_its_name():
     types = Typesetter(["C1", "q1"], (), ["C1"])
     assert types.unknown("C1", "q", 0) == "<msub><mi>q</mi><mi>C1</mi></msub>"
     assert types.unknown("q1", "q", 0) == "<msub><mi>q</mi><mn>1</mn></msub>"
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_what_a_stop_takes_is_dissipated(tmp_path, restitution):
+    """1 kg at 1 m/s: 0.5 J less what it keeps."""
+    (tmp_path / "m.sd").write_text(f"""model stop {{
+  coord x: translation = 0 m
+  energy T* = 1/2*(1 kg)*x'^2
+  init x' = 1 m/s
+  phi wall: x <= 1 m restitution {restitution}
+}}
+scene s of stop {{ time 0 s to 2 s; trace x, x' }}
+""")
+    text = report(tmp_path / "m.sd").text
+    lost = 0.5 * (1.0 - restitution**2)
+    assert text[text.index("impacts and events") + 1] == f"{lost:.4g} J"
+    row = len(text) - text[::-1].index("impacts and events")
+    assert text[row] == f"{lost:.4g}"

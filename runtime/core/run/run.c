@@ -116,7 +116,9 @@ void sd_run_restart(sd_run *run, double t, double label, const double *y, const 
 {
     const double *old = run->sample, *new = run->end;
     audit_at(run, t, y, yd, run->end);
-    run->supplied += (new[0] + new[1]) - (old[0] + old[1]);
+    const double gained = (new[0] + new[1]) - (old[0] + old[1]);
+    run->supplied += fmax(gained, 0.0);
+    run->dissipated += fmax(-gained, 0.0);
     if (run->ledgers)
         sd_ledgers_jump(run->ledgers, old, new);
     run->stepper->start(run->stepper->self, t, y, yd, 0.0);

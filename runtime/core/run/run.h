@@ -8,7 +8,8 @@
  * Energy balance: [T + V](t) - [T + V](t0) + int dissipated dt - int supplied dt.  The integrals of each accepted step:
  * where laws are steep by the method's stages, at which they hold, else on the dense output: by what is known from steps before
  * and the middle of this one (exact to degree 5), and by Lobatto's rule of five points (to 7) where that leaves something open.
- * Where an integration restarts after a jump, what T + V gained there was supplied by the impulses that forced it.
+ * Where an integration restarts after a jump, what T + V gained there was supplied by the impulses that forced it, and what
+ * it lost was dissipated by them (an impact without restitution).
  */
 #ifndef SYSDYN_RUN_H
 #define SYSDYN_RUN_H

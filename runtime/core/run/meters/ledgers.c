@@ -29,7 +29,8 @@ void sd_ledgers_jump(sd_ledgers *ledgers, const double *before, const double *af
 {
     for (int32_t k = 0; k < ledgers->count; k++) {
         double gained = rows_of(after, k)[0] - rows_of(before, k)[0];
-        ledgers->supplied[k] += gained;
+        ledgers->supplied[k] += fmax(gained, 0.0);
+        ledgers->dissipated[k] += fmax(-gained, 0.0);
         ledgers->gross[k] += fabs(gained);
     }
 }

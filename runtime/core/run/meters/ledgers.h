@@ -50,7 +50,7 @@ void sd_ledgers_add(sd_ledgers *ledgers, const double *integral);
 void sd_ledgers_note(sd_ledgers *ledgers, double t, const double *y, const double *yd, const double *audit, double *room);
 /* frees the records */
 void sd_ledgers_clear(sd_ledgers *ledgers);
-/* what contents gained at a jump was supplied: rows of block audit before and after */
+/* what contents gained at a jump was supplied, what they lost dissipated: rows of block audit before and after */
 void sd_ledgers_jump(sd_ledgers *ledgers, const double *before, const double *after);
 
 #endif
