@@ -7,6 +7,20 @@ from numpy.typing import NDArray
 def address(array: NDArray[Any], /) -> int:
     """Address of an array's first element; the caller keeps the array alive."""
 
+SD_BY_SUMS: float
+SD_BY_FACTORS: float
+SD_CANCELS: float
+SD_DEPENDENT: float
+SD_MET: float
+SD_SAME: float
+SD_INSTANT: float
+SD_HALF_OF_ITS_DIGITS: float
+SD_OPEN: float
+SD_UNSEEN: float
+SD_SLIGHT: float
+SD_SMALL: float
+SD_PIVOT: float
+SD_GENERIC: float
 FALLEN: float
 ROUNDING: float
 SD_CONTRACT: int
@@ -21,6 +35,8 @@ SD_COMPARED: int
 SD_RELAXING: int
 SD_PARTS: int
 SD_JUMP: int
+SD_BRANCH_SLIDES: int
+SD_BRANCH_RESTS: int
 SD_AUDIT_HEAD: int
 SD_LEDGER_ROWS: int
 SD_LARGEST: int

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from sysdyn.runtime import tuning
+from sysdyn.runtime import _core, tuning
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.plan import Happened, Kink
 
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from sysdyn.runtime.events.watches import Watched
 from sysdyn.runtime.model.description import Floats
 
-LIVE, ABOVE, BELOW, SLIDES, RESTS = 0.0, 1.0, -1.0, 2.0, 3.0
+BELOW, LIVE, ABOVE = map(float, range(-1, 2))
+SLIDES, RESTS = float(_core.SD_BRANCH_SLIDES), float(_core.SD_BRANCH_RESTS)
 WORDS = {LIVE: "= 0", ABOVE: "> 0", BELOW: "< 0", SLIDES: "slides", RESTS: "= 0"}
 TURNS = 4
 """Of one kink at one instant: more, and its branches contradict each other."""

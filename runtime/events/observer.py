@@ -17,7 +17,7 @@ SMALL = tuning.SAME
 """Of the largest value and terms met of a row: what is less is zero."""
 ROUNDING: float = _core.ROUNDING
 """Of the terms of a value: what a sum of a few is rounded by.  Unknowns that are solved for are known to SMALL only."""
-TIMED, ASSIGNED = 2, 1
+ASSIGNED, TIMED = range(1, 3)
 LEAST = 1e-24
 """In SI units: a value that has never been more has no size yet; round-off of what is held at zero is less still."""
 

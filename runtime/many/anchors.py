@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, stated
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.least_change import RANK
+from sysdyn.runtime.numerics.least_change import DENSE, RANK
 from sysdyn.runtime.numerics.rank import count, decomposed
 from sysdyn.runtime.start.settled import Settler
 
@@ -21,7 +21,7 @@ AGREES = tuning.CANCELS
 """Of its magnitude: an initial value that moved by less did not move."""
 OPEN = tuning.OPEN
 """Component of a null vector of unit length from which an unknown is open."""
-LARGEST = 400
+LARGEST = DENSE
 """Unknowns with their rates that are looked at: full matrices."""
 STATE = ("q", "f", "p", "s")
 

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import tuning
-from sysdyn.runtime.accuracy import pairs
+from sysdyn.runtime.accuracy import control, estimate, laws, pairs
+from sysdyn.runtime.accuracy.compared import BEYOND
 from sysdyn.runtime.accuracy.control import DRAFT, Achieved
 from sysdyn.runtime.accuracy.laws import FEW_STEPS, Law
 from sysdyn.runtime.accuracy.options import Options
@@ -40,7 +41,7 @@ from sysdyn.runtime.trace.keeping import Held
 from sysdyn.runtime.trace.trace import Parameter, Trace
 
 MOST = 48
-"""Instants of comparison that are taken of a run's steps, at most twice that (core/run/many/many.c)."""
+"""Instants of comparison that are taken of a run's steps, at most twice that."""
 COUNTS = tuning.SAME
 """Of the largest entry of a row: what is less is round-off, or may as well vanish."""
 MARGIN, LOOSER = 0.1, 3.0
@@ -308,6 +309,26 @@ class Batch:
         for name in ("power", "credit", "finest", "far", "ratio", "little", "growth"):
             setattr(many, name, getattr(law, name))
         many.fall = law.order
+        many.rules = lib.Rules(
+            safety=laws.SAFETY,
+            aim=estimate.AIM,
+            left=estimate.LEFT,
+            slowest=estimate.SLOWEST,
+            stretch=estimate.STRETCH,
+            unseen=estimate.UNSEEN,
+            short_credit=laws.SHORT_CREDIT,
+            first_drop=estimate.FIRST_DROP,
+            loose=pairs.LOOSE,
+            tame=control.TAME,
+            beyond=BEYOND,
+            hidden=pairs.UNSEEN,
+            parted=pairs.PARTED,
+            much=pairs.MUCH,
+            bend=pairs.BEND,
+            few=estimate.SHORT,
+            runs=control.RUNS,
+            instants=MOST,
+        )
         many.few_steps, many.many_steps = FEW_STEPS, law.most
         many.tolerance[0], many.tolerance[1] = draft, fine
         many.max_steps = min(options.max_steps or 2**62, 2**62)

@@ -14,7 +14,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import Structure, null_place
 
-DENSE = 600
+DENSE = tuning.NULL_SPACE
 """Unknowns up to which null vectors are taken."""
 BESIDE = tuning.UNSEEN
 """Of its size, how far beside: a slope there is no round-off, and the exponential of a diode notices little."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Set as AbstractSet
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import equilibrated
@@ -17,7 +18,7 @@ from sysdyn.runtime.numerics.rank import TOLERANCE, null_space, singular_values
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Mask, Starter
 
-DENSE = 600
+DENSE = tuning.NULL_SPACE
 """Unknowns and rates up to which the null space is taken."""
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime import tuning
+from sysdyn.runtime.events.kinks import SLIDES
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
@@ -51,8 +52,6 @@ SIDES = 2
 BESIDE = tuning.SMALL
 """Of their magnitudes: how far beside a point what it leaves open is looked at."""
 WAYS = 6
-SLIDES = 2.0
-"""Of a branch (events/kinks.py)."""
 
 
 @dataclass(frozen=True, slots=True)

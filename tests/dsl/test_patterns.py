@@ -9,8 +9,9 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import pytest
-from sysdyn.dsl.parser import patterns, table
+from sysdyn.dsl.parser import patterns
 from sysdyn.dsl.parser.automaton import Automaton
+from sysdyn.dsl.parser.grammar import load_tables
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.source import SourceText
 
@@ -95,7 +96,7 @@ def test_damaged_texts_are_read_as_before(monkeypatch):
 
 
 def test_no_terminal_has_a_digit_in_it():
-    assert not re.search(r"[0-9]", table.LOOKAHEADS)
+    assert not re.search(r"[0-9]", load_tables().lookaheads)
 
 
 def test_a_netlist_is_read_by_its_recipes(monkeypatch):

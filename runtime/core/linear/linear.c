@@ -4,12 +4,13 @@
 #include "linear/lanes.h"
 #include "linear/null_space.h"
 #include "linear/sparse/sparse.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define REFINE 1e-8 /* pivots smaller than this part of their column: one step of iterative refinement */
+#define REFINE SD_HALF_OF_ITS_DIGITS /* pivots smaller than this part of their column: one step of iterative refinement */
 
 void sd_linear_free(sd_linear *linear)
 {

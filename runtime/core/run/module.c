@@ -2,6 +2,7 @@
  * is asked some hundred times a run, and ctypes' own ways take five times as long. */
 #include <Python.h>
 
+#include "linear/tuning.h"
 #include "run/events/fits.h"
 #include "run/many/many.h"
 #include "start/magnitudes.h"
@@ -65,6 +66,8 @@ static const struct {
     {"SD_RELAXING", SD_RELAXING},
     {"SD_PARTS", SD_PARTS},
     {"SD_JUMP", SD_JUMP},
+    {"SD_BRANCH_SLIDES", SD_BRANCH_SLIDES},
+    {"SD_BRANCH_RESTS", SD_BRANCH_RESTS},
     {"SD_AUDIT_HEAD", SD_AUDIT_HEAD},
     {"SD_LEDGER_ROWS", SD_LEDGER_ROWS},
     {"SD_LARGEST", SD_LARGEST},
@@ -81,6 +84,29 @@ static const struct {
     {"SD_ROSENBROCK_DENSE", SD_ROSENBROCK_DENSE},
 };
 
+/* thresholds that both sides share (runtime/tuning.py) */
+static const struct {
+    const char *name;
+    double value;
+} level[] = {
+    {"SD_BY_SUMS", SD_BY_SUMS},
+    {"SD_BY_FACTORS", SD_BY_FACTORS},
+    {"SD_CANCELS", SD_CANCELS},
+    {"SD_DEPENDENT", SD_DEPENDENT},
+    {"SD_MET", SD_MET},
+    {"SD_SAME", SD_SAME},
+    {"SD_INSTANT", SD_INSTANT},
+    {"SD_HALF_OF_ITS_DIGITS", SD_HALF_OF_ITS_DIGITS},
+    {"SD_OPEN", SD_OPEN},
+    {"SD_UNSEEN", SD_UNSEEN},
+    {"SD_SLIGHT", SD_SLIGHT},
+    {"SD_SMALL", SD_SMALL},
+    {"SD_PIVOT", SD_PIVOT},
+    {"SD_GENERIC", SD_GENERIC},
+    {"ROUNDING", ROUNDING},
+    {"FALLEN", FALLEN},
+};
+
 static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "_core", NULL, -1, functions, NULL, NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit__core(void)
@@ -89,8 +115,8 @@ PyMODINIT_FUNC PyInit__core(void)
     for (size_t i = 0; module != NULL && i < sizeof layout / sizeof *layout; i++)
         if (PyModule_AddIntConstant(module, layout[i].name, layout[i].value))
             Py_CLEAR(module);
-    if (module != NULL && (PyModule_AddObject(module, "ROUNDING", PyFloat_FromDouble(ROUNDING)) ||
-                           PyModule_AddObject(module, "FALLEN", PyFloat_FromDouble(FALLEN))))
-        Py_CLEAR(module);
+    for (size_t i = 0; module != NULL && i < sizeof level / sizeof *level; i++)
+        if (PyModule_AddObject(module, level[i].name, PyFloat_FromDouble(level[i].value)))
+            Py_CLEAR(module);
     return module;
 }

@@ -8,11 +8,12 @@
 #include "run/meters/quadratures.h"
 #include "linear/lanes.h"
 #include "system/settle_shown.h"
+#include "linear/tuning.h"
 
 #define FAILS 4 /* rows that meet their sums for each that does not: fewer are not worth looking */
 #define CRESTS 32 /* rows of what is watched that a step may have beside those at its parts */
 #define GROWN 1.1 /* times the largest so far: beyond it the size of a step is not believed as the method left it */
-#define BEGUN 1e-3 /* magnitudes by which a start may still be moved: at a valve at rest no state gives its law a rate */
+#define BEGUN SD_SMALL /* magnitudes by which a start may still be moved: at a valve at rest no state gives its law a rate */
 
 /* points are settled in room of the method's, or no more */
 static void lend(sd_run *run, int room)

@@ -10,6 +10,7 @@
 #include "linear/linear.h"
 #include "system/assembly.h"
 #include "system/settle.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 
@@ -88,11 +89,18 @@ typedef struct sd_ivp {
 } sd_ivp;
 
 #define SD_ROUND_OFF (10.0 * DBL_EPSILON) /* part of the largest that unknowns have been */
+/* what step controls have in common (Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, II.4) */
+#define SD_SAFETY 0.9
+#define SD_SHRINK 0.2  /* of a step: what a refused one is cut to at least */
+#define SD_FAILURES 12 /* of slopes or factors in one step: it is 4000 times shorter then */
+#define SD_FIRST 1e-2  /* of the span: the first step at most */
+#define SD_OPENING 3   /* steps that tell how long the first might have been */
+
 #define SD_NOISY 10.0  /* times a correction that does not shrink any more: what such ones leave open */
-#define SD_NOISE 1e-9  /* part of an unknown up to which a correction may be that */
-#define SD_SLACK 1e-12 /* of a step: what sums of steps may leave of the span */
+#define SD_NOISE SD_SAME   /* part of an unknown up to which a correction may be that */
+#define SD_SLACK SD_CANCELS /* of a step: what sums of steps may leave of the span */
 #define SD_RESTS 400   /* steps, each of a quarter of an e-fold at least: what round-off moves off a rest has left it by then */
-#define SD_SHORT 1e-9 /* of the span: what happens this early is resolved to round-off */
+#define SD_SHORT SD_INSTANT /* of the span: what happens this early is resolved to round-off */
 
 /* What round-off leaves open of an unknown, by the last of corrections that do not shrink any more: rows far from it with
  * large terms leave more of a small unknown open than its own digits. */

@@ -1,6 +1,7 @@
 /* Residual and Jacobian of a system: see assembly.h. */
 #include "system/assembly.h"
 #include "linear/lanes.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
@@ -8,14 +9,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FAINT 1e-9 /* of the largest so far of an unknown that happens to be zero */
+#define FAINT SD_SAME /* of the largest so far of an unknown that happens to be zero */
 /* of the terms of a row, as the magnitudes of its unknowns make them: round-off of round-off.  A law that is zero (a
  * transistor that is off) leaves a row whose only term is its residual */
 #define NOTHING (DBL_EPSILON * DBL_EPSILON)
 
 /* how far beside a root at zero its slope is taken: of an unknown's magnitude, and at least */
-#define ROOT_BESIDE 1e-8
-#define ROOT_LEAST 1e-12
+#define ROOT_BESIDE SD_HALF_OF_ITS_DIGITS
+#define ROOT_LEAST SD_CANCELS
 
 /* rows q' - f of a short stretch */
 static SD_ONE_BY_ONE void put_few(int32_t number, const double *own, const double *q, const double *f, double *to)

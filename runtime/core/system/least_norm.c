@@ -1,11 +1,12 @@
 /* The least multipliers with given reactions: see least_norm.h. */
 #include "system/least_norm.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define EPSILON 1e-14
+#define EPSILON SD_BY_SUMS
 
 sd_least_norm *sd_least_norm_new(sd_system *system, sd_linear *linear, int32_t multipliers, int32_t coordinates)
 {

@@ -4,6 +4,7 @@
 #include "system/settle_basis.h"
 #include "system/settle_room.h"
 #include "system/settle_saddle.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <string.h>
@@ -11,13 +12,12 @@
 #define ITERATIONS 6
 #define PATIENT 40      /* of the last attempt: an exponential is climbed down a step at a time */
 #define EXACT 4e-15     /* scaled residual that counts as round-off */
-#define FINE 1e-13      /* ... and that with which old factors have done what they can, or twice what fresh ones could, */
-#define COARSE 1e-11    /* but no more than this */
-#define CLOSE 1e-9      /* scaled residual with which one may live */
-#define SMALL 1e-4      /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
-#define CALM 1e-9       /* the same of a point whose rows are FINE, behind which the next move is none */
-#define HELD 1e8        /* weight of the state in a second attempt */
-#define STILL 1e-12     /* move of the state, in magnitudes, that is none */
+#define FINE SD_BY_FACTORS /* ... and that with which old factors have done what they can, or twice what fresh ones could, */
+#define COARSE SD_DEPENDENT /* but no more than this */
+#define CLOSE SD_SAME /* scaled residual with which one may live */
+#define SMALL SD_SLIGHT /* move of the unknowns that follow, in magnitudes: it drags the state by WEIGHT of that */
+#define CALM SD_SAME /* the same of a point whose rows are FINE, behind which the next move is none */
+#define STILL SD_CANCELS /* move of the state, in magnitudes, that is none */
 #define REFUSALS 3      /* of the basis in a row, behind which it is tried once in AGAIN points alone, and */
 #define AGAIN 16        /* behind SD_BASIS_OUT of them not any more */
 #define BEYOND 1e3      /* times the point that was found, from which a magnitude was that of an iterate */
@@ -281,7 +281,7 @@ static int settle_unknowns(sd_settle *settle, double t, double *y, double *yd)
     iterate(settle, t, y, yd, ITERATIONS, &best);
     if (best > close) { /* near a square root's zero a move of the state is the cheaper way to change a rate */
         put(settle, settle->x0, y, yd);
-        settle->hold = HELD;
+        settle->hold = SD_HELD;
         settle->ready = 0;
         iterate(settle, t, y, yd, ITERATIONS, &best);
         settle->hold = 1.0;

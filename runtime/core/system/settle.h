@@ -21,6 +21,7 @@
 /* Of a condensed system the kept unknowns are moved; the others follow, and so do their rates. */
 /* what an unknown is of the state: nothing, one of it, one whose differences from others (`pair`) are of it: what floating
  * stores hold, each difference with the weight 1; what their ends have in common follows */
+#define SD_HELD 1e8 /* weight of the state in a second attempt, and across an instant */
 enum { SD_STATELESS, SD_CARRIES, SD_DIFFERS };
 enum { SD_OTHER, SD_CONSTRAINT, SD_RATE, SD_LEFT_OUT };
 

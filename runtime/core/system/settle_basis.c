@@ -1,10 +1,11 @@
 /* A basis of the unknowns that the rows tell: see settle_basis.h. */
 #include "system/settle_basis.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <string.h>
 
-#define LEAST_PIVOT 1e-11 /* part of its column below which a row of the basis follows from the others */
+#define LEAST_PIVOT SD_DEPENDENT /* part of its column below which a row of the basis follows from the others */
 #define FILL 6          /* entries of the factors of a basis for each of its matrix, beyond which it is not tried any more */
 
 /* 1 / weight of an unknown or rate, which carries the state or not; of a state that is to stay where it is 0 */

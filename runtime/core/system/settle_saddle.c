@@ -1,11 +1,12 @@
 /* The least change by the saddle-point matrix: see settle_saddle.h. */
 #include "system/settle_saddle.h"
 #include "system/settle_room.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <string.h>
 
-#define EPSILON 1e-14 /* of redundant rows */
+#define EPSILON SD_BY_SUMS /* of redundant rows */
 
 double sd_settle_rate(const sd_settle *settle, int32_t k, const double *yd)
 {

@@ -2,11 +2,12 @@
 #include "system/settle_shown.h"
 #include "system/condensed.h"
 #include "system/settle_room.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <string.h>
 
-#define TOLD 1e-10    /* scaled residual of a row that points between steps keep */
+#define TOLD SD_MET /* scaled residual of a row that points between steps keep */
 
 /* y, yd := what the kept unknowns z, zd make of all, as far as rows show them: their rows were just evaluated */
 static void show(const sd_settle *settle, const double *z, const double *zd, double *y, double *yd)

@@ -305,6 +305,19 @@ class RunSamples(c.Structure):
     _fields_ = [("time", P), ("value", P), ("late", P), ("number", I), ("room", I)]
 
 
+class Rules(c.Structure):
+    """sd_rules."""
+
+    _fields_ = [
+        *[
+            (name, D)
+            for name in ["safety", "aim", "left", "slowest", "stretch", "unseen", "short_credit", "first_drop"]
+        ],
+        *[(name, D) for name in ["loose", "tame", "beyond", "hidden", "parted", "much", "bend"]],
+        *[(name, I) for name in ["few", "runs", "instants"]],
+    ]
+
+
 class Many(c.Structure):
     """sd_many."""
 
@@ -327,6 +340,7 @@ class Many(c.Structure):
         *[(name, I) for name in ["units", "known"]],
         *[(name, D) for name in ["late", "power", "credit", "finest", "far"]],
         *[(name, D) for name in ["ratio", "little", "growth", "fall", "few_steps", "many_steps"]],
+        ("rules", Rules),
         ("tolerance", D * 2),
         ("max_steps", L),
         ("energy", D),

@@ -1,5 +1,6 @@
 #include "linear/dense/dense.h"
 #include "linear/lanes.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
@@ -9,9 +10,9 @@
 #define SWEEPS 8             /* of the equilibration: 1e200 becomes 6 */
 #define REFINED 2            /* rounds of iterative refinement: a weak direction is known as well as its residual is */
 #define TURNS 60             /* sweeps of rotations; they converge quadratically, within ten */
-#define TOLERANCE 1e-9       /* runtime/numerics/rank.py */
-#define CERTAIN 1e-12
-#define GENERIC 0.7310585786300049 /* runtime/structure/structure.py */
+#define TOLERANCE SD_SAME /* runtime/numerics/rank.py */
+#define CERTAIN SD_CANCELS
+#define GENERIC SD_GENERIC /* runtime/structure/structure.py */
 
 static void rotate(int32_t n, double *a, double *b, double c, double s)
 {

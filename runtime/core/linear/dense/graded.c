@@ -1,4 +1,5 @@
 #include "linear/dense/graded.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
@@ -6,7 +7,7 @@
 #include <string.h>
 
 enum { NONE = 1 << 28 }; /* the cost of an entry that is zero: no sum of others reaches it */
-#define AGREES 1e-10     /* of the largest aim: what a row in excess may be missed by */
+#define AGREES SD_MET /* of the largest aim: what a row in excess may be missed by */
 #define CERTAIN 1e8      /* bounds of its round-off that a pivot is above: half of its digits are known */
 #define LIKELY 16.0      /* the same, where the step is a correction that is asked for again */
 #define LARGE 0.25       /* of the largest entries at first: an exact pivot */

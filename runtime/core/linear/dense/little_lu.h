@@ -8,10 +8,11 @@
 #define SYSDYN_LITTLE_LU_H
 
 #include "linear/linear.h"
+#include "linear/tuning.h"
 
 #include <string.h>
 
-#define WEAK_PIVOT 1e-8 /* part of its column below which one is weak */
+#define WEAK_PIVOT SD_HALF_OF_ITS_DIGITS /* part of its column below which one is weak */
 
 /* by pivots: multipliers below the diagonal, what is left of rows on and above it, their inverse diagonal; which row of the
  * matrix each is */

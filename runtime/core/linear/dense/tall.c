@@ -1,13 +1,14 @@
 #include "linear/dense/tall.h"
 
 #include "linear/sparse/sparse.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define REFINEMENTS 2
-#define ROUND_OFF 1e-14 /* what is left of a row in excess that agrees; of others the refinement makes up for it */
+#define ROUND_OFF SD_BY_SUMS /* what is left of a row in excess that agrees; of others the refinement makes up for it */
 
 void sd_miss(int32_t rows, int32_t columns, const int32_t *column, const int32_t *row, const double *value,
              const double *b, const double *x, double *rest)

@@ -2,13 +2,14 @@
 #include "linear/elimination/elimination.h"
 
 #include "linear/lanes.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define GROWTH 1e4         /* of multipliers, where a solution is a correction that the next one corrects */
-#define WEAK 1e-8          /* pivots below this part of their column are for exchanges and refinement (linear.c) */
+#define WEAK SD_HALF_OF_ITS_DIGITS /* pivots below this part of their column are for exchanges and refinement (linear.c) */
 #define FIRST 3            /* matrices seen before an order is looked for, if nobody says more: one-off systems do not pay, */
 #define SHARE 8            /* nor do large ones before this part of n */
 #define MISSES 3           /* matrices that an order did not serve, each of which costs a fortieth of a search, before another is */

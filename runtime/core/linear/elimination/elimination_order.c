@@ -1,11 +1,12 @@
 /* The order of pivots of an elimination (elimination.h): Markowitz's, with threshold pivoting in several matrices at once. */
 #include "linear/elimination/elimination.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define STRONG 0.1         /* a pivot is no smaller than this part of its column in the newest matrix */
+#define STRONG SD_PIVOT /* a pivot is no smaller than this part of its column in the newest matrix */
 #define OLDER 0.01         /* and in those before */
 
 /* Matrices in full while they are eliminated: value [samples][n][n] by columns, zero outside the pattern; entry [n][n] by

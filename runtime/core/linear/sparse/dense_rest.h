@@ -5,16 +5,17 @@
 #define SYSDYN_DENSE_REST_H
 
 #include "linear/sparse/blocks.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <string.h>
 
 #define LONG 100000     /* columns of a line from which the room for its factors counts: */
-#define GROWN 1e-6      /* a column's own row pivots though its entry is that small, where elimination has only added to it
+#define GROWN SD_UNSEEN /* a column's own row pivots though its entry is that small, where elimination has only added to it
                          * (inductances and capacitances: two entries a column are left, not three) */
-#define FAINT_PIVOT 1e-7 /* and a column's own one of quasi-definite matrices, whose factors any of them has: refined once or
+#define FAINT_PIVOT SD_OPEN /* and a column's own one of quasi-definite matrices, whose factors any of them has: refined once or
                          * twice their solutions are as good (those of 4650 masses at random: a fifth of the time) */
-#define UNHEALTHY 1e-3  /* refactorised pivots below this part of their column are chosen anew */
+#define UNHEALTHY SD_SMALL /* refactorised pivots below this part of their column are chosen anew */
 #define PANEL 32        /* columns that are applied to all behind them together */
 #define REST_LEAST 64   /* columns of a rest that is worth it */
 #define REST_MOST 4096  /* and those whose numbers have room */

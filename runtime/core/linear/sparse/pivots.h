@@ -6,8 +6,9 @@
 #include "linear/sparse/blocks.h"
 #include "linear/sparse/dense_rest.h"
 #include "linear/sparse/substitute.h"
+#include "linear/tuning.h"
 
-#define THRESHOLD 0.1    /* a sparser row may pivot if its entry is this close to the largest */
+#define THRESHOLD SD_PIVOT /* a sparser row may pivot if its entry is this close to the largest */
 #define ROOM 2           /* entries of a factor for each of the matrix: room for them */
 #define SMALL 10000      /* columns up to which room that was not taken is kept for the next pivoting */
 

@@ -5,14 +5,15 @@
 #include <string.h>
 
 #include "run/events/fits.h"
+#include "linear/tuning.h"
 
 #define ITERATIONS 60    /* of Ridders' method */
 #define SAME 8.0         /* spacings of t within which two instants are one */
 #define FOLLOWED 8       /* points settled from an instant of the dense output as it is */
 #define CLOSER 6         /* of these, after which what is ENOUGH will do */
 #define ROUND_OFF 1e-15  /* of the largest value and terms of a row, or of its flight: it is no closer to zero */
-#define ENOUGH 1e-3      /* of what counts as zero: what is watched may be past it by */
-#define AT_ONCE 1e-6     /* of what is searched: a moment */
+#define ENOUGH SD_SMALL /* of what counts as zero: what is watched may be past it by */
+#define AT_ONCE SD_UNSEEN /* of what is searched: a moment */
 #define WIDER 3.0        /* times the stretch before: the next one that is searched behind where it has been seen */
 
 typedef void look(sd_run *run, double t, double *values);

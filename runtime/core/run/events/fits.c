@@ -4,11 +4,10 @@
 #include <math.h>
 
 #include "run/events/landing.h"
+#include "linear/tuning.h"
 
-#define FULL_SENSE 1e-9  /* of a sense: what it may pass its end by */
-#define SLIDES 2.0       /* branches, as events/kinks.py names them */
-#define RESTS 3.0
-#define NO_SIZE 1e-9     /* of its magnitude, an unknown of which round-off leaves nothing open */
+#define FULL_SENSE SD_SAME /* of a sense: what it may pass its end by */
+#define NO_SIZE SD_SAME /* of its magnitude, an unknown of which round-off leaves nothing open */
 
 /* Whether an inequality, or a friction law, is as the mode says. */
 static int contact_fits(const sd_modes *m, const sd_contact *c, int holds, const double *v)
@@ -66,9 +65,9 @@ static int kink_fits(const sd_modes *m, const sd_kink *k, const double *v)
     double branch = m->p[k->branch], small = sd_mode_zero(m, k->value);
     if (branch == 0.0)
         return fabs(v[k->value]) <= small;
-    if (branch == SLIDES)
+    if (branch == SD_BRANCH_SLIDES)
         return v[k->above] >= -FULL_SENSE && v[k->below] >= -FULL_SENSE;
-    if (branch == RESTS)
+    if (branch == SD_BRANCH_RESTS)
         return fabs(v[k->value]) <= small && (k->rate < 0 || fabs(v[k->rate]) <= sd_mode_zero(m, k->rate));
     if (branch * v[k->value] > small)
         return 1;

@@ -3,11 +3,12 @@
 #define SYSDYN_FITS_H
 
 #include "run/events/modes.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
 
-#define FALLEN 1e-4 /* of what else counts as zero, and of the height of its flight: a gap closes again below it */
+#define FALLEN SD_SLIGHT /* of what else counts as zero, and of the height of its flight: a gap closes again below it */
 
 #define ROUNDING (4.0 * DBL_EPSILON) /* of the terms of a value: what a sum of a few is rounded by */
 

@@ -7,7 +7,6 @@
 #include "run/events/fits.h"
 #include "run/events/strike.h"
 
-#define HELD 1e8 /* weight of the state across an instant */
 #define ROWS_OF_EVENT 8 /* at most, beside those asked for */
 
 void sd_landing_look(sd_run *run, double t, const double *y, const double *yd, double *values)
@@ -107,7 +106,7 @@ int sd_landing_keeps(sd_settle *settle, double t, double *y, double *yd, const s
         return 1;
     memcpy(y, keeping->before, written);
     memcpy(yd, keeping->before_d, written);
-    settle->hold = HELD;
+    settle->hold = SD_HELD;
     done = stays(settle, t, y, yd, keeping);
     settle->hold = 1.0;
     settle->ready = 0;

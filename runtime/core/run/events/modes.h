@@ -17,6 +17,8 @@ struct sd_run;
 struct sd_linear;
 
 #define SD_OWN INT32_MAX /* the mode that the core has found by itself */
+/* branches of a law, as events/kinks.py has them: the text's own, above zero, on it by both, on it by its own value; -1 below */
+enum { SD_BRANCH_LIVE, SD_BRANCH_ABOVE, SD_BRANCH_SLIDES, SD_BRANCH_RESTS };
 enum { SD_JUMP = -1 }; /* in place of samples that are due: the text jumps */
 
 enum sd_contact_kind { SD_PSI, SD_FRICTION, SD_PHI, SD_GUARDED, SD_FOLLOWS };

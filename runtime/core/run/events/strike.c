@@ -12,11 +12,12 @@
 #include "linear/linear.h"
 #include "run/events/fits.h"
 #include "run/events/landing.h"
+#include "linear/tuning.h"
 
 #define ITERATIONS_OF_STRIKE 3
 #define UNSEEN_FLIGHT (16.0 * DBL_EPSILON) /* of the terms of a gap: a flight lower than that */
-#define REGULAR 1e-11 /* of its column: a pivot */
-#define STAYS 1e-14  /* of its magnitude, what an unknown is moved by that stays where it is */
+#define REGULAR SD_DEPENDENT /* of its column: a pivot */
+#define STAYS SD_BY_SUMS /* of its magnitude, what an unknown is moved by that stays where it is */
 
 /* The flow with which the gap opens again, 0 where it closes no more, or what it reaches is at its zero too. */
 static double thrown_back(const sd_run *run, const sd_strike *strike)

@@ -1,5 +1,6 @@
 /* Whether a step passes over a change of what is watched: see watched.h. */
 #include "run/events/watched.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,17 +9,16 @@
 #define NARROWER 20   /* times the part of a step within which something changes is parted again */
 #define A_TURN 0.5     /* from one extreme to the next: a part at most */
 #define SHIFT 0.13    /* of a part, by which every other one is longer */
-#define SECOND (1.0 + SHIFT)
-#define FOURTH (3.0 + SHIFT)
+#define ODD(part) (part + SHIFT)
 /* of the cubic through four points: what the value at k counts at 2 beside those at a, b and c */
 #define IN_THE_MIDDLE(k, a, b, c) ((2.0 - (a)) / ((k) - (a)) * ((2.0 - (b)) / ((k) - (b))) * ((2.0 - (c)) / ((k) - (c))))
 #define GOLDEN 0.6180339887498949 /* of what the bottom lies within: what is kept */
 #define DEEP 70        /* of these: to the spacing of t */
 #define STEEPER 2.0    /* times the slopes met: as steep it may fall between two looks */
-#define AT_ONCE 1e-6   /* of the first part: what begins at zero and falls there may come back within it */
+#define AT_ONCE SD_UNSEEN /* of the first part: what begins at zero and falls there may come back within it */
 #define OFF 0.1        /* of what is met within a step: what is interpolated between its ends may be off by */
 #define SETTLED 2
-#define FAINT 1e-9    /* of the largest value of what is watched: what it is off by unseen */
+#define FAINT SD_SAME /* of the largest value of what is watched: what it is off by unseen */
 
 typedef void look(sd_run *run, double t, double *values);
 
@@ -46,16 +46,16 @@ static double beyond(const double *x, const double *value)
     return value[0] + (x[3] - x[0]) * (rise + bend * (x[3] - x[1]));
 }
 
-/* Whether a watch may fall through zero and come back between the ends of SD_PARTS parts, which lie at 0, SECOND, 2,
- * FOURTH, 4 (no period is a part of all): the value in the middle is off the cubic through the others by more than
+/* Whether a watch may fall through zero and come back between the ends of SD_PARTS parts, which lie at 0, ODD(1), 2,
+ * ODD(3), 4 (no period is a part of all): the value in the middle is off the cubic through the others by more than
  * a quarter of the least of them, or a parabola through neighbours falls, by so much more at most.  first: what begins at
  * zero leaves it. */
 static int unfollowed(const sd_run *run, const sd_watch *watch, int first)
 {
-    static const double part[SD_PARTS + 1] = {0.0, SECOND, 2.0, FOURTH, 4.0};
+    static const double part[SD_PARTS + 1] = {0.0, ODD(1), 2.0, ODD(3), 4.0};
     static const double against[SD_PARTS + 1] = {
-        -IN_THE_MIDDLE(0.0, SECOND, FOURTH, 4.0), -IN_THE_MIDDLE(SECOND, 0.0, FOURTH, 4.0), 1.0,
-        -IN_THE_MIDDLE(FOURTH, 0.0, SECOND, 4.0), -IN_THE_MIDDLE(4.0, 0.0, SECOND, FOURTH)};
+        -IN_THE_MIDDLE(0.0, ODD(1), ODD(3), 4.0), -IN_THE_MIDDLE(ODD(1), 0.0, ODD(3), 4.0), 1.0,
+        -IN_THE_MIDDLE(ODD(3), 0.0, ODD(1), 4.0), -IN_THE_MIDDLE(4.0, 0.0, ODD(1), ODD(3))};
     double off = 0.0, least = INFINITY, most = 0.0, found[SD_PARTS + 1];
     for (int k = 0; k <= SD_PARTS; k++) {
         found[k] = watch->side * run->looked[(size_t)k * (size_t)run->observed + (size_t)watch->row];

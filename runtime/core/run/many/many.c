@@ -9,22 +9,9 @@
 
 #include "run/many/many_compare.h"
 #include "run/many/many_start.h"
+#include "linear/tuning.h"
 
-#define MOST 48          /* instants of comparison, at most twice that (many/batch.py) */
-#define RUNS 7           /* of the accuracy control, and what follows: accuracy/control.py says why */
-#define SAFETY 2.5
-#define AIM 2.0
-#define LEFT 0.3
-#define SLOWEST 0.75
-#define STRETCH 1.5
-#define SHORT 60
-#define UNSEEN 0.5
-#define SHORT_CREDIT 0.85
-#define FIRST_DROP 1e-2
-#define LOOSE 1e-5
-#define TAME 1e-6
-#define BEYOND 100.0     /* an unknown within a step, in magnitudes of steps (accuracy/compared.py) */
-#define SAME 1e-12       /* of an instant: a claim's */
+#define SAME SD_CANCELS /* of an instant: a claim's */
 
 static double cpu_now(void)
 {
@@ -109,7 +96,7 @@ static void thin(sd_many *many, sd_samples *own, const double *row)
     put(many, own, own->number, row);
     if (many->seen++ != kept)
         return;
-    if (++own->number <= 2 * MOST)
+    if (++own->number <= 2 * many->rules.instants)
         return;
     for (int32_t k = 0; 2 * k < own->number; k++) {
         own->time[k] = own->time[2 * k];
@@ -223,7 +210,7 @@ static int integrate(sd_many *many, sd_pass *pass, sd_samples *own, sd_samples *
     }
     if (!many->known && own->number && own->time[own->number - 1] < many->last_time)
         own->number++; /* the last row stands behind the others already */
-    return run->beyond > BEYOND ? SD_MANY_ACCURACY : SD_MANY_DONE; /* a step passed over something */
+    return run->beyond > many->rules.beyond ? SD_MANY_ACCURACY : SD_MANY_DONE; /* a step passed over something */
 }
 
 /* --- the accuracy ---------------------------------------------------------------------------------------------- */
@@ -233,8 +220,8 @@ static double shrink(const sd_many *many, double power, double step, double long
 {
     double ratio = fmax(pow(10.0, -power * step), pow(many->far, power));
     if (many->fall > 0.0)
-        ratio = fmax(ratio, fmin(pow(fmax(longer, 1.0), -many->fall), UNSEEN));
-    return SAFETY * ratio / (1.0 - ratio);
+        ratio = fmax(ratio, fmin(pow(fmax(longer, 1.0), -many->fall), many->rules.unseen));
+    return many->rules.safety * ratio / (1.0 - ratio);
 }
 
 /* 1: every ledger balances */
@@ -283,7 +270,7 @@ static double part_of(const sd_many *many, fall *f, int64_t taken, int64_t befor
 {
     if (f->before >= 0.0 && f->over > f->before)
         return 1.0;
-    double credit = taken >= SHORT ? many->credit : fmin(many->credit, SHORT_CREDIT);
+    double credit = taken >= many->rules.few ? many->credit : fmin(many->credit, many->rules.short_credit);
     if (f->before >= 0.0 && f->over > 0.0 && isfinite(f->before))
         f->power = fmax(0.3, fmin(1.0, log10(f->before / f->over) / f->step_before));
     double longer = (double)taken / (double)(before > 0 ? before : 1);
@@ -293,10 +280,10 @@ static double part_of(const sd_many *many, fall *f, int64_t taken, int64_t befor
 /* the tolerance behind one whose error was so many times what is aimed at; away: the runs have parted */
 static double behind_pair(const sd_many *many, double tolerance, double error, double power, int away)
 {
-    double drop = pow(1.0 / fmax(error, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, SLOWEST)));
-    double least = power < 0.0 ? FIRST_DROP : 1e-3, most = power < 0.0 ? many->little : LEFT;
+    double drop = pow(1.0 / fmax(error, 1e-300), 1.0 / (power < 0.0 ? many->power : fmax(power, many->rules.slowest)));
+    double least = power < 0.0 ? many->rules.first_drop : 1e-3, most = power < 0.0 ? many->little : many->rules.left;
     double next = fmax(fmax(least, fmin(drop, most)) * tolerance, many->finest);
-    return away ? fmin(next, TAME) : next;
+    return away ? fmin(next, many->rules.tame) : next;
 }
 
 /* what a run says that is as accurate as asked: whether its ledgers balance and its claims hold */
@@ -331,7 +318,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
     state = lost ? SD_MANY_DONE : state;
     if (many->known)
         last = there, there = &many->sample[0];
-    for (int number = 2; state == SD_MANY_DONE && number <= RUNS; number++) {
+    for (int number = 2; state == SD_MANY_DONE && number <= many->rules.runs; number++) {
         taken_before = taken;
         taken = 0;
         /* a finer run */
@@ -356,7 +343,7 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
             return SD_MANY_ACCURACY; /* two runs that took the same steps say nothing */
         double part = part_of(many, &f, taken, taken_before);
         *estimate = apart * part;
-        int away = next > LOOSE && sd_many_parted(many, &many->passes[1], last, there);
+        int away = next > many->rules.loose && sd_many_parted(many, &many->passes[1], last, there);
         if (f.over * part <= 1.0 && !away)
             return verdict(many);
         if (next <= 1.01 * many->finest)
@@ -373,8 +360,8 @@ static int control(sd_many *many, int64_t *steps, double *estimate)
         f.step_before = f.step;
         tolerance = next;
         opened = opening(&many->passes[1]);
-        next = behind_pair(many, next, AIM * f.over * part, f.power, away);
-        longest /= STRETCH;
+        next = behind_pair(many, next, many->rules.aim * f.over * part, f.power, away);
+        longest /= many->rules.stretch;
         sd_samples **found = many->known ? &there : &own, *swap = last;
         last = *found;
         *found = swap;

@@ -15,6 +15,7 @@
 
 #include "run/run.h"
 #include "start/sizing.h"
+#include "linear/tuning.h"
 
 enum sd_many_state {
     SD_MANY_DONE = 0,
@@ -27,7 +28,7 @@ enum sd_many_state {
 };
 
 enum { SD_MANY_COUNTERS = 8 };
-#define SD_MANY_NOTHING 1e-12 /* of the largest of the same unit: what is left of a zero (model/scales.py) */
+#define SD_MANY_NOTHING SD_CANCELS /* of the largest of the same unit: what is left of a zero (model/scales.py) */
 enum { SD_MANY_ROWS = 3 }; /* `keep`: all rows of the last integration stay where it wrote them */
 
 /* a structure as it was set up */
@@ -66,6 +67,13 @@ typedef struct sd_samples {
     int32_t number, room;
 } sd_samples;
 
+/* what two runs are judged by, as the accuracy control has it (accuracy/*.py say of what each is, and why) */
+typedef struct sd_rules {
+    double safety, aim, left, slowest, stretch, unseen, short_credit, first_drop, loose, tame, beyond;
+    double hidden, parted, much, bend; /* of a pair: accuracy/pairs.py */
+    int32_t few, runs, instants;       /* steps of a short run; runs of a control; instants of comparison, at most twice that */
+} sd_rules;
+
 typedef struct sd_many {
     double *p;                   /* [parameters] that every block reads */
     int32_t parameters, written, columns, observed;
@@ -103,6 +111,7 @@ typedef struct sd_many {
     int32_t units, known;        /* known 1: instants of comparison are set up, else steps of the run before */
     double late;                 /* time tolerance of comparisons [s] */
     double power, credit, finest, far, ratio, little, growth, fall, few_steps, many_steps; /* of the method's law (accuracy/laws.py) */
+    sd_rules rules;
     double tolerance[2];         /* of the draft, of the run behind one of few steps */
     int64_t max_steps;
     double energy;               /* part of a ledger's turnover that its balance may be */

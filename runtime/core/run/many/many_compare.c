@@ -4,11 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#define UNSEEN 100.0
-#define PARTED 10.0
-#define MUCH 0.3
-#define BEND 4.0
-
 /* size [columns] of the traced quantities, noise [columns] below which one is zero */
 static void measures(const sd_many *many, const sd_pass *pass, double *size, double *noise, double *unit)
 {
@@ -25,7 +20,7 @@ static void measures(const sd_many *many, const sd_pass *pass, double *size, dou
     }
 }
 
-/* what a value at a step moves by within the time tolerance: as its rate says, but no faster than BEND times what the
+/* what a value at a step moves by within the time tolerance: as its rate says, but no faster than rules.bend times what the
  * steps beside it show (accuracy/control.py) */
 static double lateness(const sd_many *many, const sd_samples *own, int32_t k, int32_t q)
 {
@@ -37,7 +32,7 @@ static double lateness(const sd_many *many, const sd_samples *own, int32_t k, in
         double rise = own->value[(size_t)(side + 1) * columns + q] - own->value[(size_t)side * columns + q];
         least = fmin(least, fabs(rise / (own->time[side + 1] - own->time[side])));
     }
-    return fmin(own->late[(size_t)k * columns + q], BEND * many->late * least);
+    return fmin(own->late[(size_t)k * columns + q], many->rules.bend * many->late * least);
 }
 
 double sd_many_difference(const sd_many *many, const sd_pass *pass, const sd_samples *coarse, const sd_samples *fine,
@@ -62,7 +57,7 @@ double sd_many_difference(const sd_many *many, const sd_pass *pass, const sd_sam
         }
         if (largest <= noise[q])
             continue;
-        if (size[q] > UNSEEN * largest)
+        if (size[q] > many->rules.hidden * largest)
             apart = INFINITY; /* it did something between the instants of comparison */
         apart = isfinite(size[q]) ? apart / size[q] : INFINITY;
         worst = fmax(worst, apart);
@@ -82,7 +77,7 @@ int sd_many_parted(const sd_many *many, const sd_pass *pass, const sd_samples *c
         for (int32_t k = 1; k < fine->number; k++) {
             size_t at = (size_t)k * many->columns + q;
             double a = coarse->value[at], b = fine->value[at];
-            if (fabs(b - a) - fine->late[at] > fmax(PARTED * most, MUCH * fmax(fabs(a), fabs(b))))
+            if (fabs(b - a) - fine->late[at] > fmax(many->rules.parted * most, many->rules.much * fmax(fabs(a), fabs(b))))
                 return 1;
             most = fmax(most, fabs(b));
         }

@@ -1,13 +1,14 @@
 /* The start of one of many runs: see many_start.h. */
 #include "run/many/many_start.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <string.h>
 
-#define ALIKE 1e-8       /* of its magnitude: two starts that are one */
+#define ALIKE SD_HALF_OF_ITS_DIGITS /* of its magnitude: two starts that are one */
 #define CONTRACTS 0.5    /* largest residual over the one before: Newton's method converges (Deuflhard 2004, 2.1) */
-#define MOVED 1e-10      /* of its magnitude: an anchor that moves by more is not what the text gives */
-#define VANISHED 1e-6    /* pivot of the start's matrix, or entry of its Jacobian, over that of the nominal start */
+#define MOVED SD_MET /* of its magnitude: an anchor that moves by more is not what the text gives */
+#define VANISHED SD_UNSEEN /* pivot of the start's matrix, or entry of its Jacobian, over that of the nominal start */
 
 void sd_many_restore(const sd_region *region, int32_t regions)
 {

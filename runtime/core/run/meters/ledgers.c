@@ -1,12 +1,13 @@
 /* Ledgers: see ledgers.h. */
 #include "linear/lanes.h"
 #include "run/meters/ledgers.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define NEGATIVE 1e-9 /* part of the largest content seen: less below zero is round-off */
+#define NEGATIVE SD_SAME /* part of the largest content seen: less below zero is round-off */
 #define RISE 1.01 /* of a record over the one before: a staircase of bounded length */
 
 static const double *rows_of(const double *audit, int32_t ledger)

@@ -1,6 +1,7 @@
 /* The step of the BDF: predict, correct, test, choose order and step size (see bdf.h). */
 #include "steppers/bdf/bdf.h"
 #include "linear/lanes.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
@@ -29,8 +30,8 @@ enum { VECTORS = 12 };
 #define LAX 10.0            /* a steep row may be off by as many tolerances of its terms; beside 3: error over steps times tolerance
                              * at most 0.88 instead of 0.52 (an amplifier), 0.42 instead of 0.23 (a diode), in the mean the same */
 #define LOOSEST_ROW 0.3     /* and be off by no more of them: of an exponential that is no law any more any value is within 1 */
-#define FIXED_SLACK 1e-3   /* of a step of fixed length: what may be left of the span */
-#define FINEST_ROW 1e-9     /* part of a steep row's terms that round-off of its unknowns leaves */
+#define FIXED_SLACK SD_SMALL /* of a step of fixed length: what may be left of the span */
+#define FINEST_ROW SD_SAME /* part of a steep row's terms that round-off of its unknowns leaves */
 
 static void values(const void *bdf, double t, double *y)
 {

@@ -9,7 +9,6 @@
 #define S SD_ENERGY_STAGES
 #define SAFETY 0.8
 #define GROWTH 4.0       /* of the first step from one trial to the next */
-#define SHRINK 0.2
 #define EASY 0.05        /* of what is allowed: a first step with less is tried longer */
 #define MARGIN 1.2       /* growth of the roughness behind which the step is checked anew */
 #define WINDOW 20        /* steps before it is tried longer again, at first */
@@ -17,8 +16,6 @@
 #define LAST_WINDOW ((int64_t)1 << 40)
 #define HELD 500         /* steps that the iteration, and not the error, keeps too short: stiffness, not a kink */
 #define FAILURES 40      /* of slopes in one step */
-#define FIRST 1e-2       /* of the span */
-#define TWO_PI 6.283185307179586477
 enum { VECTORS = 21 }; /* of n, beside the stages */
 
 sd_energy *sd_energy_new(sd_system *system, sd_underlying *underlying, int32_t extended, int32_t audited)
@@ -88,7 +85,7 @@ void sd_energy_start(void *self, double t, const double *y, const double *yd, do
     memset(energy->rest, 0, size);
     sd_weigh(&energy->ivp, energy->ivp.rtol, energy->phi);
     if (!(h > 0.0))
-        h = sd_first_step(&energy->ivp, FIRST * (energy->ivp.t_end - t), 0.1, energy->ivp.rtol * norm(energy, energy->yd));
+        h = sd_first_step(&energy->ivp, SD_FIRST * (energy->ivp.t_end - t), 0.1, energy->ivp.rtol * norm(energy, energy->yd));
     energy->wanted = fmin(energy->ivp.fixed_h > 0.0 ? energy->ivp.fixed_h : h, energy->ivp.h_max);
     energy->anchor_end = -INFINITY;
     energy->ivp.h = energy->wanted;
@@ -214,7 +211,7 @@ static int halved(sd_energy *energy, double *error)
             return cause;
     }
     double span = energy->ivp.t_end - energy->ivp.t;
-    double period = energy->frequency > 0.0 ? fmin(TWO_PI / energy->frequency, span) : span;
+    double period = energy->frequency > 0.0 ? fmin(2.0 * acos(-1.0) / energy->frequency, span) : span;
     for (int32_t i = 0; i < energy->ivp.n; i++)
         energy->ivp.ee[i] = (energy->raw[i] - energy->inner[i]) + (energy->from_rest[i] - energy->inner_d[i]);
     *error = norm(energy, energy->ivp.ee) * fmin(fmax(1.0, period / energy->ivp.h), MOST);
@@ -246,7 +243,7 @@ static int stands(sd_energy *energy)
         energy->grown = energy->grown != 0;
         return 1;
     }
-    shrink(energy, fmax(SHRINK, fmin(factor, 0.9)));
+    shrink(energy, fmax(SD_SHRINK, fmin(factor, 0.9)));
     energy->limited = 0;
     energy->ivp.rejected_steps++;
     return 0;

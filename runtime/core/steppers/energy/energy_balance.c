@@ -1,5 +1,6 @@
 /* The energy of a point, and the move that gives it the energy it should have: see energy.h. */
 #include "steppers/energy/energy.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
@@ -8,7 +9,7 @@
 #define MOVES 6
 #define FINE 4e-15       /* what a step misses, in magnitudes, that is round-off of its stages */
 #define ROUND_OFF 1.0    /* of the content, in DBL_EPSILON: nothing is closer */
-#define TRIAL 1e-6       /* part of the direction by which the slope of the energy is felt */
+#define TRIAL SD_UNSEEN /* part of the direction by which the slope of the energy is felt */
 #define FAR 0.1          /* of the direction: so large a move is no correction (a system at rest has no energy to move) */
 
 double sd_energy_content(sd_energy *energy, double t, const double *y, const double *rate)

@@ -1,5 +1,6 @@
 /* The stages of Gauss's method by fixed-point iteration: see energy.h. */
 #include "steppers/energy/energy.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
@@ -8,11 +9,11 @@
 #define S SD_ENERGY_STAGES
 #define SWEEPS 50
 #define EXACT 4e-16      /* change of the stages, in magnitudes, behind which there is nothing to gain */
-#define CLOSE 1e-12      /* with which a sweep that stagnates is content: round-off of the slopes */
+#define CLOSE SD_CANCELS /* with which a sweep that stagnates is content: round-off of the slopes */
 #define LAX 1e-2         /* of the tolerance: with which a sweep is content that does not contract at all */
 #define STAGNANT 0.5
 #define DIVERGED 3       /* sweeps in a row that make it worse */
-#define SEEN 1e-9        /* change of a stage, in magnitudes, that tells a frequency from round-off */
+#define SEEN SD_SAME /* change of a stage, in magnitudes, that tells a frequency from round-off */
 
 void sd_energy_guess(const sd_energy *energy, const sd_collocation *known, double first, double part,
                      sd_collocation *guess)

@@ -2,20 +2,18 @@
 #include "steppers/explicit/dopri.h"
 
 #include "linear/lanes.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define SAFETY 0.9
 #define BOLD 2.0         /* of the first step: what it may be longer than for a coefficient of 1 */
-#define OPENING 3        /* steps that tell how long the first might have been */
-#define EXACT 1e-12      /* error of one of them at least */
+#define EXACT SD_CANCELS /* error of one of them at least */
 #define GROWTH 6.0       /* of the step at most; it shrinks to 1/3 at most */
 #define SHRINK 0.333
 #define MEMORY 0.03      /* exponent of the last step's error (PI control) */
-#define FAILURES 12      /* of slopes in one step */
 #define BOUNDARY 6.1     /* of h |lambda|: where the region of stability ends */
 #define STIFF 15         /* steps at the boundary that show stiffness */
 #define SOON 8           /* the same where the end is FAR times further than patience lasts */
@@ -241,10 +239,10 @@ static int is_stiff(sd_dopri *dopri)
 static void accept(sd_dopri *dopri, double error)
 {
     double h = dopri->ivp.h;
-    double ratio = pow(error, 0.125 - 0.2 * MEMORY) / pow(dopri->error_accepted, MEMORY) / SAFETY;
+    double ratio = pow(error, 0.125 - 0.2 * MEMORY) / pow(dopri->error_accepted, MEMORY) / SD_SAFETY;
     double next = h / fmax(1.0 / GROWTH, fmin(1.0 / SHRINK, ratio));
-    if (dopri->ivp.steps < OPENING)
-        dopri->opening = fmin(dopri->opening, SAFETY * h * pow(fmax(error, EXACT) * dopri->ivp.rtol, -0.125));
+    if (dopri->ivp.steps < SD_OPENING)
+        dopri->opening = fmin(dopri->opening, SD_SAFETY * h * pow(fmax(error, EXACT) * dopri->ivp.rtol, -0.125));
     if (dopri->rejected)
         next = fmin(next, h);
     dopri->error_accepted = fmax(error, 1e-4);
@@ -279,7 +277,7 @@ int sd_dopri_step(void *self)
         if (sd_ends(&dopri->ivp, cause))
             return dopri->ivp.cause = cause;
         if (cause == SD_ERROR_TEST) {
-            double ratio = pow(error, 0.125 - 0.2 * MEMORY) / SAFETY;
+            double ratio = pow(error, 0.125 - 0.2 * MEMORY) / SD_SAFETY;
             dopri->ivp.rejected_steps++;
             double steps = (dopri->ivp.t_end - dopri->ivp.t) / dopri->ivp.h;
             if (dopri->ivp.rejected_steps > dopri->ivp.steps + REFUSED && steps > dopri->patience)
@@ -287,7 +285,7 @@ int sd_dopri_step(void *self)
             dopri->ivp.h *= isfinite(ratio) ? 1.0 / fmax(1.0, fmin(1.0 / SHRINK, ratio)) : 0.1;
         } else {
             dopri->ivp.newton_failures++;
-            if (++failures > FAILURES)
+            if (++failures > SD_FAILURES)
                 return dopri->ivp.cause = cause;
             dopri->ivp.h *= 0.25;
         }

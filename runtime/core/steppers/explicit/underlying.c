@@ -2,6 +2,7 @@
 #include "steppers/explicit/underlying.h"
 
 #include "steppers/stepper.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
@@ -12,8 +13,8 @@
 #define SLOW 0.1        /* contraction above which the factors are taken anew */
 #define MOVES 6         /* of a projection */
 #define EXACT 1e-16     /* next move, in magnitudes, that is not worth making */
-#define CLOSE 1e-12     /* move with which a projection, or an iteration, that stagnates is content */
-#define FRESH 1e-9       /* the same by factors of this very point, which contract: round-off of what is nearly zero */
+#define CLOSE SD_CANCELS /* move with which a projection, or an iteration, that stagnates is content */
+#define FRESH SD_SAME /* the same by factors of this very point, which contract: round-off of what is nearly zero */
 #define STAGNANT 0.3
 #define BORNE 1e3       /* of multipliers: slopes are solved for once, nothing corrects their digits */
 

@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FIRST 1e-2         /* of the span: the first step at most */
 #define CREEPS 8           /* steps in a row for which Newton failed at first: towards a square root's zero they would never end */
 #define IDLE 1e-6          /* error of a step that only Newton keeps short */
 #define LEAP 8.0           /* the next one is tried that much longer, with fresh slopes at its end */
@@ -110,7 +109,7 @@ void sd_radau_start(void *self, double t, const double *y, const double *yd, dou
     sd_weigh(&radau->ivp, radau->tolerance, radau->phi);
     if (!(h > 0.0)) { /* local error (h y'/y)^(s+1) within tolerance, with y' / y for the rate of all derivatives */
         double change = sd_radau_norm(radau, yd) * radau->tolerance, power = power_of(radau);
-        double longest = FIRST * (radau->ivp.t_end - t) * fmin(1.0, pow(1e3 * radau->tolerance, power)); /* runs that are compared begin apart */
+        double longest = SD_FIRST * (radau->ivp.t_end - t) * fmin(1.0, pow(1e3 * radau->tolerance, power)); /* runs that are compared begin apart */
         h = sd_first_step(&radau->ivp, longest, 0.1 * pow(radau->tolerance, power), change);
     }
     radau->ivp.h = fmin(radau->ivp.fixed_h > 0.0 ? radau->ivp.fixed_h : h, radau->ivp.h_max);

@@ -34,9 +34,7 @@ enum { SD_UNPULLED = 2 };
 /* columns of sd_radau_lean: those that the factors left, those that may be left */
 enum { SD_WHERE_LEFT = 1, SD_WHERE_IDLE };
 /* of the control of steps */
-#define SD_SAFETY 0.9
 #define SD_GROWTH 8.0         /* of the step at most; it shrinks to 1/5 at most */
-#define SD_SHRINK 0.2
 
 /* Coefficients of one method (numerics/radau_coefficients.py); rows and columns of S of A^-1 = S diag(...) S^-1 */
 typedef struct sd_radau_method {

@@ -1,6 +1,7 @@
 /* The step of Rodas5P: its size, its end, values within (see rosenbrock.h). */
 #include "steppers/rosenbrock/rosenbrock.h"
 #include "linear/lanes.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
@@ -10,17 +11,12 @@
 #define STAGES SD_ROSENBROCK_STAGES
 #define POWER 0.2          /* 1 / order of the estimate's error in the step */
 #define LEAST_POWER 0.39810717055349726 /* of an error that predicts: of 1e-2 */
-#define SAFE 0.9
 #define GROW 6.0           /* of the step at most */
-#define CUT 0.2            /* what a refused one is cut to at least */
-#define OPENS 1e-2         /* of the span: the first step at most */
-#define TELLING 3          /* steps that tell how long the first might have been */
 #define SAME 0.01          /* part of an error by which that of a step half as long may differ where a law jumps */
 #define FALLS 0.5          /* of an error: that of a shorter step where none does */
 #define FAR_LONGER 1e3     /* a step over another whose error is to say the same of a jump */
-#define SHRUNK 1e-3        /* of the step that was tried first, below which the point that it begins at is settled */
+#define SHRUNK SD_SMALL /* of the step that was tried first, below which the point that it begins at is settled */
 #define AFRESH 0.1         /* of it: what is tried from there */
-#define FAILS 12           /* matrices and stages of a step that may fail */
 #define OWN_RATES 64       /* unknowns of a system whose rows are looked at for rates of their own */
 
 /* yd [n] at the last accepted point.  Where each row has the rate of one unknown and no two the same, and what rows leave there is
@@ -144,7 +140,7 @@ void sd_rosenbrock_start(void *self, double t, const double *y, const double *yd
         h = rosenbrock->opening * part;
     if (!(h > 0.0)) { /* local error (h y'/y)^5 within tolerance */
         double state = 0.0, change = rosenbrock->ivp.rtol * sd_rosenbrock_norm(rosenbrock, yd, 1.0, &state);
-        double longest = OPENS * (rosenbrock->ivp.t_end - t) * fmin(1.0, 10.0 * part); /* runs that are compared begin apart */
+        double longest = SD_FIRST * (rosenbrock->ivp.t_end - t) * fmin(1.0, 10.0 * part); /* runs that are compared begin apart */
         h = sd_first_step(&rosenbrock->ivp, longest, 0.1 * part, change);
     }
     if (rosenbrock->ivp.steps == 0)
@@ -158,14 +154,14 @@ void sd_rosenbrock_start(void *self, double t, const double *y, const double *yd
 static void accept(sd_rosenbrock *rosenbrock, double error)
 {
     const double h = rosenbrock->ivp.h, power = pow(error, POWER);
-    double ratio = power / SAFE;
+    double ratio = power / SD_SAFETY;
     if (rosenbrock->power_accepted > 0.0) { /* Gustafsson's predictive controller (Hairer & Wanner, IV.8.25) */
-        double predicted = rosenbrock->h_accepted / h * (power * power / rosenbrock->power_accepted) / SAFE;
+        double predicted = rosenbrock->h_accepted / h * (power * power / rosenbrock->power_accepted) / SD_SAFETY;
         ratio = fmax(ratio, predicted);
     }
-    double next = h / fmax(1.0 / GROW, fmin(1.0 / CUT, ratio));
-    if (rosenbrock->ivp.steps < TELLING)
-        rosenbrock->opening = fmin(rosenbrock->opening, SAFE * h / (power * pow(rosenbrock->ivp.rtol, POWER)));
+    double next = h / fmax(1.0 / GROW, fmin(1.0 / SD_SHRINK, ratio));
+    if (rosenbrock->ivp.steps < SD_OPENING)
+        rosenbrock->opening = fmin(rosenbrock->opening, SD_SAFETY * h / (power * pow(rosenbrock->ivp.rtol, POWER)));
     if (rosenbrock->rejected)
         next = fmin(next, h);
     rosenbrock->h_accepted = h;
@@ -256,11 +252,11 @@ int sd_rosenbrock_step(void *self)
         }
         if (cause == SD_ERROR_TEST) {
             rosenbrock->ivp.rejected_steps++;
-            double ratio = pow(error, POWER) / SAFE;
-            rosenbrock->ivp.h *= rosenbrock->ivp.taken == 0 ? 0.1 : isfinite(ratio) ? fmax(CUT, fmin(1.0, 1.0 / ratio)) : CUT;
+            double ratio = pow(error, POWER) / SD_SAFETY;
+            rosenbrock->ivp.h *= rosenbrock->ivp.taken == 0 ? 0.1 : isfinite(ratio) ? fmax(SD_SHRINK, fmin(1.0, 1.0 / ratio)) : SD_SHRINK;
         } else {
             rosenbrock->ivp.newton_failures++;
-            if (++failures > FAILS)
+            if (++failures > SD_FAILURES)
                 return cause;
             rosenbrock->ivp.h *= 0.25;
         }

@@ -1,5 +1,6 @@
 /* The error of a step of Rodas5P: at its end, within it, of laws that bend or give way (see rosenbrock.h). */
 #include "steppers/rosenbrock/rosenbrock.h"
+#include "linear/tuning.h"
 
 #include <math.h>
 #include <string.h>
@@ -10,7 +11,7 @@
 #define LOOSE 5e-3         /* tolerance beyond which that is asked: to 1e-3 it refused none of the steps of five circuits */
 #define GIVEN 0.1          /* of a slope: what is less has given way */
 #define UNMET 10.0         /* tolerances of its unknowns that a row may be off at the end of a step */
-#define ROUND_OFF 1e-12    /* of its terms: what a row is always off */
+#define ROUND_OFF SD_CANCELS /* of its terms: what a row is always off */
 
 double sd_rosenbrock_norm(const sd_rosenbrock *rosenbrock, const double *x, double h, double *state)
 {

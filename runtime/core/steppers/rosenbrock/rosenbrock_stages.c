@@ -2,14 +2,15 @@
 #include "steppers/rosenbrock/rosenbrock.h"
 #include "linear/lanes.h"
 #include "steppers/combine.h"
+#include "linear/tuning.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
 #define STAGES SD_ROSENBROCK_STAGES
-#define SLOPE 1e-6         /* of the step: over which dF/dt is taken */
-#define TELLS 1e-8         /* of the longest step: over that, or the step, at least, for differences over less are round-off */
+#define SLOPE SD_UNSEEN /* of the step: over which dF/dt is taken */
+#define TELLS SD_HALF_OF_ITS_DIGITS /* of the longest step: over that, or the step, at least, for differences over less are round-off */
 #define RESOLVED 64.0      /* of what t resolves: at least that */
 #define ENDS 6             /* the first of the stages that add no more than the u of the one before to its point */
 
