@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.events.contacts import Contacts
+from sysdyn.runtime.events.contacts import FAINT, Contacts
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.handler import Handler, Standing
 from sysdyn.runtime.events.implicit import DENSE
@@ -17,7 +17,7 @@ from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting, Settle
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, SolverFailure
-from sysdyn.runtime.model.scales import magnitudes
+from sysdyn.runtime.model.scales import alike, largest_of_group, magnitudes
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.work import Budget
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
@@ -221,7 +221,13 @@ class _Starts:
             self.contacts.system.description.p[self._constants] = constants
 
     def _size(self, t: float, y: Floats, yd: Floats) -> None:
-        self.contacts.size(*magnitudes(self.contacts.system, t, t + SPAN, y, yd))
+        """What is as large as the largest of its like is no noise, however fast steep laws have it move."""
+        system = self.contacts.system
+        magnitude, time = magnitudes(system, t, t + SPAN, y, yd)
+        here = np.zeros(magnitude.size)
+        here[: y.size] = np.abs(y)
+        here = largest_of_group(alike(system), here)
+        self.contacts.size(np.minimum(magnitude, here / FAINT, out=magnitude, where=here > 0.0), time)
 
     def held(self) -> Floats | None:
         """What the guesses say of a point [unknowns as written] where inequalities of flows ask for nothing, or all
@@ -297,6 +303,7 @@ class _Starts:
         if found.kept or not found.far or not ways:
             return found
         stood, constants = contacts.state(), contacts.system.description.p[self._constants]
+        self._sought_near(None)
         self._begin()
         contacts.active[ways] = True
         contacts.apply()

@@ -46,7 +46,8 @@ def _ends(random, nodes):
 
 
 def _circuit_element(random, k):
-    kind = str(random.choice(["R", "R", "R", "C", "C", "C", "L", "U", "I", "S", "D", "D", "J"]))
+    """Mostly one source of voltage, from ground; hardly ever one of current, which asks for a way."""
+    kind = str(random.choice(["U", "C", "R"] if k == 0 else [*"RRRRRRRRCCCCCCLLSSDDDDJJI"]))
     match kind:
         case "R":
             law = f"resistor(R = {_value(random, 1, 4)} ohm)"
