@@ -143,7 +143,7 @@ class Determined:
                     contacts.apply()
                     contacts.spared = spared | {k}
                     found = self._near(t, point, settle, pivots=pivots)
-                    if found is not None and self._goes_on(k, (point, found), None if small else told):
+                    if found is not None and self._goes_on(k, (point, found), told, small=small):
                         less = self.nullity(t, *found)
                         if less < open_:
                             yield found, less
@@ -175,15 +175,16 @@ class Determined:
             self._indices[key] = _index_of(*equilibrated(jyd, jy)) if finite else FAR
         return self._indices[key]
 
-    def _goes_on(self, k: int, points: tuple[Point, Point], told: NDArray[np.bool_] | None) -> bool:
-        """Whether the motion is the same: what a relation leaves open moves something where its sense decides.  told
-        [unknowns as written]: of a flow that need not be zero, flows that are told are the same, and those that have a
-        rate of their own go on alike.
+    def _goes_on(self, k: int, points: tuple[Point, Point], told: NDArray[np.bool_], *, small: bool) -> bool:
+        """Whether the motion is the same: what a relation leaves open moves something where its sense decides, but not
+        how frictions side by side share an effort, which is a flow of the mirror.  told [unknowns as written]: flows
+        that are determined are the same, and those that have a rate of their own go on alike; small: what turns is zero.
         """
         (y, yd), (other, other_d) = points
-        if told is None:
-            return self.contacts.contacts[k].hold < 0 or _same(yd, other_d, self._moves, NOTHING)
         flows = self._moves & told
+        if small:
+            moves = _same(yd, other_d, self._moves & self._rated, NOTHING) and _same(y, other, flows, NOTHING)
+            return moves or self.contacts.contacts[k].hold < 0
         least = self.contacts.observer.zero(self.contacts.contacts[k].value) / SAME  # what is less is no flow
         time = self.contacts.time
         size = np.abs(y[: flows.size][flows]).max(initial=least) / time if time > 0.0 else 0.0

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.events.contacts import Contacts
+from sysdyn.runtime.events.contacts import FAINT, Contacts
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.handler import Handler, Standing
 from sysdyn.runtime.events.implicit import DENSE
@@ -16,8 +17,9 @@ from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting, Settle
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart, SolverFailure
-from sysdyn.runtime.model.scales import magnitudes
+from sysdyn.runtime.model.scales import alike, largest_of_group, magnitudes
 from sysdyn.runtime.model.system import LARGE, System
+from sysdyn.runtime.numerics.work import Budget
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 
 SAMPLES = 4
@@ -35,40 +37,44 @@ begins.
 """
 LONGER = 100.0
 """Times such a step: one whose set a shorter one is begun with."""
+SETS, SWIFTLY = 4.0, 1.5
+"""Times what a search may take: what is spent on all sets, on those that may have a start at once."""
 TURNS = 4
 """Sets that are tried behind such a step."""
 SPAN = 1.0
 """s: in which what starts at rest may come to its magnitude."""
 
 
-def eventful_start(system: System, t0: float, plan: Plan, until: float | None = None) -> ConsistentState:
+def eventful_start(system: System, t0: float, plan: Plan, budget: Budget | None = None) -> ConsistentState:
     """A state at t0 with the active set and the senses that fit it, which the model then has.
 
     Where samples due at t0 turn what holds, and what held before them has no start, or one that is not as guessed, it
     is the one behind them, if that is as guessed: nothing moves while no time passes (a charge pump by switches whose
-    pulses begin at t0).  until: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
+    pulses begin at t0).  budget: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
     """
-    found = _sampled_start(system, t0, plan, until)
+    found = _sampled_start(system, t0, plan, Budget() if budget is None else budget)
     if system.unknowns > LARGE:
         found.put_away()
     return found
 
 
-def _sampled_start(system: System, t0: float, plan: Plan, until: float | None) -> ConsistentState:
+def _sampled_start(system: System, t0: float, plan: Plan, budget: Budget) -> ConsistentState:
     begun: Standing | None = None
+    if plan.contacts:
+        budget = budget.part(SETS)
     if plan.sampled and any(c.kind == "guarded" for c in plan.contacts):
         system.own_numbers()
         begun = _standing(system)
     found: ConsistentState | None = None
     try:
-        found = _integrated(system, t0, plan, until)
+        found = _integrated(system, t0, plan, budget)
     except InconsistentStart:
         if begun is None:
             raise
-    if begun is None or (found is not None and not _moved(found)):
+    if begun is None or (found is not None and found.kept):
         assert found is not None
         return found
-    return _behind_samples(system, t0, plan, until, begun, found)
+    return _behind_samples(system, t0, plan, budget, begun, found)
 
 
 def _standing(system: System) -> Standing:
@@ -76,13 +82,8 @@ def _standing(system: System) -> Standing:
     return system.description.p.copy(), system.description.switches.active.copy()
 
 
-def _moved(state: ConsistentState) -> bool:
-    """Whether it is not as guessed."""
-    return state.displaced or bool(state.moved)
-
-
 def _behind_samples(
-    system: System, t0: float, plan: Plan, until: float | None, begun: Standing, found: ConsistentState | None
+    system: System, t0: float, plan: Plan, budget: Budget, begun: Standing, found: ConsistentState | None
 ) -> ConsistentState:
     """The start behind samples due at t0, which assign what they do at that very point, if it is as guessed; else the
     one before them.  begun: as the text begins; found: the one before, None: there is none.  Raises InconsistentStart.
@@ -99,8 +100,9 @@ def _behind_samples(
             if behind is not None and np.array_equal(assigned, behind[2]):
                 handler.back(behind[1])
                 return replace(behind[0], sampled=True)
-            state = _integrated(system, t0, plan, until)  # where samples assign nothing, for the word why there is none
-            if not places or (found is not None and _moved(state)):
+            # where samples assign nothing, for the word why there is none
+            state = _integrated(system, t0, plan, budget)
+            if not places or (found is not None and not state.kept):
                 break
             behind = state, handler.now(), assigned
             y, yd = state.y, state.yd
@@ -115,56 +117,35 @@ def _behind_samples(
     return found
 
 
-def _integrated(system: System, t0: float, plan: Plan, until: float | None) -> ConsistentState:
+def _integrated(system: System, t0: float, plan: Plan, budget: Budget) -> ConsistentState:
     """The same, whatever samples do.
 
-    Constants of integrated constraints are those of the guess.  Where it is not the start (capacitors alone at a node,
-    in loops), they are what follows: the constraint is its own integral, whatever it is at the start.
-    until: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
+    Constants of integrated constraints are what follows from the start: such a constraint is its own integral, whatever
+    it is there, and the complementary forms have none.  Active sets that contradict themselves have no start, which
+    takes long to be sure of: first those are tried that have one at once.
+    budget: as in consistent_start.  Raises InconsistentStart; SolverFailure (max_wall).
     """
-    none: InconsistentStart | None = None
-    if system.description.constants:
-        try:
-            found = _fitting(system, t0, plan, until, constants=False)
-            if not found.displaced:
-                return found
-        except InconsistentStart as error:
-            none = error
-        system.own_numbers()  # the constants are written there
-        p = system.description.p
-        stood = p.copy()
-        with suppress(InconsistentStart):
-            return _fitting(system, t0, plan, until, constants=True)
-        p[:] = stood  # sets that were tried have left theirs
-    if none is not None:
-        raise none
-    return _fitting(system, t0, plan, until, constants=False)
-
-
-def _fitting(system: System, t0: float, plan: Plan, until: float | None, *, constants: bool) -> ConsistentState:
-    """The same; constants: those of integrated constraints are found too.  Active sets that contradict themselves have
-    no start, which takes long to be sure of: first those are tried that have one at once.
-    """
+    constants = bool(system.description.constants)
+    if constants:
+        system.own_numbers()  # they are written there
     if not plan.contacts:
-        return consistent_start(system, t0, until=until, constants=constants)
+        return consistent_start(system, t0, budget=budget, constants=constants)
     with suppress(InconsistentStart):
-        return _pivoted(system, t0, plan, until, constants=constants, quickly=True)
-    return _pivoted(system, t0, plan, until, constants=constants, quickly=False)
+        return _pivoted(system, t0, plan, budget.part(SWIFTLY), quickly=True)
+    return _pivoted(system, t0, plan, budget, quickly=False)
 
 
-def _pivoted(
-    system: System, t0: float, plan: Plan, until: float | None, *, constants: bool, quickly: bool
-) -> ConsistentState:
-    """The same; quickly: each set by the first strategy of a start alone.
+def _pivoted(system: System, t0: float, plan: Plan, budget: Budget, *, quickly: bool) -> ConsistentState:
+    """By active sets; quickly: each set by the first strategy of a start alone.
 
     First what stores hold stays as it is guessed, or moves by impulses of the inequalities alone: the set behind a
     short implicit step from there says which hold.  Else by turning those that do not fit, of starts that each set has.
     Where the least change of one set asks for another, and that for the first again, both hold at the point between
     them: a capacitor that a diode charges up to its source, which falls.  It is sought near what such a set asked for.
     """
-    starts = _Starts(system, t0, plan, until, constants=constants, quickly=quickly)
+    starts = _Starts(system, t0, plan, budget, quickly=quickly)
     try:
-        return starts.fitted(starts.held())
+        return starts.nearest(starts.fitted(starts.held()))
     except NoActiveSetError as error:
         failed = starts.failure(error)
     for asked in starts.found[: -1 - BETWEEN : -1] if quickly else ():
@@ -176,16 +157,20 @@ def _pivoted(
 class _Starts:
     """Of a model at t0 by its active sets; found, errors: in the order in which they were sought."""
 
-    def __init__(
-        self, system: System, t0: float, plan: Plan, until: float | None, *, constants: bool, quickly: bool
-    ) -> None:
+    def __init__(self, system: System, t0: float, plan: Plan, budget: Budget, *, quickly: bool) -> None:
         self.contacts = Contacts(plan, system, Observer(system), system.description.p, starting=True)
         self.found: list[ConsistentState] = []
         self.errors: list[InconsistentStart] = []
-        self._t, self._until, self._constants, self._quickly = t0, until, constants, quickly
+        self._t, self._budget, self._quickly = t0, budget, quickly
+        pieces = [np.arange(first, first + number) for _, first, number in system.description.constants]
+        self._constants = np.concatenate(pieces or [np.zeros(0, dtype=np.int64)])  # their places in p
         self._zeros = np.zeros(system.form.written)
         self._near: ConsistentState | None = None
-        self._known = dict[tuple[float, tuple[float, ...]], ConsistentState | None]()  # by instant and set
+        self._held: ConsistentState | None = None
+        self._of_held = np.zeros(0)  # the constants there
+        self._with = list[Floats]()  # those of what was found
+        # by instant and set; with the constants that are written where a start is found
+        self._known = dict[tuple[float, tuple[float, ...]], tuple[ConsistentState | None, Floats]]()
 
     def failure(self, error: NoActiveSetError) -> InconsistentStart:
         """That of the set that follows from what is wrong: those behind it are tried beside it."""
@@ -193,8 +178,9 @@ class _Starts:
 
     def _sought_near(self, near: ConsistentState | None) -> None:
         """What stores are guessed to hold from now on; None: as the text says."""
-        self._near = near
-        self._known.clear()
+        if near is not self._near:
+            self._near = near
+            self._known.clear()
 
     def _started(self, t: float, jumped: tuple[Floats, Floats] | None = None) -> ConsistentState | None:
         """That of the present set, the first failure with a word why; jumped: points behind an impulse that say which
@@ -205,8 +191,8 @@ class _Starts:
                 self.contacts.system,
                 t,
                 self._near,
-                self._until,
-                constants=self._constants,
+                self._budget,
+                constants=self._constants.size > 0,
                 quickly=self._quickly,
                 silent=bool(self.errors),
                 jumped=jumped,
@@ -218,33 +204,67 @@ class _Starts:
 
     def _settle(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         which = t, self.contacts.state()
-        if self._constants or which not in self._known:  # these are written where it is found
-            self._known[which] = self._started(t)
-        state = self._known[which]
+        if which not in self._known:
+            self._known[which] = self._started(t), self.contacts.system.description.p[self._constants]
+        state, constants = self._known[which]
+        self._put(constants)
         if state is None:
             return None
         self.found.append(state)
+        self._with.append(constants)
         self._size(t, state.y, state.yd)
         return state.y, state.yd, np.zeros_like(self._zeros)
 
+    def _put(self, constants: Floats) -> None:
+        """Constants of integrated constraints that the model then has."""
+        if constants.size:
+            self.contacts.system.description.p[self._constants] = constants
+
     def _size(self, t: float, y: Floats, yd: Floats) -> None:
-        self.contacts.size(*magnitudes(self.contacts.system, t, t + SPAN, y, yd))
+        """What is as large as the largest of its like is no noise, however fast steep laws have it move."""
+        system = self.contacts.system
+        magnitude, time = magnitudes(system, t, t + SPAN, y, yd)
+        here = np.zeros(magnitude.size)
+        here[: y.size] = np.abs(y)
+        here = largest_of_group(alike(system), here)
+        self.contacts.size(np.minimum(magnitude, here / FAINT, out=magnitude, where=here > 0.0), time)
 
     def held(self) -> Floats | None:
-        """What the guesses say of a point [unknowns as written] where inequalities of flows ask for nothing; None:
-        there are none, or too many unknowns for implicit steps, or there is no such point.
+        """What the guesses say of a point [unknowns as written] where inequalities of flows ask for nothing, or all
+        hold, if stores are only so as they are guessed (in series with diodes flows are nothing, beside them efforts);
+        None: there are none, or too many unknowns for implicit steps, or there is no such point.
         """
         self._begin()
         contacts = self.contacts
-        free = [c.number for k, c in enumerate(contacts.contacts) if c.kind == "psi" and not contacts.barred[k]]
+        free = [k for k, c in enumerate(contacts.contacts) if c.kind == "psi" and not contacts.barred[k]]
         if not free or contacts.system.unknowns > DENSE:
             return None
-        try:
-            state = consistent_start(contacts.system, self._t, until=self._until, quickly=True, without=free)
-        except InconsistentStart:
+        state = self._begun([contacts.contacts[k].number for k in free])
+        constants = contacts.system.description.p[self._constants]
+        if state is None or not state.kept:
+            contacts.active[free] = True
+            contacts.apply()
+            other = self._begun()
+            if other is not None and (state is None or state.farther(other)):
+                state, constants = other, contacts.system.description.p[self._constants]
+        if state is None:
             return None
+        self._held, self._of_held = state, constants
         self._size(self._t, state.y, state.yd)
         return state.y
+
+    def _begun(self, without: Sequence[int] = ()) -> ConsistentState | None:
+        """The start of the present set, quickly, where these switches ask for nothing."""
+        with suppress(InconsistentStart):
+            return consistent_start(
+                self.contacts.system,
+                self._t,
+                budget=self._budget,
+                constants=self._constants.size > 0,
+                quickly=True,
+                without=without,
+            )
+        return None
 
     def _begin(self) -> None:
         """Nothing holds but what the text says."""
@@ -257,15 +277,43 @@ class _Starts:
         is sought.
         """
         self._sought_near(near)
-        determined, contacts = Determined(self.contacts), self.contacts
+        determined = Determined(self.contacts)
         if held is None or not self._behind_steps(determined.pivoting, held):
             self._begin()
         else:
             self._let_go(determined)
+        return self._fitting(determined)
+
+    def _fitting(self, determined: Determined | None = None) -> ConsistentState:
+        """The same from the present set."""
+        contacts, determined = self.contacts, determined or Determined(self.contacts)
         y, yd = determined.fit(self._t, self._zeros, self._zeros, self._settle)
         if _tied(contacts, contacts.observer(self._t, y, yd)):
             y = _ahead(contacts, determined, self._t, self._settle, y)
-        return next(state for state in reversed(self.found) if state.y is y)
+        last = next(k for k in reversed(range(len(self.found))) if self.found[k].y is y)
+        self._put(self._with[last])
+        return self.found[last]
+
+    def nearest(self, found: ConsistentState) -> ConsistentState:
+        """What was found, which the model has, or what is nearer: where stores move several sets may fit, of which the
+        least change tells one.  It is sought from where all inequalities of flows hold.
+        """
+        contacts = self.contacts
+        ways = [k for k, c in enumerate(contacts.contacts) if c.kind == "psi" and not contacts.barred[k]]
+        if found.kept or not found.far or not ways:
+            return found
+        stood, constants = contacts.state(), contacts.system.description.p[self._constants]
+        self._sought_near(None)
+        self._begin()
+        contacts.active[ways] = True
+        contacts.apply()
+        with suppress(NoActiveSetError):
+            other = self._fitting()
+            if found.farther(other):
+                return other
+        contacts.become(stood)
+        self._put(constants)
+        return found
 
     def _behind_steps(self, pivoting: Pivoting, held: Floats) -> bool:
         """Whether a set that a short implicit step from there asks for fits, which the model then has: with stores as
@@ -296,6 +344,7 @@ class _Starts:
         are too far apart for one, begun with the set behind a longer one.
         """
         self._begin()
+        self._put(self._of_held)
         behind = pivoting.ahead(self._t, held, h, self._t)
         if behind is None and h < longest and self._behind(pivoting, held, LONGER * h, longest) is not None:
             behind = pivoting.ahead(self._t, held, h, self._t)
@@ -322,18 +371,19 @@ class _Starts:
     def _jumped(self, pivoting: Pivoting, held: Floats, behind: Floats, half: float) -> ConsistentState | None:
         """What the impulses of the present set leave, where a step of half (s) tells as well which stores move."""
         during = self.contacts.state()
+        self._put(self._of_held)
         again = pivoting.ahead(self._t, held, half, self._t)
         self.contacts.become(during)
         return None if again is None else self._started(self._t, (behind, again))
 
     def _nearly_fits(self, *, kept: bool) -> bool:
-        """Whether the set fits, or one a few turns away (what leaks decide is behind a step); kept: of those that leave
-        stores as they are guessed.
+        """Whether the set fits, or one a few turns away (what leaks decide is behind a step); kept: of those that move
+        stores no farther than to where they are held.
         """
         contacts, t, zeros = self.contacts, self._t, self._zeros
         for _ in range(TURNS):
             found = self._settle(t, zeros, zeros)
-            if found is None or (kept and not self.found[-1].kept):
+            if found is None or (kept and self._held is not None and self.found[-1].farther(self._held)):
                 return False
             if contacts.fits(t, zeros, found):
                 return True

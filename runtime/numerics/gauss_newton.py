@@ -25,7 +25,7 @@ from sysdyn.values import dataclass
 
 SMALL = 64
 """Rows and unknowns up to which a problem that the core knows is solved there."""
-CORRECTED = 240
+CORRECTED = 600
 """The same up to which rows are corrected: a few eliminations in which each entry has its round-off."""
 _ITERATIONS = 60
 _FOLDS = 709
@@ -266,14 +266,15 @@ def _in_core(problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, m
     use, free, work = problem.use.astype(np.int32), problem.free.astype(np.int32), problem.work
     masks = lib.pointer(use), lib.pointer(free)
     numbers = lib.pointer(problem.guess), lib.pointer(problem.scale), lib.pointer(problem.weight)
-    spent = work.share, work.spent, work.largest
+    spent = work.allowed, work.spent, work.largest
     answers = lib.pointer(found), lib.pointer(scaled)
     search = lib.Search(c.addressof(core[0]), *masks, *numbers, core[1], most, *spent, *answers)
     if (lib.core.sd_search_measure if measure else lib.core.sd_search_solve)(c.byref(search)):
         raise MemoryError
     if problem.check is not None:
         problem.check()
-    work.spent, work.largest = search.spent, search.largest
+    work.largest = search.largest
+    work.count(search.spent - work.spent)
     return Solution(found, search.residual)
 
 

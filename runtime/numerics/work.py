@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import field
 
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.values import dataclass
@@ -17,22 +18,58 @@ EACH = 40.0
 """Operations that an entry of the matrix takes in an evaluation."""
 
 
+TOGETHER = 6.0
+"""Times what a search may take: what all searches for one start may."""
+
+
 class OutOfTimeError(Exception):
     """The wall time granted is over."""
+
+
+@dataclass(slots=True)
+class Budget:
+    """What all searches for one start spend together: at most so many times what one may, and what is left of the
+    budget that it is a part of.  until: `time.monotonic()` beyond which counting raises OutOfTimeError.
+    """
+
+    until: float | None = None
+    times: float = TOGETHER
+    of: Budget | None = None
+    spent: float = 0.0
+
+    def part(self, times: float) -> Budget:
+        """So many times what a search may, out of it."""
+        return Budget(self.until, times, self)
+
+    def count(self, operations: float) -> None:
+        """So many operations, here and in what it is a part of."""
+        self.spent += operations
+        if self.of is not None:
+            self.of.count(operations)
+
+    def left(self, own: float, one: float) -> float:
+        """Times what a search may, `one`, that it grants to one which has spent `own`."""
+        here = self.times - (self.spent - own) / one
+        return here if self.of is None else min(here, self.of.left(own, one))
 
 
 @dataclass(slots=True)
 class Work:
     """What a search has left to spend, in operations counted by size: the same on every machine.
 
-    A share of GRANTED, or as much as ITERATIONS iterations of the largest problem met take.  until: `time.monotonic()`
-    beyond which counting raises OutOfTimeError.
+    A share of GRANTED, or as much as ITERATIONS iterations of the largest problem met take; no more than is left of the
+    budget.
     """
 
     share: float = 1.0
-    until: float | None = None
+    budget: Budget = field(default_factory=Budget)
     spent: float = 0.0
     largest: float = 0.0
+
+    def count(self, operations: float) -> None:
+        """So many operations, of the search and of all."""
+        self.spent += operations
+        self.budget.count(operations)
 
     def iteration(self, shape: tuple[int, int], entries: int) -> None:
         """Count one linearisation with its solution, of so many rows and unknowns."""
@@ -45,19 +82,24 @@ class Work:
         self.clocked()
         whole = solution + EVALUATION + EACH * entries
         self.largest = max(self.largest, whole)
-        self.spent += whole
+        self.count(whole)
 
     def evaluation(self, entries: int) -> None:
         """Count one evaluation of all rows."""
         self.clocked()
-        self.spent += EVALUATION + EACH * entries
+        self.count(EVALUATION + EACH * entries)
 
     def clocked(self) -> None:
         """Raise OutOfTimeError where the wall time is over."""
-        if self.until is not None and time.monotonic() > self.until:
+        if self.budget.until is not None and time.monotonic() > self.budget.until:
             raise OutOfTimeError
 
     @property
     def done(self) -> bool:
         """Whether nothing is left."""
-        return self.spent > self.share * max(GRANTED, ITERATIONS * self.largest)
+        return self.spent > self.allowed * max(GRANTED, ITERATIONS * self.largest)
+
+    @property
+    def allowed(self) -> float:
+        """The share that the budget leaves of it."""
+        return min(self.share, self.budget.left(self.spent, max(GRANTED, ITERATIONS * self.largest)))

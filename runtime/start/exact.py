@@ -121,9 +121,13 @@ def sharp(starter: Starter, t: float, best: Solution, free: Mask) -> Solution | 
 
 
 def _resolved(starter: Starter, t: float, x: Floats) -> bool:
-    """Whether contents that are guessed or said are more than round-off of the terms that make them: beside potentials
-    of 1e16 V any volt holds.
+    """Whether contents that are guessed or said are more than round-off of the terms that make them, and states more
+    than that of the largest of their like: beside potentials of 1e16 V any volt holds, beside 1e24 A of a junction a
+    coil is empty.
     """
+    state = starter.written & ~starter.following(t, x) & (starter.guess != 0.0)
+    if (np.abs(starter.guess) < EPS * starter.largest_alike(x))[state].any():
+        return False
     of = starter.groups("initial")[starter.rows]
     said = np.abs(starter.residual(t, np.zeros_like(x)))
     terms = np.zeros_like(said)

@@ -22,12 +22,14 @@ from sysdyn.runtime.model.slopes import labels, rows_without_slope
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.gauss_newton import Solution, least_residual, solve
 from sysdyn.runtime.numerics.least_change import DENSE
+from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.numerics.stretches import Stretches, whole_of
 from sysdyn.runtime.numerics.tall import free_unknowns
-from sysdyn.runtime.numerics.work import OutOfTimeError, Work
+from sysdyn.runtime.numerics.work import Budget, OutOfTimeError, Work
 from sysdyn.runtime.start.corrections import EXACT
 from sysdyn.runtime.start.exact import anew, sharp
 from sysdyn.runtime.start.flat import OWN, off_the_flat, unasked, without_rates
+from sysdyn.runtime.start.held import FARTHER
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import contradicting, no_start
 from sysdyn.runtime.start.moved import moved_guesses
@@ -48,6 +50,8 @@ MOVED = 1e-6
 """Of its magnitude: what a fixed value that is in the way has to move by, at least."""
 BESIDE = 1e-3
 """Of the move of the fixed value most in the way: what moves by less is not."""
+QUICK = 0.3
+"""Times what a search may take: what one may that is asked for quickly; those that succeed take at most 0.1."""
 EXPLAINED = 0.1
 """Share of the work of a search that explaining what was not found may take."""
 
@@ -59,8 +63,8 @@ class ConsistentState:
     moved: (name, guess, value, "asked for by ...") of written guesses that moved.  strategy: the one of STRATEGIES that
     found it; "" of a state that was not sought from guesses.  zeros: where y is what the search left of a zero (None:
     nowhere), by which nothing else is sized: a slope made of such a current would have 1e19 K balance a voltage.
-    displaced: whether a displacement is not as guessed; kept: whether all that carries the state is.  sampled: it is
-    the point behind the samples that are due at t.
+    kept: whether all that carries the state is as the text guesses it; far: of a small model how far it is from there,
+    by level (least.py).  sampled: it is the point behind the samples that are due at t.
     """
 
     t: float
@@ -70,9 +74,16 @@ class ConsistentState:
     residual: float
     strategy: str = ""
     zeros: Mask | Stretches[np.bool_] | None = None
-    displaced: bool = False
     kept: bool = True
+    far: tuple[float, ...] = ()
     sampled: bool = False
+
+    def farther(self, other: ConsistentState) -> bool:
+        """Whether it is farther from the guess than another state of the model, by what moves least."""
+        if self.kept or other.kept:
+            return other.kept and not self.kept
+        apart = (a - b for a, b in zip(self.far, other.far, strict=True))
+        return next((d for d in apart if abs(d) > FARTHER), 0.0) > 0.0
 
     @property
     def y(self) -> Floats:
@@ -233,7 +244,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
         return InconsistentStart("nonfinite", float("inf"), rows)
-    starter.work = Work(EXPLAINED, starter.work.until)
+    starter.work = Work(EXPLAINED, starter.work.budget)
     x, linear = best.x, contradicting(starter, t, guess, free)
     every = starter.every if linear is None else linear
     if x.size <= DENSE:
@@ -280,7 +291,7 @@ def _flat(starter: Starter, t: float, guess: Floats, free: Mask) -> Ints:
     """
     if guess.size > DENSE:
         return np.zeros(0, dtype=np.int64)
-    starter.work = Work(EXPLAINED, starter.work.until)
+    starter.work = Work(EXPLAINED, starter.work.budget)
     rows, follows = without_rates(starter), free & starter.following(t, guess)
     moved = ((x, free) for x in itertools.chain([guess], around(starter, t, guess, free)))
     for x, may in itertools.chain(off_the_flat(starter, t, guess, follows), moved):
@@ -295,7 +306,7 @@ def consistent_start(
     system: System,
     t0: float,
     near: ConsistentState | None = None,
-    until: float | None = None,
+    budget: Budget | None = None,
     *,
     constants: bool = False,
     quickly: bool = False,
@@ -305,11 +316,11 @@ def consistent_start(
 ) -> ConsistentState:
     """A state at t0 that satisfies all rows and their hidden derivatives.
 
-    system: any index form of the model; near: a state to stay close to, else the guesses; until: `time.monotonic()` at
-    which the search is given up; constants: those of integrated constraints, which the model then has, follow from the
-    rest; quickly: by the first strategy alone, and no word why there is none; silent: no word where linear rows
-    contradict each other; without: switches of constraints that ask for nothing; jumped: points behind a step, and
-    behind one of half its length, that say which stores alone move.
+    system: any index form of the model; near: a state to stay close to, else the guesses; budget: what the search draws
+    on; constants: those of integrated constraints, which the model then has, follow from the rest; quickly: by the
+    first strategy alone, and no word why there is none; silent: no word where linear rows contradict each other;
+    without: switches of constraints that ask for nothing; jumped: points behind a step, and behind one of half its
+    length, that say which stores alone move.
     Raises InconsistentStart; SolverFailure (max_wall).
     """
     starter = Starter(system if system.form.name == "3" else system.another("3"))
@@ -320,7 +331,8 @@ def consistent_start(
     if without:
         rows, _, numbers, _ = switch_rows(system.description, starter.settled.form)
         starter.every[rows[np.isin(numbers, without)]] = False
-    starter.work = Work(until=until)
+    budget = Budget() if budget is None else budget
+    starter.work = Work(budget=budget.part(QUICK) if quickly else budget)
     try:
         if jumped is not None:
             starter.jump_alone(t0, jumped)
@@ -328,9 +340,11 @@ def consistent_start(
         best, strategy = _sought(starter, t0, guess, quickly=quickly, silent=silent or quickly)
     except OutOfTimeError as error:
         raise SolverFailure("max_wall", t0, 0.0) from error
+    except NotFiniteError as error:
+        raise InconsistentStart("nonfinite", float("inf")) from error
     if constants:
         system.description.p[places] += starter.residual(t0, best.x)[integrated]
-    found = _state(starter, t0, guess, best, strategy)
+    found = _state(starter, t0, guess if near is None else _aimed(starter, t0), best, strategy)
     if best.x.size > LARGE:
         starter.forget()
         del starter, guess, best
@@ -360,7 +374,7 @@ def _sought(starter: Starter, t: float, guess: Floats, *, quickly: bool, silent:
     """
     if silent and not starter.jumping and no_start(starter, t, guess, starter.free):
         raise InconsistentStart("stuck", float("inf"))
-    until = starter.work.until
+    budget = starter.work.budget
     best, strategy = _attempt(starter, t, guess, starter.free, 1 if quickly else None)
     if strategy:
         return best, strategy
@@ -368,7 +382,7 @@ def _sought(starter: Starter, t: float, guess: Floats, *, quickly: bool, silent:
         raise InconsistentStart("stuck", best.residual)
     flat = _flat(starter, t, guess, starter.free)
     if unasked(starter, flat):
-        starter.work = Work(until=until)
+        starter.work = Work(budget=budget)
         best, strategy = _attempt(starter, t, guess, starter.free)
         if strategy:
             return best, strategy
@@ -377,12 +391,14 @@ def _sought(starter: Starter, t: float, guess: Floats, *, quickly: bool, silent:
 
 def _state(starter: Starter, t: float, guess: Floats, best: Solution, strategy: str) -> ConsistentState:
     """The state at a solution, and what moved for it."""
-    at = starter.moves("q")
-    displaced = bool((best.x[at] != guess[at]).any())
     starter.spare()
     largest = np.maximum(starter.scale(t, guess), starter.largest_alike(best.x))
     state = starter.free & ~starter.following(t, best.x)
     kept = bool((np.abs(best.x - guess) <= EXACT * largest)[state].all())
+    far = ()
+    if not kept and best.x.size <= DENSE:
+        measure = problem_of(starter, t, guess, guess, rows=starter.every, free=starter.free, least=True)
+        far = measure.distances(best.x)
     small = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: starter.system.form.written]
     zeros = Stretches(small) if small.size > LARGE else small
     del largest, small  # of a large model the room counts
@@ -391,4 +407,4 @@ def _state(starter: Starter, t: float, guess: Floats, best: Solution, strategy: 
     fixed = np.abs(best.x[starter.pinned])
     nothing = NOTHING * min(1.0, float(fixed[fixed > 0.0].min(initial=1.0)))
     y, yd = (np.where(np.abs(values) < nothing, 0.0, values) for values in starter.expand(best.x))
-    return ConsistentState(t, y, yd, moved, best.residual, strategy, zeros, displaced, kept)
+    return ConsistentState(t, y, yd, moved, best.residual, strategy, zeros, kept, far)

@@ -123,7 +123,7 @@ class Starter:
     @contextmanager
     def granted(self, share: float = 1.0) -> Iterator[None]:
         """Work of its own for what is done within, under the same limit of wall time."""
-        own, self.work = self.work, Work(share, self.work.until)
+        own, self.work = self.work, Work(share, self.work.budget)
         try:
             yield
         finally:

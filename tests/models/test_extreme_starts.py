@@ -10,6 +10,7 @@ from scipy.optimize import brentq, minimize
 from start_strategies import started
 from sysdyn import api
 from sysdyn.runtime.model.failures import SolverFailure
+from sysdyn.runtime.numerics.work import Budget
 from sysdyn.runtime.start.start import consistent_start
 
 SOLITON = """
@@ -219,9 +220,9 @@ def test_guesses_that_hold_to_round_off_of_large_voltages_stay(formulation):
 def test_the_wall_time_binds_the_start():
     begun = started(SERIES, "lagrangian")
     with pytest.raises(SolverFailure) as caught:
-        consistent_start(begun.system, 0.0, until=time.monotonic() - 1.0)
+        consistent_start(begun.system, 0.0, budget=Budget(time.monotonic() - 1.0))
     assert caught.value.cause == "max_wall"
-    assert consistent_start(begun.system, 0.0, until=time.monotonic() + 1e3).residual < 1e-9
+    assert consistent_start(begun.system, 0.0, budget=Budget(time.monotonic() + 1e3)).residual < 1e-9
 
 
 SHAFTS = """\

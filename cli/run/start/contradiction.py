@@ -25,6 +25,7 @@ from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFai
 from sysdyn.runtime.model.slopes import WITH_A_SLOPE, no_slope
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import NotFiniteError
+from sysdyn.runtime.numerics.work import Budget
 
 MOST = 20
 """Zeros that are tried out: more are values of a table, not slips."""
@@ -167,6 +168,7 @@ def _zero(prepared: Prepared, t0: float, until: float | None) -> Parameter | Non
     zeros = [
         p for p in prepared.network.parameters if np.ndim(values.get(p.name, 1.0)) == 0 and not values.get(p.name, 1)
     ]
+    budget = Budget(until)
     for p in zeros[:MOST]:
         if p.name in prepared.network.discretes or p.whole:
             continue
@@ -174,7 +176,7 @@ def _zero(prepared: Prepared, t0: float, until: float | None) -> Parameter | Non
             binding = prepared.compiled.bind({p.name: 1.0})
             system = System(prepared.structure, prepared.arrays_of(binding), prepared.carrier)
             with np.errstate(all="ignore"):
-                eventful_start(system, t0, plan(replace(prepared, binding=binding), system), until)
+                eventful_start(system, t0, plan(replace(prepared, binding=binding), system), budget)
         except SolverFailure:  # no time is left
             return None
         except (InconsistentStart, NotFiniteError, ModelError):

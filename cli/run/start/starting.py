@@ -24,6 +24,7 @@ from sysdyn.runtime.model.description import describe
 from sysdyn.runtime.model.failures import InconsistentStart, SolverFailure
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.rank import NotFiniteError
+from sysdyn.runtime.numerics.work import Budget
 from sysdyn.runtime.start.moved import Moved
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.implicit import undetermined
@@ -73,7 +74,7 @@ def _started(
     system = System.of(describe(prepared.structure, prepared.arrays), prepared.carrier, "3")
     try:
         with np.errstate(all="ignore"):  # what overflows is seen as no number
-            state = eventful_start(system, t0, plan(prepared, system), until)
+            state = eventful_start(system, t0, plan(prepared, system), Budget(until))
             facts = structure(system, state)
             implicit = undetermined(system, state, facts)
     except InconsistentStart as error:
