@@ -15,19 +15,19 @@
 #define CLOSE 1e-10    /* of magnitudes: the last of these corrections */
 #define SINGULAR 1e-13 /* of its largest entry: a pivot that is round-off, of rows that depend on each other */
 
-sd_branches *sd_branches_new(sd_settle *settle, const sd_stepper *stepper, const int32_t *row, int32_t rows)
+sd_branches *sd_branches_new(sd_settle *settle, const sd_stepper *stepper, int32_t extended, const int32_t *row, int32_t rows)
 {
-    const int32_t n = stepper->n;
+    const int32_t n = (extended > stepper->n ? extended : stepper->n) + 8;
     const size_t m = (size_t)rows, unknowns = (size_t)settle->unknowns, entries = (size_t)settle->system->entries;
     const size_t all = (size_t)sd_whole_lanes(settle->rows) + m;
     sd_branches *b = calloc(1, sizeof *b);
-    double *next = calloc(3 * m * unknowns + m * m + all + 2 * entries + 5 * unknowns + 2 * (size_t)n + 1, sizeof *next);
+    double *next = calloc(3 * m * unknowns + m * m + all + 2 * entries + 5 * unknowns + 4 * (size_t)n + 1, sizeof *next);
     if (!b || !next) {
         free(b);
         free(next);
         return NULL;
     }
-    *b = (sd_branches){.settle = settle, .row = row, .rows = rows, .n = n, .memory = next, .before = next};
+    *b = (sd_branches){.settle = settle, .row = row, .rows = rows, .memory = next, .before = next};
     b->now = b->before + m * unknowns;
     b->middle = b->now + m * unknowns;
     b->product = b->middle + m * unknowns;
@@ -41,6 +41,8 @@ sd_branches *sd_branches_new(sd_settle *settle, const sd_stepper *stepper, const
     b->far = b->near + unknowns;
     b->y = b->far + unknowns;
     b->yd = b->y + n;
+    b->end = b->yd + n;
+    b->end_d = b->end + n;
     return b;
 }
 
@@ -220,10 +222,8 @@ static void keep(sd_branches *b)
 
 void sd_branches_leave(sd_branches *b, const sd_stepper *stepper)
 {
-    const size_t size = (size_t)b->n * sizeof(double);
-    memcpy(b->y, stepper->y, size);
-    memcpy(b->yd, stepper->yd, size);
     b->t = stepper->ivp->t;
+    stepper->dense(stepper->self, b->t, b->y, b->yd);
     if (stepper->ivp->steps == 0)
         b->most = 0.0;
     take_point(b, b->y, b->yd);
@@ -237,7 +237,8 @@ int sd_branches_follow(sd_branches *b, sd_stepper *stepper)
 {
     if (!b->begun || stepper->ivp->fixed_h > 0.0)
         return 1;
-    take_point(b, stepper->y, stepper->yd);
+    stepper->dense(stepper->self, stepper->ivp->t, b->end, b->end_d);
+    take_point(b, b->end, b->end_d);
     if (b->size >= SHORT * b->most && !has_moved(b))
         return 1;
     if (!take_normals(b, stepper->ivp->t, b->now))
@@ -249,7 +250,7 @@ int sd_branches_follow(sd_branches *b, sd_stepper *stepper)
             stepper->start(stepper->self, b->t, b->y, b->yd, 0.25 * (t - b->t));
             return 0;
         }
-        take_point(b, stepper->y, stepper->yd);
+        take_point(b, b->end, b->end_d);
     }
     keep(b);
     return 1;

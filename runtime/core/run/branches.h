@@ -24,13 +24,14 @@ typedef struct sd_branches {
     double *z, *zd, *at;         /* [unknowns] of the settled system: a point; where `before` was taken */
     double *near, *far;          /* [unknowns] ends of a part of the chord */
     double *y, *yd, t;           /* [n] the point that the step begins at */
+    double *end, *end_d;         /* [n] the one that it ends at */
     double most, size;           /* largest volume of normals, its root a row, so far; the last one */
-    int32_t n, begun;
+    int32_t begun;
     double *memory;
 } sd_branches;
 
-/* row [rows]: of the caller.  NULL without memory */
-sd_branches *sd_branches_new(sd_settle *settle, const sd_stepper *stepper, const int32_t *row, int32_t rows);
+/* row [rows]: of the caller; extended: unknowns and what is audited.  NULL without memory */
+sd_branches *sd_branches_new(sd_settle *settle, const sd_stepper *stepper, int32_t extended, const int32_t *row, int32_t rows);
 void sd_branches_free(sd_branches *branches);
 /* a step begins at the last point of the method */
 void sd_branches_leave(sd_branches *branches, const sd_stepper *stepper);

@@ -29,7 +29,8 @@ int sd_unresolved(const sd_system *system, const uint8_t *constraint, const doub
             for (int32_t e = system->column[j]; e < system->column[j + 1]; e++) {
                 int32_t i = system->row[e];
                 double slope = fabs(jy[e]);
-                if (!constraint[i] || !isfinite(slope) || slope == 0.0)
+                /* one that is round-off itself (a crank at its dead centre) tells nothing of the unknown */
+                if (!constraint[i] || !isfinite(slope) || slope <= DBL_EPSILON * leading[i])
                     continue;
                 if (pass == 0)
                     most = sd_larger(most, slope / leading[i]);

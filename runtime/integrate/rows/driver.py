@@ -30,8 +30,9 @@ SWIFT = 100.0
 """Of the tolerance: what is observed would move by more of its largest in a step, by the equations beside the dense
 output, where it relaxes at once (smooth motions: up to ten).
 """
-FEW, FEW_ROWS = 400, 40
-"""Unknowns and constraints up to which the branch is watched: a determinant of products of normals a step."""
+FEW, FEW_ROWS = 400, 1
+"""Unknowns and constraints up to which the branch is watched.  Of several constraints at once that fold (chains of cranks
+as long as their rods lie flat) one curve through the singular place is not told from two branches beside it."""
 CREDIT = 16
 """Rows that are looked at before it shows that few of them meet their sums."""
 
@@ -137,7 +138,9 @@ class Driver:
         if not 0 < rows.size <= FEW_ROWS:
             return
         self._phi = rows
-        self.branches = lib.core.sd_branches_new(settler.core, method.stepper, lib.pointer(rows), rows.size)
+        self.branches = lib.core.sd_branches_new(
+            settler.core, method.stepper, self.system.form.extended, lib.pointer(rows), rows.size
+        )
         if not self.branches:
             raise MemoryError
         self.run.branches = self.branches
