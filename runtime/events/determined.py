@@ -172,7 +172,8 @@ class Determined:
     def _goes_on(self, k: int, points: tuple[Point, Point], told: NDArray[np.bool_], *, small: bool) -> bool:
         """Whether the motion is the same: what a relation leaves open moves something where its sense decides, but not
         how frictions side by side share an effort, which is a flow of the mirror.  told [unknowns as written]: flows
-        that are determined are the same, and those that have a rate of their own go on alike; small: what turns is zero.
+        that are determined are the same, and those that have a rate of their own go on alike; small: what turns is
+        zero.
         """
         (y, yd), (other, other_d) = points
         flows = self._moves & told
