@@ -41,7 +41,7 @@ HOLD = ("psi", "friction")
 """Kinds of contacts that all hold where a nearer state is sought."""
 BESIDE = 8
 """Contacts up to which sets are tried in which one of them stands otherwise."""
-SETS, SWIFTLY = 4.0, 1.5
+SETS, SWIFTLY = 3.0, 1.2
 """Times what a search may take: what is spent on all sets, on those that may have a start at once."""
 TURNS = 4
 """Sets that are tried behind such a step."""

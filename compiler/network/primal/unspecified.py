@@ -33,14 +33,14 @@ def measured(
     the text are among them.  constant: those that hold the same whatever happens.
 
     Between common-flow nodes of the author's network positions are guessed, not lengths, but where the text guesses
-    lengths that close a loop.
+    lengths that close a loop, or all of them.
     """
     found: list[tuple[Initial, set[tuple[str, str]]]] = []
     shared: set[tuple[str, str]] = set()
     held: dict[tuple[str, str], list[Box]] = {}
     known = {initial.store for initial in initials}
     lengths = [b for b in network.branches if b.kind == "potential" and b.domain.common == "flow" and not reflected]
-    positions = set[Branch]() if _guessed_in_loops(lengths, initials) else set(lengths)
+    positions = set[Branch]() if _lengths_guessed(lengths, initials) else set(lengths)
     for b in network.branches:
         if b.kind not in TELLING or b in constant or b in positions:
             continue
@@ -69,11 +69,16 @@ def measured(
     return kept, frozenset(i.store for i in kept if i.said)
 
 
-def _guessed_in_loops(lengths: Sequence[Branch], initials: Sequence[Initial]) -> bool:
-    """Whether the text tells the contents of such stores that close a loop, where guesses may miss each other."""
+def _lengths_guessed(lengths: Sequence[Branch], initials: Sequence[Initial]) -> bool:
+    """Whether the text tells the contents of such stores that close a loop, where guesses may miss each other, or of
+    all: guesses of positions are none then.
+    """
     told = [b for b in lengths if b.plus and b.minus and any(_tells(i, b) for i in initials)]
     guessed = any(_tells(i, b) and not i.fixed for b in told for i in initials)
-    return guessed and bool(in_loops([(b.plus.node or "", b.minus.node or "", 1) for b in told if b.plus and b.minus]))
+    return guessed and (
+        len(told) == len(lengths)
+        or bool(in_loops([(b.plus.node or "", b.minus.node or "", 1) for b in told if b.plus and b.minus]))
+    )
 
 
 def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
