@@ -20,7 +20,7 @@ from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import Started, start
 from sysdyn.cli.run.verdict.expectations import Claim, judge
-from sysdyn.cli.run.verdict.verdict import author_place, differences, stopped, verdict
+from sysdyn.cli.run.verdict.verdict import author_place, differences, stopped, unkicked, verdict
 from sysdyn.compiler.forms.kane import repeats
 from sysdyn.dsl import load
 from sysdyn.dsl.model import budget
@@ -193,4 +193,5 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
         verdict(target, prepared, started, outcome, report)
         differences(prepared, outcome.cancelled, report)
         zeno(prepared, outcome.events, report)
+        unkicked(prepared, started, outcome, report)
     return Ran(target, prepared, started, outcome, claims, code, failure)

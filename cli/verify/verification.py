@@ -24,7 +24,7 @@ from sysdyn.cli.run.request import targets
 from sysdyn.cli.run.request.asked import ACCURACY, Request, check_tolerances, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, finding, integrate, ready
-from sysdyn.cli.verify.agreement import Bounds, Gap, horizon
+from sysdyn.cli.verify.agreement import Bounds, Gap, gaps, horizon
 from sysdyn.cli.verify.twins import Twins, free_quantities, twins
 from sysdyn.cli.verify.verified import Refusal, Run, Verified, disagreements, worst
 from sysdyn.dsl.model import expression as ex
@@ -315,8 +315,18 @@ class _Verification:
             tuple(bounds),
             tuple(sorted(self.left_out.items())),
             found,
+            self._starts(bounds),
             self.interrupted,
         )
+
+    def _starts(self, bounds: dict[str, float]) -> tuple[tuple[Run, Gap], ...]:
+        """One run of each other formulation, and its worst gap to the reference at the first instant."""
+        reference, begun = self.runs[0], dict[str, tuple[Run, Gap]]()
+        for run in self.runs:
+            if run.formulation != reference.formulation and run.formulation not in begun:
+                for gap in gaps(reference.trace, run.trace, bounds, self.span[0])[:1]:
+                    begun[run.formulation] = run, gap
+        return tuple(begun.values())
 
     def _own_horizon(self, name: str, bounds: Bounds) -> tuple[float, Gap | None]:
         """The horizon [s] of a run from its own finer one, and what differs beyond it."""

@@ -92,7 +92,8 @@ class Verified:
 
     runs: the reference first; finer: the reference at a tenth of the accuracy; worst: gap of each run to the reference;
     horizon [s], beyond: what differs after it (None: compared to the end), by: the run that gives it; compared: names;
-    left_out: names and why; interrupted: other runs would have followed.
+    left_out: names and why; starts: one run of each other formulation, and where it begins farthest from the reference;
+    interrupted: other runs would have followed.
     """
 
     name: str
@@ -108,7 +109,13 @@ class Verified:
     compared: tuple[str, ...]
     left_out: tuple[tuple[str, str], ...]
     disagreements: tuple[Disagreement, ...]
+    starts: tuple[tuple[Run, Gap], ...] = ()
     interrupted: bool = False
+
+    @property
+    def apart(self) -> tuple[tuple[Run, Gap], ...]:
+        """Formulations that begin elsewhere than the reference."""
+        return tuple((run, gap) for run, gap in self.starts if gap.ratio > 1.0)
 
     @property
     def failures(self) -> tuple[Run, ...]:

@@ -95,7 +95,8 @@ def with_positions(network: Network, wanted: frozenset[Wanted]) -> Network:
     springs = tuple(_springs(network, wanted))
     read = (n for n in ex.topological(expressions(network, "initials")) if n.op == "var")
     said = {n.data[0] for n in read if n.data[1] in ("nq", "bq", "be")}
-    parts = _parts(network, springs, said | {name for name, _ in wanted}, open_=_says_of_others(network))
+    open_ = _says_of_others(network) or _massless(network, springs)
+    parts = _parts(network, springs, said | {name for name, _ in wanted}, open_=open_)
 
     def position(end: Terminal) -> Node:
         return ex.const(0.0) if end.node is None else ex.var(f"{end.node}.start", "start", *end.at)
@@ -138,6 +139,12 @@ def _says_of_others(network: Network) -> bool:
         or (n.data[1] in ("be", "bf") and n.data[0] not in stores)
         for n in read
     )
+
+
+def _massless(network: Network, springs: Sequence[_Join]) -> bool:
+    """Whether nothing is inert at a point between stores: its balance may ask for their contents."""
+    inert = {end.node for b in network.branches if b.kind == "kinetic" for end in (b.plus, b.minus) if end}
+    return any(name not in inert for join in springs for name in join.nodes)
 
 
 def _parts(network: Network, springs: Sequence[_Join], said: set[str], *, open_: bool) -> dict[str, str]:

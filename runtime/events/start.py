@@ -37,7 +37,11 @@ begins.
 """
 LONGER = 100.0
 """Times such a step: one whose set a shorter one is begun with."""
-SETS, SWIFTLY = 4.0, 1.5
+HOLD = ("psi", "friction")
+"""Kinds of contacts that all hold where a nearer state is sought."""
+BESIDE = 8
+"""Contacts up to which sets are tried in which one of them stands otherwise."""
+SETS, SWIFTLY = 3.0, 1.2
 """Times what a search may take: what is spent on all sets, on those that may have a start at once."""
 TURNS = 4
 """Sets that are tried behind such a step."""
@@ -296,13 +300,14 @@ class _Starts:
 
     def nearest(self, found: ConsistentState) -> ConsistentState:
         """What was found, which the model has, or what is nearer: where stores move several sets may fit, of which the
-        least change tells one.  It is sought from where all inequalities of flows hold.
+        least change tells one.  It is sought from where all inequalities of flows hold, and all frictions, then among
+        sets in which one of these stands otherwise.
         """
-        contacts = self.contacts
-        ways = [k for k, c in enumerate(contacts.contacts) if c.kind == "psi" and not contacts.barred[k]]
+        contacts, t, zeros = self.contacts, self._t, self._zeros
+        ways = [k for k, c in enumerate(contacts.contacts) if c.kind in HOLD and not contacts.barred[k]]
         if found.kept or not found.far or not ways:
             return found
-        stood, constants = contacts.state(), contacts.system.description.p[self._constants]
+        best = found, contacts.state(), contacts.system.description.p[self._constants]
         self._sought_near(None)
         self._begin()
         contacts.active[ways] = True
@@ -310,10 +315,17 @@ class _Starts:
         with suppress(NoActiveSetError):
             other = self._fitting()
             if found.farther(other):
-                return other
-        contacts.become(stood)
-        self._put(constants)
-        return found
+                best = other, contacts.state(), contacts.system.description.p[self._constants]
+        for k in ways if len(ways) <= BESIDE else ():
+            contacts.become(best[1])
+            contacts.flip(k, contacts.observer(t, best[0].y, best[0].yd))
+            contacts.apply()
+            point = self._settle(t, zeros, zeros)
+            if point is not None and best[0].farther(self.found[-1]) and contacts.fits(t, zeros, point):
+                best = self.found[-1], contacts.state(), self._with[-1]
+        contacts.become(best[1])
+        self._put(best[2])
+        return best[0]
 
     def _behind_steps(self, pivoting: Pivoting, held: Floats) -> bool:
         """Whether a set that a short implicit step from there asks for fits, which the model then has: with stores as

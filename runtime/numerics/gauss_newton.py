@@ -25,7 +25,7 @@ from sysdyn.values import dataclass
 
 SMALL = 64
 """Rows and unknowns up to which a problem that the core knows is solved there."""
-CORRECTED = 600
+CORRECTED = 240
 """The same up to which rows are corrected: a few eliminations in which each entry has its round-off."""
 _ITERATIONS = 60
 _FOLDS = 709

@@ -395,7 +395,7 @@ def _state(starter: Starter, t: float, guess: Floats, best: Solution, strategy: 
     largest = np.maximum(starter.scale(t, guess), starter.largest_alike(best.x))
     state = starter.free & ~starter.following(t, best.x)
     kept = bool((np.abs(best.x - guess) <= EXACT * largest)[state].all())
-    far = ()
+    far: tuple[float, ...] = ()
     if not kept and best.x.size <= DENSE:
         measure = problem_of(starter, t, guess, guess, rows=starter.every, free=starter.free, least=True)
         far = measure.distances(best.x)

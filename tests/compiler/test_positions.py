@@ -60,12 +60,18 @@ def test_what_is_said_of_contents_stays():
 
 
 def test_positions_are_asked_where_they_tell_anything():
-    """Springs in a tree of which nothing is said begin for themselves; a loop, or a word, asks for their part."""
+    """Springs in a tree of which nothing is said begin for themselves between masses; a loop, or a word, asks for
+    their part.
+    """
     net = Net()
     for name in "abcd":
         net.node(name, TRANSLATION)
     for name, ends in (("s", ("a", "b")), ("t", ("c",)), ("u", ("d", "c"))):
         net.C(name, 1.0, *ends)
+    # the balance of a point without inertia may ask for their contents
+    assert [p.name for p in with_positions(net.network(), frozenset()).positions] == [f"{n}.start" for n in "abcd"]
+    for name in "abcd":
+        net.L(f"m{name}", 1.0, name)
     bare = net.network()
     assert not with_positions(bare, frozenset()).positions
     said = replace(bare, initials=(Initial(of("d", "nq"), x.const(1.0), False, (), PLACE),))

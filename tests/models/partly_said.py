@@ -91,8 +91,12 @@ def circuit(seed):
 
 
 def mechanism(seed):
-    """Text of masses on a line between springs, dampers, dry friction, forces and velocities, and its contents."""
+    """Text of masses on a line between springs, dampers, dry friction, forces and velocities, and its contents.
+
+    Of all springs the lengths are said, or of none: beside some that are both positions and lengths would be guessed.
+    """
     random = np.random.default_rng(seed)
+    lengths = random.random() < 0.5
     nodes = ["ground", *(f"x{k}" for k in range(1, int(random.integers(2, 6))))]
     lines, contents, kinds = [], [], ["spring", "spring", "damper", "damper", "coulomb", "coulomb", "force", "velocity"]
     for k, (a, b) in enumerate(_ends(random, nodes)):
@@ -100,8 +104,8 @@ def mechanism(seed):
             case "spring":
                 law, content = f"spring(k = {_value(random, 0, 3)} N/m)", f"k{k}.e"
                 contents.append(content)
-                say = str(random.choice(["=", "~", "", ""]))
-                if say:
+                if lengths:
+                    say = str(random.choice(["=", "~", "~", "~"]))
                     lines.append(f"  init {content} {say} {_signed(random, 5.0)} N")
                 name = f"k{k}"
             case "damper":

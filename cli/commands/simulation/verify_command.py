@@ -108,7 +108,27 @@ def _complaints(found: Verified) -> list[str]:
         for t in found.twins
         if not t.agree
     ]
-    return [*shortened(pairs), *carriers]
+    begun = [
+        f"{run.name} begins elsewhere than {found.runs[0].name}: {_values(found, gap)}" for run, gap in found.apart
+    ]
+    return [*begun, *shortened(pairs), *carriers]
+
+
+def _values(found: Verified, gap: Gap) -> str:
+    """Those of a quantity in the reference and another run."""
+    unit = found.runs[0].trace[gap.variable].units
+    a, b = (f"{value:.6g}{'' if unit == '1' else f' {unit}'}" for value in gap.values)
+    return f"{gap.variable} is {b}, not {a}"
+
+
+def _starts(found: Verified) -> list[str]:
+    """How the formulations begin, in one line; none where one begins alone."""
+    if not found.starts:
+        return []
+    if found.apart:
+        return ["starts: " + "; ".join(f"{run.formulation}: {_values(found, gap)}" for run, gap in found.apart)]
+    _, worst = max(found.starts, key=lambda pair: pair[1].ratio)
+    return [f"starts: {len(found.starts) + 1} formulations begin alike ({worst.variable} apart by {worst.ratio:.2g})"]
 
 
 def _doubts(found: Verified) -> list[str]:
@@ -163,7 +183,7 @@ def _table(found: Verified, *, timings: bool) -> str:
     rows, said = fitted(rows, SPARE, terminal())
     columns = len(rows[0])
     lines += [aligned(rows, right={*range(2, columns)} - {columns - 2}), *([said] if said else [])]
-    lines += _refused(found)
+    lines += [*_starts(found), *_refused(found)]
     lines += [f"not compared: {name}: {reason}" for name, reason in found.left_out]
     if found.twins:
         apart = max(found.twins, key=lambda t: t.difference)
@@ -208,7 +228,7 @@ def _horizon(found: Verified) -> str:
 def _verdict(found: Verified) -> str:
     ended = [run for run in found.runs if not run.failure]
     number = len(ended)
-    if any(not d.doubted for d in found.disagreements) or not all(t.agree for t in found.twins):
+    if found.apart or any(not d.doubted for d in found.disagreements) or not all(t.agree for t in found.twins):
         return f"{number} runs: they disagree"
     if found.disagreements:
         return f"{number} runs, of which some are not met: the others agree"
@@ -234,6 +254,7 @@ def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
             }
             for d in found.disagreements
         ],
+        "starts": [{"formulation": run.formulation, **asdict(gap)} for run, gap in found.starts],
         "horizon": found.horizon,
         "compared": list(found.compared),
         "not_compared": [{"variable": name, "reason": reason} for name, reason in found.left_out],

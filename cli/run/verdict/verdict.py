@@ -1,6 +1,7 @@
 """What a run says of itself, as findings.
 
-Where it stopped (E930 to E934), what it did not meet (E920, E921, W920), what cancels in what it traced (N922).
+Where it stopped (E930 to E934), what it did not meet (E920, E921, W920), what cancels in what it traced (N922), a
+rest that is not stable (N924).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 from sysdyn.cli.run.prepare import Prepared, place_at
 from sysdyn.cli.run.request.targets import Target
+from sysdyn.cli.run.start.author import names_of
 from sysdyn.cli.run.start.flat_laws import by_element
 from sysdyn.cli.run.start.starting import Started
 from sysdyn.cli.run.verdict.culprit import Culprit, culprit
@@ -20,6 +22,8 @@ from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.judgement import Cancelled, NotMet
+from sysdyn.runtime.linear.growth import growth
+from sysdyn.runtime.linear.states import moving
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
 from sysdyn.runtime.model.held_rows import multiplier_row
 from sysdyn.runtime.model.scales import group_maximum
@@ -60,6 +64,9 @@ _CAUSES = {
     "conflict": ("E704", "two events assign one variable at one instant"),
     "memory": ("E934", "there is no memory left"),
 }
+UNKICKED, FOLDS = 60, 100.0
+"""Unknowns up to which a rest is asked whether it is stable; powers of e by which what disturbs it would grow over a
+run: round-off grows to the size of everything in 37."""
 AT_REST = 1e-8
 """Of what there was of its kind at the start: an unknown that has come to rest."""
 _OF_EVENTS = (
@@ -242,6 +249,26 @@ def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Repo
             text = f"{lost.quantity} moves by {lost.moves:.2g}{unit}, and {share}"
             help_ = f"accuracy 1e-4 on {lost.quantity} relative to range, or an origin nearby"
         report.note("N922", text, place, help=help_)
+
+
+def unkicked(prepared: Prepared, started: Started, outcome: Outcome, report: Report) -> None:
+    """N924 of a run in which nothing has moved, though what disturbs it would have grown by FOLDS powers of e."""
+    system, state = started.system, started.state
+    if system.unknowns > UNKICKED or moving(system, state) or (trace := outcome.traced) is None:
+        return
+    if any(np.ptp(trace[name].values) > 0.0 for name in trace.names if not name.startswith("audit.")):
+        return
+    rate, name = growth(system, state)
+    folds = rate * (outcome.reached - state.t)
+    if folds > FOLDS:
+        (shown,) = names_of(prepared.network, [name])
+        text = (
+            f"nothing moves: the run stays at a rest that is not stable, beside which {shown} grows at {rate:.3g} 1/s"
+        )
+        help_ = (
+            f"that is by e^{folds:.3g} over the run: an initial value beside the rest, however near, begins the motion"
+        )
+        report.note("N924", text, prepared.network.place, help=help_)
 
 
 def verdict(target: Target, prepared: Prepared, started: Started, outcome: Outcome, report: Report) -> None:

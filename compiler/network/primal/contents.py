@@ -180,7 +180,8 @@ class Contents:
         self.reader = reader
         self.initials = initials
         joining = [(e, e.branch.kind, e.branch.domain.common) for e in elements if len(e.ends) == 2]
-        series = [e for e, kind, common in joining if common == "effort" and kind in ("potential", "effort")]
+        # a branch of its own law may be a wire: an ideal diode, a switch
+        series = [e for e, kind, common in joining if common == "effort" and kind in ("potential", "effort", "field")]
         between = [e for e, kind, common in joining if reflected and common == "flow" and kind == "potential"]
         both = [*series, *between]
         looped = in_loops([(e.ends[0].node, e.ends[1].node, box_size(e.box)) for e in both])

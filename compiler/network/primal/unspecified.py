@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Box, Sizes, meet
 from sysdyn.compiler.network.primal.contents import TELLING, told
+from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.integrals import line
 from sysdyn.compiler.network.primal.overlaps import narrowed, ranges_of, untold
 from sysdyn.compiler.network.primal.reading import Rewriter
@@ -31,18 +32,17 @@ def measured(
     """One guess for the stores of a statement that are measured by their contents; the stores all of whose guesses by
     the text are among them.  constant: those that hold the same whatever happens.
 
-    Between common-flow nodes of the author's network positions are guessed, not lengths.
+    Between common-flow nodes of the author's network positions are guessed, not lengths, but where the text guesses
+    lengths that close a loop, or all of them.
     """
     found: list[tuple[Initial, set[tuple[str, str]]]] = []
     shared: set[tuple[str, str]] = set()
     held: dict[tuple[str, str], list[Box]] = {}
     known = {initial.store for initial in initials}
+    lengths = [b for b in network.branches if b.kind == "potential" and b.domain.common == "flow" and not reflected]
+    positions = set[Branch]() if _lengths_guessed(lengths, initials) else set(lengths)
     for b in network.branches:
-        if (
-            b.kind not in TELLING
-            or b in constant
-            or (b.kind == "potential" and b.domain.common == "flow" and not reflected)
-        ):
+        if b.kind not in TELLING or b in constant or b in positions:
             continue
         unit = b.domain.displacement if b.kind == "potential" else b.domain.effort
         for loops, content, read in _contents(b, b.loops, reader):
@@ -67,6 +67,18 @@ def measured(
         shared |= {owner for initial, owners in found if initial.store in more for owner in owners} - written
     kept = tuple(initial for initial, _ in found if initial.store in names)
     return kept, frozenset(i.store for i in kept if i.said)
+
+
+def _lengths_guessed(lengths: Sequence[Branch], initials: Sequence[Initial]) -> bool:
+    """Whether the text tells the contents of such stores that close a loop, where guesses may miss each other, or of
+    all: guesses of positions are none then.
+    """
+    told = [b for b in lengths if b.plus and b.minus and any(_tells(i, b) for i in initials)]
+    guessed = any(_tells(i, b) and not i.fixed for b in told for i in initials)
+    return guessed and (
+        len(told) == len(lengths)
+        or bool(in_loops([(b.plus.node or "", b.minus.node or "", 1) for b in told if b.plus and b.minus]))
+    )
 
 
 def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
