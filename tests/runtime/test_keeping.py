@@ -119,6 +119,7 @@ def test_parameters_of_one_unit_and_of_several_come_back(tmp_path):
     assert Trace.open(kept.path).parameters == {"m": (2.0, "kg"), "a\u2215b": (3.0, "kg"), "k": (4.0, "N/m")}
 
 
+@pytest.mark.long
 def test_each_of_many_parameters_keeps_its_own_number_and_unit(tmp_path):
     units = ("F", "ohm", "kg*m^2/s^2")
     given = tuple(Parameter(f"C{k}.C", (-1.0) ** k * np.exp(0.37 * k), units[k % 3]) for k in range(300))

@@ -13,6 +13,7 @@ CORE = Path(__file__).parents[2] / "runtime" / "core"
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+@pytest.mark.long
 def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs = [("Frame", "sd_frame"), ("Call", "sd_call"), ("System", "sd_system"), ("Linear", "sd_linear")]
     pairs += [("Ivp", "sd_ivp"), ("Bdf", "sd_bdf"), ("Radau", "sd_radau"), ("Stepper", "sd_stepper")]
