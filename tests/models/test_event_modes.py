@@ -281,7 +281,7 @@ def test_the_core_makes_what_the_handler_does(name, way, tmp_path, asked, monkey
 
 
 @pytest.mark.parametrize("name", [name for name in MANY if name != "comes to rest"])
-@pytest.mark.one_in(12)
+@pytest.mark.one_in(3)
 def test_the_handler_is_asked_for_what_is_new(name, tmp_path, asked):
     file = tmp_path / "m.sd"
     file.write_text(MANY[name])
