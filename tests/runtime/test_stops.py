@@ -236,7 +236,7 @@ def saw(t):
 
 
 @pytest.mark.parametrize("method", ["rosenbrock", "radau", "bdf", "dopri", "energy"])
-@pytest.mark.long
+@pytest.mark.one_in(5)
 def test_no_step_sees_what_holds_from_the_end_on(method, tmp_path):
     """A saw tooth falls where the run ends: the last step ends before it, the last row stands behind it."""
     t, columns, outcome = run(SAW, tmp_path, accuracy=1e-6, method=method)
