@@ -105,7 +105,7 @@ def test_faults_of_files_are_told_with_their_path(tmp_path):
 
 def test_the_head_of_a_row_is_as_long_in_the_core_as_in_what_reads_it():
     header = Path(__file__).parents[2] / "runtime" / "core" / "run" / "run.h"
-    counted = int(re.search(r"#define SD_ROW_HEAD (\d+)", header.read_text(encoding="utf-8"))[1])
+    counted = int(re.search(r"SD_ROW_HEAD = (\d+)", header.read_text(encoding="utf-8"))[1])
     assert counted == lib.ROW_HEAD == BEFORE
 
 
