@@ -21,7 +21,7 @@ from sysdyn.runtime.model.forms import stretches
 
 HERE = Path(__file__).parent
 CORE = Path(core.__path__[0])
-ASSEMBLY = ("system/model.h", "linear/lanes.h", "system/assembly.h", "system/assembly.c")
+ASSEMBLY = ("system/model.h", "linear/tuning.h", "linear/lanes.h", "system/assembly.h", "system/assembly.c")
 ALGEBRA = (
     "linear/number.h", "linear/sums.h", "linear/elimination/elimination.h",
     "linear/linear.h", "linear/sparse/matrix.h", "linear/sparse/sparse.h", "system/settle.h",

@@ -130,6 +130,7 @@ def test_tables_on_the_terminal(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("formulation", ALL)
+@pytest.mark.long
 def test_the_energy_of_a_mode_by_the_elements_that_hold_it(formulation, tmp_path, capsys):
     """Of an RLC oscillation half in the coil; of two capacitors C v^2, as their eigenvectors have it."""
     for mode in answered(capsys, write(tmp_path, RLC), "--formulation", formulation)["modes"]:
@@ -332,6 +333,7 @@ def _motor():
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.long
 def test_poles_zeros_and_gain_of(name, formulation, tmp_path, capsys):
     body, output, above, below = SYSTEMS[name]
     below = _motor() if below is None else below

@@ -8,6 +8,7 @@ from sysdyn.runtime.accuracy.runs import Runs
 from texts import ARRAY, BROKEN, FAILING, PENDULUM, STUCK, TWO_SCENES, write
 
 
+@pytest.mark.long
 def test_simulate_and_trace(tmp_path):
     trace = api.simulate(
         write(tmp_path, PENDULUM), accuracy=1e-6, set={"l": 2.0, "m": "900 g"}, at=[0.123, 0.5], until=1
@@ -93,6 +94,7 @@ def test_residual(tmp_path, backend):
         module.residual(0.0, y, ydot, {"L": 1.0})
 
 
+@pytest.mark.long
 def test_backends_agree_on_residuals(tmp_path):
     for text in (PENDULUM, ARRAY):
         path = write(tmp_path, text)
@@ -104,6 +106,7 @@ def test_backends_agree_on_residuals(tmp_path):
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.max(np.abs(one)))
 
 
+@pytest.mark.long
 def test_arrays_of_parameters_are_read_back(tmp_path):
     trace = api.simulate(write(tmp_path, ARRAY))
     assert trace.parameters["m[3]"] == (1.0, "kg")

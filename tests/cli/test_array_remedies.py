@@ -86,6 +86,7 @@ def test_sizes_that_differ_in_an_array_are_named_where_they_are_given(size):
     assert not errors(chains("n"))
 
 
+@pytest.mark.long
 def test_the_last_node_of_each_component_in_an_array_is_found_by_its_size(tmp_path):
     """`v[N]` of components of one size: three of 2*(1 ohm) + 3*(1 kohm) side by side, leaks of 1 Gohm in place of C."""
     path = tmp_path / "chains.sd"

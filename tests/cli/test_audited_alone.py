@@ -1,6 +1,7 @@
 """Between rows a run looks at what powers and energies read, and at nothing else."""
 
 import numpy as np
+import pytest
 from sysdyn.cli.main import run
 from sysdyn.runtime.condense.sums import Straights
 from sysdyn.runtime.trace.trace import Trace
@@ -30,6 +31,7 @@ scene s of grid {
 """
 
 
+@pytest.mark.long
 def test_energies_are_those_of_all_unknowns_bit_by_bit(tmp_path, monkeypatch):
     (tmp_path / "grid.sd").write_text(GRID)
     mark = Straights.mark

@@ -83,6 +83,7 @@ def test_without_arguments_the_help_is_shown(capsys):
         (["plot"], "Missing argument 'TRACE'"),
     ],
 )
+@pytest.mark.one_in(2)
 def test_wrong_usage(tmp_path, capsys, arguments, said):
     write(tmp_path, TWO_SCENES, "two.sd")
     write(tmp_path, PENDULUM.partition("scene")[0], "bare.sd")
@@ -104,6 +105,7 @@ def test_several_models_without_scenes_are_listed(tmp_path, capsys):
     assert (tmp_path / "model.h5").is_file()
 
 
+@pytest.mark.long
 def test_exit_codes(tmp_path, capsys):
     assert run(["simulate", write(tmp_path, PENDULUM)]) == 0
     assert run(["simulate", write(tmp_path, BROKEN)]) == 1
@@ -153,6 +155,7 @@ def test_strict_counts_warnings(tmp_path, capsys, monkeypatch):
     assert "W201" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_quiet_leaves_errors_only(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
     commands = ["check", "simulate", "verify", "trade", "linearize", "equilibrium", "reduce"]
@@ -163,6 +166,7 @@ def test_quiet_leaves_errors_only(tmp_path, capsys):
     assert "E208" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_messages_go_to_standard_error(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
     for arguments in (["check", path], ["simulate", path], ["compile", path]):
@@ -172,6 +176,7 @@ def test_messages_go_to_standard_error(tmp_path, capsys):
         assert captured.err
 
 
+@pytest.mark.long
 def test_colours(tmp_path, capsys, monkeypatch):
     path = write(tmp_path, BROKEN)
 

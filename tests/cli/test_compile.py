@@ -38,6 +38,7 @@ def test_stage_and_files(tmp_path, capsys):
     assert Path("out/manifest.json").is_file()
 
 
+@pytest.mark.long
 def test_formulations_differ(tmp_path):
     path = write(tmp_path, PENDULUM)
     for formulation in ("lagrangian", "hamiltonian"):

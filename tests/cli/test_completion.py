@@ -80,6 +80,7 @@ def test_what_cannot_be_read_offers_nothing(tmp_path, file):
     assert offered("simulate", file, "--set", "") == {}
 
 
+@pytest.mark.long
 def test_the_script_for_a_shell(tmp_path):
     command = [sys.executable, "-c", "from sysdyn.cli.main import main; main()"]
     env = {"_SYSDYN_COMPLETE": "zsh_source", "PATH": "/usr/bin:/bin", "HOME": str(tmp_path)}

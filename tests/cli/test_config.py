@@ -90,6 +90,7 @@ def test_what_is_wrong_is_told(tmp_path, capsys, text, message):
     assert str(tmp_path / "sysdyn.toml") in found["message"]
 
 
+@pytest.mark.long
 def test_other_tools_and_other_folders_are_no_business_of_it(tmp_path, capsys):
     model = write(tmp_path, PENDULUM)
     (tmp_path / "pyproject.toml").write_text("[tool.other]\nstrikt = true\n")

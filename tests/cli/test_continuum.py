@@ -38,6 +38,7 @@ def test_a_hat_rests_on_its_rim_and_at_its_centre(tmp_path, capsys, names):
         ("seed/lcr_nonlinear.sd", 1),  # the slope of f*abs(f) vanishes there
     ],
 )
+@pytest.mark.long
 def test_round_off_tells_no_states_apart(capsys, path, number):
     code, said = run_json(capsys, "equilibrium", str(ROOT / "models" / path), "--backend", "numpy", "--tries", "8")
     found = said["result"]["equilibria"]

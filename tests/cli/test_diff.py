@@ -33,6 +33,7 @@ def traces(tmp_path):
     return tmp_path
 
 
+@pytest.mark.long
 def test_equal(traces, capsys):
     assert run(["diff", "ref.h5", "ref.h5"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -41,6 +42,7 @@ def test_equal(traces, capsys):
     assert lines[-1].startswith("limit: 0 + 0.001 x nominal within 1e-09 s, 101 and 101 instants")
 
 
+@pytest.mark.long
 def test_the_first_line_names_the_worst(traces, capsys):
     assert run(["diff", "ref.h5", "other.h5"]) == 1
     lines = capsys.readouterr().out.splitlines()
@@ -51,6 +53,7 @@ def test_the_first_line_names_the_worst(traces, capsys):
     assert len({line.index(word) for line, word in zip(lines[1:3], ("verdict", "differs"), strict=True)}) == 1
 
 
+@pytest.mark.long
 def test_json(traces, capsys):
     code, found = run_json(capsys, "diff", "ref.h5", "other.h5")
     assert code == 1
@@ -74,6 +77,7 @@ def test_no_limit_is_null_in_json(traces, capsys):
     assert found["result"]["worst"] == {"variable": "x", "time": 0.03, "ratio": None, "status": "nonfinite"}
 
 
+@pytest.mark.long
 def test_quiet_says_no_more_than_the_reason(traces, capsys):
     assert run(["diff", "-q", "ref.h5", "ref.h5"]) == 0
     said = capsys.readouterr()
@@ -112,6 +116,7 @@ def test_both_from_standard_input_is_wrong(traces):
     assert run(["diff", "-", "-"]) == 2
 
 
+@pytest.mark.long
 def test_standard_input(traces):
     data = (traces / "other.h5").read_bytes()
     assert process("diff", "-q", "ref.h5", "-", text=False, input=data).returncode == 1

@@ -147,6 +147,7 @@ def activity(name, value, role="out"):
     return Activity(**{k: given.get(k) for k in fields})
 
 
+@pytest.mark.long
 def test_candidates_are_statements_the_least_active_first_and_no_sources():
     found = [activity("R2", 3.0), activity("C1", 1.0, "held"), activity("V", 0.5, "in"), activity("R1", 2.0)]
     assert list(made(found)) == ["C1", "R1", "R2"]

@@ -122,6 +122,7 @@ def test_efforts_of_an_array_with_an_implicit_effort(tmp_path):
     assert np.abs(got["total"]).max() < 1e-12
 
 
+@pytest.mark.long
 def test_the_reaction_of_a_flow_constraint_is_its_effort(tmp_path):
     text = """
     model knife {
@@ -163,6 +164,7 @@ scene t of circuit {
 
 
 @pytest.mark.parametrize("formulation", [*PRIMAL, "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_the_momentum_content_and_cocontent_of_a_resistor(formulation, tmp_path):
     got = traced(write(tmp_path, CIRCUIT), formulation=formulation, output=str(tmp_path / "o.h5"))
     decay = np.exp(-got["t"] / 0.01)
@@ -173,6 +175,7 @@ def test_the_momentum_content_and_cocontent_of_a_resistor(formulation, tmp_path)
     assert got["g"] == pytest.approx(got["d"], rel=1e-9)
 
 
+@pytest.mark.long
 def test_the_drift_is_what_a_projection_removes(tmp_path):
     text = ROD.replace("trace x, y,", "trace audit.drift as drift, audit.constraints as held, x, y,")
     path = write(tmp_path, text)
@@ -239,6 +242,7 @@ scene s of rig {
 
 
 @pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.long
 def test_what_goes_through_a_port_counts_every_statement_inside(formulation, tmp_path):
     """State functions, friction, work, constraints, elements along expressions, of components within too: a node
     passes on what it is given.
@@ -290,6 +294,7 @@ scene s of pendulum {
 """
 
 
+@pytest.mark.long
 def test_a_port_of_a_bundle_carries_the_force_of_a_pin(tmp_path):
     """Of a body at rest over its pin's side: m*(w^2*r) towards the pin, m*(g - a) upwards, both against the body's."""
     got = traced(write(tmp_path, PIN), output=str(tmp_path / "o.h5"))

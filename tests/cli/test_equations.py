@@ -120,6 +120,7 @@ M f_x' = -e - b f_x - k x
 
 
 @pytest.mark.parametrize(("name", "formulation"), GOLDEN)
+@pytest.mark.long
 def test_equations_are_those_of_the_book(name, formulation, capsys):
     """Examples 6.1, 3.4, 6.6, 2.4.2, 6.4, 5.1 and 2.30, read by eye: rows, signs and classes of efforts."""
     found = printed(capsys, name, "--formulation", formulation)
@@ -136,7 +137,7 @@ def test_thirteen_systems_in_two_formulations():
 
 
 @pytest.mark.parametrize("path", BOOK, ids=lambda p: p.stem)
-@pytest.mark.one_in(7)
+@pytest.mark.long
 def test_the_books_systems_are_printed_as_there(path, capsys):
     """Texts read by eye against (6.27), (6.40), Examples 3.1 to 3.4, 4.1, 4.2, 5.1 to 5.4, 6.6, 2.37 and 2.4.2."""
     system, formulation = path.name.split(".")[:2]
@@ -157,6 +158,7 @@ def _same_terms(found, expected):
     return True
 
 
+@pytest.mark.long
 def test_the_arm_has_the_terms_of_the_book(capsys):
     """Example 3.1: squares of sines and cosines joined, differences of angles, like terms: four terms a row."""
     found = printed(capsys, "two_link_arm", "--formulation", "lagrangian")

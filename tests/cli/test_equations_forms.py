@@ -180,7 +180,7 @@ def test_a_law_that_is_not_linear_has_its_content_by_the_legendre_transform(caps
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("name", ["slider_crank", "two_link_arm", "dc_motor", "solenoid", "lcr_nonlinear"])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(9)
 def test_efforts_by_class_add_up_to_the_balance(name, formulation):
     """(2.10): inertial, potential, dissipative, source, implicit and constraint efforts against the balances' rows."""
     with ex.fresh():

@@ -29,6 +29,7 @@ def by(found, name):
 
 
 @pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.long
 def test_a_pendulum_hangs_or_stands(formulation, capsys):
     found = by(rests(capsys, SEED / "pendulum.sd", "--formulation", formulation), "q2")
     assert [e["values"]["q2"] for e in found] == pytest.approx([-2.34, 2.34], rel=1e-12)
@@ -58,6 +59,7 @@ model duffing {
 
 
 @pytest.mark.parametrize(("c", "wells"), [("0.3", "asymptotically stable"), ("0", "stable"), ("-0.1", "unstable")])
+@pytest.mark.long
 def test_a_double_well(c, wells, tmp_path, capsys):
     found = by(rests(capsys, write(tmp_path, DUFFING), "--set", f"c={c}"), "x")
     assert [e["values"]["x"] for e in found] == pytest.approx([-2.0, 0.0, 2.0], abs=1e-12)
@@ -86,7 +88,7 @@ model diode {
 
 
 @pytest.mark.parametrize("formulation", [*PRIMAL, "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_the_operating_point_of_a_diode(formulation, tmp_path, capsys):
     (found,) = rests(capsys, write(tmp_path, DIODE), "--formulation", formulation)
     current = lambda v: 1e-12 * (np.exp(v / 0.02585) - 1.0)  # noqa: E731
@@ -110,6 +112,7 @@ def test_a_diode_at_its_voltage(tmp_path, capsys):
     assert by_current["static"] == pytest.approx(1.0 / (resistance + 220.0), rel=1e-9)
 
 
+@pytest.mark.long
 def test_levitation_rests_where_the_magnet_bears_the_load(capsys):
     found = by(rests(capsys, SEED / "em_suspension.sd"), "x")
     gap = 4.42 / 5.0 * np.sqrt(0.004 / (2 * 19.62))
@@ -126,6 +129,7 @@ def test_a_motor_turns_steadily(capsys):
     assert found["stability"] == "asymptotically stable"
 
 
+@pytest.mark.long
 def test_four_rests_of_a_double_pendulum(capsys):
     found = rests(capsys, SEED / "two_link_arm.sd")
     angles = {tuple(np.round(np.sin([e["values"]["th1"], e["values"]["th2"]])).astype(int)): e for e in found}
@@ -142,6 +146,7 @@ def test_redundant_constraints_do_not_disturb(capsys):
     assert found[0]["free"] == ["th"]
 
 
+@pytest.mark.long
 def test_dynamic_variables_alone(tmp_path, capsys):
     """Van der Pol: 0 is unstable, its eigenvalues are those of s^2 - mu s + 1."""
     text = """
@@ -177,6 +182,7 @@ model drive {
 
 
 @pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.one_in(2)
 def test_two_wheels_turn_together(formulation, tmp_path, capsys):
     """A driven shaft: speed M/b, twist M/k; one eigenvalue at zero is its angle's, the others decide."""
     (found,) = rests(capsys, write(tmp_path, SHAFT), "--formulation", formulation)
@@ -215,6 +221,7 @@ def test_a_free_mass_goes_on_and_is_not_called_stable(tmp_path, capsys):
     assert found["free"] == ["x'"]
 
 
+@pytest.mark.long
 def test_the_table(tmp_path, capsys):
     assert run(["equilibrium", str(write(tmp_path, DUFFING)), "--backend", "numpy"]) == 0
     out, err = capsys.readouterr()
@@ -382,6 +389,7 @@ scene s of sums { time 0 s to 1 s; trace a }
     assert found["values"] == pytest.approx({"a": 1.0, "b": 2.0})
 
 
+@pytest.mark.long
 def test_large_models_are_not_tried_at_random_points(tmp_path, capsys, monkeypatch):
     path = write(tmp_path, DUFFING)
     assert len(rests(capsys, path)) == 3

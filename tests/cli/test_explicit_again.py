@@ -1,12 +1,14 @@
 """Where radau takes more steps than stability leaves the explicit method, method auto goes on with that."""
 
 import numpy as np
+import pytest
 from sysdyn.runtime.trace.trace import Trace
 from texts import ROOT, run_json
 
 CHAIN = str(ROOT / "models" / "gallery" / "chain_1000.sd")
 
 
+@pytest.mark.long
 def test_a_whipping_chain_is_the_explicit_methods(tmp_path, capsys):
     """Its fastest waves hold the dopri to its region of stability, and its tip holds radau to steps as short: a hundred
     links in 0.3 of the CPU, nearer to the motion.

@@ -112,6 +112,7 @@ formulations = ["lagrangian"]
 @posix
 @pytest.mark.parametrize("model", ["../../../secret.sd", "{outside}/secret.sd", "../../link.sd", "a\\\\u0000b"])
 @pytest.mark.parametrize("command", [["list"], ["check"], ["accept", "m/s", "--reason", "r"]])
+@pytest.mark.one_in(6)
 def test_the_model_of_a_golden_stays_inside_the_project(model, command, tmp_path, capsys, monkeypatch):
     project = tmp_path / "project"
     (project / "golden" / "m").mkdir(parents=True)
@@ -129,6 +130,7 @@ def test_the_model_of_a_golden_stays_inside_the_project(model, command, tmp_path
 
 @posix
 @pytest.mark.parametrize("kind", ["a pipe", "a device", "deep lists", "a long key"])
+@pytest.mark.one_in(2)
 def test_a_golden_book_that_is_none_is_told(kind, tmp_path, capsys, monkeypatch):
     (tmp_path / "golden" / "m").mkdir(parents=True)
     HOSTILE[kind][0](tmp_path / "golden" / "m" / "golden.toml")
@@ -159,6 +161,7 @@ COMPILERS = {
 
 @posix
 @pytest.mark.parametrize("kind", COMPILERS)
+@pytest.mark.one_in(2)
 def test_what_a_compiler_says_is_bytes(kind, tmp_path, capsys, monkeypatch):
     script, message = COMPILERS[kind]
     compiler(tmp_path, monkeypatch, f'[ "$1" = --version ] && exit 0\n{script}')

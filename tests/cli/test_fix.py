@@ -45,6 +45,7 @@ model m {
 """
 
 
+@pytest.mark.long
 def test_habits_are_mended_and_shown(tmp_path, capsys):
     path = tmp_path / "m.sd"
     path.write_text(WRONG)
@@ -81,8 +82,8 @@ def test_a_mended_unit_may_bring_another_finding_to_light():
     assert [d.code for d in done] == ["E201"]
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("code", sorted(codes.codes()))
+@pytest.mark.one_in(77)
 def test_mending_never_adds_findings(code):
     """Over all wrong examples: what is written raises no code that was not there, and right texts stay as they are."""
     page = codes.codes()[code]
@@ -123,6 +124,7 @@ def test_sarif_carries_the_changes(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("line", ["param R = 10k", "phi stop: x == 1 m", "let y := x"])
+@pytest.mark.one_in(2)
 def test_a_model_with_a_slip_is_not_called_ok(tmp_path, capsys, line):
     text = f"model m {{\n  coord x: translation = 1 m\n  energy T* = 1/2*(1 kg)*x'^2\n  {line}\n}}\n"
     (tmp_path / "m.sd").write_text(text)

@@ -36,6 +36,7 @@ def simulated(tmp_path, capsys, law, *options, b="1e4 Pa"):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
 def test_valves_side_by_side_pass_nothing_at_rest(tmp_path, capsys, formulation):
     """None says how much of it the other passes: no slope does, and the laws do, for they are monotone.  A pump that
     starts later: 5 l/s through 1/sqrt(Cr) of both is a head of 360 Pa, between vessels that hold 1.9 m^3 more.
@@ -57,6 +58,7 @@ def test_valves_side_by_side_pass_nothing_at_rest(tmp_path, capsys, formulation)
     ("formulation", "method", "code"),
     [("lagrangian", "dopri", "E607"), ("co_lagrangian", "dopri", "E607"), ("co_lagrangian", "rosenbrock", "E931")],
 )
+@pytest.mark.one_in(2)
 def test_a_method_that_needs_the_slope_of_a_flat_law_says_so(tmp_path, capsys, formulation, method, code):
     """No function is outside its domain (E933), and no inertia is missing."""
     exit_, said = simulated(tmp_path, capsys, TURBULENT, "--formulation", formulation, "--method", method)
@@ -69,7 +71,7 @@ def test_a_method_that_needs_the_slope_of_a_flat_law_says_so(tmp_path, capsys, f
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_the_remedies_hold(tmp_path, capsys, formulation):
     """Other methods from rest; a laminar part; a start in motion."""
     found = []
@@ -84,7 +86,7 @@ def test_the_remedies_hold(tmp_path, capsys, formulation):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
 @pytest.mark.parametrize("law", ["e = 1e5 Pa.s^2/m^6*abs(f)*f", "f = sign(e)*sqrt(abs(e)/(1e5 Pa.s^2/m^6))"])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_a_start_from_which_no_rate_follows_is_one(tmp_path, capsys, law, formulation):
     """The flow grows as the root of time: the equations hold at the start, a rate of it there is none."""
     (tmp_path / "m.sd").write_text(f"""model m {{
@@ -104,7 +106,7 @@ scene s of m {{ time 0 s to 10 s; trace C.e }}
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("source", ["flow(f = 1 l/s) ground -> a", "valve(Cr = 1e9 Pa.s^2/m^6) p -> a"])
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(5)
 def test_an_empty_vessel_over_a_valve_fills(tmp_path, capsys, source, formulation):
     """What the valve passes at no pressure has no rate; the pressure of the vessel has."""
     supplied = "node p: hydraulic; P: effort(e = 1 bar) p" if "p ->" in source else ""
@@ -133,6 +135,7 @@ scene s of m {{ time 0 s to 1 s; trace a.e, out.f }}
     ("formulation", "method", "code"),
     [("lagrangian", "dopri", "E607"), ("lagrangian", "rosenbrock", "E931"), ("co_lagrangian", "dopri", "E607")],
 )
+@pytest.mark.one_in(2)
 def test_the_element_is_named_not_the_balance_that_holds_it(tmp_path, capsys, formulation, method, code):
     """R and C are in series: one balance holds both."""
     (tmp_path / "m.sd").write_text("""model m {
@@ -188,6 +191,7 @@ scene s of m { time 0 s to 1 ms; trace D.e }
 
 
 @pytest.mark.parametrize("law", ["f*abs(f)", "f*abs(f) + 1e8 s/m^3*f^3"])
+@pytest.mark.one_in(2)
 def test_what_a_slope_does_at_rest_is_told(tmp_path, capsys, law):
     given = ["--formulation", "co_lagrangian", "--method", "dopri"]
     exit_, said = simulated(tmp_path, capsys, f"dissipator(e = 1e11 Pa.s^2/m^6*({law}))", *given)

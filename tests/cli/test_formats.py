@@ -52,6 +52,7 @@ def found(project, capsys):
     return json.loads(said.out)["diagnostics"]
 
 
+@pytest.mark.long
 def test_a_folder_is_all_the_files_below_it(found, capsys):
     _, said = checked(capsys, "models", "--json")
     files = json.loads(said.out)["result"]["files"]
@@ -68,6 +69,7 @@ def test_a_folder_is_all_the_files_below_it(found, capsys):
         (["models/b", "models/b/warned.sd"], NAMES[1:2]),
     ],
 )
+@pytest.mark.one_in(2)
 def test_patterns_and_doubles(project, capsys, arguments, files):
     _, said = checked(capsys, *arguments, "--json")
     assert [f["file"] for f in json.loads(said.out)["result"]["files"]] == files
@@ -92,12 +94,14 @@ def test_json_is_json(found, project, capsys):
     assert json.loads(said.out)["diagnostics"] == found
 
 
+@pytest.mark.long
 def test_full_is_the_default(project, capsys):
     plain = checked(capsys, "models")
     assert checked(capsys, "models", "--output-format", "full") == plain
     assert plain[1].out == ""
 
 
+@pytest.mark.long
 def test_concise_is_one_line_a_finding(found, project, capsys):
     code, said = checked(capsys, "models", "--output-format", "concise")
     assert code == 1
@@ -159,6 +163,7 @@ def test_sarif_holds_the_same_places_and_the_pages_of_the_codes(found, project, 
 
 
 @pytest.mark.parametrize("form", ["concise", "github", "junit", "sarif"])
+@pytest.mark.one_in(2)
 def test_a_file_that_cannot_be_read_is_in_every_form(project, capsys, form):
     code, said = checked(capsys, "models/right.sd", "nothing.sd", "--output-format", form)
     assert code == 5

@@ -42,6 +42,7 @@ def model(tmp_path):
         ("plain", {"S.V.v": "exp(-t/(1 s))*(1 V)"}, np.exp(-1)),
     ],
 )
+@pytest.mark.long
 def test_an_input_is_given_by_its_path(model, tmp_path, scene, given, end):
     trace = simulate(model, scene=scene, set=given, accuracy=1e-7, output=tmp_path / "t.h5")
     assert trace["v"].values[-1] == pytest.approx(end, rel=1e-6)

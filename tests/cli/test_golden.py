@@ -85,6 +85,7 @@ def sabotage(name, old, new):
     path.write_text(text.replace(old, new))
 
 
+@pytest.mark.long
 def test_what_is_recorded(project):
     data = tomllib.loads((project / "golden/spring/golden.toml").read_text())
     assert data["model"] == "../../spring.sd"
@@ -122,7 +123,7 @@ def test_other_methods_and_backends_are_no_alarm(project):
 
 
 @pytest.mark.parametrize("build", ["cc -O0", "cc -O3 -march=native -ffp-contract=fast", "clang", "tcc"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_another_compilers_build_is_no_alarm(project, capsys, monkeypatch, build):
     """The goldens were recorded with the flags of compiler/build.py; a wrapper's own come last and win."""
     name, *flags = build.split()
@@ -265,6 +266,7 @@ def test_a_size_that_is_too_small(project, capsys):
 
 
 @pytest.mark.parametrize("number", ["1", "2"])
+@pytest.mark.one_in(2)
 def test_broken_goldens_are_said(project, capsys, number):
     trace = Path("golden/spring/ring.h5")
     trace.write_bytes(trace.read_bytes()[:3000])
@@ -306,6 +308,7 @@ BROKEN_BOOKS = ["", "[", "version = 9", "version = 1\nmodel = 3", "version = 1\n
 
 
 @pytest.mark.parametrize("text", BROKEN_BOOKS)
+@pytest.mark.one_in(3)
 def test_broken_books_are_said(project, capsys, text):
     Path("golden/spring/golden.toml").write_text(text)
     assert run(["golden", "check"]) == 5
@@ -374,6 +377,7 @@ scene again of spring {
     assert "E907" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_golden_is_a_trace(project):
     with h5py.File("golden/pendulum/swing.h5") as file:
         assert file.attrs["Conventions"] == b"CF-1.11"
@@ -384,6 +388,7 @@ def test_a_golden_is_a_trace(project):
     assert run(["plot", "-q", "golden/pendulum/swing.h5", "-o", "a.png"]) in (0, 5)
 
 
+@pytest.mark.long
 def test_a_golden_of_a_scene_that_needs_a_part_holds_the_structure_of_the_whole(tmp_path, monkeypatch):
     """An array with initial values that nothing asks for: a fault in sysdyn before (exit 4)."""
     walls = (

@@ -24,6 +24,7 @@ def refused(path, capsys, *, commands=("check", "simulate", "compile", "fmt")):
 
 
 @pytest.mark.parametrize("seed", range(8))
+@pytest.mark.one_in(5)
 def test_random_bytes(tmp_path, capsys, seed):
     path = tmp_path / "random.sd"
     path.write_bytes(random.Random(seed).randbytes(3000))
@@ -41,6 +42,7 @@ def test_a_sum_of_60000_terms(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("part", range(1, 12))
+@pytest.mark.one_in(6)
 def test_cut_files(tmp_path, capsys, part):
     cut = PENDULUM[: len(PENDULUM) * part // 12]
     path = write(tmp_path, cut)
@@ -63,6 +65,7 @@ HOSTILE = [
 
 
 @pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.one_in(5)
 def test_names_with_code_in_them(tmp_path, capsys, name):
     before = tree(tmp_path)
     text = PENDULUM.replace("rod", name).replace("model pendulum", f"model pendulum{name}")
@@ -72,6 +75,7 @@ def test_names_with_code_in_them(tmp_path, capsys, name):
     assert tree(tmp_path) == sorted([*before, "model.sd"])
 
 
+@pytest.mark.long
 def test_keywords_of_c_and_python_are_names(tmp_path):
     text = PENDULUM
     for old, new in (("m", "int"), ("l", "lambda"), ("rod", "exit"), ("pendulum", "class")):
@@ -100,6 +104,7 @@ def test_strings_and_paths_of_the_text_are_not_opened(tmp_path, capsys):
     assert "root:" not in captured.err
 
 
+@pytest.mark.long
 def test_scene_names_do_not_leave_the_folder(tmp_path):
     path = write(tmp_path, PENDULUM)
     before = tree(tmp_path)
@@ -107,6 +112,7 @@ def test_scene_names_do_not_leave_the_folder(tmp_path):
     assert tree(tmp_path) == sorted([*before, "model-swing.h5"])
 
 
+@pytest.mark.long
 def test_bounded_time_in_a_process(tmp_path):
     path = write(tmp_path, "model m {\n" + "  coord x[1..n]: translation = ((((\n" * 2000)
     ran = process("check", path, timeout=60)
@@ -117,6 +123,7 @@ def test_bounded_time_in_a_process(tmp_path):
 @pytest.mark.parametrize(
     "data", [b"", b"\xff\xfe" + "model m {}".encode("utf-16-le"), b"\x00" * 100, b"model m {}\r\n"]
 )
+@pytest.mark.one_in(2)
 def test_odd_files(tmp_path, capsys, data):
     path = tmp_path / "odd.sd"
     path.write_bytes(data)
@@ -133,6 +140,7 @@ def test_a_table_whose_file_is_a_link_to_itself(tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("command", ["check", "fmt", "simulate", "verify", "reduce", "compile", "golden record", "new"])
+@pytest.mark.one_in(4)
 def test_a_link_to_itself_and_no_name_are_unreadable_files(tmp_path, capsys, monkeypatch, command):
     """Exit 5, never a fault inside."""
     monkeypatch.chdir(tmp_path)

@@ -104,7 +104,7 @@ def pictures(capsys, names):
 
 
 @pytest.mark.parametrize("batch", DRAWN)
-@pytest.mark.one_in(12)
+@pytest.mark.one_in(5)
 def test_names_of_traces(good, capsys, batch):
     units = strings(batch)
     names = list(dict.fromkeys(f"q{k}{u}".replace("/", "\u2215").replace("\0", "") for k, u in enumerate(units)))
@@ -145,7 +145,7 @@ def tokens(text):
 
 
 @pytest.mark.parametrize("batch", range(BATCHES))
-@pytest.mark.one_in(12)
+@pytest.mark.long
 def test_strings_and_comments_of_texts(tmp_path, monkeypatch, capsys, batch):
     monkeypatch.chdir(tmp_path)
     wanted = None
@@ -165,6 +165,7 @@ def test_strings_and_comments_of_texts(tmp_path, monkeypatch, capsys, batch):
         shutil.rmtree("out")
 
 
+@pytest.mark.long
 def test_a_report_about_hostile_remarks(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
 

@@ -65,6 +65,7 @@ def traces(name, folder, capsys, accuracy=1e-7):
     return simulate(out, scene="tran", accuracy=accuracy, output=folder / "t.h5")
 
 
+@pytest.mark.long
 def test_a_pulse_through_a_resistor_and_a_capacitor(tmp_path, capsys):
     """Linear rise in 1 us, 5 V for 3 ms: the closed form at the end of each edge and long after."""
     trace = traces("rc", tmp_path, capsys)
@@ -165,9 +166,9 @@ def test_there_are_twenty_netlists():
     assert len(list(NETLISTS.glob("*.cir"))) == 20
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.skipif(shutil.which("ngspice") is None, reason="ngspice is not installed")
 @pytest.mark.parametrize("name", sorted(p.stem for p in NETLISTS.glob("*.cir")))
+@pytest.mark.long
 def test_ngspice_agrees(name, tmp_path, capsys):
     """Every trace within 3e-4 of its largest value (between the rows both are interpolated by lines)."""
     trace = traces(name, tmp_path, capsys, FRONTS.get(name, 1e-6))
@@ -240,6 +241,7 @@ def test_a_finding_of_an_included_file_stands_there(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("kind", ["NPN", "PNP"])
+@pytest.mark.long
 def test_a_transistor_joined_to_a_diode(kind, tmp_path, capsys):
     """Collector and base are one node: (5 V - v)/1 kohm = IS/aF (exp(v/VT) - 1)."""
     path = tmp_path / "n.cir"
@@ -262,6 +264,7 @@ def test_what_is_left_out_is_said(tmp_path, capsys):
     assert {(d["code"], d["line"]) for d in found["diagnostics"]} == {("W941", 5), ("N941", 6)}
 
 
+@pytest.mark.long
 def test_names_and_titles_of_others_are_data(tmp_path, capsys):
     """Whatever they are, the text is one that `check` takes."""
     path = tmp_path / "n.cir"

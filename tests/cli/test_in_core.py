@@ -33,7 +33,7 @@ def core(model):
 
 
 @pytest.mark.parametrize(("name", "formulation"), SEEDS)
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_a_run_in_the_core_is_the_run_of_the_command(name, formulation, tmp_path):
     file = MODELS / "seed" / f"{name}.sd"
     model = load(file, scene="reference", formulation=formulation)
@@ -64,6 +64,7 @@ def test_a_run_in_the_core_is_the_run_of_the_command(name, formulation, tmp_path
 
 
 @pytest.mark.parametrize("name", ["pendulum", "two_tank", "slider_crank"])
+@pytest.mark.long
 def test_a_run_depends_on_its_own_numbers_alone(name):
     """The first call and the second, after others, of another object and in threads: the same bits."""
     file = MODELS / "seed" / f"{name}.sd"
@@ -177,6 +178,7 @@ FALLING = (
 
 
 @pytest.mark.parametrize(("name", "options", "why"), FALLING)
+@pytest.mark.long
 def test_what_has_no_place_in_the_core_is_run_on_its_own(name, options, why):
     model = load(MODELS / "seed" / f"{name}.sd", scene="reference", **options)
     case = {k: 1.01 * v for k, v in list(numbers(model).items())[:1]}
@@ -206,6 +208,7 @@ def test_a_long_run_is_made_on_its_own(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "parameter"), [("pendulum", "l"), ("dc_motor", "L1"), ("mass_spring", "M")])
+@pytest.mark.long
 def test_a_call_is_few_lines_of_python(name, parameter, effort):
     """1 ms beside 1.5 times the integrations was asked for (tests/bench/api.py)."""
     model = load(MODELS / "seed" / f"{name}.sd", scene="reference")

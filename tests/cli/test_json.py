@@ -28,6 +28,7 @@ from sysdyn.cli.main import run
 from texts import BROKEN, FAILING, PENDULUM, STUCK, TWO_SCENES, run_json, write
 
 
+@pytest.mark.long
 def test_check(tmp_path, capsys):
     code, found = run_json(capsys, "check", write(tmp_path, TWO_SCENES))
     assert code == 0
@@ -39,6 +40,7 @@ def test_check(tmp_path, capsys):
         assert (target["dof"], target["m1"], target["index"]) == (1, 1, 3)
 
 
+@pytest.mark.long
 def test_linearize(tmp_path, capsys):
     code, found = run_json(capsys, "linearize", write(tmp_path, PENDULUM))
     assert code == 0
@@ -52,6 +54,7 @@ def test_linearize(tmp_path, capsys):
         conforms(mode, MODE)
 
 
+@pytest.mark.long
 def test_equilibrium(tmp_path, capsys):
     code, found = run_json(capsys, "equilibrium", write(tmp_path, PENDULUM))
     assert code == 0
@@ -61,6 +64,7 @@ def test_equilibrium(tmp_path, capsys):
         conforms(rest, REST)
 
 
+@pytest.mark.long
 def test_equations(tmp_path, capsys):
     code, found = run_json(capsys, "equations", write(tmp_path, PENDULUM))
     assert code == 0
@@ -95,6 +99,7 @@ def test_fmt(tmp_path, capsys):
     assert found["result"]["changed"] == [path]
 
 
+@pytest.mark.long
 def test_compile(tmp_path, capsys):
     code, found = run_json(capsys, "compile", write(tmp_path, PENDULUM), "-o", str(tmp_path))
     assert code == 0
@@ -107,6 +112,7 @@ def test_compile(tmp_path, capsys):
             conforms(item, schema)
 
 
+@pytest.mark.long
 def test_simulate(tmp_path, capsys):
     code, found = run_json(capsys, "simulate", write(tmp_path, PENDULUM))
     assert code == 0
@@ -121,6 +127,7 @@ def test_simulate(tmp_path, capsys):
     assert claim["ok"] is True
 
 
+@pytest.mark.long
 def test_simulate_with_a_failed_expectation(tmp_path, capsys):
     code, found = run_json(capsys, "simulate", write(tmp_path, FAILING))
     assert code == 1
@@ -182,6 +189,7 @@ def test_explain(capsys):
         (("simulate", "two.sd", "--scene", "swing", "-o", "-"), 2, "usage"),
     ],
 )
+@pytest.mark.one_in(6)
 def test_failures_without_a_place(tmp_path, capsys, arguments, code, kind):
     write(tmp_path, TWO_SCENES, "two.sd")
     exit_code, found = run_json(capsys, *arguments)
@@ -201,6 +209,7 @@ def test_numbers_that_json_has_not_become_null():
     }
 
 
+@pytest.mark.long
 def test_nothing_else_reaches_standard_output(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
     for arguments in (("check", path), ("simulate", path), ("compile", path, "--dump", "network")):

@@ -46,6 +46,7 @@ NAN, INF = float("nan"), float("inf")
         ),  # no number is no answer
     ],
 )
+@pytest.mark.one_in(12)
 def test_what_holds_within_a_tolerance(operator, left, right, within, found):
     assert holds(operator, left, right, within) is found
 

@@ -26,6 +26,7 @@ PENDULUM = (SEED / "pendulum.sd").read_text()
 
 @pytest.mark.parametrize("index", ["3", "2", "2v", "1", "0"])
 @pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.long
 def test_a_pendulum_at_the_bottom(formulation, index, capsys):
     options = ("--formulation", formulation, "--index", index, "--equilibrium")
     found = linear(capsys, SEED / "pendulum.sd", *options)
@@ -40,6 +41,7 @@ def test_a_pendulum_at_the_bottom(formulation, index, capsys):
 
 
 @pytest.mark.parametrize("formulation", ALL)
+@pytest.mark.long
 def test_a_series_circuit_in_every_formulation(formulation, tmp_path, capsys):
     found = linear(capsys, write(tmp_path, RLC), "--formulation", formulation, "--equilibrium")
     poles = np.roots([0.5 * 0.02, 3 * 0.02, 1])
@@ -57,6 +59,7 @@ def test_a_series_circuit_in_every_formulation(formulation, tmp_path, capsys):
     assert by_output["v"]["static"] == pytest.approx(1.0, rel=CLOSE)
 
 
+@pytest.mark.long
 def test_the_lead_filter_of_the_book(tmp_path, capsys):
     """(6.43): E_o/E_s = (R1 R2 C s + R2)/(R1 R2 C s + R1 + R2)."""
     text = (SEED / "lead_filter.sd").read_text().replace("effort(e = E*sin(w*t))", "effort(e = u)")
@@ -71,6 +74,7 @@ def test_the_lead_filter_of_the_book(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.long
 def test_a_dc_motor(formulation, capsys):
     options = ("--inputs", "E", "--outputs", "om,i", "--formulation", formulation)
     found = linear(capsys, SEED / "dc_motor.sd", *options)
@@ -104,6 +108,7 @@ def test_a_free_chain_of_two_masses(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.long
 def test_the_unstable_pendulum(formulation, capsys):
     options = ("--set", "th_0=3.141592653589793", "--formulation", formulation)
     found = linear(capsys, SEED / "inverted_pendulum.sd", *options)
@@ -114,6 +119,7 @@ def test_the_unstable_pendulum(formulation, capsys):
 
 @pytest.mark.parametrize("formulation", PRIMAL)
 @pytest.mark.parametrize("index", ["3", "2"])
+@pytest.mark.long
 def test_a_slider_on_an_incline(formulation, index, tmp_path, capsys):
     """A constraint of index 3 with damping: m s^2 + c s + k along the line."""
     text = """
@@ -141,6 +147,7 @@ def test_a_slider_on_an_incline(formulation, index, tmp_path, capsys):
     assert y["gain"] == pytest.approx(np.cos(0.6) * np.sin(0.6) / 0.7, rel=CLOSE)
 
 
+@pytest.mark.long
 def test_levitation_about_its_rest(capsys):
     """m x'' = F - b0 i^2/(2 (b1 + x)^2), d/dt(b0 i/(b1 + x)) = E - R i; the rest has i = E/R (book, 3.54)."""
     mass, b0, b1, r, force, volt = 2.0, 0.004, 0.01, 5.0, 19.62, 5.0
@@ -154,6 +161,7 @@ def test_levitation_about_its_rest(capsys):
     assert found["point"]["x"] == pytest.approx(gap - b1, rel=1e-9)
 
 
+@pytest.mark.long
 def test_two_tanks(tmp_path, capsys):
     text = """
     model tanks {
@@ -180,6 +188,7 @@ def test_two_tanks(tmp_path, capsys):
         assert t["zeros"] == []
 
 
+@pytest.mark.long
 def test_a_gear_between_a_flywheel_and_a_spring(tmp_path, capsys):
     text = """
     model geared {

@@ -9,6 +9,7 @@ from sysdyn.cli.main import run
 from texts import run_json, write
 
 
+@pytest.mark.long
 def test_the_reduction_is_a_state_space_of_scipy(tmp_path, capsys):
     found = linear(capsys, write(tmp_path, RLC), "--equilibrium", "--outputs", "c.e")
     small = found["reduced"]
@@ -21,6 +22,7 @@ def test_the_reduction_is_a_state_space_of_scipy(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("formulation", ALL)
+@pytest.mark.long
 def test_the_descriptor_matrices_have_the_transfer_function(formulation, tmp_path, capsys):
     found = linear(capsys, write(tmp_path, RLC), "--formulation", formulation, "--equilibrium", "--outputs", "v,v_r")
     e, a, b, c, d = (np.array(found[k]) for k in "EABCD")
@@ -33,6 +35,7 @@ def test_the_descriptor_matrices_have_the_transfer_function(formulation, tmp_pat
 # -- the command -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_the_table_names_modes_and_transfer_functions(tmp_path, capsys):
     assert run(["linearize", str(write(tmp_path, RLC)), "--outputs", "v", "--backend", "numpy"]) == 0
     out, err = capsys.readouterr()
@@ -52,6 +55,7 @@ def test_the_table_names_modes_and_transfer_functions(tmp_path, capsys):
         (("--at", "-1"), "--at -1 s lies before the start"),
     ],
 )
+@pytest.mark.one_in(3)
 def test_wrong_usage(options, message, tmp_path, capsys):
     code, found = run_json(capsys, "linearize", str(write(tmp_path, RLC)), "--backend", "numpy", *options)
     assert code == 2

@@ -25,6 +25,7 @@ def test_an_input_that_is_differentiated(tmp_path, capsys):
         assert (v["gain"], v["improper"][0]) == (pytest.approx(0.0, abs=1e-12), pytest.approx(0.25, rel=CLOSE))
 
 
+@pytest.mark.long
 def test_an_amplitude_is_held_at_its_instant(capsys):
     """E sin(w t) at 0.05 s: the filter's own transfer function times sin(w t), in either family."""
     for formulation in ALL:
@@ -38,6 +39,7 @@ def test_an_amplitude_is_held_at_its_instant(capsys):
 @pytest.mark.parametrize(
     ("inputs", "label"), [((), "u"), (("--inputs", "u"), "u"), (("--inputs", "supply.v"), "supply.v")]
 )
+@pytest.mark.one_in(2)
 def test_an_input_that_follows_a_formula_is_moved_about_it(inputs, label, tmp_path, capsys):
     """Of a linear circuit the transfer function is that of an input that holds a constant."""
     circuit = "from std.electrical import voltage\n" + RLC.replace("effort(e = u)", "voltage(v = u)")
@@ -96,10 +98,10 @@ scene gap_s of gap { time 0 s to 1 s
 """L i0 = 0.1 H x 2 A, q0 = 1 mF x 10 V: what moves the inductance or the gap of a loaded store moves it by its rate."""
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", ALL)
 @pytest.mark.parametrize("index", ["3", "1", "0"])
 @pytest.mark.parametrize("scene", ["coil_s", "gap_s"])
+@pytest.mark.one_in(30)
 def test_an_input_in_a_loaded_store_acts_by_its_rate(scene, index, formulation, tmp_path, capsys):
     options = ("--scene", scene, "--equilibrium", "--formulation", formulation, "--index", index)
     found = linear(capsys, write(tmp_path, BIASED), *options)
@@ -137,9 +139,9 @@ scene frame_s of frame { time 0 s to 1 s
 """
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("index", ["3", "2", "2v", "1", "0"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+@pytest.mark.one_in(12)
 def test_matrices_of_every_index_hold_the_rates_of_inputs(formulation, index, tmp_path, capsys):
     """The base moved with v: x'' + x' + 100 x = v' + ...; in the frame x'' + u'' + x'/2 + 9 x = 0."""
     path = write(tmp_path, BASE)
@@ -188,6 +190,7 @@ scene s of row { time 0 s to 1 s
 
 
 @pytest.mark.parametrize(("asked", "slopes"), [("u", (2, 4, 3)), ("c", (0, 10, 0)), ("kk[2]", (0, 1, 0))])
+@pytest.mark.one_in(2)
 def test_arrays_by_formula_follow_an_input(asked, slopes, tmp_path, capsys):
     found = linear(capsys, write(tmp_path, ROW), "--equilibrium", "--inputs", asked)
     s, stiffness = 3j, (20, 40, 70)
@@ -217,6 +220,7 @@ scene s of two { time 0 s to 1 s
 """
 
 
+@pytest.mark.long
 def test_an_input_that_is_an_array_is_one_input_an_element(tmp_path, capsys):
     """Each seat: 2 (x'' + u'') + k x = 0."""
     found = linear(capsys, write(tmp_path, SEATS), "--equilibrium")

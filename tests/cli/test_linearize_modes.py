@@ -14,7 +14,7 @@ NETWORKS = 200 if os.environ.get("SYSDYN_LONG") else 12
 
 
 @pytest.mark.parametrize("formulation", ALL)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_contrasts_of_many_decades(formulation, tmp_path, capsys):
     """Each eigenvalue to 1e-10 of itself, the slow one beside one up to 1e13 times as fast; gain and zeros too."""
     path = write(tmp_path, RLC)
@@ -79,7 +79,7 @@ def finite(e, a):
 
 
 @pytest.mark.parametrize("formulation", ALL)
-@pytest.mark.one_in(8)
+@pytest.mark.one_in(5)
 def test_random_networks_have_the_eigenvalues_of_a_nodal_tableau(formulation, tmp_path, capsys):
     random = np.random.default_rng(11 + ALL.index(formulation))
     worst, counted = 0.0, 0
@@ -112,6 +112,7 @@ model contrasts {
 
 
 @pytest.mark.parametrize("formulation", ALL)
+@pytest.mark.one_in(2)
 def test_no_mode_is_lost_where_elements_are_twelve_decades_apart(formulation, tmp_path, capsys):
     """Eigenvalues of its nodal pencil in 120 digits; co_ forms add up what is at a node in doubles, and may refuse."""
     path = str(write(tmp_path, LOST))

@@ -108,6 +108,7 @@ def test_what_is_zero_but_for_round_off_is_no_derivative(tmp_path, capsys):
     assert not {"D1", "D2"} & result["reduced"].keys()
 
 
+@pytest.mark.long
 def test_a_true_derivative_is_told(tmp_path, capsys):
     """The torque of a path a = u is J u'': -1 s^2 is exact."""
     text = TWO_DISCS.replace("  input M: N.m = 0 N.m\n  work M on a\n", "  input u: 1 = 0\n  phi path: a = u\n")
@@ -117,6 +118,7 @@ def test_a_true_derivative_is_told(tmp_path, capsys):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
 @pytest.mark.parametrize("text", [WHEEL, SKATE, DISC, MOTOR], ids=["wheel", "skate", "disc", "motor"])
+@pytest.mark.one_in(12)
 def test_what_rolls_steadily_is_not_at_rest(text, formulation, tmp_path, capsys):
     """Also where its position is no unknown, for nothing depends on it; without speed it is at rest."""
     options = "--formulation", formulation
@@ -125,6 +127,7 @@ def test_what_rolls_steadily_is_not_at_rest(text, formulation, tmp_path, capsys)
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_a_current_through_a_circuit_at_rest_is_no_motion(formulation, tmp_path, capsys):
     """In every formulation; of a motor the complementary ones know the momentum."""
     options = "--formulation", formulation

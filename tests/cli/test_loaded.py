@@ -47,7 +47,7 @@ SAME = ("pendulum", "dc_motor", "bouncing_ball", "diode_circuit", "co_circuit", 
 
 
 @pytest.mark.parametrize("name", [f"seed/{name}" for name in SAME])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_runs_equal_those_of_the_command_to_the_last_bit(name, tmp_path):
     """Runs on their own: with an option that the others do not have (tests/cli/test_in_core.py looks at those)."""
     file = MODELS / f"{name}.sd"
@@ -69,6 +69,7 @@ CASES = (("seed/slider_crank", "reference"), ("gallery/lead_filter", "charges"),
 
 
 @pytest.mark.parametrize(("name", "scene"), CASES)
+@pytest.mark.long
 def test_a_run_depends_on_nothing_that_ran_before(name, scene):
     """Structures of other runs, of other forms and of one that stopped, leave no trace in it."""
     used, fresh = (load(MODELS / f"{name}.sd", scene=scene) for _ in range(2))
@@ -224,7 +225,7 @@ def test_functions_of_sums_over_a_size_follow_the_size(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_ladder_of_another_length_is_that_ladder(tmp_path, n):
     """Of three sections the middle one is both the second and the last but one: no other length has its rows."""
     (tmp_path / "m.sd").write_text(LADDER)
@@ -254,6 +255,7 @@ def test_the_residual_of_a_network_is_that_of_one_size(tmp_path):
         ({"n": 2.5}, "E805"),
     ],
 )
+@pytest.mark.one_in(2)
 def test_numbers_that_a_text_refuses_are_refused_of_a_run(tmp_path, settings, code):
     (tmp_path / "m.sd").write_text(LADDER)
     model = load(tmp_path / "m.sd")
@@ -264,6 +266,7 @@ def test_numbers_that_a_text_refuses_are_refused_of_a_run(tmp_path, settings, co
 
 
 @pytest.mark.parametrize("settings", [{"k": -2.0}, {"m[2]": -1.0}, {"m": [1.0, 2.0, -3.0]}])
+@pytest.mark.one_in(5)
 def test_a_negative_stiffness_or_inertia_is_refused_of_a_run(tmp_path, settings):
     (tmp_path / "m.sd").write_text("""model m {
   param k = 4 N/m

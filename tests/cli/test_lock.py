@@ -44,6 +44,7 @@ def test_a_lock_is_written_and_honoured(tmp_path, capsys):
     capsys.readouterr()
 
 
+@pytest.mark.long
 def test_the_api_honours_it(tmp_path):
     file = locked(tmp_path)
     assert api.simulate(file, output="one.h5").attributes["method"] == "bdf"
@@ -61,7 +62,7 @@ def test_the_api_honours_it(tmp_path):
         (["--accuracy", "1e-5"], ("hamiltonian", "1", "bdf"), "formulation hamiltonian"),
     ],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(5)
 def test_the_command_line_wins(tmp_path, arguments, how, part):
     *found, text = ran(locked(tmp_path), *arguments)
     assert tuple(found) == how
@@ -77,6 +78,7 @@ def test_the_command_line_wins(tmp_path, arguments, how, part):
         ("solver auto(index = 3)", ("hamiltonian", "3", "radau")),
     ],
 )
+@pytest.mark.long
 def test_the_scene_wins(tmp_path, statement, how):
     file = locked(tmp_path)
     text = PENDULUM.replace("time 0 s to 1 s", f"time 0 s to 1 s\n  {statement}")
@@ -105,7 +107,7 @@ def test_the_scene_wins(tmp_path, statement, how):
         (lambda lock: lock.replace("\n[files]", "\nfiles = 3\n[other]"), "cannot be read"),
     ],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(5)
 def test_a_stale_lock_is_ignored_and_said_so_even_quietly(tmp_path, capsys, change, said):
     file = locked(tmp_path, change=change)
     capsys.readouterr()

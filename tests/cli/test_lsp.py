@@ -50,6 +50,7 @@ def client(tmp_path):
         yield one
 
 
+@pytest.mark.long
 def test_a_connection_begins_and_ends(tmp_path):
     with editor(tmp_path) as one:
         early = one.answer("textDocument/hover", textDocument={"uri": "file:///x"}, position={})
@@ -68,6 +69,7 @@ def test_a_connection_begins_and_ends(tmp_path):
         assert one.process.wait(10) == 0
 
 
+@pytest.mark.long
 def test_an_exit_without_shutdown_is_one(tmp_path):
     with editor(tmp_path) as one:
         one.begin()
@@ -78,6 +80,7 @@ def test_an_exit_without_shutdown_is_one(tmp_path):
         assert one.process.wait(10) == 1
 
 
+@pytest.mark.long
 def test_what_is_no_message_is_told_and_the_next_is_answered(client):
     client.raw(b"Content-Length: 5\r\n\r\n{oops")
     assert client.receive()["error"]["code"] == -32700
@@ -145,6 +148,7 @@ def test_findings_are_those_of_check(client, tmp_path, capsys):
     assert client.end() == 0
 
 
+@pytest.mark.long
 def test_changes_are_made_in_order_and_the_newest_text_wins(client):
     text = SPRING.replace("A mass", "A 😀 mass")
     client.open("a.sd", text)
@@ -168,6 +172,7 @@ def test_changes_are_made_in_order_and_the_newest_text_wins(client):
     assert not published, "older texts are not checked"
 
 
+@pytest.mark.long
 def test_imports_are_read_from_open_documents_and_from_files(client, tmp_path):
     part = "component part {\n  branch: translation\n  param c = 1 N/m\n  law e = c*q\n}\n"
     user = "from parts import part\nmodel m {\n  node a: translation\n"
@@ -196,6 +201,7 @@ def test_imports_are_read_from_open_documents_and_from_files(client, tmp_path):
     assert client.end() == 0
 
 
+@pytest.mark.long
 def test_names_of_files_are_as_the_editor_writes_them(client, tmp_path):
     """A URI with more signs escaped than need be, a folder with a blank, and a text that is no file."""
     folder = tmp_path / "a folder é#1"
@@ -211,6 +217,7 @@ def test_names_of_files_are_as_the_editor_writes_them(client, tmp_path):
         assert [d["code"] for d in message["params"]["diagnostics"]] == [code]
 
 
+@pytest.mark.long
 def test_layout_is_that_of_fmt(client, tmp_path, capsys):
     text = SPRING.replace("  param k = 4 N/m", "param   k=4 N/m").replace("A mass", "A 😀 mass")
     client.open("a.sd", text)
@@ -231,6 +238,7 @@ def test_layout_is_that_of_fmt(client, tmp_path, capsys):
     assert client.ask("textDocument/formatting", textDocument=document, options=options) is None
 
 
+@pytest.mark.long
 def test_safe_changes_are_offered_and_mend(client):
     text = SPRING.replace("1/2*k*x^2", "1/2*k*x**2")
     client.open("a.sd", text)
@@ -255,6 +263,7 @@ def test_safe_changes_are_offered_and_mend(client):
     assert client.ask("textDocument/codeAction", **given) == []
 
 
+@pytest.mark.long
 def test_hover_tells_what_a_name_is(client):
     client.open("a.sd", SPRING)
     assert client.findings("a.sd") == []
@@ -279,6 +288,7 @@ def test_hover_tells_what_a_name_is(client):
     assert "sysdyn explain E101" in client.at("hover", "a.sd", wrong, "n*x'")["contents"]["value"]
 
 
+@pytest.mark.long
 def test_definitions_and_references(client):
     client.open("c.sd", CIRCUIT)
     (place,) = client.at("definition", "c.sd", CIRCUIT, "R0)")
@@ -294,6 +304,7 @@ def test_definitions_and_references(client):
     assert [p["range"]["start"] for p in found] == [{"line": 5, "character": 18}, {"line": 6, "character": 23}]
 
 
+@pytest.mark.long
 def test_names_are_changed_where_they_mean_the_same(client):
     text = """component part {
   branch: electrical
@@ -342,6 +353,7 @@ scene s of m { time 0 s to 1 s; set R = 2 ohm; trace P.R, R, P.f }
         assert said in client.answer("textDocument/rename", **given)["error"]["message"]
 
 
+@pytest.mark.long
 def test_levels_are_names_of_their_own(client):
     text = """component part {
   port p: electrical
@@ -364,6 +376,7 @@ scene s of m { level P = electrical; time 0 s to 1 s; trace P.p.f }
     assert found["uri"].endswith("/std/prelude.sd")
 
 
+@pytest.mark.long
 def test_symbols_are_those_of_the_text(client):
     client.open("a.sd", SPRING)
     model, scene = client.ask("textDocument/documentSymbol", textDocument={"uri": client.uri("a.sd")})
@@ -380,6 +393,7 @@ def _labels(client, name, text, word, shift=0):
     return {item["label"]: item for item in client.at("completion", name, text, word, shift)}
 
 
+@pytest.mark.long
 def test_completion_offers_what_fits(client):
     text = CIRCUIT.replace("  C1:", "  pa\n  C1:") + "scene s of rc { time 0 s to 1 s; trace R1. }\n"
     client.open("c.sd", text)
@@ -413,6 +427,7 @@ def test_completion_offers_what_fits(client):
     assert "resistor" in _labels(client, "c.sd", text, "resistor\n", 2)
 
 
+@pytest.mark.long
 def test_hostile_texts_harm_nobody(client):
     """Bytes of all kinds, deep nests and half messages: answers, and nothing else on standard output."""
     for k, text in enumerate(
@@ -433,6 +448,7 @@ def test_hostile_texts_harm_nobody(client):
     assert client.end() == 0
 
 
+@pytest.mark.long
 def test_a_check_that_dies_is_told_and_the_next_text_is_checked(client, tmp_path):
     client.open("a.sd", SPRING)
     assert client.findings("a.sd") == []
@@ -498,12 +514,14 @@ def _ascii(message):
 
 
 @pytest.mark.parametrize("name", ["t", "pi", "ground", "audit", "if", "true"])
+@pytest.mark.long
 def test_no_name_becomes_one_that_the_language_has(client, name):
     client.open("s.sd", SPRING)
     given = {"textDocument": {"uri": client.uri("s.sd")}, "position": {"line": 3, "character": 8}, "newName": name}
     assert "cannot be a name" in client.answer("textDocument/rename", **given)["error"]["message"]
 
 
+@pytest.mark.long
 def test_nine_megabytes_block_nobody(client):
     large = SPRING + "# " + "a" * 9_000_000 + "\n" + "model m {\n}\n" * 3
     client.open("large.sd", large)
@@ -516,6 +534,7 @@ def test_nine_megabytes_block_nobody(client):
     assert client.findings("large.sd", 2) == []
 
 
+@pytest.mark.long
 def test_a_killed_server_leaves_no_checker(tmp_path):
     rows = "".join(f"  let a{k} = {'sin(' * 60}x/(1 m){')' * 60}\n" for k in range(3000))
     with editor(tmp_path) as one:

@@ -21,7 +21,7 @@ def listed(capsys, *arguments):
 
 
 @pytest.mark.parametrize("path", sorted(GALLERY.glob("*.sd")), ids=lambda p: p.stem)
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(30)
 def test_every_listed_name_can_be_traced(path, tmp_path, capsys):
     """A scene that traces all of them in the units said (the first element of arrays) is free of errors."""
     text = path.read_text()
@@ -108,7 +108,7 @@ def test_every_component_has_an_example_that_uses_it():
 
 
 @pytest.mark.parametrize("entry", COMPONENTS, ids=lambda e: e.name)
-@pytest.mark.one_in(14)
+@pytest.mark.one_in(77)
 def test_example_of_a_component_runs(entry, tmp_path, capsys):
     (tmp_path / "example.sd").write_text(library.example(entry))
     assert run(["check", "--strict", "example.sd"]) == 0, capsys.readouterr().err
@@ -116,6 +116,7 @@ def test_example_of_a_component_runs(entry, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("entry", library.entries(), ids=lambda e: e.name)
+@pytest.mark.one_in(39)
 def test_page_of_an_entry_holds_what_its_text_declares(entry, capsys):
     assert run(["std", entry.name]) == 0
     page = capsys.readouterr().out

@@ -42,6 +42,7 @@ def simulated(path, tmp_path, capsys, *options):
     return code, json.loads(captured.out), captured.err
 
 
+@pytest.mark.long
 def test_a_run_that_is_met_says_by_what(duffing, tmp_path, capsys):
     code, found, _ = simulated(duffing, tmp_path, capsys)
     assert code == 0
@@ -72,6 +73,7 @@ def test_a_ledger_that_is_off_is_exit_3_with_element_and_instant(duffing, tmp_pa
     assert [e["ok"] for e in found["result"]["expects"]] == [None]
 
 
+@pytest.mark.long
 def test_an_accuracy_that_is_not_reached_is_exit_3(tmp_path, capsys):
     path = Path(__file__).parents[2] / "models/seed/two_link_arm.sd"
     code, found, _ = simulated(path, tmp_path, capsys, "--accuracy", "1e-13")
@@ -83,6 +85,7 @@ def test_an_accuracy_that_is_not_reached_is_exit_3(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("law", ["ln(x)", "asin(2*x - 1)", "sqrt(x)"])
+@pytest.mark.one_in(2)
 def test_a_traced_value_that_is_no_number_is_told_as_that(tmp_path, capsys, law):
     """x = 0.5 - t is negative from 0.5 s on."""
     path = tmp_path / "m.sd"
@@ -99,6 +102,7 @@ def test_a_traced_value_that_is_no_number_is_told_as_that(tmp_path, capsys, law)
     assert since == pytest.approx(missed["time"]) == pytest.approx(0.5, abs=0.11)
 
 
+@pytest.mark.long
 def test_euler_is_not_judged_and_says_so(duffing, tmp_path, capsys):
     text = duffing.read_text().replace("trace x\n", "trace x\n  solver euler(step = 1 ms)\n")
     duffing.write_text(text)
@@ -125,6 +129,7 @@ scene s of rober {
 """
 
 
+@pytest.mark.long
 def test_a_linear_invariant_of_states_is_judged(tmp_path, capsys):
     path = tmp_path / "rober.sd"
     path.write_text(ROBERTSON)
@@ -161,6 +166,7 @@ def test_what_double_precision_cannot_tell_is_refused(duffing, tmp_path, capsys,
     assert option in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_scene_without_trace_traces_every_coordinate(tmp_path, capsys):
     path = tmp_path / "three.sd"
     text = DUFFING.replace("  trace x\n  expect always: x < 0.6 m\n", "")
@@ -205,7 +211,7 @@ RUN = ("E608", "W920", "E931", "E932", "E933", "E934")
 
 
 @pytest.mark.parametrize("code", RUN)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_pages_of_what_a_run_finds_tell_the_truth(code, tmp_path, capsys):
     page = codes.codes()[code]
     path = tmp_path / "example.sd"
@@ -255,6 +261,7 @@ def test_a_module_that_is_not_the_text_is_exit_4_though_it_conserves_energy(duff
 
 
 @pytest.mark.parametrize(("redirection", "arguments"), [(">/dev/full", "--json"), (">&-", "--json"), ("2>&-", "")])
+@pytest.mark.long
 def test_a_stream_that_takes_nothing_is_exit_5(duffing, tmp_path, redirection, arguments):
     out = tmp_path / "out.h5"
     command = f"{sys.executable} -m sysdyn.cli simulate {duffing} -o {out} {arguments} {redirection}"
@@ -263,6 +270,7 @@ def test_a_stream_that_takes_nothing_is_exit_5(duffing, tmp_path, redirection, a
     assert "Traceback" not in ran.stderr + ran.stdout
 
 
+@pytest.mark.long
 def test_independent_parts_have_ledgers_of_their_own(tmp_path, capsys):
     """What is lost in a small part is not hidden by a large one."""
     path = tmp_path / "two.sd"
@@ -311,7 +319,7 @@ scene s of two {
         ),
     ],
 )
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_power_that_is_constant_is_no_constant_of_the_ledger(tmp_path, capsys, elements, end, formulation):
     path = tmp_path / "m.sd"
     scene = "scene s of m {\n  time 0 s to 50 s\n  trace C.e as e\n}\n"
@@ -338,7 +346,7 @@ scene s of light {
 
 @pytest.mark.parametrize("method", ["auto", "radau", "rosenbrock"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(5)
 def test_a_motion_too_fast_for_the_resolution_of_time_is_not_met(tmp_path, capsys, formulation, method):
     """Of 1e-60 kg on 4 N/m a second is 3e29 periods: steps damp what they do not follow, 2 J, which round-off does not
     excuse.

@@ -143,6 +143,7 @@ CIRCUITS = {
 
 
 @pytest.mark.parametrize("name", sorted(CIRCUITS))
+@pytest.mark.one_in(12)
 def test_a_netlist_is_the_circuit_that_it_is_elsewhere(name, tmp_path, capsys):
     text, wanted = CIRCUITS[name]
     code, found, out = imported(f"{name}\n{text}", tmp_path, capsys)
@@ -295,6 +296,7 @@ def test_many_elements_take_work_in_proportion():
 
 
 @pytest.mark.parametrize("inside", [False, True])
+@pytest.mark.one_in(2)
 def test_subcircuits_within_each_other(inside, tmp_path, capsys):
     """150 levels run; 3000 are refused; defined beside each other or within."""
 

@@ -34,6 +34,7 @@ VERDICTS = {
 
 
 @pytest.mark.parametrize("name", VERDICTS)
+@pytest.mark.long
 def test_the_verdict_of(name, capsys):
     found = certified(capsys, SEED / f"{name}.sd")
     verdict, proven = VERDICTS[name]
@@ -67,6 +68,7 @@ scene x of m { time 0 s to 1 s; trace n.e }
         ("0*a*f", "1 F", "lossless", "conserves", "intervals"),
     ],
 )
+@pytest.mark.one_in(12)
 def test_a_law_is_proven_or_sampled(law, cap, verdict, role, how, tmp_path, capsys):
     found = certified(capsys, write(tmp_path, TEXT.replace("LAW", law).replace("CAP", cap)))
     (r,) = [e for e in found["elements"] if e["name"] == "r"]
@@ -103,6 +105,7 @@ scene s of m {{ time 0 s to 1 s; trace x }}
     assert [e["name"] for e in found["elements"] if e["role"] == "active"] == [element]
 
 
+@pytest.mark.long
 def test_works_that_only_exchange_power_conserve_it(tmp_path, capsys):
     """A magnetic force: each work alone supplies, both together nothing."""
     text = """model m {

@@ -27,6 +27,7 @@ def made(traces):
 
 
 @pytest.mark.usefixtures("traces")
+@pytest.mark.long
 def test_pictures(capsys):
     assert run(["plot", "a.h5"]) == 0
     assert Path("a.png").read_bytes().startswith(b"\x89PNG\r\n")
@@ -75,6 +76,7 @@ def test_sparklines():
 
 @pytest.mark.usefixtures("traces")
 @pytest.mark.parametrize("kind", ["png", "svg", "html"])
+@pytest.mark.long
 def test_the_same_trace_gives_the_same_bytes(kind):
     for name in ("one", "two"):
         assert run(["plot", "-q", "a.h5", "-o", f"{name}.{kind}"]) == 0
@@ -91,6 +93,7 @@ def test_the_same_trace_gives_the_same_bytes(kind):
         (["a.h5", "-o", "a"], "a picture is one of .png, .svg, .html"),
     ],
 )
+@pytest.mark.one_in(2)
 def test_wrong_usage(arguments, said, capsys):
     assert run(["plot", *arguments]) == 2
     assert said in capsys.readouterr().err
@@ -126,6 +129,7 @@ def test_layout_of_panels():
     assert names == [["a", "b"], ["far"], ["force"], ["flat"], ["tiny"]]
 
 
+@pytest.mark.long
 def test_names_and_values_that_are_hard_to_draw(tmp_path):
     trace = made(
         [
@@ -220,6 +224,7 @@ def test_units(unit, text):
 
 @pytest.mark.usefixtures("traces")
 @pytest.mark.parametrize(("size", "said"), [(None, "this is no HDF5 file"), (3000, "it is cut short")])
+@pytest.mark.long
 def test_what_is_no_trace_is_told_as_that(tmp_path, capsys, size, said):
     """HDF5's own words were 'Unable to synchronously open file'."""
     content = (tmp_path / "a.h5").read_bytes()

@@ -68,6 +68,7 @@ def rate(node):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("name", PASSIVE)
+@pytest.mark.one_in(4)
 def test_the_view_has_the_rows_of_the_form(name, formulation):
     with ex.fresh():
         view, model, binding = viewed(SEED / f"{name}.sd", formulation)

@@ -31,6 +31,7 @@ MASS = {"coord": "energy T* = 1/2*(1 kg)*x'^2", "node": "M: mass(m = 1 kg) x"}
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_a_coordinate_is_a_node_to_the_inside_of_a_component(formulation, tmp_path):
     """A fault in sysdyn before; of elements alone inside, P.x.e was zero."""
     path, found = tmp_path / "m.sd", {}

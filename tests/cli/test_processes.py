@@ -25,6 +25,7 @@ def started(path, *options):
     return child
 
 
+@pytest.mark.long
 def test_exit_codes_of_the_process(tmp_path):
     path = write(tmp_path, PENDULUM)
     assert process("check", path).returncode == 0
@@ -32,6 +33,7 @@ def test_exit_codes_of_the_process(tmp_path):
     assert process("chek", path).returncode == 2
 
 
+@pytest.mark.long
 def test_interrupt_leaves_what_was_computed(tmp_path):
     child = started(write(tmp_path, ENDLESS), "--max-wall", "60")
     time.sleep(1.5)
@@ -47,7 +49,7 @@ def test_interrupt_leaves_what_was_computed(tmp_path):
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.4, 1.1, 1.9])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_kill_leaves_a_readable_trace(tmp_path, seconds):
     child = started(write(tmp_path, ENDLESS), "--max-wall", "60")
     time.sleep(seconds)
@@ -61,6 +63,7 @@ def test_kill_leaves_a_readable_trace(tmp_path, seconds):
         assert trace.time.size > 100
 
 
+@pytest.mark.long
 def test_reader_that_goes_away(tmp_path):
     command = f"{sys.executable} -m sysdyn.cli explain E208 | head -c 1"
     ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False)
@@ -82,6 +85,7 @@ def imported(*arguments):
 HEAVY = {"numpy", "scipy", "sympy", "h5py", "matplotlib", "xarray", "lark"}
 
 
+@pytest.mark.long
 def test_help_imports_nothing_heavy():
     assert not imported("--help") & HEAVY
     assert not imported("--version") & HEAVY
@@ -89,22 +93,25 @@ def test_help_imports_nothing_heavy():
 
 
 @pytest.mark.parametrize("command", ["simulate", "verify", "report", "golden", "plot", "diff", "new", "doctor"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_help_of_a_command_costs_little(command):
     """0.07 s of CPU and 17 MB, start of Python included, while nothing heavy is imported."""
     assert not imported(command, "--help") & HEAVY
 
 
+@pytest.mark.long
 def test_fmt_and_plot_import_what_they_need(tmp_path):
     path = write(tmp_path, PENDULUM)
     assert not imported("fmt", "--check", path) & (HEAVY - {"lark"})
 
 
 @pytest.mark.parametrize("name", ["gallery/pendulum", "seed/rectifier_motor_crank", "benchmark/andrews"])
+@pytest.mark.long
 def test_check_of_small_models_imports_no_algebra(name):
     assert not imported("check", str(ROOT / "models" / f"{name}.sd")) & {"scipy", "sympy", "matplotlib", "h5py"}
 
 
+@pytest.mark.long
 def test_a_short_run_imports_nothing_for_a_handful_of_numbers(tmp_path):
     model = str(ROOT / "models/book/dc_motor.sd")
     run = "simulate", "-q", model, "-o", str(tmp_path / "x.h5")
@@ -113,6 +120,7 @@ def test_a_short_run_imports_nothing_for_a_handful_of_numbers(tmp_path):
     assert not imported(*run) & slow
 
 
+@pytest.mark.long
 def test_check_of_200_unknowns_imports_no_algebra(tmp_path):
     path = write(tmp_path, row_of_masses(50))
     found = imported("check", path)
@@ -132,6 +140,7 @@ def row_of_masses(masses):
     return "\n".join([*lines, "}", "scene s of row {", "  time 0 s to 1 s", "  trace x0", "}", ""])
 
 
+@pytest.mark.long
 def test_check_is_linear_in_the_lines_of_a_model(tmp_path, effort):
     """1000 lines cost 0.85 s of CPU, start of Python included."""
 
@@ -145,11 +154,13 @@ def test_check_is_linear_in_the_lines_of_a_model(tmp_path, effort):
     assert lines(80) < 2.2 * lines(40)
 
 
+@pytest.mark.long
 def test_progress_is_silent_where_nobody_looks(tmp_path):
     ran = process("simulate", write(tmp_path, PENDULUM))
     assert "%" not in ran.stderr
 
 
+@pytest.mark.long
 def test_home_that_cannot_be_written(tmp_path):
     """The cache goes elsewhere; nothing is said."""
     path = write(tmp_path, PENDULUM)
@@ -178,6 +189,7 @@ main.main(["check"])
 
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.long
 def test_an_interruption_while_an_object_is_taken_apart_is_not_lost(sent):
     """Python drops what is raised there."""
     command = [sys.executable, "-c", LOST]

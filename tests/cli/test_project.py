@@ -40,6 +40,7 @@ def test_a_new_project_passes_as_it_is(tmp_path, monkeypatch, capsys):
     assert (folder / "golden.html").is_file()
 
 
+@pytest.mark.long
 def test_a_change_of_the_model_fails_its_ci(tmp_path, monkeypatch, capsys):
     assert run(["new", str(tmp_path / "swing"), "--quiet"]) == 0
     assert capsys.readouterr().out == ""
@@ -105,6 +106,7 @@ def test_the_package_says_its_version_and_is_the_command():
     assert ran.stdout.strip() == f"sysdyn, version {sysdyn.__version__}"
 
 
+@pytest.mark.long
 def test_the_hooks_of_pre_commit_pass_on_a_new_project(tmp_path, monkeypatch, capsys):
     text = (Path(__file__).resolve().parents[2] / ".pre-commit-hooks.yaml").read_text()
     entries = re.findall(r"^  entry: sysdyn (.*)$", text, re.M)

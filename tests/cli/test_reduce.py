@@ -113,6 +113,7 @@ def test_a_spring_and_a_mass_turn_their_energy_over_four_times_a_period(tmp_path
         assert found[name]["role"] == "stored"
 
 
+@pytest.mark.long
 def test_a_capacitor_is_charged(tmp_path, capsys):
     found = activities(capsys, tmp_path, CHARGING)
     v = 4.0 * (1.0 - np.exp(-2.0 / 1.5))
@@ -121,6 +122,7 @@ def test_a_capacitor_is_charged(tmp_path, capsys):
     assert found["r"]["activity"] == pytest.approx(0.25 * 16.0 * (1.0 - np.exp(-4.0 / 1.5)), rel=1e-5)
 
 
+@pytest.mark.long
 def test_the_largest_come_first_and_shares_add_up(tmp_path, capsys):
     code, found = run_json(capsys, "reduce", str(ROOT / "models/seed/dc_motor.sd"), "--activity")
     assert code == 0

@@ -66,7 +66,7 @@ def curves(text):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(2)
 def test_a_page_of_every_formulation(formulation):
     page = report(SEED / "dc_motor.sd", "--formulation", formulation)
     assert set(SECTIONS) <= set(page.ids)

@@ -94,6 +94,7 @@ def test_an_output_that_leads_nowhere_is_one_of_input_and_output(model, capsys, 
 
 
 @pytest.mark.parametrize("command", [["simulate"], ["sweep", *OVER]], ids=["simulate", "sweep"])
+@pytest.mark.long
 def test_an_output_that_is_a_link_stays_one(model, command):
     kept = Path("trace.h5" if command == ["simulate"] else "runs.h5")
     link = Path("link.h5")
@@ -113,6 +114,7 @@ def test_a_sweep_is_no_trace(model, capsys):
 
 
 @pytest.mark.parametrize("values", [np.full(101, b"text"), np.full(101, 1j)], ids=["texts", "complex"])
+@pytest.mark.long
 def test_what_is_no_number_over_time_is_not_drawn(model, capsys, recwarn, values):
     with h5py.File("trace.h5", "a") as file:
         file["odd"] = values
@@ -172,7 +174,7 @@ def test_the_exit_that_counts_first():
     "options",
     [["--until", "1 m"], ["--max-wall", "0"], ["--max-wall", "1 V"], ["--until", "-1"], ["--set", "nosuch=1"]],
 )
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_wrong_usage_of_a_sweep_is_no_failure_of_its_runs(model, options):
     assert run(["sweep", "-q", model, *OVER, "-o", "new.h5", *options]) == 2
     assert run(["simulate", "-q", model, "-o", "new.h5", *options]) == 2
@@ -187,7 +189,7 @@ def test_a_value_that_was_typed_wrong_is_wrong_usage(model, capsys, command, opt
 
 
 @pytest.mark.parametrize("command", ["trade", "reduce"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(2)
 def test_a_limit_of_wall_time_has_a_unit(model, capsys, command):
     for text in ("1 m", "soon", "inf"):
         assert run([command, model, "--max-wall", text]) == 2
@@ -203,6 +205,7 @@ def test_the_limit_of_a_reduction_counts_from_its_first_run(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("command", ["simulate", "reduce", "report"])
+@pytest.mark.long
 def test_a_limit_of_steps_ends_every_command_as_a_run(tmp_path, monkeypatch, capsys, command):
     monkeypatch.chdir(tmp_path)
     assert run([command, write(tmp_path, ENDLESS), "--max-steps", "3", "--json"]) == 3
@@ -220,7 +223,7 @@ def test_a_netlist_goes_to_standard_output_by_its_name(tmp_path, monkeypatch, ca
 
 
 @pytest.mark.parametrize("command", [["verify"], ["trade", "--accuracy", "1e-2"]], ids=["verify", "trade"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_processes_side_by_side_read_standard_input_too(command):
     run_ = [*command, "-", "--until", "0.2", "--no-timings", "--json"]
     found = [process(*run_, "--jobs", n, input=PENDULUM) for n in ("1", "2")]
@@ -231,6 +234,7 @@ def test_processes_side_by_side_read_standard_input_too(command):
 @pytest.mark.parametrize(
     ("command", "code"), [("help --json", 0), ("list {}", 0), ("check {0} --json", 1), ("check {0} 2>&1", 1)]
 )
+@pytest.mark.long
 def test_a_reader_that_goes_away_changes_no_exit(tmp_path, command, code):
     path = write(tmp_path, BROKEN if code else PENDULUM)
     line = f"{sys.executable} -m sysdyn.cli {command.format(path)} | true; exit ${{PIPESTATUS[0]}}"
@@ -238,6 +242,7 @@ def test_a_reader_that_goes_away_changes_no_exit(tmp_path, command, code):
     assert (ran.returncode, ran.stderr) == (code, "")
 
 
+@pytest.mark.long
 def test_a_window_that_matplotlib_does_not_know_is_no_fault(model):
     environment = {**os.environ, "MPLBACKEND": "none such"}
     ran = process("plot", "trace.h5", "-o", "p.png", env=environment)
@@ -245,7 +250,7 @@ def test_a_window_that_matplotlib_does_not_know_is_no_fault(model):
 
 
 @pytest.mark.parametrize("command", ["simulate -", "check -", "plot - -o p.png", "diff - trace.h5", "import -"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_closed_standard_input_is_one_of_input_and_output(model, command):
     line = f"{sys.executable} -m sysdyn.cli {command} <&-"
     ran = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=60, check=False)
@@ -253,6 +258,7 @@ def test_a_closed_standard_input_is_one_of_input_and_output(model, command):
     assert "the standard input stream is closed" in ran.stderr
 
 
+@pytest.mark.long
 def test_a_netlist_comes_from_standard_input(tmp_path, monkeypatch):
     netlist = "low pass\nV1 a 0 1\nR1 a b 1k\nC1 b 0 1u\n.tran 1u 5m\n.end\n"
     monkeypatch.chdir(tmp_path)
@@ -260,6 +266,7 @@ def test_a_netlist_comes_from_standard_input(tmp_path, monkeypatch):
     assert process("import", "-", input=netlist).stdout == process("import", "stdin.cir").stdout
 
 
+@pytest.mark.long
 def test_quiet_keeps_the_reason_of_a_difference(model, capsys):
     assert run(["simulate", "-q", model, "--set", "m=3", "--set", "l=2.3", "-o", "second.h5"]) == 0
     assert run(["diff", "-q", "trace.h5", "second.h5"]) == 1
@@ -283,6 +290,7 @@ def test_quiet_keeps_the_reason_of_a_difference(model, capsys):
         (["--over", "nosuch=1,2"], 2),
     ],
 )
+@pytest.mark.one_in(5)
 def test_what_a_sweep_cannot_vary_is_said_before_its_runs(model, capsys, options, code):
     assert run(["sweep", model, "-o", "new.h5", *options]) == code
     assert capsys.readouterr().err
@@ -290,6 +298,7 @@ def test_what_a_sweep_cannot_vary_is_said_before_its_runs(model, capsys, options
 
 
 @pytest.mark.parametrize("command", [["linearize", "--at"], ["simulate", "--until"], ["simulate", "--max-wall"]])
+@pytest.mark.one_in(5)
 def test_a_number_that_no_float_holds_is_refused(model, capsys, command):
     for text in ("1e400", "1e-400"):
         assert run([command[0], model, command[1], text]) == 2

@@ -51,6 +51,7 @@ WRONG = [
 
 @pytest.mark.parametrize("command", ["check", "simulate"])
 @pytest.mark.parametrize(("old", "new", "code", "said", "at"), WRONG)
+@pytest.mark.one_in(30)
 def test_it_is_an_error_of_the_text(tmp_path, capsys, command, old, new, code, said, at):
     text = TEXT.replace(old, new)
     exit_code, found = run_json(capsys, command, write(tmp_path, text))
@@ -77,6 +78,7 @@ def test_it_is_an_error_of_the_text(tmp_path, capsys, command, old, new, code, s
         (TRACE, "  trace x\n  solver euler(step = 1 ms)\n", ["--method", "radau"]),
     ],
 )
+@pytest.mark.long
 def test_the_command_line_wins(tmp_path, old, new, options):
     text = TEXT.replace(old, new)
     text = text.replace(TIME, "") if text.count("  time ") > 1 else text
@@ -84,6 +86,7 @@ def test_the_command_line_wins(tmp_path, old, new, options):
 
 
 @pytest.mark.parametrize("until", ["5e-324", "1e-310", "1e-295", "1e-76", "1e76", "1e300"])
+@pytest.mark.one_in(5)
 def test_a_span_beyond_double_precision_is_refused_at_once(tmp_path, capsys, until):
     assert run(["simulate", write(tmp_path, TEXT), "--until", until]) == 2
     assert "1e-75 s to 1e+75 s" in capsys.readouterr().err
@@ -91,6 +94,7 @@ def test_a_span_beyond_double_precision_is_refused_at_once(tmp_path, capsys, unt
 
 @pytest.mark.parametrize("method", ["auto", "bdf", "radau", "rosenbrock", "dopri", "energy"])
 @pytest.mark.parametrize("until", ["1e-74", "1e-40"])
+@pytest.mark.long
 def test_the_shortest_spans_are_run(tmp_path, until, method):
     """x stays, and x' = -4 t: nothing overflows on the way (a warning is an error here)."""
     out = str(tmp_path / "t.h5")
@@ -107,6 +111,7 @@ def test_energies_beyond_double_precision_are_said_by_the_ledger(tmp_path, capsy
 @pytest.mark.parametrize(
     ("solver", "order", "span"), [("bdf(order = 1)", 1, 2), ("bdf(order = 2)", 2, 2), ("radau(order = 5)", 5, 100)]
 )
+@pytest.mark.long
 def test_the_order_asked_for_is_that_of_the_steps(tmp_path, solver, order, span):
     """Steps grow with the power 1/(order + 1) of the tolerance, where the longest step does not hold them."""
     text = TEXT.replace(TIME, f"  time 0 s to {span} s\n").replace(TRACE, f"  trace x\n  solver {solver}\n")

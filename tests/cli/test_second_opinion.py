@@ -19,6 +19,7 @@ def simulated(tmp_path, capsys, name, *options):
 
 
 @pytest.mark.parametrize("name", ["pendulum", "lcr_nonlinear", "coulomb_slide"])
+@pytest.mark.one_in(2)
 def test_it_holds_what_the_run_promised(name, tmp_path, capsys):
     _, plain, _ = simulated(tmp_path, capsys, name, "--accuracy", "1e-5")
     code, checked, trace = simulated(tmp_path, capsys, name, "--accuracy", "1e-5", "--accuracy-check")

@@ -53,6 +53,7 @@ def test_an_item_that_kills_its_process_costs_its_own_answer():
     assert (one[0], two, three[0]) == (4, crew.Lost("signal 9"), 9)
 
 
+@pytest.mark.long
 def test_processes_begin_where_what_is_left_foreseeably_pays(monkeypatch):
     monkeypatch.setattr(crew, "PAYS", 3.0)
     monkeypatch.setattr(crew, "cores", lambda: 2)

@@ -21,6 +21,7 @@ def simulate(tmp_path, text, *options, exit_code=0):
     return Trace.open("out.h5")
 
 
+@pytest.mark.long
 def test_default_names_of_traces(tmp_path):
     (tmp_path / "folder").mkdir()
     path = write(tmp_path / "folder", PENDULUM, "a.b.sd")
@@ -28,6 +29,7 @@ def test_default_names_of_traces(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.b-swing.h5", "folder"]
 
 
+@pytest.mark.long
 def test_the_trace_is_as_the_contract_says(tmp_path):
     simulate(tmp_path, PENDULUM)
     with h5py.File("out.h5") as file:
@@ -78,6 +80,7 @@ def test_the_trace_is_as_the_contract_says(tmp_path):
         file.visititems(no_objects)
 
 
+@pytest.mark.long
 def test_two_runs_without_timings_are_equal_bit_for_bit(tmp_path):
     path = write(tmp_path, PENDULUM)
 
@@ -103,6 +106,7 @@ def test_two_runs_without_timings_are_equal_bit_for_bit(tmp_path):
     assert ("/", "timings") not in one
 
 
+@pytest.mark.long
 def test_xarray_opens_the_trace(tmp_path):
     xarray = pytest.importorskip("xarray")
     simulate(tmp_path, PENDULUM)
@@ -131,6 +135,7 @@ def parameters(trace):
         ("m=200 g", "m", 0.2),
     ],
 )
+@pytest.mark.long
 def test_set_a_parameter(tmp_path, setting, name, value):
     trace = simulate(tmp_path, PENDULUM, "--set", setting)
     assert parameters(trace)[name] == pytest.approx(value, rel=1e-15)
@@ -161,6 +166,7 @@ def test_set_elements_sizes_and_inputs(tmp_path):
         ("l=2; m=3", None, ""),
     ],
 )
+@pytest.mark.one_in(5)
 def test_settings_that_make_no_sense(tmp_path, capsys, setting, code, said):
     exit_code, found = run_json(capsys, "simulate", write(tmp_path, PENDULUM), "--set", setting)
     assert exit_code == 2
@@ -177,6 +183,7 @@ def test_the_nearest_name_is_offered(tmp_path, capsys):
     assert "push" in found["diagnostics"][0]["help"]
 
 
+@pytest.mark.long
 def test_until_and_at(tmp_path):
     trace = simulate(tmp_path, PENDULUM, "--until", "500 ms", "--at", "0.1234,1 s/3,min(0.2, 0.3)*1 s")
     assert trace.time[-1] == 0.5
@@ -186,12 +193,14 @@ def test_until_and_at(tmp_path):
 
 
 @pytest.mark.parametrize("instants", ["0.1,,0.2", ",", "0.1,", ""])
+@pytest.mark.one_in(2)
 def test_an_instant_that_is_missing_is_wrong_usage(tmp_path, instants, capsys):
     assert run(["simulate", write(tmp_path, PENDULUM), "--at", instants]) == 2
     assert f"--at '{instants}': a value is missing" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("option", [("--until", "1 m"), ("--until", "x"), ("--at", "1 kg"), ("--max-wall", "2 V")])
+@pytest.mark.one_in(2)
 def test_times_with_other_units_are_refused(tmp_path, capsys, option):
     assert run(["simulate", write(tmp_path, PENDULUM), *option]) == 2
     assert option[0] in capsys.readouterr().err
@@ -205,6 +214,7 @@ def test_formulation_index_and_tolerances_are_in_the_trace(tmp_path):
     assert simulate(tmp_path, PENDULUM, "--index", "3").attributes["index"] == "3"
 
 
+@pytest.mark.long
 def test_backends_agree(tmp_path):
     c = simulate(tmp_path, PENDULUM)
     numpy = simulate(tmp_path, PENDULUM, "--backend", "numpy")
@@ -212,6 +222,7 @@ def test_backends_agree(tmp_path):
 
 
 @pytest.mark.parametrize("expect", ["", "expect always: abs(audit.energy) <= 1 J"])
+@pytest.mark.long
 def test_a_draft_left_alone_tells_its_balance_only_where_it_is_asked_for(expect, tmp_path, capsys):
     """Integrals of powers are for the run that is kept, and for what reads them."""
     scene = f"scene alone of pendulum {{\n time 0 s to 6 s\n trace x every 10 ms\n {expect}\n}}\n"
@@ -243,6 +254,7 @@ def test_limits_leave_a_readable_trace(tmp_path, capsys):
     assert not Trace.open("out.h5").final
 
 
+@pytest.mark.long
 def test_errors_leave_the_old_trace_alone(tmp_path):
     simulate(tmp_path, PENDULUM)
     before = Path("out.h5").read_bytes()
@@ -250,6 +262,7 @@ def test_errors_leave_the_old_trace_alone(tmp_path):
     assert Path("out.h5").read_bytes() == before
 
 
+@pytest.mark.long
 def test_changing_parameters_compiles_nothing(tmp_path, monkeypatch):
     cache = tmp_path / "cache"
     monkeypatch.setenv("SYSDYN_CACHE", str(cache))
@@ -262,6 +275,7 @@ def test_changing_parameters_compiles_nothing(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("compiler", ["/nonexistent/cc", "false"])
+@pytest.mark.long
 def test_numpy_takes_over_without_a_compiler(tmp_path, capsys, monkeypatch, compiler):
     monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
     monkeypatch.setenv("CC", compiler)
@@ -272,6 +286,7 @@ def test_numpy_takes_over_without_a_compiler(tmp_path, capsys, monkeypatch, comp
     assert ", numpy\n" in err
 
 
+@pytest.mark.long
 def test_an_empty_path_has_no_compiler(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
     monkeypatch.setenv("PATH", "")
@@ -280,6 +295,7 @@ def test_an_empty_path_has_no_compiler(tmp_path, monkeypatch, capsys):
     assert "note N609" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_to_standard_output(tmp_path):
     path = write(tmp_path, PENDULUM)
     ran = process("simulate", path, "-o", "-", text=False)
@@ -291,6 +307,7 @@ def test_to_standard_output(tmp_path):
     assert not list(tmp_path.glob("*.h5"))
 
 
+@pytest.mark.long
 def test_progress_on_request(tmp_path):
     path = write(tmp_path, ENDLESS)
     ran = process("simulate", path, "--max-wall", "2.5", "--progress", "always")
@@ -299,11 +316,13 @@ def test_progress_on_request(tmp_path):
     assert " %" not in process("simulate", path, "--max-wall", "1.5").stderr
 
 
+@pytest.mark.long
 def test_what_the_start_moved_is_said(tmp_path, capsys):
     assert run(["simulate", write(tmp_path, PENDULUM)]) == 0
     assert "y: -2.1 -> -2.11556, asked for by phi rod" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_what_the_start_moved_is_said_by_the_names_of_the_text(tmp_path, capsys):
     """A node's effort, not the multiplier that stands for it; the element whose law alone says what it is."""
     model = Path(__file__).parents[2] / "models" / "gallery" / "heat_exchanger.sd"
@@ -314,6 +333,7 @@ def test_what_the_start_moved_is_said_by_the_names_of_the_text(tmp_path, capsys)
     ]
 
 
+@pytest.mark.long
 def test_the_balance_of_energy_is_finite_within_steps_that_time_does_not_resolve(tmp_path, capsys):
     """Where the valve turns, steps share their instant; a balance by those before was infinite there."""
     text = (Path(__file__).parents[2] / "models" / "gallery" / "fluid_tank.sd").read_text()
@@ -322,6 +342,7 @@ def test_the_balance_of_energy_is_finite_within_steps_that_time_does_not_resolve
     assert run(["simulate", path, "--scene", "fill", "-o", str(tmp_path / "out.h5")]) == 0, capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_what_cannot_be_is_said_with_a_code(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
     assert run(["simulate", path, "--level", "a=b"]) == 2
@@ -330,6 +351,7 @@ def test_what_cannot_be_is_said_with_a_code(tmp_path, capsys):
     assert "E607" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_the_span_is_told_where_a_run_does_not_begin_at_zero(tmp_path, capsys):
     text = PENDULUM.replace("time 0 s to", "time 0.25 s to")
     assert text != PENDULUM
@@ -348,6 +370,7 @@ def test_an_end_out_of_reach_is_said(tmp_path, monkeypatch, capsys):
     assert "help: an earlier end (--until)" in err
 
 
+@pytest.mark.long
 def test_bare_numbers_of_an_array_are_in_si_units(tmp_path):
     """x[i] swings with sqrt(k/m[i]): cos of it at the end, from i cm."""
     trace = simulate(tmp_path, ARRAY, "--set", "m=[1, 2, 3]", "--accuracy", "1e-8")
@@ -383,6 +406,7 @@ def test_a_limit_of_wall_time_that_is_over_before_the_run(tmp_path, capsys):
         (["--method", "euler", "--step", "1e-3"], "a longer --step"),
     ],
 )
+@pytest.mark.long
 def test_what_would_shorten_a_stopped_run_is_what_it_listens_to(tmp_path, capsys, monkeypatch, options, remedy):
     monkeypatch.chdir(tmp_path)
     code, found = run_json(capsys, "simulate", write(tmp_path, PENDULUM), "--max-steps", "5", *options)

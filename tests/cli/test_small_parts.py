@@ -46,6 +46,7 @@ from sysdyn.values import dataclass
         ("#offset rod", Letter("c", ("rod",), 0), False),
     ],
 )
+@pytest.mark.one_in(5)
 def test_names_are_letters_where_they_are_one(text, letter, one):
     assert named(text) == letter
     assert is_letter(text) == one

@@ -56,6 +56,7 @@ def readable(path, rows=0):
     return trace
 
 
+@pytest.mark.long
 def test_the_next_run_removes_what_a_killed_one_left(tmp_path, monkeypatch):
     """But nothing of another run that lives, even where the names are alike."""
     path = write(tmp_path, ENDLESS)
@@ -88,6 +89,7 @@ def test_the_next_run_removes_what_a_killed_one_left(tmp_path, monkeypatch):
     readable("out.h5.0123abcd.a")
 
 
+@pytest.mark.long
 def test_killed_at_any_moment_the_trace_holds_what_was_acknowledged(tmp_path):
     path = write(tmp_path, ENDLESS)
     chance = random.Random(7)
@@ -128,6 +130,7 @@ main(sys.argv[1:])
 
 
 @pytest.mark.parametrize("size", [int(s) for s in np.geomspace(20_000, 400_000, SIZES)])
+@pytest.mark.long
 def test_files_that_may_not_grow(tmp_path, size):
     """Exit 5 and a readable trace where there is one; never a signal."""
     path = write(tmp_path, ENDLESS)
@@ -163,6 +166,7 @@ def mounts(tmp_path_factory):
 
 
 @pytest.mark.parametrize("size", [int(s) // 4096 * 4096 for s in np.geomspace(40_000, 1_200_000, SIZES)])
+@pytest.mark.long
 def test_a_disk_that_fills_up(tmp_path, mounts, size):
     disk = mounts(size)
     path = write(tmp_path, ENDLESS)
@@ -174,6 +178,7 @@ def test_a_disk_that_fills_up(tmp_path, mounts, size):
         readable(disk / "out.h5", 1 if size > 500_000 else 0)
 
 
+@pytest.mark.long
 def test_a_short_run_keeps_the_rows_that_fit(tmp_path, mounts):
     """One that meets the full disk with its first and only rows: what fits is there, and said."""
     disk = mounts(1 << 20)
@@ -186,6 +191,7 @@ def test_a_short_run_keeps_the_rows_that_fit(tmp_path, mounts):
 
 
 @pytest.mark.parametrize(("size", "options"), [(16384, "rw"), (1 << 24, "noexec"), (1 << 24, "ro")])
+@pytest.mark.long
 def test_a_cache_that_takes_or_runs_nothing_costs_no_run(tmp_path, mounts, size, options):
     """Too small for a library, a folder that nothing may be run from, one that is read only."""
     disk = mounts(size, options)
@@ -212,6 +218,7 @@ def damaged(good, chance):
 
 
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.long
 def test_damaged_files_are_refused_with_a_message_or_read(tmp_path, capfd):
     """No fault, no signal: each command ends with an exit code of its own and one line."""
     path = write(tmp_path, PENDULUM)
@@ -245,6 +252,7 @@ for name in sys.argv[1:]:
                 assert name in said or "good.h5" in said, line
 
 
+@pytest.mark.long
 def test_every_cut_is_refused(tmp_path):
     path = write(tmp_path, PENDULUM)
     assert run(["simulate", "-q", path, "-o", "good.h5"]) == 0
@@ -265,6 +273,7 @@ def test_damaged_models_are_refused(tmp_path):
         assert code in (0, 1, 2, 3, 5)
 
 
+@pytest.mark.long
 def test_an_interruption_keeps_what_was_computed(tmp_path):
     child = started(write(tmp_path, ENDLESS), "out.h5")
     rows = int(child.stdout.readline())
@@ -277,6 +286,7 @@ def test_an_interruption_keeps_what_was_computed(tmp_path):
     assert list(Path().glob(".out.h5*")) == []
 
 
+@pytest.mark.long
 def test_a_process_that_may_not_load_numpy_says_so(tmp_path):
     path = write(tmp_path, PENDULUM)
     for command, code in ((["simulate", path], 3), (["fmt", "--check", path], 0), (["explain", "E101"], 0)):

@@ -70,6 +70,7 @@ def plain(name, text):
         ("level plant = fine, coarse", ("fine", "coarse")),
     ],
 )
+@pytest.mark.one_in(3)
 def test_lists_and_grids(text, values):
     found = axis(text, plain).values
     assert found == pytest.approx(values) if isinstance(values[0], float) else found == values
@@ -80,12 +81,14 @@ def test_lists_and_grids(text, values):
     ["k", "k=", "=3", "k=1,,2", "k=1..2", "k=1..2:0", "k=1..2:x", "k=-1..2:3:log", "k=1..2:3:cubic", "k~gauss(1, 2)",
      "k~normal(1)", "k~normal(1, -2)", "k~uniform(2, 1)", "k~lognormal(1, 0.5)", "k~loguniform(0, 2)"],
 )  # fmt: skip
+@pytest.mark.one_in(12)
 def test_what_is_no_axis_is_wrong_usage(text):
     with pytest.raises(UsageError):
         axis(text, plain)
 
 
 @pytest.mark.parametrize("sample", ["random", "latin", "sobol"])
+@pytest.mark.one_in(2)
 def test_samples_have_their_distributions(sample):
     """Moments within four standard errors of a random sample; a stratified one is far better."""
     drawn = [axis("a~normal(3, 0.5)", plain), axis("b~uniform(-1, 1)", plain), axis("c~lognormal(2, 1.5)", plain)]
@@ -135,6 +138,7 @@ def test_every_run_meets_its_closed_form(spring, capsys):
     assert not list(Path().glob(".*")), "nothing is left beside it"
 
 
+@pytest.mark.long
 def test_it_opens_in_xarray(spring, capsys):
     xarray = pytest.importorskip("xarray")
     assert run(["sweep", spring, "--over", "k=1,4", "--jobs", "1", "-o", "runs.h5"]) == 0
@@ -187,6 +191,7 @@ def test_formulations_inputs_and_what_fails(spring, capsys):
         ([], "nothing varies"),
     ],
 )
+@pytest.mark.one_in(5)
 def test_wrong_usage_is_told_before_anything_runs(arguments, said, spring, capsys):
     code, found = swept(capsys, spring, *arguments)
     assert code in (1, 2)

@@ -46,7 +46,7 @@ def varied(loaded, names, runs, seed=0):
 
 @pytest.mark.parametrize("name", SEEDS)
 @pytest.mark.parametrize("keep", ["end", "traces"])
-@pytest.mark.one_in(8)
+@pytest.mark.one_in(30)
 def test_runs_in_the_core_are_single_runs(name, keep):
     """End values and extrema within the accuracy of 1e-4 that both promise, and equal in any order and company."""
     loaded = Loaded(Request(str(MODELS / "seed" / f"{name}.sd"), accuracy=1e-4))
@@ -73,7 +73,7 @@ def test_runs_in_the_core_are_single_runs(name, keep):
 
 
 @pytest.mark.parametrize("name", ["slider_crank", "solenoid", "two_link_arm", "lcr_nonlinear", "inverted_pendulum"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_what_is_met_is_within_the_accuracy(name):
     """End values against runs at 1e-9, parameters spread by 10 %: within 1e-4 of the largest, all of them."""
     loaded = Loaded(Request(str(MODELS / "seed" / f"{name}.sd"), accuracy=1e-4))
@@ -88,6 +88,7 @@ def test_what_is_met_is_within_the_accuracy(name):
             assert abs(block.end[row, j] - values[-1]) <= 1e-4 * max(np.abs(values).max(), 1e-12), (k, quantity)
 
 
+@pytest.mark.long
 def test_small_swings_meet_the_closed_form(tmp_path):
     """th(T) of a pendulum released at 1e-3 rad: th_0 cos(sqrt(g/l) T) to 1e-6; of amplitudes from 1e-3 to 1.5 rad the
     accuracy is kept though magnitudes differ by 1000 from the nominal run's.
@@ -154,6 +155,7 @@ def test_results_are_equal_bit_for_bit_whoever_runs_them(tmp_path, monkeypatch):
     assert "trace.q1" not in tables[0]
 
 
+@pytest.mark.long
 def test_runs_in_the_core_pass_no_line_of_python_each(effort):
     """A period of the pendulum at 1e-4, end values: 10000 runs a second of a core (tests/bench/sweeps.py)."""
     loaded = Loaded(Request(str(MODELS / "seed" / "pendulum.sd"), until="3.07"))

@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+import pytest
 from sysdyn import api, models
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
@@ -17,6 +18,7 @@ def _run(name):
     return {quantity: np.asarray(trace[quantity]) for quantity in trace.names}
 
 
+@pytest.mark.long
 def test_threads_find_what_one_finds():
     alone = [_run(name) for name in TEXTS]
     limit, every = sys.getrecursionlimit(), sys.getswitchinterval()

@@ -77,6 +77,7 @@ LEADING_OUT = (_external_link, _external_link_in_a_group, _raw_storage, _virtual
     ],
     ids=["plot html", "plot", "diff test", "diff reference", "animate"],
 )
+@pytest.mark.one_in(30)
 def test_a_trace_that_leads_to_another_file_is_refused(trace, capsys, plant, command):
     Path("bad.h5").write_bytes(trace.read_bytes())
     with h5py.File("bad.h5", "a") as file:
@@ -89,6 +90,7 @@ def test_a_trace_that_leads_to_another_file_is_refused(trace, capsys, plant, com
 
 
 @pytest.mark.parametrize("plant", LEADING_OUT, ids=lambda plant: plant.__name__.strip("_"))
+@pytest.mark.one_in(3)
 def test_the_interface_refuses_it_too(trace, plant):
     Path("bad.h5").write_bytes(trace.read_bytes())
     with h5py.File("bad.h5", "a") as file:
@@ -101,7 +103,7 @@ def test_the_interface_refuses_it_too(trace, plant):
 
 
 @pytest.mark.parametrize("plant", LEADING_OUT, ids=lambda plant: plant.__name__.strip("_"))
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(3)
 def test_a_golden_and_a_scene_that_expects_one_refuse_it_too(trace, capsys, plant):
     assert run(["golden", "record", "-q", "model.sd"]) == 0
     (golden,) = Path("golden").glob("*/*.h5")
@@ -125,6 +127,7 @@ def test_a_file_that_claims_more_than_it_can_hold_is_damaged(trace, capsys):
 
 
 @pytest.mark.parametrize("kind", ["link", "empty link", "pipe", "words"])
+@pytest.mark.one_in(2)
 def test_the_journal_of_a_sweep_is_its_own(trace, capsys, kind):
     journal, foreign = Path(".s.h5.runs"), Path("foreign")
     foreign.write_bytes(b"" if kind == "empty link" else b"words without a line")
@@ -146,6 +149,7 @@ FOREIGN = ("residual.c", "binding.c", "manifest.json", "binding.json", "sysdyn_m
 
 @pytest.mark.parametrize("name", FOREIGN)
 @pytest.mark.parametrize("kind", ["file", "link", "dangling link", "folder", "pipe"])
+@pytest.mark.one_in(12)
 def test_compile_overwrites_nothing_that_it_did_not_write(trace, capsys, kind, name):
     target, foreign = Path("out") / name, Path("foreign.c")
     target.parent.mkdir()
@@ -167,12 +171,14 @@ def test_compile_overwrites_nothing_that_it_did_not_write(trace, capsys, kind, n
     assert [path.name for path in target.parent.iterdir()] == [name]
 
 
+@pytest.mark.long
 def test_compile_overwrites_its_own(trace):
     for _ in range(2):
         assert run(["compile", "-q", "model.sd", "-o", "out"]) == 0
         assert run(["compile", "-q", "model.sd", "-o", "out", "--backend", "numpy"]) == 0
 
 
+@pytest.mark.long
 def test_soft_links_inside_a_trace_are_its_own(trace):
     with h5py.File("good.h5", "a") as file:
         file["again"] = h5py.SoftLink("/x")
@@ -180,6 +186,7 @@ def test_soft_links_inside_a_trace_are_its_own(trace):
 
 
 @pytest.mark.parametrize("command", [["plot", "pipe"], ["diff", "good.h5", "pipe"], ["diff", "pipe", "good.h5"]])
+@pytest.mark.one_in(2)
 def test_a_pipe_is_no_trace(trace, capsys, command):
     os.mkfifo("pipe")
     assert run(command) == 5
@@ -220,7 +227,7 @@ def living(path, output, *more):
 
 
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_every_polite_end_keeps_the_rows_and_removes_what_was_hidden(tmp_path, monkeypatch, sent):
     monkeypatch.chdir(tmp_path)
     child = living(write(tmp_path, ENDLESS), "out.h5")
@@ -235,6 +242,7 @@ def test_every_polite_end_keeps_the_rows_and_removes_what_was_hidden(tmp_path, m
     assert {p.name for p in tmp_path.iterdir()} == {"model.sd", "out.h5"}
 
 
+@pytest.mark.long
 def test_a_command_that_shall_not_be_hung_up_is_not(tmp_path, monkeypatch):
     """nohup: SIGHUP ignored stays ignored."""
     monkeypatch.chdir(tmp_path)
@@ -292,6 +300,7 @@ print("same", flush=True)
 """
 
 
+@pytest.mark.long
 def test_a_running_trace_is_read_and_does_not_change_under_its_reader(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     child = living(write(tmp_path, ENDLESS), "out.h5")
@@ -339,6 +348,7 @@ def test_control_characters_of_names_do_not_reach_the_terminal(trace, tmp_path, 
             assert not {c for c in text if ord(c) < 32 or ord(c) == 127} - {"\n"}, (command, text)
 
 
+@pytest.mark.long
 def test_the_same_names_are_whole_in_json(trace, capsys):
     evil = "x\x1b[2Jy"
     with h5py.File("good.h5", "a") as file:

@@ -309,6 +309,7 @@ def test_pictures(tmp_path, capsys):
         (["--max-wall", "-1"], "must be positive"),
     ],
 )
+@pytest.mark.one_in(3)
 def test_wrong_usage(tmp_path, capsys, arguments, said):
     assert run(["trade", str(write(tmp_path, PENDULUM)), *arguments]) == 2
     assert said in capsys.readouterr().err

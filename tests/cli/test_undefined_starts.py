@@ -19,6 +19,7 @@ scene s of m {{ time 0 s to 1 s; trace h }}
     ("law", "argument"), [("sqrt(h/(1 m))", "-1"), ("ln(a + h/(1 m))", "-0.5"), ("acos(a - h/(1 m))", "1.5")]
 )
 @pytest.mark.parametrize("command", ["check", "simulate"])
+@pytest.mark.one_in(5)
 def test_the_function_is_named_where_it_stands(tmp_path, capsys, monkeypatch, command, law, argument):
     monkeypatch.chdir(tmp_path)
     code, found = run_json(capsys, command, str(write(tmp_path, MODEL.format(law))))

@@ -143,6 +143,7 @@ def test_other_kinds_are_the_standard_decorators_own():
 
 
 @pytest.mark.parametrize("count", range(1, len(INITIALS) + 2))
+@pytest.mark.one_in(15)
 def test_each_argument_is_the_field_of_its_place_and_of_its_name(count):
     """As far as `__init__` stands written, and one field beyond, where the standard decorator takes over."""
     names = [f"field{k}" for k in range(count)]

@@ -59,7 +59,7 @@ def _without_co_kane(request, monkeypatch):
         ("seed/nonlinear_spring", (), FOUR),
     ],
 )
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_models_of_each_kind_agree(name, options, formulations, capsys):
     code, found = run_json(capsys, "verify", str(MODELS / f"{name}.sd"), *options)
     assert code == 0, found["diagnostics"]
@@ -71,7 +71,7 @@ def test_models_of_each_kind_agree(name, options, formulations, capsys):
 
 
 @pytest.mark.parametrize("name", ["seed/gear_pair", "seed/lever"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_kane_agrees_in_momenta_too(name, capsys):
     code, found = run_json(capsys, "verify", str(MODELS / f"{name}.sd"))
     assert code == 0, found["diagnostics"]
@@ -116,7 +116,7 @@ COSTLY = (
 
 
 @pytest.mark.parametrize(("file", "scene"), list(scenes()))
-@pytest.mark.one_in(204)
+@pytest.mark.long
 def test_every_scene_agrees(file, scene, capsys):
     if (file, scene) in COSTLY and not LONG:
         pytest.skip("SYSDYN_LONG=1 verifies it")
@@ -234,6 +234,7 @@ scene s of charged {
 """
 
 
+@pytest.mark.long
 def test_constants_of_integrated_rows_that_the_start_finds_are_those_of_both_carriers(tmp_path, capsys):
     """'c and numpy disagree in lagrangian: row a by 1.4e-02 of itself', of a right model."""
     code, found = run_json(capsys, "verify", write(tmp_path, CHARGED))
@@ -272,6 +273,7 @@ def test_quantities_without_an_accuracy_are_left_out(tmp_path, capsys):
     assert {item["reason"] for item in found["result"]["not_compared"]} == {"no accuracy is asked of it"}
 
 
+@pytest.mark.long
 def test_a_scene_that_traces_nothing_is_compared_on_its_coordinates(tmp_path, capsys):
     text = re.sub(r"  trace .*\n", "", PENDULUM)
     code, found = run_json(capsys, "verify", write(tmp_path, text))
@@ -279,6 +281,7 @@ def test_a_scene_that_traces_nothing_is_compared_on_its_coordinates(tmp_path, ca
     assert found["result"]["compared"] == ["x", "y"]
 
 
+@pytest.mark.long
 def test_without_an_interval_the_runs_share_instants(tmp_path, capsys):
     path = write(tmp_path, PENDULUM.replace(" every 10 ms", ""))
     assert run(["verify", "-q", path, "-o", "kept", "--at", "0.1234"]) == 0

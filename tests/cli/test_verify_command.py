@@ -41,6 +41,7 @@ RUN = {
 }
 
 
+@pytest.mark.long
 def test_an_expectation_that_fails_is_listed_and_never_decides(tmp_path, capsys):
     code, found = run_json(capsys, "verify", write(tmp_path, FAILING))
     assert code == 0
@@ -71,6 +72,7 @@ def test_a_solver_that_stops_is_exit_3_with_time_and_run(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("at", "shown"), [("co_lagrangian", 4), ("hamiltonian", 2), (None, 0)])
+@pytest.mark.one_in(2)
 def test_an_interruption_shows_the_runs_so_far(tmp_path, capsys, monkeypatch, at, shown):
     made = verification._Verification._formulation
 
@@ -88,6 +90,7 @@ def test_an_interruption_shows_the_runs_so_far(tmp_path, capsys, monkeypatch, at
     assert (f"{shown} runs agree on" in out) == (shown > 0)
 
 
+@pytest.mark.long
 def test_formulation_and_method_name_the_reference(tmp_path, capsys):
     options = ("--formulation", "co_hamiltonian", "--method", "radau")
     code, found = run_json(capsys, "verify", write(tmp_path, CIRCUIT), *options)
@@ -99,6 +102,7 @@ def test_formulation_and_method_name_the_reference(tmp_path, capsys):
     assert finer["accuracy"] == pytest.approx(1e-5)
 
 
+@pytest.mark.long
 def test_the_numpy_backend_agrees(tmp_path, capsys):
     assert run(["verify", "--backend", "numpy", "--until", "0.05", write(tmp_path, PENDULUM)]) == 0
     assert "residuals of numpy and c: " in capsys.readouterr().out
@@ -119,6 +123,7 @@ def sized(tmp_path):
     ("options", "mass", "length"),
     [((), 2.5, 3.0), (("--set", "m=5"), 5.0, 3.0), (("--full",), 1.13, 2.34)],
 )
+@pytest.mark.one_in(5)
 def test_sizes_of_ci_toml_hold_unless_the_command_line_wins(sized, options, mass, length, capsys):
     assert run(["verify", sized, "-o", "kept", "--until", "0.1", *options]) == 0
     parameters = Trace.open("kept/lagrangian-bdf.h5").parameters
@@ -127,6 +132,7 @@ def test_sizes_of_ci_toml_hold_unless_the_command_line_wins(sized, options, mass
 
 
 @pytest.mark.parametrize("text", ["[own.swing]\nm = ", "[own]\nswing = 3\n", "[own.swing]\nm = [1, 2]\n"])
+@pytest.mark.one_in(2)
 def test_sizes_that_are_none_are_wrong_usage(sized, text, tmp_path, capsys):
     (tmp_path / "ci.toml").write_text(text)
     code, found = run_json(capsys, "verify", sized)
@@ -137,6 +143,7 @@ def test_sizes_that_are_none_are_wrong_usage(sized, text, tmp_path, capsys):
 # --- the command ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_the_object_of_json(tmp_path, capsys):
     code, found = run_json(capsys, "verify", write(tmp_path, PENDULUM))
     assert code == 0
@@ -158,6 +165,7 @@ def test_the_object_of_json(tmp_path, capsys):
     assert (refused["co_lagrangian"], refused["co_hamiltonian"]) == ("E602", "E602")
 
 
+@pytest.mark.long
 def test_the_table_is_aligned_and_nothing_is_left_behind(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
     assert run(["verify", path]) == 0
@@ -174,6 +182,7 @@ def test_the_table_is_aligned_and_nothing_is_left_behind(tmp_path, capsys):
     assert [p.name for p in tmp_path.iterdir()] == ["model.sd"]
 
 
+@pytest.mark.long
 def test_no_timings_gives_the_same_table_twice(tmp_path, capsys):
     path = write(tmp_path, PENDULUM)
     shown = []
@@ -195,6 +204,7 @@ def test_no_timings_gives_the_same_table_twice(tmp_path, capsys):
         (PENDULUM.replace("= l^2", "= l"), (), 1, "the two sides differ"),
     ],
 )
+@pytest.mark.one_in(5)
 def test_wrong_usage_and_wrong_models(tmp_path, capsys, text, options, exit_code, said):
     code, found = run_json(capsys, "verify", write(tmp_path, text), *options)
     assert code == exit_code
@@ -209,7 +219,6 @@ def test_a_missing_file_is_exit_5(capsys):
 @pytest.mark.parametrize(
     "name", ["coulomb_slide", *(["pendulum", "redundant_pendulum", "incline_friction"] if LONG else [])]
 )
-@pytest.mark.one_in(3)
 def test_processes_side_by_side_find_what_one_finds(name, capsys):
     """Runs, gaps, refusals, warnings and exit code, in the same order, whatever ends first."""
     model = str(Path(__file__).parents[2] / "models" / "seed" / f"{name}.sd")

@@ -46,6 +46,7 @@ class Watched:
             time.sleep(0.05)
 
 
+@pytest.mark.long
 def test_changes_are_checked_until_it_is_interrupted(tmp_path):
     (tmp_path / "parts.sd").write_text("const k = 4 N/m\n")
     (tmp_path / "m.sd").write_text(MODEL)
@@ -66,6 +67,7 @@ def test_changes_are_checked_until_it_is_interrupted(tmp_path):
 
 
 @pytest.mark.parametrize("other", [["-"], ["m.sd", "--json"], ["m.sd", "--output-format", "sarif"]])
+@pytest.mark.one_in(2)
 def test_what_is_one_object_is_not_watched(tmp_path, capsys, other):
     (tmp_path / "m.sd").write_text("model m {\n  param a = 1\n}\n")
     assert run(["check", "--watch", *other]) == 2

@@ -30,6 +30,7 @@ def _names(folder):
 
 
 @pytest.mark.parametrize("command", ["plot", "sweep"])
+@pytest.mark.long
 def test_a_file_that_cannot_be_written_is_as_before(tmp_path, capsys, small, command):
     model = write(tmp_path, PENDULUM)
     assert run(["simulate", "-q", model, "-o", "a.h5"]) == 0
@@ -75,6 +76,7 @@ def test_a_text_beside_which_no_file_can_be_made_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(("mode", "code"), [("r+", 5), ("r", 0)])
+@pytest.mark.one_in(2)
 def test_a_trace_that_another_program_writes_is_said_to_be_held(tmp_path, capsys, mode, code):
     """And is as before; one that somebody reads is replaced."""
     model, output = write(tmp_path, PENDULUM), tmp_path / "o.h5"

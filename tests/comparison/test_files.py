@@ -54,6 +54,7 @@ def test_blocks_do_not_change_the_verdict(file, tmp_path, monkeypatch):
             assert one.ratio == pytest.approx(two.ratio, rel=1e-9), name
 
 
+@pytest.mark.long
 def test_cut_files_are_refused(file, tmp_path):
     data = file.read_bytes()
     for size in [0, 1, 7, 100, *range(512, len(data), len(data) // 60)]:
@@ -91,6 +92,7 @@ def test_flipped_bits_never_raise_anything_else(file, tmp_path):
         (lambda f: f.create_group("events").create_dataset("time", data=np.zeros(3)), "no time and name"),
     ],
 )
+@pytest.mark.one_in(3)
 def test_what_is_no_trace_says_why(file, tmp_path, change, message):
     path = tmp_path / "no.h5"
     path.write_bytes(file.read_bytes())

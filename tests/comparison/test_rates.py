@@ -21,7 +21,7 @@ MODELS = Path(__file__).resolve().parents[2] / "models"
         ("gallery/diode_circuit.sd", "lagrangian", set(), {"current", "drop"}),
     ],
 )
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_rates_that_no_equation_determines_are_not_stored(tmp_path, monkeypatch, file, formulation, known, unknown):
     monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
     output = str(tmp_path / "out.h5")
@@ -35,6 +35,7 @@ def test_rates_that_no_equation_determines_are_not_stored(tmp_path, monkeypatch,
         assert np.allclose(quantity.derivative, slope, atol=5e-2 * np.max(np.abs(slope)))
 
 
+@pytest.mark.long
 def test_of_two_flows_whose_difference_alone_is_differentiated_no_rate_is_trusted(tmp_path, monkeypatch):
     """Radau made its values between the first steps of the start's rates: 17 % off."""
     monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))

@@ -11,6 +11,7 @@ from sysdyn.runtime.comparison.verdict import Tolerance
 
 @pytest.mark.parametrize("with_rates", [True, False])
 @pytest.mark.parametrize("rows", [60, 200])
+@pytest.mark.one_in(2)
 def test_the_estimate_of_a_sine_is_its_error(rows, with_rates):
     t = np.linspace(0.0, 20.0, rows) ** 1.1
     curve = Curve(t, np.sin(t), np.cos(t) if with_rates else None)

@@ -51,8 +51,8 @@ def brute(r, s, tau, instants):
     return worst
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("seed", range(30))
+@pytest.mark.one_in(15)
 def test_the_tube_is_what_brute_force_finds(seed):
     random = np.random.default_rng(seed)
     r, s = random_curve(random, seed % 2), random_curve(random, seed % 3 == 0)
@@ -77,6 +77,7 @@ def test_a_band_of_a_jump_holds_both_sides():
     assert band(jump, 5.0, 0.05) == (np.inf, -np.inf)
 
 
+@pytest.mark.long
 def test_extrema_in_closed_form():
     random = np.random.default_rng(0)
     b = random.standard_normal((4, 2000))
@@ -108,6 +109,7 @@ def cubic(*coefficients):
         ((0.0, 1.0, 1.0, 1.0), []),
     ],
 )
+@pytest.mark.one_in(5)
 def test_where_a_cubic_turns(coefficients, found):
     x = turning_points(cubic(*coefficients))
     assert np.sort(x[np.isfinite(x)]) == pytest.approx(found, rel=1e-13)
@@ -184,6 +186,7 @@ def test_what_is_no_number_stands_beside_the_number_of_the_other():
 
 
 @pytest.mark.parametrize(("late", "equal"), [(0.0, True), (1e-10, True), (0.2, False)])
+@pytest.mark.one_in(2)
 def test_a_row_of_an_event_a_little_later_leaves_cells_lines_where_one_has_no_rates(late, equal):
     """t^2 with rates and by its rows: in a cell of both the rows say all, in others the line is 1/16 off."""
     time = np.array([0.0, 0.5, 0.5, 1.0])

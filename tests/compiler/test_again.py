@@ -18,7 +18,7 @@ NAMES = (
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.one_in(8)
+@pytest.mark.long
 def test_equals_a_binding_made_anew(name):
     loaded = Loaded(Request(str(MODELS / f"{name}.sd"), scene="reference" if "seed" in name else "launch")).first
     compiled, binding = loaded.prepared.compiled, loaded.prepared.binding
@@ -40,6 +40,7 @@ def test_equals_a_binding_made_anew(name):
     assert ways
 
 
+@pytest.mark.long
 def test_sizes_have_no_way():
     loaded = Loaded(Request(str(MODELS / "benchmark" / "rc_ladder.sd"), scene="reference")).first
     with ex.fresh(loaded.nodes):

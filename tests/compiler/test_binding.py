@@ -46,6 +46,7 @@ def test_values_follow_dependencies_and_overrides(tmp_path):
     assert carrier.rows("dynamics", 0.0, y, 0 * y)[0] == 8.0
 
 
+@pytest.mark.long
 def test_long_chains_of_dependencies():
     parameters = tuple(parameter(f"p{i}", x.add(x.param(f"p{i + 1}"), x.const(1))) for i in range(3000))
     model = compile_network(oscillator((*parameters, parameter("p3000", 0.0)), x.param("p0")))
@@ -144,6 +145,7 @@ def test_labels_cover_their_hull_once(first, message):
     assert message in error.value.diagnostics[0].message
 
 
+@pytest.mark.long
 def test_large_arrays_bind_without_loops_in_python(effort):
     model = compile_network(chain(10))
     _, few = effort(lambda: model.bind({"n": 10}))

@@ -22,6 +22,7 @@ def compiled(n, formulation="lagrangian", backend="c"):
 
 @pytest.mark.parametrize("backend", ["c", "numpy"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_text_and_structure_do_not_depend_on_the_length(formulation, backend):
     short, long = compiled(10, formulation, backend), compiled(100_000, formulation, backend)
     assert short.text == long.text
@@ -34,6 +35,7 @@ def point(oracle, seed=1):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_carriers_agree_with_the_oracle(formulation, tmp_path):
     model = compiled(7, formulation)
     binding = model.bind()
@@ -54,6 +56,7 @@ def test_carriers_agree_with_the_oracle(formulation, tmp_path):
 
 
 @pytest.mark.parametrize("n", [1, 2, 10, 1000])
+@pytest.mark.one_in(5)
 def test_residual_is_that_of_the_unrolled_chain(n, tmp_path):
     model = compiled(n)
     binding = model.bind()
@@ -67,6 +70,7 @@ def test_residual_is_that_of_the_unrolled_chain(n, tmp_path):
         np.testing.assert_allclose(r[: 3 * n], reference(n, y, yd), rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.long
 def test_compiling_and_binding_run_as_many_lines_for_any_length(effort):
     def lines(length):
         with x.fresh():
@@ -76,6 +80,7 @@ def test_compiling_and_binding_run_as_many_lines_for_any_length(effort):
     assert lines(100_000) <= 1.05 * lines(10)
 
 
+@pytest.mark.long
 def test_binding_of_the_chain():
     model = compiled(4)
     binding = model.bind({("m", 2): 7.0})
@@ -91,6 +96,7 @@ def test_binding_of_the_chain():
     assert rows["initial"] == ((2, 4),)
 
 
+@pytest.mark.long
 def test_observations_read_arrays():
     model = compiled(5)
     oracle = Oracle(model.form, model.bind())
@@ -168,6 +174,7 @@ def test_two_indices_triangles_and_products_of_sums(tmp_path):
 
 @pytest.mark.parametrize("given", [False, True])
 @pytest.mark.parametrize("first", [1, 2, 6])
+@pytest.mark.long
 def test_momenta_cover_the_elements_that_have_a_mass(first, given, tmp_path):
     """Rows of massless elements hold no p'; where T is given, their momentum row is p = 0."""
     with x.fresh():

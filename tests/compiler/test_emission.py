@@ -61,6 +61,7 @@ def test_two_processes_print_the_same():
     assert len(prints) == 1
 
 
+@pytest.mark.long
 def test_an_earlier_model_changes_nothing():
     entries = load("catalogue.json")
 
@@ -73,6 +74,7 @@ def test_an_earlier_model_changes_nothing():
     assert text("solenoid") == first
 
 
+@pytest.mark.long
 def test_where_values_lie_in_memory_changes_nothing():
     """The rate of a balance makes nodes of a set of unknowns: in the order of their making, not of their addresses."""
     document = dsl.read(HERE.parents[1] / "models" / "seed" / "msd_velocity_source.sd", Report())
@@ -116,7 +118,7 @@ def renamed(net, change):
 
 @pytest.mark.parametrize("name", HOSTILE)
 @pytest.mark.parametrize("emit", [emit_c, emit_numpy])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_no_name_of_the_user_reaches_the_text(emit, name):
     entry = load("catalogue.json")["rectifier_motor_crank"]
     with x.fresh():
@@ -126,6 +128,7 @@ def test_no_name_of_the_user_reaches_the_text(emit, name):
     assert emit(plain.program, plain.form) == emit(other.program, other.form)
 
 
+@pytest.mark.long
 def test_observations_by_name_do_not_either():
     with x.fresh():
         net = chain(3)
@@ -143,6 +146,7 @@ def test_text_is_ascii_and_numbers_survive():
         assert str(PLACE.start[0]) in model.text
 
 
+@pytest.mark.long
 def test_two_names_of_one_length_do_not_matter(tmp_path, monkeypatch):
     monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
     with x.fresh():
@@ -182,6 +186,7 @@ def test_a_folder_that_others_write_is_not_used(tmp_path, monkeypatch):
     assert build_.build("int sd_x;").parent == folder
 
 
+@pytest.mark.long
 def test_many_processes_build_one_text(tmp_path):
     run = "from sysdyn.compiler.program.build import build; import ctypes; ctypes.CDLL(str(build('int sd_x = 7;')))"
     env = {**os.environ, "SYSDYN_CACHE": str(tmp_path / "cache")}
@@ -190,6 +195,7 @@ def test_many_processes_build_one_text(tmp_path):
     assert len(list((tmp_path / "cache").iterdir())) == 1
 
 
+@pytest.mark.long
 def test_angles_are_turned_once_and_kept_for_each_thread(tmp_path):
     """Blocks and entries of a two-link arm from C, at points in any order and from two threads, beside NumPy."""
     entry = load("catalogue.json")["two_link_arm"]
@@ -217,6 +223,7 @@ def test_angles_are_turned_once_and_kept_for_each_thread(tmp_path):
         assert max(pool.map(worst, (1, 2))) < 1e-13 * max(np.abs(e).max() for e in expected)
 
 
+@pytest.mark.long
 def test_what_a_spared_loop_adds_is_left_out_and_nothing_else():
     """Of a chain each block's loops, one spared after the other: what is missing adds up to what all of them add."""
     with x.fresh():

@@ -175,7 +175,7 @@ SINGLE = {
 
 
 @pytest.mark.parametrize("name", SINGLE)
-@pytest.mark.one_in(5)
+@pytest.mark.long
 def test_plain_numbers_bound_an_operation_as_arrays_do(name):
     root = SINGLE[name]
     ranges = [(low, high) for low in ENDS for high in ENDS if low <= high] + [(math.nan, math.nan)]

@@ -33,6 +33,7 @@ COMPLEMENTARY = {"G": "0.5*(a' - b')^2/R.R", "T": "0.5*(b - c)^2/L.L", "V*": "0.
         ("co_kane", COMPLEMENTARY, "cocoordinate"),
     ],
 )
+@pytest.mark.one_in(3)
 def test_state_functions_have_the_names_of_their_family(formulation, functions, kind, tmp_path, capsys):
     """The coil's energy is T of the flux linkage, the capacitor's V* of the voltage, the resistor's cocontent G."""
     path = tmp_path / "rlc.sd"

@@ -35,7 +35,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("model", "formulation", "stage"), CASES)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(12)
 def test_a_stage_is_printed_as_it_was_read(model, formulation, stage, capsys):
     path = ROOT / "models" / f"{model}.sd"
     scenes = load.read(path, Report()).scenes

@@ -83,7 +83,7 @@ def test_functions_conditions_and_powers(tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(8))
-@pytest.mark.one_in(9)
+@pytest.mark.one_in(12)
 def test_random_models(seed, tmp_path):
     """T*, V, D, work, phi, psi, gamma, lambda of random expressions: carriers against the oracle, entries as slopes."""
     random = np.random.default_rng(seed)

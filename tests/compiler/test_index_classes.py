@@ -140,7 +140,7 @@ def random_net(random, dimensions):
 
 
 @pytest.mark.parametrize("dimensions", [1, 2])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(2)
 def test_elements_belong_together_as_if_each_link_were_followed(dimensions):
     followed = 0
     for seed in range(1500):

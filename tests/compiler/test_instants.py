@@ -77,6 +77,7 @@ def test_instants_of_one_argument(effort, expected):
     np.testing.assert_allclose(times, expected, rtol=4e-15 if "sin" in effort else 4e-16)
 
 
+@pytest.mark.long
 def test_affine_arguments_give_the_very_double():
     for value in (0.3, 0.1, 1e-3, 1.7000000000000002, 2 / 3):
         assert found(on_x(f"(1 N)*step(t - {value!r} s)")).times.tolist() == [value]
@@ -89,6 +90,7 @@ def test_breakpoints_of_tables(method):
     np.testing.assert_allclose(found(on_x("f(2*t)"), tables=table).times, [0.25, 0.375, 0.75])
 
 
+@pytest.mark.long
 def test_arrays_are_searched_at_once_and_their_size_is_data():
     text = "for i in 1..n { work (1 N)*step(t - i*T) on x[i] }"
     assert found(text).times == pytest.approx([0.1, 0.2, 0.3, 0.4])

@@ -116,6 +116,7 @@ def at(node, name, values, tables=TABLES):
 
 
 @pytest.mark.parametrize("name", YES)
+@pytest.mark.one_in(3)
 def test_inverted(name):
     v, w = given(), x.var("D", "bf")
     law = YES[name](v)

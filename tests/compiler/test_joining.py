@@ -43,6 +43,7 @@ def test_inertias_of_one_rate_are_one():
     assert texts([first]) in (["(m*l^2 + J)*a''"], ["(J + m*l^2)*a''"])
 
 
+@pytest.mark.long
 def test_squares_of_sine_and_cosine_are_one():
     m, _, _, a, _, _, rate, _ = leaves()
     squares = x.add(x.power(x.call("sin", a), x.const(2.0)), x.power(x.call("cos", a), x.const(2.0)))
@@ -84,6 +85,7 @@ def random_expression(random, depth, own):
 
 @pytest.mark.parametrize("arrow", [joined, shorter])
 @pytest.mark.parametrize("seed", range(40))
+@pytest.mark.one_in(5)
 def test_the_terms_are_worth_what_was_joined(seed, arrow):
     random = np.random.default_rng(seed)
     own = leaves()

@@ -131,7 +131,7 @@ def rows_of(form):
 
 
 @pytest.mark.parametrize("n", [2, 3, 5, 6])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_inertias_that_move_and_join_coordinates(tmp_path, n):
     """0 = M^-1 p - f up to COUPLED coordinates, p' = -dT/dq + ..., against numpy's solution of M f = p.
 

@@ -28,6 +28,7 @@ def circuit(tmp_path, monkeypatch):
     return "circuit.sd"
 
 
+@pytest.mark.long
 def test_the_displacement_of_the_co_hamiltonian_is_minus_the_slope_of_the_coenergy(circuit):
     assert run(["compile", "-q", circuit, "--formulation", "co_hamiltonian", "-o", "out"]) == 0
     names = [u["name"] for u in json.loads(Path("out/manifest.json").read_text())["unknowns"]]
@@ -37,6 +38,7 @@ def test_the_displacement_of_the_co_hamiltonian_is_minus_the_slope_of_the_coener
 
 
 @pytest.mark.parametrize("formulation", ["hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_a_traced_displacement_keeps_the_sign_of_its_element(circuit, formulation):
     trace = api.simulate(circuit, formulation=formulation, output="t.h5")
     e = trace["C.e"].values

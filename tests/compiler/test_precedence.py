@@ -1,5 +1,6 @@
 """Of several initial values of one element, the one that goes before the others is left."""
 
+import pytest
 from sysdyn.compiler.network.primal import overlaps, primal
 from sysdyn.compiler.network.primal.precedence import outermost
 from sysdyn.compiler.network.reflection import reflect
@@ -84,6 +85,7 @@ def rings(number):
     return network
 
 
+@pytest.mark.long
 def test_constants_of_rings_cost_what_the_text_is_long(effort):
     """Three times as many inductors in loops: three times the lines of Python run, not more."""
     with ex.fresh():

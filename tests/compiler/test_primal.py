@@ -184,6 +184,7 @@ def reduced(rhs, start, end, **options):
     return solve_ivp(rhs, (0.0, end), start, rtol=1e-10, atol=1e-12, **options).y[:, -1]
 
 
+@pytest.mark.long
 def test_nonlinear_laws(tmp_path):
     """Saturating coil f(p), quadratic valve c f |f|, cubic spring, all in one loop, against the reduced equations."""
 
@@ -215,6 +216,7 @@ def test_nonlinear_laws(tmp_path):
     assert trace["e"].values[-1] == pytest.approx(rhs(3.0, [p, q])[0], abs=1e-4)
 
 
+@pytest.mark.long
 def test_diode_is_an_implicit_effort(tmp_path):
     """f = Is (exp(e/Vt) - 1) in series with a resistor charges a capacitor."""
 
@@ -268,6 +270,7 @@ def transactor(kind):
     return net.network(observe=seen, init=start)
 
 
+@pytest.mark.long
 def test_a_controlled_flow_source_never_loads_its_control_port(tmp_path):
     """Seed README, section 7.1: as a psi it would give i1 = -0.0093, v2 = 0.1594."""
     found, _, _ = primal(transactor("flow"))
@@ -279,6 +282,7 @@ def test_a_controlled_flow_source_never_loads_its_control_port(tmp_path):
     assert trace["g"].values[-1] == pytest.approx(-trace["v2"].values[-1], abs=1e-4)
 
 
+@pytest.mark.long
 def test_a_flow_source_of_time_is_a_flow_constraint(tmp_path):
     def network():
         net = Net()
@@ -320,6 +324,7 @@ def test_a_source_controlled_by_a_read_node(tmp_path):
     assert trace["v2"].values[-1] == pytest.approx(v2, abs=1e-5)
 
 
+@pytest.mark.long
 def test_a_law_that_reads_the_effort_of_a_kinetic_store(tmp_path):
     """Its momentum becomes a state: no law holds the rate of a flow."""
 
@@ -347,6 +352,7 @@ def test_a_law_that_reads_the_effort_of_a_kinetic_store(tmp_path):
     assert trace["d"].values[-1] == pytest.approx(3 * (np.sin(8.0) - f), abs=1e-4)
 
 
+@pytest.mark.long
 def test_laws_that_move_with_time_or_place(tmp_path):
     """A resistance of time, a transformer whose ratio is a function of the displacement of a mass."""
 
@@ -377,6 +383,7 @@ def test_laws_that_move_with_time_or_place(tmp_path):
     assert abs(outcome.samples.energy[-1]) < 1e-4
 
 
+@pytest.mark.long
 def test_heat_leaves_no_trace_in_the_audit(tmp_path):
     """Two heat capacities and a resistance that the losses of a circuit warm."""
 
@@ -409,6 +416,7 @@ def test_heat_leaves_no_trace_in_the_audit(tmp_path):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_tank_with_inertia(formulation, tmp_path):
     """Pump, pipe with inertia, tank, outlet."""
 

@@ -216,7 +216,7 @@ def sized(net, size, **more):
 
 
 @pytest.mark.parametrize("make", CASES)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_poles_and_modes_are_those_of_the_unrolled_network(make):
     for size in (4, 7):
         net = make()
@@ -229,6 +229,7 @@ def test_poles_and_modes_are_those_of_the_unrolled_network(make):
 
 
 @pytest.mark.parametrize("make", CASES)
+@pytest.mark.long
 def test_structure_and_text_do_not_depend_on_the_size(make):
     found = []
     for size in (10, 100_000):
@@ -238,6 +239,7 @@ def test_structure_and_text_do_not_depend_on_the_size(make):
     assert found[0] == found[1]
 
 
+@pytest.mark.long
 def test_the_transmission_line_has_one_text(effort):
     found, lines = [], []
     for size in (10.0, 10.0, 100_000.0):

@@ -43,6 +43,7 @@ def number(node, **values):
     return evaluate([node], lambda n: values[n.data])[0]
 
 
+@pytest.mark.long
 def test_stores_in_series_keep_their_own_contents(tmp_path):
     start = ((of("C", "be"), 3.0), (of("B", "be"), 2.0))
 
@@ -202,6 +203,7 @@ def test_springs_and_nodes_of_mechanisms():
     compiled(starting(net, *start[:2]))
 
 
+@pytest.mark.long
 def test_the_charge_of_a_tank_starts_its_constraint(tmp_path):
     """The integrated constraint takes the contents that the text gives, not zero."""
 

@@ -21,7 +21,7 @@ def numbers(sizes):
 
 
 @pytest.mark.parametrize("block", range(10 * LONG))
-@pytest.mark.one_in(5)
+@pytest.mark.long
 def test_scalar_networks(block):
     for seed in range(10 * block, 10 * block + 10):
         with x.fresh():
@@ -43,7 +43,7 @@ def or_refused(net, sizes, **more):
 
 
 @pytest.mark.parametrize("block", range(10 * LONG))
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_statements_over_loops(block):
     """Rarely one is refused, never wrong."""
     refused = 0
@@ -62,7 +62,7 @@ def test_statements_over_loops(block):
 
 @pytest.mark.parametrize("kind", ["scalar", "arrays"])
 @pytest.mark.parametrize("block", range(2 * LONG))
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_efforts_and_flows_of_modes(block, kind):
     for seed in range(10 * block, 10 * block + 10):
         with x.fresh():

@@ -33,7 +33,7 @@ def found(tmp_path, signal, known=()):
 
 @pytest.mark.parametrize("carrier", CARRIERS)
 @pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-7])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_a_pulse_is_found_on_what_varies_by_itself(tmp_path, width, carrier):
     place = 7.2345678
     times = found(tmp_path, f"2 N*exp(-((t - {place} s)/({width * SPAN} s))^2){carrier}")
@@ -45,6 +45,7 @@ def test_a_pulse_is_found_on_what_varies_by_itself(tmp_path, width, carrier):
 @pytest.mark.parametrize(
     "signal", ["2 N*sin(3 rad/s*t)", "1 N*sin(40 rad/s*t)^3", "5 N*t/(1 s)*exp(-t/(2 s))", "1 N*tanh((t - 5 s)/(3 s))"]
 )
+@pytest.mark.long
 def test_a_signal_that_steps_follow_has_none(tmp_path, signal):
     assert found(tmp_path, signal).size == 0
 
@@ -53,6 +54,7 @@ GATE = "2 N*(clip((mod(t, 2 s) - 1 s)/(10 ms), 0, 1) - clip((mod(t, 2 s) - 1.3 s
 CORNERS = [2 * k + at for k in range(5) for at in (1.0, 1.01, 1.3, 1.31, 2.0)]
 
 
+@pytest.mark.long
 def test_between_corners_that_are_known_a_gate_needs_none(tmp_path):
     assert found(tmp_path, GATE, CORNERS).size == 0
     assert found(tmp_path, GATE).size > 10
@@ -62,7 +64,7 @@ def test_between_corners_that_are_known_a_gate_needs_none(tmp_path):
 
 
 @pytest.mark.parametrize("shot", shots(8, seed=3), ids=lambda s: f"{s.shape}-{s.method}")
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_no_pulse_is_missed_in_silence(tmp_path, shot):
     wrong, error = missed(shot, tmp_path)
     assert not wrong

@@ -41,7 +41,7 @@ def values(model):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("text", [mixed(24), power_grid(24), stages(12)], ids=["mixed", "power_grid", "stages"])
-@pytest.mark.one_in(12)
+@pytest.mark.long
 def test_loops_through_tables_compute_the_same_numbers(text, formulation, monkeypatch):
     for limit, few in (("ALIKE", 4), ("TERMS", 8), ("LARGE", 1)):
         monkeypatch.setattr(emit_c_rolled, limit, few)

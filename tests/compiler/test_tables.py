@@ -67,7 +67,7 @@ def model_of(tables, energy, observed=()):
 
 @pytest.mark.parametrize("outside", ["clamp", "extend"])
 @pytest.mark.parametrize("method", ["linear", "pchip", "cubic", "hold"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(4)
 def test_carriers(method, outside, tmp_path):
     """T* = 1/2 L(q) f^2 with L a table: its derivatives enter rows and entries."""
     with x.fresh():

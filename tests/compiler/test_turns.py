@@ -40,6 +40,7 @@ def angles(kind):
 
 
 @pytest.mark.parametrize("kind", ["a turn", "many turns", "tiny", "near quarters", "beyond"])
+@pytest.mark.long
 def test_sines_and_cosines_are_within_a_unit_in_the_last_place(kind):
     angle = angles(kind)
     for found, exact in zip(turned(angle), (np.sin, np.cos), strict=True):

@@ -87,6 +87,7 @@ def test_printers(model):
     assert "dynamics rows kernel 0 for ix[" in program_text.show(model.program)
 
 
+@pytest.mark.long
 def test_lowering_twice_changes_nothing(model):
     again = compile_network(model.network, "hamiltonian")
     assert again.form == model.form
@@ -142,7 +143,7 @@ def random_expression(random, leaves, depth):
 
 
 @pytest.mark.parametrize("seed", range(25))
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_derivatives_are_sympy_s(seed):
     random = np.random.default_rng(seed)
     with x.fresh():
@@ -174,6 +175,7 @@ def test_energy_model_can_be_written_directly():
         assert kernel.rows[0].expression is x.var("a", "f", order=1)
 
 
+@pytest.mark.long
 def test_hamiltonian_needs_no_momentum_without_inertia():
     entry = load("catalogue.json")["rectifier_motor_crank"]
     with x.fresh():

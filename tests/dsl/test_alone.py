@@ -46,6 +46,7 @@ USER = "model m {\n  node a: electrical\n  U: used() a -> ground\n  V: effort(e 
 
 
 @pytest.mark.parametrize("file", LIBRARY, ids=lambda file: file.stem)
+@pytest.mark.one_in(12)
 def test_every_component_of_the_library_is_sound_alone(file):
     document = load.read(file, Report())
     assert {name: list(own) for name, own in alone.judged(document)} == {

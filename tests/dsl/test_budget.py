@@ -54,6 +54,7 @@ NESTED = {
 
 
 @pytest.mark.parametrize("kind", NESTED)
+@pytest.mark.one_in(12)
 def test_every_expression_is_resolved_once(monkeypatch, kind):
     before, after = NESTED[kind]
 
@@ -66,6 +67,7 @@ def test_every_expression_is_resolved_once(monkeypatch, kind):
     assert many - few == 2 * (few - ones)
 
 
+@pytest.mark.long
 def test_nested_calls_cost_as_many_lines_each(effort):
     def lines(depth):
         found, count = effort(lambda: judged(f"  let y = {'tanh(' * depth}x/(1 m){')' * depth}"))
@@ -112,7 +114,7 @@ LARGE = {  # body, head, line of the finding
 
 
 @pytest.mark.parametrize("kind", LARGE)
-@pytest.mark.one_in(9)
+@pytest.mark.one_in(12)
 def test_what_asks_for_more_than_there_is_has_a_place(kind, monkeypatch):
     monkeypatch.setattr(budget, "GRANTED", 1 << 30)  # what is counted one by one comes to its end sooner
     body, head, line = LARGE[kind]

@@ -34,6 +34,7 @@ def check_round_trip(text):
 
 
 @pytest.mark.parametrize("path", [*CORPUS, *MODELS], ids=lambda path: path.stem)
+@pytest.mark.one_in(200)
 def test_formatting_is_idempotent_and_keeps_the_tree_and_the_comments(path):
     text = SourceText.read(path).text
     once = check_round_trip(text)
@@ -220,6 +221,7 @@ SEPARATORS = st.sampled_from(["\n", "\n\n\n", ";", "  # said\n", "\n## doc\n", "
 
 @settings(max_examples=150, deadline=None)
 @given(EXPRESSIONS)
+@pytest.mark.long
 def test_any_expression_survives_formatting(text):
     expr = tree(f"const c = {text}").items[0].value
     once = format_expression(expr)
@@ -230,6 +232,7 @@ def test_any_expression_survives_formatting(text):
 
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.tuples(STATEMENTS, SEPARATORS), max_size=6))
+@pytest.mark.long
 def test_any_model_survives_formatting(parts):
     text = "model m {\n" + "".join(statement + separator for statement, separator in parts) + "}\n"
     once = check_round_trip(text)

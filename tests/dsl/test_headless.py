@@ -35,6 +35,7 @@ HEADS = {"component part {": 2, "component lag {": 7, "model net {": 13, "scene 
 
 
 @pytest.mark.parametrize("head", HEADS)
+@pytest.mark.one_in(5)
 def test_a_head_that_is_missing_is_told_once(head):
     assert not check(TEXT)
     (found,) = check(TEXT.replace(head + "\n", ""))
@@ -45,6 +46,7 @@ def test_a_head_that_is_missing_is_told_once(head):
 
 @pytest.mark.parametrize("head", [*HEADS, "  for i in 1..2 {"])
 @pytest.mark.parametrize("beside", ["", " # {"])
+@pytest.mark.one_in(4)
 def test_a_brace_that_is_missing_is_told_once(head, beside):
     (found,) = check(TEXT.replace(head, head[:-2] + beside))
     assert found.code == "E113"

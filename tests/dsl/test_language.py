@@ -22,16 +22,16 @@ LONGEST, WIDEST = 80, 114
 LONG = ("tutorial",)
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda e: f"{e.topic}{EXAMPLES.index(e)}")
+@pytest.mark.long
 def test_example_is_right_or_wrong_as_it_says(example):
     raised = found(example.text)
     errors = {c for c in raised if c[0] == "E"}
     assert errors == ({example.code} if example.code else set())
 
 
-@pytest.mark.one_in(6)
 @pytest.mark.parametrize("example", [e for e in EXAMPLES if not e.code], ids=lambda e: f"{e.topic}{EXAMPLES.index(e)}")
+@pytest.mark.one_in(77)
 def test_scenes_of_an_example_run(example, tmp_path, capsys):
     """A coil whose linkage cannot pass 1 mWb stopped at 0.1 ms under 10 V (E930), on the page of components."""
     (tmp_path / "m.sd").write_text(example.text)

@@ -1,5 +1,6 @@
 """Files of the library are read once, however many values of a command line are told by their names."""
 
+import pytest
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate import files
 from sysdyn.dsl.model import dimensions as dim
@@ -12,6 +13,7 @@ model one { node a: electrical; R1: resistor(R = 1 ohm) a -> ground }
 """
 
 
+@pytest.mark.long
 def test_a_module_is_parsed_once_for_many_values(monkeypatch):
     read = []
     monkeypatch.setattr(files, "parse", lambda source: read.append(source.name) or parse(source))

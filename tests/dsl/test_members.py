@@ -334,6 +334,7 @@ scene s of m {
         ("a.V", "write a.e", "a.e"),
     ],
 )
+@pytest.mark.one_in(12)
 def test_who_has_no_state_function_is_told_who_has(read, help_, right):
     (error,) = _errors(STORES.replace("READ", read))
     assert (error.code, error.help) == ("E102", help_)

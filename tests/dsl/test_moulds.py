@@ -90,7 +90,7 @@ BAD = [
 
 
 @pytest.mark.parametrize("bad", BAD)
-@pytest.mark.one_in(6)
+@pytest.mark.long
 def test_the_whole_way_and_a_mould_make_the_same(bad, monkeypatch):
     made, found = read(net(bad=bad))
     with monkeypatch.context() as patch:

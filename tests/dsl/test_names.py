@@ -105,6 +105,7 @@ def test_a_number_and_its_unit(read, text, value, unit):
     assert read.value(text) == (pytest.approx(value, rel=1e-15), unit)
 
 
+@pytest.mark.long
 def test_a_quantity_is_the_nearest_double_to_what_is_written(read):
     """Whatever its prefix: 1.1 uF is 1.1e-6, not 1.1 times a rounded 1e-6."""
     draw = random.Random(5)

@@ -82,6 +82,7 @@ def test_a_component_sees_nothing_of_its_user():
         ("r: transformer(e1 = R*f2) a -> b, b -> ground", "E316"),
     ],
 )
+@pytest.mark.one_in(2)
 def test_mistakes_in_an_instance(line, code):
     text = RC.replace("r: resistor(R = R) a -> b", line)
     assert code in codes_of(text)

@@ -25,12 +25,14 @@ scene s of m { time 0 s to 1 s; trace x[1] }
 """
 
 
+@pytest.mark.long
 def test_a_unit_may_be_written_in_one_that_follows(tmp_path):
     path = tmp_path / "m.sd"
     path.write_text(f"{UNITS}scene s of m {{ time 0 s to 1 s; trace x }}\n")
     assert load(path).parameters["Q"] == pytest.approx(72.0 * 1e-3 / 3600, rel=1e-14)
 
 
+@pytest.mark.long
 def test_a_loop_around_parameters_may_run_to_one_that_follows(tmp_path):
     path = tmp_path / "m.sd"
     path.write_text(LOOPS)
@@ -52,6 +54,7 @@ def test_a_unit_that_is_none_is_told_once(units, said):
     assert [d.message for d in found if d.severity == "error"] == said
 
 
+@pytest.mark.long
 def test_many_units_in_turn():
     units = "".join(f"unit u{i} = 1 u{i + 1}\n" for i in range(1500))
     text = "unit u1500 = 1 m\nmodel m { coord x: translation = 1 u0; energy T* = 1/2*(1 kg)*x'^2 }\n"

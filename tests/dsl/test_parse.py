@@ -227,6 +227,7 @@ def test_names_are_unicode_and_columns_are_code_points():
     assert parse(source)[1][0].place.start == (1, 7)
 
 
+@pytest.mark.long
 def test_a_sum_of_50000_terms_is_one_node():
     total = value(" +\n".join(["x"] * 50_000))
     assert len(total.terms) == 50_000

@@ -90,6 +90,7 @@ def lark():
 
 
 @pytest.mark.parametrize("path", CORPUS, ids=lambda path: path.stem)
+@pytest.mark.long
 def test_lark_accepts_the_corpus_too(lark, path):
     text = SourceText.read(path).text
     ours = parse(SourceText("t", text))[0]

@@ -37,6 +37,7 @@ model m {
 
 
 @pytest.mark.parametrize(("resistance", "codes"), [("0 ohm", []), ("1e-3 ohm", ["E314"]), ("-1e-3 ohm", ["E314"])])
+@pytest.mark.one_in(5)
 def test_powers_of_a_lossless_component_add_up_to_zero(resistance, codes):
     """R f^2 is nothing at all currents where R is zero, whatever the law looks like."""
     found = [d for d in check(PORTS % resistance) if d.code == "E314"]

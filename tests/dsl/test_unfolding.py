@@ -51,6 +51,7 @@ UNFOLDING = {
 
 
 @pytest.mark.parametrize("kind", UNFOLDING)
+@pytest.mark.one_in(3)
 def test_a_text_that_unfolds_without_end_has_a_finding(kind, tmp_path, capsys):
     text, message = UNFOLDING[kind]
     path = tmp_path / "m.sd"
@@ -61,6 +62,7 @@ def test_a_text_that_unfolds_without_end_has_a_finding(kind, tmp_path, capsys):
     assert " --> " in said
 
 
+@pytest.mark.long
 def test_a_chain_that_people_write_is_taken(tmp_path):
     path = tmp_path / "m.sd"
     chain = "".join(f"  let a{k} = a{k - 1}*1.01\n" for k in range(1, budget.DEEPEST - 5))
@@ -84,6 +86,7 @@ def test_the_text_of_shared_parts_does_not_double_with_each():
 
 @pytest.mark.parametrize("body", ["", "  param a = 1\n"])
 @pytest.mark.parametrize("command", ["simulate", "verify", "report"])
+@pytest.mark.one_in(2)
 def test_a_model_with_nothing_in_it_has_nothing_to_run(body, command, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "m.sd").write_text(f"model m {{\n{body}}}\nscene s of m {{\n  time 0 s to 1 s\n}}\n")

@@ -10,7 +10,7 @@ CASES = [(k, f) for f in ("lagrangian", "hamiltonian", "co_lagrangian") for k in
 
 
 @pytest.mark.parametrize(("number", "formulation"), CASES)
-@pytest.mark.one_in(90)
+@pytest.mark.long
 def test_converters_run_as_by_backward_euler(number, formulation, tmp_path):
     case = drawn(number)
     (tmp_path / "net.sd").write_text(case.text)
@@ -42,6 +42,7 @@ FORMULATIONS = ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"]
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.long
 def test_four_thyristors_block_and_fire_by_pairs(tmp_path, formulation):
     """All of them block at the start, and between two halves: of what they say then one follows from the others (E509
     before), and nothing says where the source floats (E516 before).  From 2 ms of each half on the load has its size.
@@ -71,6 +72,7 @@ scene go of bridge { time BEGIN to 60 ms; trace R.f as i, S1.e as u every 1 ms }
 
 @pytest.mark.parametrize("begin", ["0 s", "3 ms"])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.long
 def test_a_load_floats_between_four_open_switches(tmp_path, formulation, begin):
     """The current of a bridge with dead times (E509, E516, E931 before, in all four formulations); of the potential
     that nothing determines meanwhile a sentence says so, and of the current none.

@@ -22,13 +22,13 @@ def _count(tmp_path, condition, tau, **options):
     return api.simulate(path, output=tmp_path / "m.h5", **options)["n"].values[-1]
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
 @pytest.mark.parametrize(
     ("period", "level", "tau"),
     [(0.6385322855606298, 0.6308943568804829, 75.1470059009799), (1.8797620535493815, 0.5578169406229144, 36.2)],
 )
+@pytest.mark.long
 def test_each_wave_of_time_alone_is_counted(tmp_path, period, level, tau, accuracy, method):
     """157 and 54 times; 152 and 53 by radau and rosenbrock at 1e-3, told as met (80 of 320 such runs were E920)."""
     condition = f"sin(2*pi*t/({period!r} s)) > {level!r}"
@@ -43,7 +43,6 @@ def test_a_narrow_pulse_of_time_alone_is_seen(tmp_path, method):
     assert _count(tmp_path, condition, 50.0, method=method) == 1
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
 @pytest.mark.parametrize(
@@ -55,6 +54,7 @@ def test_a_narrow_pulse_of_time_alone_is_seen(tmp_path, method):
         (0.23447310726489168, 0.2947461695265786, 0.4629684418841744, 14.75043469400847),
     ],
 )
+@pytest.mark.long
 def test_each_wave_that_a_state_meets_is_counted(tmp_path, level, wave, period, tau, accuracy, method):
     """Of the third the first lasts 9 ms, 5e-5 of the state high.  Of 320 such runs 34 missed one or more (7 told as
     met, 27 E920).

@@ -19,6 +19,7 @@ scene s of divider { time 0 s to 1 s; trace R.f as through, Q.f as beside, U.f a
 
 
 @pytest.mark.parametrize(("gate", "current"), [("0", 0.0), ("1", 4.0), ("step(t/(1 s) - 0.5)", 4.0)])
+@pytest.mark.one_in(5)
 def test_gates_that_stand_still(tmp_path, gate, current):
     path = tmp_path / "m.sd"
     path.write_text(MODEL.replace("SET", gate))

@@ -3,6 +3,7 @@
 from itertools import product
 
 import numpy as np
+import pytest
 from sysdyn.runtime.events.implicit import base_of, lemke
 
 
@@ -18,6 +19,7 @@ def by_sets(m, q):
     return None
 
 
+@pytest.mark.long
 def test_what_is_passive():
     """Semidefinite of rank 3 with a skew part (what coils and capacitors beside each other make of it): it finds a
     solution wherever there is one.

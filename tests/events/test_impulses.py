@@ -53,6 +53,7 @@ scene s of m { time 0 s to 2 s; trace x, y, y' as v every 0.1 s }
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_a_freewheel_does_not_stop_what_turns_on(formulation, tmp_path):
     (tmp_path / "m.sd").write_text(FREEWHEEL)
     trace = simulate(tmp_path / "m.sd", output=tmp_path / "m.h5", formulation=formulation)
@@ -62,6 +63,7 @@ def test_a_freewheel_does_not_stop_what_turns_on(formulation, tmp_path):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_a_diode_keeps_a_capacitor_from_a_switch_that_closes(formulation, tmp_path):
     (tmp_path / "m.sd").write_text(BOOST)
     trace = simulate(tmp_path / "m.sd", output=tmp_path / "m.h5", formulation=formulation)
@@ -70,6 +72,7 @@ def test_a_diode_keeps_a_capacitor_from_a_switch_that_closes(formulation, tmp_pa
     assert v[30] == pytest.approx(v[20] * np.exp(-10e-6 / (60 * 20e-6)), rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_wall_gives_a_ball_no_more_than_it_brought(tmp_path):
     (tmp_path / "m.sd").write_text(SQUEEZED)
     trace = simulate(tmp_path / "m.sd", output=tmp_path / "m.h5")

@@ -96,6 +96,7 @@ def refused(tmp_path, text, **options):
 
 @pytest.mark.parametrize("method", ["auto", "bdf", "radau", "dopri"])
 @pytest.mark.parametrize("soon", [1e-7, 5e-10, 1e-12, 3e-15])
+@pytest.mark.long
 def test_what_is_due_again_at_once_happens(tmp_path, soon, method):
     trace = run(tmp_path, AGAIN % soon, method=method)
     assert [e.time for e in trace.events] == pytest.approx([1.0, 1.0 + soon], abs=1e-14)
@@ -104,6 +105,7 @@ def test_what_is_due_again_at_once_happens(tmp_path, soon, method):
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("begin", [0.0, 1e4, 1e6])
+@pytest.mark.long
 def test_pulses_of_a_timer_have_their_lengths(tmp_path, begin, method):
     """1 to 5 us each second: 200 pulses, of which the last but for 3 us of its own is over at the end."""
     trace = run(tmp_path, TIMER % {"begin": begin}, method=method)
@@ -113,6 +115,7 @@ def test_pulses_of_a_timer_have_their_lengths(tmp_path, begin, method):
 
 
 @pytest.mark.parametrize("span", [1e9, 1e11, 1e13])
+@pytest.mark.long
 def test_an_event_shortly_before_the_end_of_a_long_span_happens(tmp_path, span):
     trace = run(tmp_path, LATE % {"span": span})
     assert trace["n"].values[-1] == 1
@@ -124,6 +127,7 @@ def test_an_event_shortly_before_the_end_of_a_long_span_happens(tmp_path, span):
     *[(HALVES % ratio, 1.0 + 1.0 / (1.0 - ratio)) for ratio in (0.1, 0.5, 0.9)],
     *[(TANKS % (b, fill, fill), (1.0 + b) / (1.0 - fill)) for b, fill in ((1.0, 0.75), (1.3, 0.5), (0.2, 0.2))],
 ])  # fmt: skip
+@pytest.mark.one_in(12)
 def test_instants_with_a_limit_end_the_run_there(tmp_path, text, limit, method):
     said = refused(tmp_path, text, method=method)
     assert "E930" in said
@@ -161,6 +165,7 @@ scene run of schmitt {
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("r", [15.0, 30.0])
+@pytest.mark.one_in(2)
 def test_a_trigger_without_a_pole_is_told_as_a_fold(tmp_path, r, method):
     said = refused(tmp_path, FOLD % r, method=method)
     assert "E930" in said

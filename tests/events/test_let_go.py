@@ -60,6 +60,7 @@ def run(tmp_path, text, **options):
 
 @pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("name", CIRCUITS)
+@pytest.mark.one_in(12)
 def test_a_coil_behind_a_resistor_is_opened(name, formulation, tmp_path):
     """The balances of the nodes between have flows that might answer each of them, and none together (E930)."""
     body, read = CIRCUITS[name]

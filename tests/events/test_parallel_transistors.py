@@ -24,7 +24,7 @@ scene s of pair {{
 
 @pytest.mark.parametrize("vf", [0.7, 0.5])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_two_body_diodes_side_by_side(tmp_path, vf, formulation):
     """Channels of 1 and 2 ohm divide 10 V sin beside 4 ohm; below, the diode with the least forward voltage holds."""
     (tmp_path / "pair.sd").write_text(TEXT.format(vf=vf))

@@ -39,6 +39,7 @@ def output():
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize(("given", "duty"), [("= 5", "0.5"), ("~ 5", "if Co.e < 4 V then 0.9 else 0.5")])
+@pytest.mark.one_in(5)
 def test_a_charge_pump_begins_with_the_phase_of_its_first_pulse(given, duty, formulation, tmp_path):
     path = tmp_path / "m.sd"
     path.write_text(PUMP.replace("GIVEN", given).replace("DUTY", duty))

@@ -12,7 +12,7 @@ STRAY = 4
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("number", range(NUMBER))
-@pytest.mark.one_in(90)
+@pytest.mark.long
 def test_shafts_turn_as_moreaus_do(number, formulation, tmp_path):
     case = drawn(number)
     (tmp_path / "shafts.sd").write_text(case.text)

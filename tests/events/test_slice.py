@@ -8,12 +8,13 @@ SLICE = 3 * len(FAMILIES)
 
 
 @pytest.mark.parametrize("number", range(SLICE), ids=lambda k: f"{FAMILIES[k % len(FAMILIES)].__name__}-{k}")
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_ends_met_or_says_why(number, tmp_path):
     found = judge(tmp_path, drawn(number))
     assert found.kind in ("met", "refused"), found.reason
 
 
+@pytest.mark.long
 def test_a_jump_that_projections_miss_is_searched(tmp_path):
     """Diodes that commutate where no nearest point settles: Gauss-Newton from the state held finds it."""
     found = judge(tmp_path, drawn(182))

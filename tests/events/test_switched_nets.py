@@ -14,7 +14,7 @@ NEAR = 0.3
 
 @pytest.mark.filterwarnings("ignore:at times")
 @pytest.mark.parametrize("seed", sorted({*range(120)} - {*NONE}))
-@pytest.mark.one_in(15)
+@pytest.mark.long
 def test_switched_nets_are_those_of_nodal_analysis_in_four_formulations(tmp_path, seed):
     """Currents as with small leaks; with a capacitor alike in all."""
     parts = nets.net(seed)

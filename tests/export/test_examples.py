@@ -45,6 +45,7 @@ def printed(command, folder, **environment):
 
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 @pytest.mark.skipif(not HEADER, reason="no SUNDIALS: apt-get install libsundials-dev")
+@pytest.mark.long
 def test_ida(tmp_path):
     export(tmp_path)
     sources = [str(EMBEDDING / "ida.c"), "residual.c", "binding.c"]
@@ -52,6 +53,7 @@ def test_ida(tmp_path):
     assert np.max(np.abs(printed(["./run"], tmp_path) - exact())) < 1e-6
 
 
+@pytest.mark.long
 def test_scipy(tmp_path):
     export(tmp_path, "--index", "0", "--backend", "numpy")
     blocked = tmp_path / "sysdyn"  # whoever imported sysdyn would fail

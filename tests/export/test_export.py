@@ -109,7 +109,7 @@ def formed_of(model, index, backend, scene, settings):
 @C
 @pytest.mark.parametrize("backend", ["c", "numpy"])
 @pytest.mark.parametrize("model", EVERY if LONG else SLICE)
-@pytest.mark.one_in(6)
+@pytest.mark.long
 def test_outside_is_inside_to_the_last_bit(tmp_path, model, backend):
     for index in ("auto", *FORMS) if LONG else ("auto", "1"):
         same(model, tmp_path / index, index, backend)
@@ -117,7 +117,7 @@ def test_outside_is_inside_to_the_last_bit(tmp_path, model, backend):
 
 @C
 @pytest.mark.parametrize("backend", ["c", "numpy"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_arrays_of_thousands(tmp_path, backend):
     same("gallery/transmission_line", tmp_path, "auto", backend, ["--set=n=3000"])
 
@@ -153,7 +153,7 @@ def test_index_forms_by_name(tmp_path):
 
 @C
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_index_0_is_the_underlying_equation(tmp_path, formulation):
     """A pendulum: f' = -g (q - ...) by hand; the Jacobian by differences; the Python beside the C."""
     options = ("--scene", "reference", "--index", "0", "--formulation", formulation)
@@ -201,7 +201,7 @@ def test_no_underlying_equation_is_said(tmp_path, capsys):
         ("knife_edge", {"J": 0.9, "v_0": 2.0}), ("parallelogram", {}), ("rolling_disk", {"r": 0.7, "om_0": -0.4}),
     ],
 )  # fmt: skip
-@pytest.mark.one_in(9)
+@pytest.mark.one_in(6)
 def test_starts_at_other_parameters(tmp_path, model, changed, index):
     """Outside as inside: initial values by their formulas, constraints and everything that follows from them."""
     found = inside(f"seed/{model}", index, scene="reference")
@@ -256,6 +256,7 @@ def test_positions_tell_stretches_outside(tmp_path, backend):
 
 
 @C
+@pytest.mark.long
 def test_rates_of_a_blocked_diode_are_no_noise(tmp_path):
     """Its slope is 1e-50 A/V: whatever stands in the voltage's rate, the rows hold; 1e33 V/s stood there."""
     changed = {"K": 0.353, "th_0": 0.326}
@@ -273,6 +274,7 @@ def test_rates_of_a_blocked_diode_are_no_noise(tmp_path):
 
 
 @C
+@pytest.mark.long
 def test_what_follows_from_parameters(tmp_path):
     """Parameters by others, arrays too, and the constant of an integrated row: 3 gap - 2 gap."""
     path = tmp_path / "chain.sd"
@@ -306,6 +308,7 @@ def test_what_follows_from_parameters(tmp_path):
 
 
 @C
+@pytest.mark.long
 def test_a_point_that_is_none(tmp_path):
     path = tmp_path / "root.sd"
     path.write_text(
@@ -318,6 +321,7 @@ def test_a_point_that_is_none(tmp_path):
 
 
 @C
+@pytest.mark.long
 def test_outputs_are_those_of_the_trace(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = MODELS / "seed" / "slider_crank.sd"
@@ -338,6 +342,7 @@ def test_outputs_are_those_of_the_trace(tmp_path, monkeypatch):
         np.testing.assert_allclose(w, [trace[name][0] for name in names], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.long
 def test_letters_of_complementary_forms(tmp_path):
     for formulation in ("co_lagrangian", "co_hamiltonian"):
         folder = tmp_path / formulation
@@ -354,6 +359,7 @@ def test_letters_of_complementary_forms(tmp_path):
             assert "displacement" in {row["kind"] for row in manifest["rows"]}
 
 
+@pytest.mark.long
 def test_parameters_that_may_change_the_index(tmp_path):
     path = tmp_path / "two.sd"
     path.write_text(

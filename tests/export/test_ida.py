@@ -105,7 +105,7 @@ CASES = [(s, i) for k, s in enumerate(CHANGED) for i in ("3", "2", "1") if LONG 
 
 
 @pytest.mark.parametrize(("system", "index"), CASES)
-@pytest.mark.one_in(40)
+@pytest.mark.long
 def test_references(tmp_path, system, index):
     given, instants, expected = reference(system)
     # compiled with other values: those of the reference are set at run time

@@ -49,6 +49,7 @@ def written(tmp_path, text):
 @pytest.mark.parametrize("backend", ["c", "numpy"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize(("name", "value"), [("L", 0.5), ("R", 3e5), ("C", 2e-7)])
+@pytest.mark.one_in(6)
 def test_what_follows_from_a_parameter_that_follows(tmp_path, formulation, backend, name, value):
     """`parameters(L = 0.5)` left what follows from L as it was (R, V0, the coil: 10 V for 22); starts at scales far
     from those bound were not found.

@@ -93,6 +93,7 @@ def _belt(time):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_slip_behind_a_stick_begins_in_the_sense_that_drives_it(tmp_path, formulation):
     """Looked at a little later by a straight line, the belt's acceleration turned the sense round: they chattered."""
     run = ran(tmp_path, BELT, formulation=formulation, accuracy=1e-7)
@@ -128,7 +129,7 @@ def _bridge(time):
 
 @pytest.mark.parametrize(("accuracy", "strong"), [(1e-3, False), (1e-7, False), (1e-3, True)])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(7)
+@pytest.mark.long
 def test_bridge_that_starts_without_voltage(tmp_path, formulation, accuracy, strong):
     """A quarter of the first step went backwards through a diode, as told met; at 1e-7 it stopped (Newton's iteration
     asked for less than round-off leaves of nodes that stay at zero).  strong: currents a million times larger.
@@ -168,6 +169,7 @@ scene run of step_of_force {
 
 @pytest.mark.parametrize("event", ["0.45 A", "9 A"])
 @pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.long
 def test_a_row_where_the_text_jumps_stands_twice(tmp_path, method, event):
     """Of two jumps one lies at an instant of the trace; what does not jump there has two equal values."""
     run = ran(tmp_path, STEP.replace("EVENT", event), method=method)
@@ -198,6 +200,7 @@ scene run of constant_power {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_a_current_that_is_the_difference_of_equal_voltages(tmp_path, formulation):
     """The current through R begins at zero: round-off of 24 V leaves more of it open than was asked (E930 at 1e-7)."""
     run = ran(tmp_path, LOAD, formulation=formulation, accuracy=1e-7, method="rosenbrock")
@@ -220,6 +223,7 @@ def test_a_current_that_is_the_difference_of_equal_voltages(tmp_path, formulatio
 
 
 @pytest.mark.parametrize("size", [1e-120, 1e-250])
+@pytest.mark.long
 def test_a_start_is_what_it_says_however_small(tmp_path, size):
     """Below 1e-100 m it was zero, told as met."""
     path = tmp_path / "m.sd"

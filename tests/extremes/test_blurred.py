@@ -37,6 +37,7 @@ def run(tmp_path, text, **options):
 
 @pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("R", ["1e-14", "1e-16", "1e-20", "1e-300"])
+@pytest.mark.one_in(5)
 def test_a_current_told_by_potentials_that_are_equal_is_not_met(R, formulation, tmp_path):
     """Of 1e-14 ohm it was 5e-4 off, of 1e-16 ohm 80 %, of 1e-20 ohm 88 kA for 10 A, each told as met."""
     with pytest.raises(api.NotMet, match="round-off of the unknowns that tell ir"):
@@ -44,6 +45,7 @@ def test_a_current_told_by_potentials_that_are_equal_is_not_met(R, formulation, 
 
 
 @pytest.mark.parametrize("R", ["1e-9", "1e-14", "1e-20"])
+@pytest.mark.long
 def test_what_has_an_unknown_of_its_own_is(R, tmp_path):
     trace = run(tmp_path, CIRCUIT.format(R, "L.f as i, R.f as ir"), formulation="lagrangian")
     assert [trace[name].values[-1] for name in ("i", "ir")] == pytest.approx(END, abs=1e-3)
@@ -52,6 +54,7 @@ def test_what_has_an_unknown_of_its_own_is(R, tmp_path):
 
 
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-9])
+@pytest.mark.long
 def test_zero_by_symmetry_and_whole_numbers_are_no_blur(accuracy, tmp_path):
     trace = run(tmp_path, STEADY, accuracy=accuracy)
     assert abs(trace["apart"].values).max() <= 1e-12

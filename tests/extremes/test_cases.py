@@ -39,7 +39,7 @@ def judged(folder, family, cases):
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
-@pytest.mark.one_in(23)
+@pytest.mark.long
 def test_a_slice_is_right_or_refused(tmp_path, family):
     found = judged(tmp_path, family, family.cases if LONG else sliced(family))
     assert not [v for v in found if v.kind in ("wrong", "unbounded")]

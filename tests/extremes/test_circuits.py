@@ -77,7 +77,7 @@ def test_the_energy_of_steep_laws_balances_in_every_row(tmp_path, number):
 
 
 @pytest.mark.parametrize(("number", "formulation"), [(0, "lagrangian"), (5, "co_lagrangian")])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_rows_between_steps_are_as_accurate_as_steps(tmp_path, number, formulation):
     """1600 instants of a rectifier and a freewheeling coil, most of them within steps: interpolated, then settled."""
     made = circuit(number)
@@ -104,7 +104,7 @@ def test_bridges_whose_sources_float_while_all_diodes_block(tmp_path, number, fo
 
 
 @pytest.mark.parametrize("seed", [*((1, 7, 9, 20, 24, 26, 33) if not LONG else range(60))])
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(12)
 def test_random_rectifiers_start_where_their_diodes_leave_them(tmp_path, seed):
     """Sources float behind diodes that block by 200 V (exp(-7700)): nothing but leakage says where.  Four of these were
     refused before, the seventh began 42 mV off.
@@ -120,13 +120,13 @@ def test_random_rectifiers_start_where_their_diodes_leave_them(tmp_path, seed):
         assert error <= 1e-6 * np.abs(potentials).max()
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("seed", "formulation"),
     list(itertools.product(range(20, 40), FORMULATIONS[2:]))
     if LONG
     else [(24, "co_lagrangian"), (27, "co_lagrangian"), (31, "co_hamiltonian"), (33, "co_lagrangian")],
 )
+@pytest.mark.long
 def test_potentials_that_leakage_alone_holds_are_right_or_refused(seed, formulation):
     """Sums of conductances, 1e-13 S of leakage beside 10 S, say where these nodes are as far as their digits reach: one
     began 0.3 V off, two 26 and 2 mV (steps within their bounds of round-off that still went on), the fourth (capacitors

@@ -56,6 +56,7 @@ def motion(name):
 @pytest.mark.parametrize(
     ("name", "formulation"), [("one", "lagrangian"), ("other", "lagrangian"), ("other", "co_lagrangian")]
 )
+@pytest.mark.long
 def test_a_clutch_that_breaks_away_is_seen(name, formulation, tmp_path):
     """Both runs took it for the damper that it is while it holds: 3.3 and 7.2 times off, told as met."""
     speeds = motion(name)

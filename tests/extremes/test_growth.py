@@ -45,7 +45,7 @@ def ignition(t):
 
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-6])
 @pytest.mark.parametrize("reference", [exponential, epidemic, oscillator, pendulum, ignition], ids=lambda f: f.__name__)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_what_grows_is_right(tmp_path, reference, accuracy):
     run = ran(tmp_path, FILE, scene=f"{reference.__name__}_run", accuracy=accuracy)
     assert not run.refused
@@ -56,6 +56,7 @@ def test_what_grows_is_right(tmp_path, reference, accuracy):
 
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.long
 def test_an_epidemic_breaks_out_with_either_method(tmp_path, method):
     run = ran(tmp_path, FILE, scene="epidemic_run", method=method, accuracy=1e-3)
     t = np.unique(np.asarray(run.trace.time))
@@ -79,6 +80,7 @@ scene run of rod {
 """
 
 
+@pytest.mark.long
 def test_zeros_at_the_start_count_as_a_part_of_their_like(tmp_path, monkeypatch):
     """Not as what they move in the shortest time about: beside that what moves at last is without bounds."""
     found = []

@@ -49,7 +49,7 @@ def pressures(rows):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_relief_valve_that_opens_with_each_stroke(formulation, tmp_path):
     """1.2 times what was asked of its flow, and a tenth of that told: 790 steps of a draft, 826 behind it."""
     rows = np.linspace(0.0, 3.0, 601)
@@ -87,6 +87,7 @@ def slipped():
 
 
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-6])
+@pytest.mark.long
 def test_a_block_that_sticks_under_a_sine_slips_at_the_first_peak_that_is_enough(accuracy, tmp_path):
     """It was not seen at all: what holds the block was a polynomial over half a period, and no error test asks it."""
     found = ran(tmp_path, SHAKEN, formulation="lagrangian", accuracy=accuracy)

@@ -35,6 +35,7 @@ FORCES = {
 
 @pytest.mark.parametrize("force", FORCES)
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9])
+@pytest.mark.one_in(5)
 def test_forces_that_begin_steeply_late(force, accuracy, tmp_path):
     """Hundreds of steps of 1e-15 s and E930 before, for sizes were those of round-off of the force."""
     text, law, knots = FORCES[force]

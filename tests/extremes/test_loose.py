@@ -84,6 +84,7 @@ def clipped(t, v):
         (CLIPPER, clipped, "rosenbrock", 0.02, 0.1),  # a step over a half period: 1.7 times off
     ],
 )
+@pytest.mark.long
 def test_rows_beside_diodes_are_some_tolerances_off(tmp_path, text, rate, method, rtol, within):
     path = tmp_path / "m.sd"
     path.write_text(text)
@@ -96,6 +97,7 @@ def test_rows_beside_diodes_are_some_tolerances_off(tmp_path, text, rate, method
 
 
 @pytest.mark.parametrize("rtol", [0.03, 0.01, 1e-3])
+@pytest.mark.long
 def test_a_relaxation_returns_to_its_limit_cycle(tmp_path, rtol):
     """Slopes taken within the jump made what was left behind it look small: x went on to 3.7, 6.8, 3.7, told as done.
     The amplitude is 2 + 0.78 mu^(-4/3) (J. Cole, Perturbation Methods in Applied Mathematics, 1968).
@@ -125,6 +127,7 @@ def _narrow(t, y):
     return [(5e-3 * np.cos(900 * t) - i - 0.01 * u) / 1e-5, (i - 1e-3 * w**3) / stored, (u - w) / 0.02]
 
 
+@pytest.mark.long
 def test_rows_of_an_explicit_step_through_a_narrow_minimum_of_a_capacity_are_those_of_the_motion(tmp_path):
     """A step that is fast for a moment was taken for one at the edge of stability: its rows were those of a cubic
     between the ends, 2 % off beside ends that are within 1e-6, told as met at 1e-3.
@@ -156,6 +159,7 @@ scene s of beside {
 """
 
 
+@pytest.mark.long
 def test_rows_of_a_motion_beside_what_an_explicit_step_holds_at_the_edge_are_its_own(tmp_path):
     """Further stages of a current of 1e-10 A that noise moves made a cubic of the rows of everything beside it: 3e-5
     off beside ends that are within 1e-11, at twice the steps.
@@ -225,6 +229,7 @@ scene s of falls {
 
 
 @pytest.mark.parametrize("accuracy", [1e-1, 1e-2])
+@pytest.mark.one_in(2)
 def test_what_falls_beside_a_pole_is_met_loosely_too(accuracy, tmp_path):
     """An Oregonator, whose x falls from 0.85 to 2.4e-5 beside its pole at -2.4e-5: every loose draft stepped over it,
     all methods were refused (22 of 56 such runs), though at 1e-4 and finer it is met.

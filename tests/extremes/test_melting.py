@@ -34,6 +34,7 @@ def truth(times):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
 def test_a_front_of_melting_is_followed_in_steps_of_its_own(formulation, tmp_path):
     """Rosenbrock took what each correction passes over for a law that jumps: 1e7 steps in the complementary forms."""
     found = ran(tmp_path, MODEL, formulation=formulation, accuracy=1e-4)

@@ -33,7 +33,7 @@ scene run of ladder {
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_closed_form(tmp_path, law, formulation):
     run = ran(tmp_path, MODEL.replace("LAW", law), formulation=formulation, accuracy=1e-6)
     assert run.met
@@ -53,7 +53,7 @@ def _charge(linkage):
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize(("law", "begun"), [("f = (0.01 ohm^-1 + k*p^2)*e", 0.0), ("e = f/(0.01 ohm^-1 + k*p^2)", 0.5)])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(5)
 def test_by_its_momentum(tmp_path, law, begun, formulation):
     """Of V = i sin 3t the linkage is begun + i (1 - cos 3t)/3, whatever the law."""
     text = (
@@ -76,7 +76,7 @@ def test_by_its_momentum(tmp_path, law, begun, formulation):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_a_damper_that_reads_where_it_is(tmp_path, formulation):
     """M v' = -c (1 + (x/d)^2) v has the integral M v + c (x + x^3/(3 d^2))."""
     text = """model m {

@@ -41,6 +41,7 @@ MOMENTS = {  # how often, and the last instant
 
 @pytest.mark.parametrize("condition", MOMENTS)
 @pytest.mark.parametrize("options", [{"accuracy": 1e-2}, {"accuracy": 1e-5, "method": "dopri"}])
+@pytest.mark.one_in(30)
 def test_a_moment_is_not_passed_over(condition, options, tmp_path):
     """Of steps of 0.1 s and more none was long enough to be told: no event, or one of ten, told as met."""
     found = ran(tmp_path, FLIGHT % condition, **options)
@@ -65,6 +66,7 @@ scene s of m { time 0 s to 2 s; trace x, x' as v }
 
 
 @pytest.mark.parametrize("method", ["radau", "dopri", "bdf"])
+@pytest.mark.one_in(2)
 def test_what_happens_within_a_hill_does_not_lengthen_its_steps(method, tmp_path):
     """Two peaks, one within the other's range, beside an event; v^2/2 + V stays."""
     found = ran(tmp_path, HILLS, accuracy=1e-6, method=method)
@@ -88,6 +90,7 @@ scene s of m { time 0 s to 0.6 s; trace x, x' as v }
 
 @pytest.mark.parametrize("window", ["floor(x/(1 mm)) == 500", "mod(x + 0.5 m, 1 m) < 1 mm and x < 1 m"])
 @pytest.mark.parametrize("options", [{"accuracy": 1e-3}, {"accuracy": 1e-6}, {"accuracy": 1e-6, "method": "dopri"}])
+@pytest.mark.one_in(12)
 def test_a_law_within_a_narrow_window_of_whole_numbers_acts(window, options, tmp_path):
     """30 N over 1 mm, by v^2/2.  It was passed over: no force, told as met, its energy balance zero."""
     found = ran(tmp_path, TEETH % window, **options)

@@ -37,7 +37,7 @@ class Compared:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_what_is_met_is_right(tmp_path, seed):
     """Behind the first row, where currents of coils that no text fixes may be what they like."""
     made = Compared(seed)

@@ -51,6 +51,7 @@ HILLS = {
 @pytest.mark.parametrize("hill", HILLS)
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
+@pytest.mark.long
 def test_a_hill_on_a_plain_delays(hill, formulation, accuracy, tmp_path):
     """By v^2/2 + V = 1/2 in all rows, and as much as it takes.  It was passed over, told as met."""
     law, top, half = HILLS[hill]
@@ -86,6 +87,7 @@ scene s of m {
 
 @pytest.mark.parametrize("width", [1.0, 0.1, 0.01])
 @pytest.mark.parametrize("options", [{}, {"accuracy": 1e-6}, {"accuracy": 1e-6, "method": "bdf"}])
+@pytest.mark.one_in(5)
 def test_the_heat_of_a_melting_is_not_left_out(width, options, tmp_path):
     """200 kJ at 330 K: behind it the temperature is what the heat says.  It was 190 K more by default, told as met."""
     found = ran(tmp_path, LATENT, settings=(("width", str(width)),), **options)
@@ -111,6 +113,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("number", [3, 4, pytest.param(220, marks=pytest.mark.long)])
+@pytest.mark.long
 def test_hills_of_arrays(number, tmp_path):
     """Each passes its own; more than 200 were passed over, told as met."""
     found = ran(tmp_path, SWARM, settings=(("n", str(number)),), accuracy=1e-6)
@@ -151,6 +154,7 @@ scene s of m {
     ],
 )
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
+@pytest.mark.one_in(12)
 def test_a_peak_that_an_event_waits_for_is_met(watched, at, accuracy, tmp_path):
     """Looks passed over it, and the event did not happen."""
     found = ran(tmp_path, PASSED % watched, accuracy=accuracy)
@@ -188,6 +192,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize(("accuracy", "part"), [(1e-3, 1e-3), (1e-3, 1e-5), (1e-6, 1e-5)])
+@pytest.mark.long
 def test_what_algebra_alone_decides_is_met_where_it_hardly_is(part, accuracy, tmp_path):
     """A node between resistors, a thousandth past its limit: interpolated within steps it stayed below, told as met."""
     for phase in (0.3, 1.3):

@@ -33,6 +33,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_a_fixed_content_is_what_the_text_says(formulation, tmp_path):
     """350 K beside 300 K, which stays, and 500 K, which cool."""
     found, t = ran(tmp_path, HEAT, formulation=formulation, accuracy=1e-6), np.linspace(0.0, 5e-3, 51)
@@ -68,6 +69,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_a_small_effort_is_no_difference_of_large_ones(formulation, tmp_path):
     """0.3 nV on a capacitor behind 1 Mohm at 324 V, whose digits end at 60 fV: a t/(R C), a being what divides V."""
     found, t = ran(tmp_path, BEHIND, formulation=formulation, accuracy=1e-6), np.linspace(0.0, 1.0, 11)
@@ -76,6 +78,7 @@ def test_a_small_effort_is_no_difference_of_large_ones(formulation, tmp_path):
     assert np.abs(found.at("b", t) - a * t / 1e12).max() < a * 1e-12 * 1e-6
 
 
+@pytest.mark.long
 def test_a_diode_that_turns_on_passes_over_nothing(tmp_path):
     """Its current grows a hundredfold within one step, a multiplier of the stabilised form is round-off: both were
     taken for steps that pass over something. Runs were finer than any iteration of Newton bears (6664 steps; E930).
@@ -115,6 +118,7 @@ def rings(time, w, r, h, c, m, leak):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("accuracy", [1e-2, 3e-3, 1e-3])
+@pytest.mark.long
 def test_a_light_mass_that_rings_is_not_passed_over(formulation, accuracy, tmp_path):
     """A pressure of which 7e-3 ring behind a choke, 1270 times less than the source alone would make of it: both runs
     passed over them, agreed, and were up to 7 times what was asked off.
@@ -132,6 +136,7 @@ LIGHTER = (
 
 
 @pytest.mark.parametrize("accuracy", [2.4e-4, 1e-5])
+@pytest.mark.one_in(2)
 def test_a_pair_is_not_believed_whose_finer_run_met_more(accuracy, tmp_path):
     """6e-4 of a pressure ring at 128 krad/s: no run of some 50 steps sees it, and where the pressure's size is guessed
     40 times too large neither do finer ones (63 times what was asked off, told as met).

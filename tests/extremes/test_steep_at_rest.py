@@ -15,6 +15,7 @@ scene s of m { time 0 s to 2.7 s; trace C.e as v }
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+@pytest.mark.long
 def test_round_off_of_a_law_is_no_magnitude(formulation, tmp_path):
     """E519 before: the residual cannot fall below 1.39e-17."""
     found = ran(tmp_path, MODEL, formulation=formulation, accuracy=1e-4)

@@ -53,7 +53,7 @@ def ended(folder, published, family, accuracy):
 # the tube's flows turn round at square roots: rows within steps miss 1e-5 there, which the run says itself
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-5])
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name not in SLOW])
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_published_end_values(tmp_path, published, family, accuracy):
     refused, error = ended(tmp_path, published, family, accuracy if family != "tube" else 10.0 * accuracy)
     assert refused == ("not met" if family == UNSEEN else "")
@@ -98,6 +98,7 @@ def test_a_draft_in_which_newton_fails_is_given_up(tmp_path, published):
         (1e-7, "radau", 500_000),
     ],
 )
+@pytest.mark.long
 def test_a_long_smooth_motion_of_steep_laws(tmp_path, published, accuracy, method, most):
     """The ring modulator's diodes are steep, its motion is smooth: the bdf at its highest order would take a million
     steps.  Rosenbrock goes on although its first runs have nothing in common; beyond it is radau's with all its stages.

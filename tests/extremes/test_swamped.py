@@ -49,6 +49,7 @@ def charging(v, t, R=1e3, C=1e-5, w=50.0):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("v", [1.0, 2.0, 3.5])
+@pytest.mark.long
 def test_a_capacitor_beside_a_diode_across_the_source(v, formulation, tmp_path):
     accuracy = 1e-3
     found = ran(tmp_path, RC.format(v), formulation=formulation, accuracy=accuracy)
@@ -61,6 +62,7 @@ def test_a_capacitor_beside_a_diode_across_the_source(v, formulation, tmp_path):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_an_estimate_is_of_the_traced_quantity(formulation, tmp_path):
     """It was 0.0, and the energy 30 % or 99 % off: round-off of the diode's 1e61 A excused 1e96 J."""
     found = ran(tmp_path, CUBIC, formulation=formulation)

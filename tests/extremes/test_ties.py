@@ -101,7 +101,7 @@ def train(t):
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize(("text", "exact"), [(PULLEY, pulley), (TRAIN, train), (CORE, core), (LAWS, laws)])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_closed_form(tmp_path, formulation, text, exact):
     run = ran(tmp_path, text, formulation=formulation, accuracy=1e-6)
     assert run.met

@@ -17,6 +17,7 @@ from told import told
         (48, "co_lagrangian", 1e-2),  # 3.8
     ],
 )
+@pytest.mark.long
 def test_no_more_is_left_open_than_is_told(number, formulation, accuracy, tmp_path):
     found = told(tmp_path, drawn(number), formulation, accuracy, "auto", [])
     assert not found.refused
@@ -24,6 +25,7 @@ def test_no_more_is_left_open_than_is_told(number, formulation, accuracy, tmp_pa
     assert not found.defect, str(found)
 
 
+@pytest.mark.long
 def test_rows_within_a_step_taken_for_its_state_are_of_that_step(tmp_path):
     """A reaction jumps within it: 5.8 times off what was asked in one row."""
     found = told(tmp_path, drawn(117), "lagrangian", 1e-3, "rosenbrock", [])
@@ -48,7 +50,7 @@ def test_rows_within_a_step_taken_for_its_state_are_of_that_step(tmp_path):
         (94, "lagrangian", 1e-2, "auto"),
     ],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(12)
 def test_what_is_told_as_met_is(number, formulation, accuracy, method, tmp_path):
     found = told(tmp_path, drawn(number), formulation, accuracy, method, [])
     assert found.met
@@ -56,7 +58,7 @@ def test_what_is_told_as_met_is(number, formulation, accuracy, method, tmp_path)
 
 
 @pytest.mark.parametrize("number", range(len(FAMILIES)), ids=[family.__name__ for family in FAMILIES])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_every_family_is_met_as_told(number, tmp_path):
     motion, truth = drawn(number), []
     for accuracy in (1e-2, 1e-3):
@@ -69,7 +71,7 @@ def test_every_family_is_met_as_told(number, tmp_path):
 @pytest.mark.parametrize(
     "number", range(len(switched_motions.FAMILIES)), ids=[family.__name__ for family in switched_motions.FAMILIES]
 )
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(12)
 def test_what_events_carry_is_met_as_told(number, tmp_path):
     found = told(tmp_path, switched_motions.drawn(number), "lagrangian", 1e-3, "auto", [])
     assert not found.refused
@@ -77,6 +79,7 @@ def test_what_events_carry_is_met_as_told(number, tmp_path):
     assert not found.defect, str(found)
 
 
+@pytest.mark.long
 def test_truths_at_two_tolerances_agree_and_are_the_same_for_ever():
     motion = drawn(5)
     times = np.linspace(0.0, motion.end, 50)

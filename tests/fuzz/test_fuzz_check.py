@@ -29,6 +29,7 @@ def script(path, *options, within):
     return done.returncode, done.stdout + done.stderr
 
 
+@pytest.mark.long
 def test_mutated_models():
     cases = 20_000 if LONG else 24
     code, said = fuzz("--cases", cases, "--jobs", 2, "--seed", "ci", within=200 if not LONG else 6 * 3600)
@@ -36,6 +37,7 @@ def test_mutated_models():
     assert said.endswith(f"{cases} texts, 0 failed\n")
 
 
+@pytest.mark.long
 def test_what_failed_once():
     files = sorted(KEPT.glob("*.sd"))[:: 1 if LONG else 12]
     assert files
@@ -45,6 +47,7 @@ def test_what_failed_once():
 
 
 @pytest.mark.skipif(os.name != "posix", reason="forks")
+@pytest.mark.long
 def test_hostile_input_to_every_door():
     code, said = script(CAMPAIGN, *(() if LONG else ("--cases", 2)), "--seed", "ci", within=8 * 3600)
     assert code == 0, said

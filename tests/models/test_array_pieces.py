@@ -43,6 +43,7 @@ def drops(n):
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 6])
+@pytest.mark.one_in(2)
 def test_an_index_means_its_own_statement(tmp_path, n):
     (tmp_path / "m.sd").write_text(CHAIN)
     trace = load(tmp_path / "m.sd").run(set={"A.n": n})
@@ -99,6 +100,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("n", [2, 3, 5])
+@pytest.mark.one_in(5)
 def test_what_an_input_reads_is_read_anew_in_each_part_of_a_loop(tmp_path, n):
     """A cascade of first-order lags behind a step: 1 - exp(-t) sum of t^j/j! below k (Erlang)."""
     (tmp_path / "m.sd").write_text(LAGS)
@@ -131,6 +133,7 @@ scene s of m {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("n", [1, 4])
+@pytest.mark.long
 def test_a_start_that_a_loop_says_of_several_statements(tmp_path, formulation, n):
     (tmp_path / "m.sd").write_text(FILTER)
     trace = load(tmp_path / "m.sd", formulation=formulation).run(set={"n": n})
@@ -192,6 +195,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_laws_that_read_both_neighbours_stand_in_parts(tmp_path, formulation):
     """At rest each cell is the mean of its neighbours."""
     (tmp_path / "m.sd").write_text(CELLS)
@@ -248,6 +252,7 @@ def test_a_grid_with_edges_and_corners_of_their_own(tmp_path, n, k):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_a_range_that_the_sizes_leave_empty(tmp_path, formulation):
     """Its inner nodes were undetermined coordinates in the complementary formulations (E516)."""
     changes = {
@@ -324,6 +329,7 @@ scene go of m {
 
 
 @pytest.mark.parametrize("n", [2, 4])
+@pytest.mark.one_in(2)
 def test_events_of_an_element_that_is_declared_by_itself(tmp_path, n):
     """Their targets have sizes for indices, `s[n].n[n]`: a fault before."""
     (tmp_path / "m.sd").write_text(FALLING)
@@ -354,6 +360,7 @@ LOOPED = "  c[1]: cell(k = 1) a = h, b = ground\n  for i in 2..n { c[i]: cell(k 
 
 
 @pytest.mark.parametrize("other", ["i - 1", "1"])
+@pytest.mark.long
 def test_elements_of_two_statements_side_by_side(tmp_path, other):
     """A loop that begins behind the first statement has no part there, which had both ends at one node (E413)."""
     looped = f"{LOOPED}\n  for i in 2..n {{ W[i]: dissipator(e = 1 ohm*f) c[i].m -> c[{other}].m }}"

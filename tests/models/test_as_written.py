@@ -47,6 +47,7 @@ READ += ", R.e as er, R.f as fr, Y.a.e as y"
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_a_branch_in_an_energy_has_its_slope_as_effort(tmp_path, formulation):
     trace = run(tmp_path, PAIR, READ + ", audit.energy", formulation)
     names = ("qa", "qb", "ea", "eb", "u", "v", "w", "er", "fr", "y")
@@ -132,6 +133,7 @@ def test_elements_along_displacements(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_elements_in_the_flow_of_a_branch(tmp_path, formulation):
     """A loop of one current: 2 H, 3.9 ohm, 0.8 F."""
     trace = run(tmp_path, SERIES, "W.L.f as f, a.e as a, c.e as c, L2.e + R2.e as far, W.b.e as b", formulation)
@@ -190,7 +192,7 @@ model m {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_initial_values_over_a_label_of_two_places(tmp_path, formulation):
     traced = ", ".join(f"P[{i}].M.f as f{i}, P[{i}].w as w{i}" for i in range(1, 6))
     trace = run(tmp_path, LINKS, f"{traced}, sum(i in 1..n: P[i].K.e) as total", formulation)
@@ -213,6 +215,7 @@ def test_no_second_place_has_a_name_that_nobody_wrote(tmp_path):
     assert not any("#" in d.message for d in report)
 
 
+@pytest.mark.long
 def test_a_scene_goes_before_the_model_and_the_model_before_a_component(tmp_path):
     text = LINKS + END.format("P[1].M.f as a, P[2].M.f as b").replace("time 0", "init P[2].M.f = -7 m/s\n  time 0")
     trace = trace_of(tmp_path, text, backend="numpy")
@@ -248,7 +251,7 @@ model m {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("law", ["gain*e", "0.3 S*e*(1 + t/(1 s))"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(4)
 def test_a_source_that_reads_an_input_or_time_is_one(tmp_path, law, formulation):
     text = f"""
 model m {{
@@ -314,6 +317,7 @@ def test_they_are_raised(tmp_path, code):
     assert codes_of(tmp_path, REFUSED[code]) == {code}
 
 
+@pytest.mark.long
 def test_a_loop_of_stores_is_a_note(tmp_path):
     text = """
 model m {
@@ -352,6 +356,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("end", ["0.7", "0.333", "3"])
+@pytest.mark.long
 def test_the_last_euler_sample_is_on_the_end(tmp_path, end):
     trace = trace_of(tmp_path, KNIFE, until=end)
     assert trace.time[-1] == float(end)
@@ -436,6 +441,7 @@ model m {
 
 @pytest.mark.parametrize("formulation", FOUR[:2])
 @pytest.mark.parametrize("name", SINGULAR)
+@pytest.mark.one_in(5)
 def test_a_singular_start_is_found_and_a_regular_one_is_none(tmp_path, name, formulation):
     text, says, (here, moved) = SINGULAR[name]
     ran, report = attempt(tmp_path, text + END.format("t"), formulation=formulation, backend="numpy")

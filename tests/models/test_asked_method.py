@@ -39,6 +39,7 @@ def _slopes(t, state):
 
 
 @pytest.mark.parametrize(("method", "accuracy"), [("rosenbrock", 1e-6), ("bdf", 1e-5), ("bdf", 1e-6)])
+@pytest.mark.long
 def test_a_sled_slides(method, accuracy, tmp_path):
     """Its blade turns it about, and errors grow a thousandfold: by rosenbrock the run behind the draft misses; by the
     bdf one of two runs was so good by chance that the other was believed, 1.5 and 1.9 times off.

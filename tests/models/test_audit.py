@@ -28,7 +28,7 @@ LINEAR, CHARGE = "p = 0.5 H*f", "q = 0.7 F*e"
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("read", ["0.3*L.e", "0.1 V"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_store_whose_effort_a_law_reads(tmp_path, read, formulation):
     trace = trace_of(tmp_path, COIL.format(law=LINEAR, store=CHARGE, read=read), formulation=formulation)
     assert trace["audit.kinetic"].values == pytest.approx(0.25 * trace["L.f"].values ** 2, abs=1e-9)
@@ -48,6 +48,7 @@ def test_stores_that_stay_implicit(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_stores_whose_integral_is_a_logarithm_of_cosh_or_of_a_sum_of_squares(tmp_path, formulation):
     law, store = "f = 3 A/Wb*p + 0.2 A*atan(p/(0.01 Wb))", "e = 2 V/C*q + 0.3 V*tanh(q/(0.05 C))"
     trace = trace_of(tmp_path, COIL.format(law=law, store=store, read="0.1 V"), formulation=formulation)
@@ -80,6 +81,7 @@ def test_no_law_reads_the_audit(tmp_path, statement):
     assert [d.code for d in report if d.severity == "error"] == ["E102"]
 
 
+@pytest.mark.long
 def test_round_off_beside_what_is_stored_is_no_turnover(tmp_path):
     """Charged capacitors that do nothing: the balance is measured by what they hold."""
     text = """
@@ -117,7 +119,7 @@ scene go of branches {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_what_dissipators_absorb_is_dissipated_whatever_form_their_laws_take(tmp_path, formulation):
     trace = trace_of(tmp_path, BRANCHES, formulation=formulation)
     lost = sum(trace[f"{name}.energy"].values for name in "RDM")
@@ -126,6 +128,7 @@ def test_what_dissipators_absorb_is_dissipated_whatever_form_their_laws_take(tmp
     assert trace["audit.supplied"].values == pytest.approx(-trace["Vs.energy"].values, abs=1e-6 * lost[-1])
 
 
+@pytest.mark.long
 def test_what_is_supplied_is_accurate_against_what_goes_round(tmp_path):
     """A bead on a hoop that turns: its energy in the turning frame stays, and nothing is supplied; E920 before."""
     (tmp_path / "m.sd").write_text("""\

@@ -36,7 +36,7 @@ def _chamber(instants):
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_pump_draws(tmp_path, accuracy):
     """By rosenbrock the flow drawn, zero for a third of a second, was tested below round-off once the valve opened.  At
     1e-3 the row 4 us behind an event, which the draft has before its own, was compared with nothing: 2.4 times off.

@@ -42,7 +42,7 @@ ENDS = {
 
 
 @pytest.mark.parametrize("family", ENDS)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_published_ends(family, tmp_path):
     run = simulate(BENCHMARK / f"{family}.sd", scene="reference", accuracy=ASKED, output=tmp_path / "t.h5")
     for number, wanted in ENDS[family].items():
@@ -67,6 +67,7 @@ def modal(t, n, node, f=2.0):
 
 
 @pytest.mark.parametrize("n", [10, 100])
+@pytest.mark.long
 def test_rc_ladder_against_its_modes(n, tmp_path):
     time, *found = ladder("rc_ladder", tmp_path, n)
     for values, node in zip(found, (n // 2, n), strict=True):
@@ -90,6 +91,7 @@ def diodes(t, v):
 
 
 @pytest.mark.parametrize(("name", "slopes", "per"), [("lc_line", line, 2), ("nltl", diodes, 1)])
+@pytest.mark.long
 def test_lines_against_scipy(name, slopes, per, tmp_path):
     n = 40
     time, middle, end = ladder(name, tmp_path, n)
@@ -100,6 +102,7 @@ def test_lines_against_scipy(name, slopes, per, tmp_path):
 
 
 @pytest.mark.parametrize("accuracy", [1e-5, 1e-7])
+@pytest.mark.one_in(2)
 def test_what_flows_known_by_differences_have_in_common_is_no_state(accuracy, tmp_path):
     """Tested as states, the potentials of floating capacitors held the bdf at order 1: 281 000 steps at 1e-7, an error
     of 10 times that, and an estimate of a hundredth of the error.

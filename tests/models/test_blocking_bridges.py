@@ -56,7 +56,7 @@ def exact():
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-7])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(12)
 def test_bridge_that_blocks_is_as_accurate_as_asked(accuracy, formulation, exact, tmp_path):
     """Behind its line a bridge shorts nothing where its source goes through zero: no steps of round-off there."""
     file = tmp_path / "m.sd"

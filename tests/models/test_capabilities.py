@@ -24,6 +24,7 @@ from sysdyn.dsl.text.diagnostics import Report
 # -- chapters 1 and 2 --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_01_unified_variables():
     """Effort times flow is a power; momentum and displacement are their integrals; heat is the pseudo domain."""
     seen = set()
@@ -55,6 +56,7 @@ def test_02_paynter_diagram(formulation, kinds):
     assert found == kinds
 
 
+@pytest.mark.long
 def test_03_power_and_energy(tmp_path):
     """P = e f, E = its integral: what the capacitor gives the resistor turns to heat."""
     found = trace_of(tmp_path, RC)
@@ -66,18 +68,21 @@ def test_03_power_and_energy(tmp_path):
     assert found["stored"].values == pytest.approx(9.0 * np.exp(-2 * t), abs=1e-7 * 9)
 
 
+@pytest.mark.long
 def test_04_kinetic_stores():
     """Linear, saturating with speed (relativistic), and with an inductance that moves; by T* and by T."""
     for key in ("mass_spring", "relativistic_mass", "solenoid"):
         meets(key)
 
 
+@pytest.mark.long
 def test_05_potential_stores():
     """A linear and a cubic spring by V, a spring by V*."""
     meets("nonlinear_spring")
     meets("mass_spring", "lagrangian", "co_lagrangian")
 
 
+@pytest.mark.long
 def test_06_dissipators():
     """Content D, cocontent G, and Coulomb friction through virtual work alone."""
     meets("nonlinear_spring", "lagrangian")
@@ -86,12 +91,14 @@ def test_06_dissipators():
     assert not made[1].energies.function("D")
 
 
+@pytest.mark.long
 def test_07_sources_of_time():
     """An effort source, and a flow source as implicit effort and as rheonomic constraint: one solution."""
     meets("electrical_transformer")
     assert counts("fluid_tank") == {(3, 1, 0, 1, 0), (3, 1, 1, 0, 0)}
 
 
+@pytest.mark.long
 def test_08_legendre_transformation():
     """T + T* = p f and dT*/dq = -dT/dq on the solution of the solenoid, from the compiled rows of both forms."""
     (_, lagrange, _), (_, hamilton, _) = meets("solenoid")
@@ -114,34 +121,40 @@ def _own(root, node):
     return next(n for n in ex.variables(root) if repr(n) == repr(node))
 
 
+@pytest.mark.long
 def test_09_transformers():
     for key in ("lever", "gear_pair", "electrical_transformer", "fluid_transformer"):
         meets(key)
 
 
+@pytest.mark.long
 def test_10_transforming_transducers():
     for key in ("rack_pinion", "ram_cylinder", "pd_pump"):
         meets(key)
 
 
+@pytest.mark.long
 def test_11_gyrators():
     """Two implicit efforts each, which do no work together."""
     for key in ("dc_motor", "mechanical_gyrator", "voice_coil"):
         assert counts(key) == {(2, 0, 0, 2, 0)}
 
 
+@pytest.mark.long
 def test_12_signal_transducers():
     """The speed that a controller reads loads nothing: the brake's rows have no effort of the sensor."""
     meets("brake_by_wire")
     meets("pi_controller")
 
 
+@pytest.mark.long
 def test_13_transactors():
     """The four controlled sources as effort constraints: the controlling port is not loaded."""
     for key in ("transactor_vcvs", "transactor_ccvs", "transactor_vccs", "transactor_cccs"):
         assert all(m3 == 1 for _, _, _, m3, _ in counts(key))
 
 
+@pytest.mark.long
 def test_14_configuration_coordinates():
     """The arm in four Cartesian coordinates and in two angles: one motion, dof 2 in both."""
     made = meets("two_link_arm", "lagrangian")
@@ -149,17 +162,20 @@ def test_14_configuration_coordinates():
     assert {facts.dof for _, _, facts in made} == {2}
 
 
+@pytest.mark.long
 def test_15_complementary_configuration():
     """Momenta as coordinates."""
     assert counts("co_circuit") == {(3, 0, 0, 0, 0)}
 
 
+@pytest.mark.long
 def test_16_displacement_constraints():
     """Scleronomic (slider-crank) and rheonomic (bead on a turning rod)."""
     meets("slider_crank")
     meets("bead_rod")
 
 
+@pytest.mark.long
 def test_17_flow_constraints():
     """Integrable and nonholonomic; the disk keeps four configurations for two degrees of freedom."""
     meets("electrical_transformer")
@@ -176,6 +192,7 @@ def test_18_tangible_displacements():
         assert any(d.code == "N501" for d in prepared.compiled.notes)
 
 
+@pytest.mark.long
 def test_19_degrees_of_freedom():
     """n - m1 - m2 where the constraints are independent."""
     for key in ("pendulum", "slider_crank", "parallelogram", "rolling_disk", "lead_filter", "lc_ladder"):
@@ -184,18 +201,21 @@ def test_19_degrees_of_freedom():
             assert facts.dof == n - m1 - m2
 
 
+@pytest.mark.long
 def test_20_effort_constraints():
     """A diode, a motor, friction: implicit efforts closed by gamma."""
     for key in ("diode_circuit", "dc_motor", "incline_friction", "coulomb_planar"):
         assert all(m3 > 0 for _, _, _, m3, _ in counts(key))
 
 
+@pytest.mark.long
 def test_21_dynamic_constraints():
     """Integral control and the junctions of a transistor."""
     assert counts("integral_controller") == {(1, 0, 0, 1, 1)}
     assert counts("ebers_moll") == {(2, 0, 0, 2, 2)}
 
 
+@pytest.mark.long
 def test_22_displacement_classes():
     """Phi_q f + Phi_t = 0 of the bead: the actual motion has the term of time, the virtual one has not."""
     (entry,) = (e for e in entries("bead_rod", "lagrangian") if e.file == "bead_rod_sin_cos_form")

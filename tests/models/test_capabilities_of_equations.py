@@ -10,11 +10,13 @@ from sysdyn.compiler.forms.descriptor import BESIDE
 from sysdyn.dsl.model import expression as ex
 
 
+@pytest.mark.long
 def test_23_virtual_work(capsys):
     """Printed as the sum of efforts by virtual displacements, in mechanical and electrical letters."""
     assert "δW = (F0 + F1 sin(w t)) δq1 + E δq3" in printed(capsys, "em_suspension", "lagrangian")
 
 
+@pytest.mark.long
 def test_24_lagranges_principle():
     """Constraint efforts do no virtual work: -(Phi_q^T kappa) dq = 0 for every dq with Phi_q dq = 0."""
     (entry,) = entries("slider_crank", "lagrangian")
@@ -33,6 +35,7 @@ def test_24_lagranges_principle():
     assert abs(efforts @ virtual) <= 1e-14 * np.linalg.norm(efforts)
 
 
+@pytest.mark.long
 def test_25_kinetic_efforts(capsys):
     """The pull of the suspension's magnet is physical; the arm's terms in f^2 come of its angles alone."""
     assert "M f1' = -b0 f2^2/(2 (b1 + q1)^2) + F0 + F1 sin(w t)" in printed(capsys, "em_suspension", "lagrangian")
@@ -41,12 +44,14 @@ def test_25_kinetic_efforts(capsys):
     assert not any("f1^2" in line for line in printed(capsys, "two_link_arm_cartesian", "lagrangian")[3:])
 
 
+@pytest.mark.long
 def test_26_applied_efforts(capsys):
     """A torque resolved on the pin's Cartesian coordinates."""
     meets("slider_crank")
     assert "δW = -tau q2/r^2 δq1 + tau q1/r^2 δq2" in printed(capsys, "slider_crank", "lagrangian")
 
 
+@pytest.mark.long
 def test_27_multipliers_are_reactions(tmp_path):
     """The force of the pendulum's rod: 2 l kappa = m (l om^2 + g cos th)."""
     (entry,) = (e for e in entries("pendulum", "lagrangian") if e.counts[0] == 2)
@@ -79,6 +84,7 @@ def test_28_virtual_momentum(capsys):
 # -- chapter 3 ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_29_first_law_in_variational_form():
     """d(T + V)/dt + dissipated - supplied = 0 along every virtual motion: the audit's identity on random states."""
     for entry in entries("em_suspension"):
@@ -99,6 +105,7 @@ def test_29_first_law_in_variational_form():
                 assert abs(balance) <= 1e-7 * max(size, 1e-3)
 
 
+@pytest.mark.long
 def test_30_lagrange_ode():
     """Independent coordinates: no multiplier, index 0."""
     for key in ("pendulum", "two_link_arm"):
@@ -106,6 +113,7 @@ def test_30_lagrange_ode():
         assert [entry.counts[1:5] for entry, _, _ in made] == [(0, 0, 0, 0)]
 
 
+@pytest.mark.long
 def test_31_lagrangian_dae(capsys):
     """The multiplier rule: M f' + Phi_q^T kappa = Y."""
     lines = printed(capsys, "pendulum", "lagrangian")
@@ -113,6 +121,7 @@ def test_31_lagrangian_dae(capsys):
         assert wanted in lines
 
 
+@pytest.mark.long
 def test_32_work_energy_statement(tmp_path):
     """The balance of energy of a run is the sum of what is stored, dissipated and supplied."""
     found = trace_of(tmp_path, RC)
@@ -144,6 +153,7 @@ def test_35_hamiltonian_dae(capsys):
         assert wanted in lines
 
 
+@pytest.mark.long
 def test_36_underlying_hamilton_ode(capsys):
     """With a displacement and with a flow constraint."""
     for file in ("pendulum", "knife_edge_sin_cos_form"):
@@ -162,11 +172,13 @@ def test_37_canonical_form(capsys):
 # -- chapter 5 ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_38_co_lagrangian_dae():
     for key in ("co_circuit", "msd_velocity_source", "two_tank", "mass_spring"):
         meets(key, "co_lagrangian")
 
 
+@pytest.mark.long
 def test_39_co_hamiltonian_dae(capsys):
     """The book's sign: k q2 + e2 = 0."""
     for key in ("co_circuit", "msd_velocity_source", "two_tank", "mass_spring"):
@@ -174,12 +186,14 @@ def test_39_co_hamiltonian_dae(capsys):
     assert "e2 = -k q2" in printed(capsys, "msd_velocity_source", "co_hamiltonian")
 
 
+@pytest.mark.long
 def test_40_complementary_constraints():
     """Momentum constraints with initial momenta, an effort constraint."""
     assert counts("msd_velocity_source") == {(3, 2, 0, 0, 0)}
     assert counts("two_tank", "co_lagrangian", "co_hamiltonian") == {(4, 1, 1, 0, 0)}
 
 
+@pytest.mark.long
 def test_41_duality(capsys):
     """Two tanks: balances of flows in momenta, balances of efforts in displacements; one solution."""
     meets("two_tank")
@@ -191,6 +205,7 @@ def test_41_duality(capsys):
 # -- chapter 6 ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_42_analysis_procedure(tmp_path):
     """Text to trace in one call: coordinates, energies, constraint, work, parameters, start, solution."""
     text = (BOOK / "pendulum_minimal.sd").read_text()
@@ -201,6 +216,7 @@ def test_42_analysis_procedure(tmp_path):
     assert np.max(np.abs(found["q1"].values[places] - wanted)) <= 1e-6 * np.max(np.abs(wanted))
 
 
+@pytest.mark.long
 def test_43_consistent_initial_conditions():
     """Multipliers and hidden constraints at the start, against the first row of the known solution."""
     for key in ("pendulum_spring", "slider_crank", "rectifier_motor_crank"):

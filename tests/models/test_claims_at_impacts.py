@@ -23,6 +23,7 @@ def _run(folder, claim, method):
 
 
 @pytest.mark.parametrize("method", ["radau", "bdf", "rosenbrock"])
+@pytest.mark.long
 def test_a_ball_is_above_its_floor(tmp_path, method):
     found = _run(tmp_path, "y - r >= 0.2 m", method)
     off = 0.3 - found["y"].values.min()
@@ -30,6 +31,7 @@ def test_a_ball_is_above_its_floor(tmp_path, method):
 
 
 @pytest.mark.parametrize("claim", ["y - r >= (0.2 + 1e-11)*(1 m)", "0.2 m*(1 + 1e-11) <= y - r", "y - r > 0.2 m"])
+@pytest.mark.long
 def test_what_is_off_by_more_or_asked_strictly_fails(tmp_path, claim):
     with pytest.raises(api.ModelError, match="E909"):
         _run(tmp_path, claim, "radau")

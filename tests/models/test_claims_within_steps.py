@@ -22,6 +22,7 @@ def _run(folder, limit, **options):
 
 
 @pytest.mark.parametrize("method", ["bdf", "radau", "dopri", "rosenbrock"])
+@pytest.mark.long
 def test_a_crest_within_a_step_breaks_a_claim(tmp_path, method):
     """At the ends of steps alone x was no more than 0.4566 m, at eight instants of each up to 3e-3 too little."""
     with pytest.raises(api.ModelError, match="E909"):
@@ -29,5 +30,6 @@ def test_a_crest_within_a_step_breaks_a_claim(tmp_path, method):
     _run(tmp_path, (1.0 + 1e-6) * AMPLITUDE, method=method, accuracy=1e-7)
 
 
+@pytest.mark.long
 def test_what_holds_between_steps_adds_no_rows(tmp_path):
     assert _run(tmp_path, 1.001 * AMPLITUDE).time.tolist() == [0.0, 5.0, 10.0]

@@ -101,8 +101,8 @@ def run(text, folder, formulation):
     return simulate(folder / "m.sd", formulation=formulation, output=folder / f"{formulation}.h5")
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("text", [PEAK, CHOPPER, SIDE_BY_SIDE, CLUTCH], ids=["peak", "chopper", "array", "freewheel"])
+@pytest.mark.long
 def test_four_formulations_move_and_happen_alike(tmp_path, text):
     first, *others = (run(text, tmp_path, formulation) for formulation in FOUR)
     assert len(first.events) > 2
@@ -117,6 +117,7 @@ def test_four_formulations_move_and_happen_alike(tmp_path, text):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(5)
 def test_a_capacitor_behind_a_diode_holds_the_peak(tmp_path, formulation):
     """It follows the source until i = C v' + v/R is zero, and falls with R C from there."""
     trace = run(PEAK, tmp_path, formulation)
@@ -129,6 +130,7 @@ def test_a_capacitor_behind_a_diode_holds_the_peak(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_a_thyristor_conducts_from_its_gate_to_the_end_of_its_current(tmp_path, formulation):
     """i = V/Z (sin(w t - phi) - sin(w t0 - phi) exp(-(t - t0) R/L)) from 3 ms on, as long as it is positive."""
     trace = run(RECTIFIER, tmp_path, formulation)
@@ -153,6 +155,7 @@ def test_an_inequality_that_holds_at_times_leaves_a_wire_in_between(tmp_path):
 
 
 @pytest.mark.parametrize("formulation", FOUR[2:])
+@pytest.mark.long
 def test_a_constraint_reads_the_time(tmp_path, formulation):
     """A first-order lag behind a sine: v = A exp(-t/T) + 5 V (sin t - T cos t)/(1 + T^2), T = 2 s."""
     found = run(DRIVEN, tmp_path, formulation)

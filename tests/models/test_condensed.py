@@ -82,7 +82,7 @@ def waves():
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize(("text", "exact"), [(LADDER, ladder), (WAVES, waves)], ids=["ladder", "waves"])
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_a_line_meets_its_exponential(tmp_path, text, exact, formulation, method):
     trace = trace_of(tmp_path, text, formulation=formulation, method=method)
     for name, value in zip(("end", "middle", "current"), exact(), strict=True):
@@ -92,7 +92,7 @@ def test_a_line_meets_its_exponential(tmp_path, text, exact, formulation, method
 
 @pytest.mark.parametrize(("text", "left"), [(LADDER, 1.2), (WAVES, 2.2)], ids=["ladder", "waves"])
 @pytest.mark.parametrize("formulation", FOUR[:2])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_what_is_left_of_a_node(tmp_path, monkeypatch, text, left, formulation):
     """One unknown a node of a ladder, two of a line of inductors; rows and matrix are those of all unknowns."""
     met = []
@@ -130,6 +130,7 @@ CELL = """
 """
 
 
+@pytest.mark.long
 def test_the_matrix_of_a_circuit_is_the_slope_of_its_rows(tmp_path, monkeypatch):
     """At a random point."""
     met = []
@@ -293,7 +294,7 @@ def _after_jump(matrix, drive):
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize(("source", "exact"), [(KINKED, _after_ramp), (JUMPING, _after_jump)], ids=["kink", "jump"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_pieces_between_kinks_and_jumps_are_condensed(tmp_path, monkeypatch, source, exact, method):
     """One unknown a node on both sides of it; no structure of all unknowns is made where no state jumps."""
     seen, whole = [], []
@@ -345,7 +346,7 @@ scene s of ladder {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_charge_jumps_where_resistors_have_passed_charge_that_nothing_reads(tmp_path, formulation):
     (tmp_path / "ladder.sd").write_text(JUMPING)
     trace = simulate(tmp_path / "ladder.sd", formulation=formulation, output=tmp_path / "out.h5")
@@ -384,6 +385,7 @@ scene s of apart {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.long
 def test_no_unknown_leaves_as_the_small_difference_of_large_ones(tmp_path, method, formulation):
     """1 nA through 1 Gohm was the sum of -40 A and 40 A: the node was 3.5 uV off at the start, alike in all runs."""
     (tmp_path / "apart.sd").write_text(APART)

@@ -355,7 +355,7 @@ scene s of w { time 0 s to 0.5 s; trace r, spin.on(φ) as M; expect always: abs(
 @pytest.mark.parametrize(
     ("name", "formulation"), [(name, form) for name, (_, _, forms, _) in CASES.items() for form in forms]
 )
-@pytest.mark.one_in(10)
+@pytest.mark.long
 def test_a_model_is_what_its_text_says(tmp_path, name, formulation):
     text, closed, _, within = CASES[name]
     file = tmp_path / "m.sd"

@@ -140,6 +140,7 @@ TABLE = "table k(x: 1) -> N pchip stop [ (0, 1), (0.5, 2), (0.75, 0) ]\n"
         (TABLE + ENDLESS.format(rate="1 Hz", read="k(x)"), "E932", 0.75),
     ],
 )
+@pytest.mark.one_in(2)
 def test_no_run_is_met_whose_trace_is_no_number(tmp_path, capsys, text, code, since):
     file = tmp_path / "m.sd"
     file.write_text(text)

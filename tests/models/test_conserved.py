@@ -82,6 +82,7 @@ def conserved(text, tmp_path, **options):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["dopri", "radau", "bdf"])
+@pytest.mark.long
 def test_bodies_that_act_on_each_other_keep_their_momentum(formulation, method, tmp_path):
     kept, trace = conserved(PAIR, tmp_path, formulation=formulation, method=method)
     assert set(kept) == {"momentum of a + b"}  # a damper: not the energy
@@ -93,6 +94,7 @@ def test_bodies_that_act_on_each_other_keep_their_momentum(formulation, method, 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-4, 1e-8])
+@pytest.mark.one_in(12)
 def test_an_orbit_keeps_its_momentum_and_its_energy_as_well_as_it_says(formulation, accuracy, tmp_path):
     kept, trace = conserved(ORBIT, tmp_path, formulation=formulation, accuracy=accuracy)
     assert set(kept) == {"energy of r, phi", "momentum of phi"}
@@ -105,6 +107,7 @@ def test_an_orbit_keeps_its_momentum_and_its_energy_as_well_as_it_says(formulati
 
 
 @pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
 def test_charges_that_nothing_leads_away_are_kept(formulation, tmp_path):
     kept, trace = conserved(CHARGES, tmp_path, formulation=formulation)
     charge = next(k for what, k in kept.items() if what.startswith("displacement of"))
@@ -113,12 +116,14 @@ def test_charges_that_nothing_leads_away_are_kept(formulation, tmp_path):
     assert np.abs(trace["q"].values - 0.01).max() < 1e-12
 
 
+@pytest.mark.long
 def test_a_momentum_that_is_zero_is_judged_by_its_terms(tmp_path):
     kept, _ = conserved(CART, tmp_path, accuracy=1e-3)
     momentum = kept["momentum of x"]
     assert 0.0 < momentum["drift"] < 1e-3 * momentum["of"]
 
 
+@pytest.mark.long
 def test_a_push_ends_it(tmp_path):
     pushed = CART.replace("energy V", "work (1 N)*sin(t*(1 rad/s)) on x\n  energy V")
     kept, _ = conserved(pushed, tmp_path)

@@ -163,7 +163,7 @@ CASES = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.one_in(20)
+@pytest.mark.long
 def test_contents(tmp_path, case, formulation):
     body, start = CASES[case]
     text = "from std.electrical import coupled_inductors\nmodel net {{\n" + body + SCENE
@@ -176,7 +176,7 @@ def test_contents(tmp_path, case, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_what_may_stay_stays(tmp_path, formulation):
     """What follows from the state is free to move: laws that read an effort, an inductor that is said by its flow."""
     text = (ROOT / "tests" / "mutation" / "laws.sd").read_text()

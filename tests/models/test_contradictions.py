@@ -23,6 +23,7 @@ scene s of m { time 0 s to 5 us; trace a.e }
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
+@pytest.mark.long
 def test_voltages_around_a_loop(tmp_path, monkeypatch, formulation):
     """And a junction at 3 V, whose current of 1e43 A is nothing to search by."""
     searched = []
@@ -35,6 +36,7 @@ def test_voltages_around_a_loop(tmp_path, monkeypatch, formulation):
     assert not searched
 
 
+@pytest.mark.long
 def test_a_node_that_its_circuit_holds_elsewhere():
     """1 V behind 3 ohm on 2 ohm, the coil without current: 0.4 V; what has nothing to do with it is not named."""
     text = """
@@ -59,6 +61,7 @@ scene s of m { time 0 s to 1 s; trace p_.e }
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_what_moves_a_little_with_the_value_in_the_way_is_not_named(tmp_path, formulation):
     """The least change spread over the current of a coil, 1.5e-6 of its size: it was named beside the capacitor."""
     text = """

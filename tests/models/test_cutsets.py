@@ -29,7 +29,7 @@ scene go of cut {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_capacitors_behind_a_cut(tmp_path, formulation):
     trace = trace_of(tmp_path, MODEL, formulation=formulation)
     t = trace.time
@@ -42,6 +42,7 @@ def test_capacitors_behind_a_cut(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(5)
 def test_an_inerter_between_free_springs(tmp_path, formulation):
     """The same in a common-flow domain: nothing but springs and a force hold what the inerter joins."""
     text = """
@@ -148,14 +149,14 @@ def compared(tmp_path, case, n, formulation):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("case", FLOATING)
-@pytest.mark.one_in(5)
+@pytest.mark.long
 def test_families_behind_a_cut(tmp_path, case, formulation):
     compared(tmp_path, case, 3, formulation)
 
 
 @pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
 @pytest.mark.parametrize("case", FLOATING)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(2)
 def test_families_behind_a_cut_step_as_small_ones(tmp_path, case, formulation):
     """The sum of the balances is a row of its own: without it the steps are ten times as many."""
     trace = compared(tmp_path, case, 30, formulation)
@@ -188,7 +189,7 @@ HELD = {
 
 @pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian", "lagrangian"])
 @pytest.mark.parametrize("case", HELD)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_many_pairs_behind_cuts_begin_by_the_factors_of_their_rows(tmp_path, case, formulation, monkeypatch):
     """Capacitors that float, more of them than full matrices hold: what pairs have in common follows from currents, or
     their rates; that of rates may stay open, and the saddle point of twice the size is not asked for it.
@@ -209,6 +210,7 @@ def test_many_pairs_behind_cuts_begin_by_the_factors_of_their_rows(tmp_path, cas
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+@pytest.mark.long
 def test_an_inerter_between_springs_that_a_constraint_reads(tmp_path, formulation):
     """Psi ties z' to what the inerter sees: 3 a + 5 c = 0 with w = a - c leaves 3 kg w'' = - (15/8 N/m) w."""
     text = """
@@ -242,6 +244,7 @@ def _levered(t):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_a_mass_on_a_lever_between_springs(tmp_path, formulation):
     """The sum of balances that reads no inertia weighs them 2 to 1: its rates ask for y' at the start."""
     text = """
@@ -283,7 +286,7 @@ scene go of levers {{ time 0 s to 3 s; accuracy 1e-6; trace x[n] as x, y[n] as y
 
 @pytest.mark.parametrize("n", [3, 300])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(5)
 def test_however_many_levers_begin_where_their_balances_say(tmp_path, formulation, n):
     """2 x + 3 y = 0 follows from both balances of each, and its rate."""
     trace = trace_of(tmp_path, LEVERS.format(n=n), scene="go", formulation=formulation)
@@ -318,6 +321,7 @@ def test_a_long_chain_of_inerters_begins_where_its_springs_balance(tmp_path, for
 
 
 @pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_where_nothing_is_traced_every_node_is_told_whole(tmp_path, formulation):
     """sin(t) through 3 H and two capacitors side by side: node impulses are 3 sin(t) and (t - sin(t))/7 more.
 

@@ -76,7 +76,7 @@ def _missed(trace, accuracy):
      ("rosenbrock", 1e-7), ("rosenbrock", 1e-8), ("bdf", 1e-3), ("bdf", 1e-4), ("bdf", 1e-6), ("bdf", 1e-7),
      ("bdf", 1e-8)],
 )  # fmt: skip
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_a_crank_runs_down(method, accuracy, tmp_path):
     """A trial of friction that sticks there made 1e27 of a multiplier and of a rate, and points behind were settled
     beside that: they were off by 6 N, and at rest slips followed each other without end (E934).
@@ -87,6 +87,7 @@ def test_a_crank_runs_down(method, accuracy, tmp_path):
 
 
 @pytest.mark.parametrize(("method", "rtol"), [("radau", 1e-4), ("rosenbrock", 1e-8)])
+@pytest.mark.one_in(2)
 def test_a_crank_comes_to_rest_by_its_own_tolerance(method, rtol, tmp_path):
     """No set of constraints fitted there (E930)."""
     (tmp_path / "crank.sd").write_text(CRANK)

@@ -110,7 +110,7 @@ CASES = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(30)
 def test_a_step_across_stores(tmp_path, name, formulation):
     text, exact = CASES[name]
     trace = trace_of(tmp_path, text, formulation=formulation)
@@ -129,7 +129,7 @@ def test_a_damper_takes_along_what_hangs_on_it(tmp_path, formulation):
 
 @pytest.mark.parametrize("text", [PUSHED, TAKEN], ids=["pushed", "taken"])
 @pytest.mark.parametrize("formulation", [*FOUR[:2], "kane"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_damper_that_is_displaced_pushes_a_mass(tmp_path, text, formulation):
     """c dq = 2 N.s on 4 kg, through the damper or as the reaction of a rod: behind it 4 x'' + 2 x' + 5 x = 0."""
     trace = trace_of(tmp_path, text, formulation=formulation)
@@ -186,7 +186,7 @@ def random_circuit(seed):
 
 
 @pytest.mark.parametrize("seed", range(60) if os.environ.get("SYSDYN_LONG") else [0, 5, 6, 9, 17, 56])
-@pytest.mark.one_in(8)
+@pytest.mark.long
 def test_random_circuits_behind_a_step(tmp_path, seed):
     """Charges and voltages as coordinates agree."""
     found = []

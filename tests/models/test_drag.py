@@ -25,7 +25,7 @@ scene s of m {{
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("content", ["1/3*c*abs(x')^3", "1/3*c*x'^2*abs(x')", "1/3*c*hypot(x', 0 m/s)^3"])
 @pytest.mark.parametrize("speed", [1.0, -1.5])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(6)
 def test_quadratic_drag_is_smooth(tmp_path, formulation, content, speed):
     trace = trace_of(tmp_path, TEXT.format(coulomb=0, content=content, speed=speed), scene="s", formulation=formulation)
     known = speed / (1.0 + 2.0 * abs(speed))
@@ -33,6 +33,7 @@ def test_quadratic_drag_is_smooth(tmp_path, formulation, content, speed):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_drag_and_dry_friction_come_to_rest(tmp_path, formulation):
     """v' = -(1 + 2 v^2): at rest from t = atan(sqrt 2)/sqrt 2 on, after ln(3)/4 m."""
     text = TEXT.format(coulomb=1, content="N0*abs(x') + 1/3*c*abs(x')^3", speed=1)

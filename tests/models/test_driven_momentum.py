@@ -38,6 +38,7 @@ scene shakes of table {
 
 @pytest.mark.parametrize("method", ["radau", "bdf"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_the_torque_of_a_driven_inertia(tmp_path, formulation, method):
     path = tmp_path / "table.sd"
     path.write_text(MODEL)

@@ -21,6 +21,7 @@ def test_a_thousand_periods(name, formulation):
     assert abs(row.phase) < 1e-5
 
 
+@pytest.mark.long
 def test_the_meter_of_the_others_drifts():
     # so what holds above is no accident of the model
     assert measure("pendulum", "lagrangian", "dopri", 1e3, 1e-8).energy > 1e-6

@@ -34,7 +34,7 @@ def heated(t, tau):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(5)
 def test_thermostats_side_by_side(tmp_path, formulation):
     trace = trace_of(tmp_path, HEATED, formulation=formulation, accuracy=1e-6)
     for i in (1, 2, 3):
@@ -103,6 +103,7 @@ scene s of m { time 0 s to 1 s; trace x[1..n] as x every 0.05 s }
 
 
 @pytest.mark.parametrize("method", ["auto", "bdf", "radau"])
+@pytest.mark.one_in(2)
 def test_relays_that_slide_each_at_its_own_place(tmp_path, method):
     trace = trace_of(tmp_path, RELAYS, method=method, accuracy=1e-7)
     for i in (1, 2, 3, 4):
@@ -127,6 +128,7 @@ scene s of m { time 0 s to 0.7 s; trace y[n] as y every 0.1 s }
 
 
 @pytest.mark.parametrize("sizes", [(1, 3, 2), (3, 1)])
+@pytest.mark.long
 def test_a_loaded_model_with_events_takes_other_sizes(tmp_path, sizes):
     (tmp_path / "m.sd").write_text(BALLS)
     loaded = load(tmp_path / "m.sd")

@@ -43,14 +43,14 @@ def four(tmp_path_factory):
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-12])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_floating_bridge_at_every_tolerance(method, rtol, four, tmp_path):
     found = run(bridge(1, 1), tmp_path, rtol=rtol, method=method)
     assert abs(found["R.e"][-1] - four["R.e"][-1]) < 2e3 * rtol + 2e-8
 
 
 @pytest.mark.parametrize(("series", "parallel"), [(2, 1), (1, 2), (2, 2), (4, 4)])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(2)
 def test_strings_and_parallels_are_as_one(series, parallel, four, tmp_path):
     """An ideal diode in series or in parallel with its like changes no voltage outside."""
     found = run(bridge(series, parallel), tmp_path, rtol=1e-8, method="radau")
@@ -73,7 +73,7 @@ def test_diodes_behind_sources_of_their_own_are_no_parallel(tmp_path):
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("rtol", [1e-8, 1e-10])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(5)
 def test_bridge_before_a_coil_commutates_at_once(method, rtol, tmp_path):
     """The current of the coil changes arms where the source passes zero: at half periods, all four diodes at once."""
     gallery = Path(__file__).resolve().parents[2] / "models" / "gallery" / "diode_bridge.sd"
@@ -86,6 +86,7 @@ def test_bridge_before_a_coil_commutates_at_once(method, rtol, tmp_path):
 SIX = Path(__file__).parents[2] / "models" / "gallery" / "six_pulse_rectifier.sd"
 
 
+@pytest.mark.long
 def test_sets_that_short_a_source_are_not_searched_for(tmp_path, monkeypatch):
     """Where the current goes from one phase to the next both diodes conduct in the first set that is tried: linear
     algebra says at once that there is no such point.  Voltage and current against closed forms.
@@ -123,7 +124,7 @@ scene s of m { time 0 s to 0.9 ms; trace Ls.f, Ld.f, A.f, B.f, C.f, D.f every 0.
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(5)
 def test_a_current_that_circles_in_conducting_diodes_is_held_though_none_is_zero(tmp_path, formulation):
     """While two phases overlap all four conduct, and what circles in them is open (E516 in two formulations): one of
     them is held at zero.  The source charges its coil, the load decays, no diode leads backwards.
@@ -158,6 +159,7 @@ scene s of m { time 0 s to 1 ms; trace Cd.e as v every 0.1 ms; accuracy 1e-6 }
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_a_capacitor_at_a_source_that_falls_begins_at_it(tmp_path, formulation):
     """Nothing is said of it.  Conducting diodes take it to the source, whose fall they then would have to follow;
     blocked ones leave it at zero, where they conduct (E903): it begins at the source, and decays from there.
@@ -247,6 +249,7 @@ scene s of m { time 0 s to 20 ms; trace C.e as v every 1 ms; accuracy 1e-3 }
 
 
 @pytest.mark.parametrize("method", ["radau", "bdf", "rosenbrock"])
+@pytest.mark.one_in(2)
 def test_a_load_that_floats_behind_blocked_diodes_is_held_by_the_one_at_ground(tmp_path, method):
     """Held by the one behind the coil its current is a constraint of a constraint (index 3): 44000 events of round-off,
     or no step at all (E930) in the co-Hamiltonian form.

@@ -41,7 +41,7 @@ BRIDGES = [(2, "lagrangian"), (2, "hamiltonian"), (3, "lagrangian"), (5, "lagran
 
 
 @pytest.mark.parametrize(("phases", "formulation"), BRIDGES)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_a_bridge_commutates_and_does_nothing_else(phases, formulation, tmp_path):
     trace = run(bridge(phases), tmp_path, formulation)
     waves = [10.0 * np.sin(W * trace.time + PHASE - 2.0 * np.pi * k / phases) for k in range(phases)]
@@ -74,6 +74,7 @@ scene s of m {{
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_a_half_wave_into_a_resistor(formulation, tmp_path):
     trace = run(half_wave("r"), tmp_path, formulation)
     assert np.abs(trace["i"].values - 2.0 * np.maximum(np.sin(W * trace.time), 0.0)).max() < 1e-9
@@ -81,6 +82,7 @@ def test_a_half_wave_into_a_resistor(formulation, tmp_path):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_a_half_wave_into_a_capacitor(formulation, tmp_path):
     """The capacitor follows the source until its current turns, then discharges alone until the source is above it."""
     trace = run(half_wave("rc"), tmp_path, formulation)
@@ -97,6 +99,7 @@ def test_a_half_wave_into_a_capacitor(formulation, tmp_path):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_a_half_wave_into_a_coil(formulation, tmp_path):
     """The coil carries the current on beyond the half wave, until it ends; then nothing flows up to the next."""
     trace = run(half_wave("rl"), tmp_path, formulation)
@@ -130,7 +133,7 @@ scene s of m {
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["radau", "bdf"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_a_buck_converter_against_its_exponentials(method, formulation, tmp_path):
     trace = run(BUCK, tmp_path, formulation, method=method)
     assert trace.statistics["error_estimate"] <= 1e-6
@@ -168,6 +171,7 @@ scene s of m {
 """
 
 
+@pytest.mark.long
 def test_valves_in_series_begin_with_the_flow_that_keeps_both_pressures_alike(tmp_path):
     """An open valve joins both vessels: 0.02 l/s that leak divide as the stiffnesses do."""
     trace = run(VALVES, tmp_path, "lagrangian")
@@ -206,6 +210,7 @@ scene s of m { time 0 s to 20 ns; trace b.e as v every 0.1 ns }
 """
 
 
+@pytest.mark.long
 def test_a_gate_whose_transistors_are_off_by_turns(tmp_path):
     """An off transistor's law is zero, and its row has no term beside its residual; the discharge has a closed form."""
     file = tmp_path / "m.sd"
@@ -239,6 +244,7 @@ scene s of shared {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_two_capacitors_and_a_switch_alone(formulation, tmp_path):
     """One flow through all three, which nothing resists: its row alone says where the charge is behind the jump."""
     trace = run(SHARED, tmp_path, formulation)
@@ -267,6 +273,7 @@ scene s of grounded {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_what_series_capacitors_hold_besides_their_flow_stays_where_charge_jumps(formulation, tmp_path):
     """n3 at 7 V is grounded: each branch loses it in the inverse proportion of its capacities, its own charge stays."""
     trace = run(GROUNDED, tmp_path, formulation)
@@ -292,6 +299,7 @@ scene s of twice {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(2)
 def test_closed_switches_side_by_side_discharge_a_capacitor_and_their_shares_are_a_choice(tmp_path, formulation):
     """From 0.4 s on both say the same (E931 before)."""
     with pytest.warns(UserWarning, match=r"at times S.blocks, T.blocks leave S.f open: .* one of many"):
@@ -318,7 +326,7 @@ scene s of rectifier { time 0 s to 0.2 s; trace b.e }
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_diode_before_a_capacitor_lets_go_at_every_accuracy(tmp_path, accuracy, method):
     """Its current ends while the voltage across it is nothing: what a draft leaves of that is no voltage.  Closed form:
     the source, from where the current is nothing the capacitor over the resistor.

@@ -62,6 +62,7 @@ scene drop of box {
 """
 
 
+@pytest.mark.long
 def test_a_box_drops_on_four_feet_and_stays_level(tmp_path):
     file = tmp_path / "box.sd"
     file.write_text(BOX)

@@ -65,6 +65,7 @@ def both(text, tmp_path, monkeypatch, **options):
 
 
 @pytest.mark.parametrize("method", ["radau", "bdf"])
+@pytest.mark.long
 def test_a_converter_asks_its_handler_a_few_times(method, tmp_path, asked, monkeypatch):
     one, two = both(BUCK.replace("MORE", ""), tmp_path, monkeypatch, rtol=1e-8, method=method)
     assert len(one.events) == len(two.events) >= 600
@@ -89,7 +90,7 @@ def test_a_limit_of_events_ends_it_where_the_handler_does(tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize("number", range(len(FAMILIES)), ids=lambda k: FAMILIES[k].__name__)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_random_models_have_the_same_events(number, tmp_path, monkeypatch):
     one, two = both(drawn(number).text, tmp_path, monkeypatch, rtol=1e-7, method="radau")
     assert [e.name for e in one.events] == [e.name for e in two.events]
@@ -258,7 +259,7 @@ MOST_ASKED = 10
 
 @pytest.mark.parametrize("way", ["radau", "bdf", "rosenbrock", "dopri", "hamiltonian", "kane"])
 @pytest.mark.parametrize("name", list(MANY))
-@pytest.mark.one_in(6)
+@pytest.mark.long
 def test_the_core_makes_what_the_handler_does(name, way, tmp_path, asked, monkeypatch):
     """Assignments, cascades, flows that are assigned, samples, impacts: instants, entries, values, steps."""
     if way == "dopri" and any(word in MANY[name] for word in ("phi ", "psi ", "abs(")):
@@ -280,6 +281,7 @@ def test_the_core_makes_what_the_handler_does(name, way, tmp_path, asked, monkey
 
 
 @pytest.mark.parametrize("name", [name for name in MANY if name != "comes to rest"])
+@pytest.mark.one_in(3)
 def test_the_handler_is_asked_for_what_is_new(name, tmp_path, asked):
     file = tmp_path / "m.sd"
     file.write_text(MANY[name])
@@ -287,6 +289,7 @@ def test_the_handler_is_asked_for_what_is_new(name, tmp_path, asked):
     assert asked[1] <= min(MOST_ASKED, len(trace.events))
 
 
+@pytest.mark.long
 def test_elastic_impacts_by_the_core_keep_their_energy(tmp_path, asked):
     """Between two walls: impact k is at (2 k + 1) 5 cm/(1 m/s), 10000 of them."""
     file = tmp_path / "m.sd"
@@ -308,6 +311,7 @@ scene s of m { time 0 s to 1000 s; trace x, x' as v every 37 ms }
 
 
 @pytest.mark.parametrize("method", ["radau", "rosenbrock"])
+@pytest.mark.long
 def test_what_twists_into_its_zero_rests_there(method, tmp_path):
     """Each half turn takes a third of the way, and the root of a third of the time, of the one before: a finite sum."""
     file = tmp_path / "m.sd"

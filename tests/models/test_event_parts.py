@@ -103,6 +103,7 @@ def newton(masses, speeds, restitution):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("seed", range(6))
+@pytest.mark.one_in(12)
 def test_impulses_of_a_row_of_bodies_solve_their_complementarity_problem(seed, formulation):
     random = np.random.default_rng(seed)
     masses = 10.0 ** random.uniform(-1.0, 1.0, int(random.integers(2, 6)))
@@ -130,6 +131,7 @@ def test_a_cradle_hands_its_motion_on():
     assert found[[model.system.unknown_names.index(n) for n in ("a'", "b'")]] == pytest.approx([-1.0, 3.0], abs=1e-12)
 
 
+@pytest.mark.long
 def test_bodies_that_part_are_not_struck():
     model = Model(row_of([1.0, 2.0, 3.0]))
     y = model.at(**{"a'": -1.0, "b'": 0.5, "c'": 0.5})
@@ -194,6 +196,7 @@ scene s of block { time 0 s to 1 s; trace x }
     ],
 )
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_dry_friction_holds_up_to_its_bound_and_slides_along_the_speed(push, speed, word, rate, formulation):
     model = Model(BLOCK.replace("PUSH", f"{push} N").replace("SPEED", f"{speed} m/s"), formulation)
     (y, yd), _ = model.succession.after(0.0, model.y, model.yd, [], stalled=False)
@@ -227,6 +230,7 @@ scene s of bridge { time 0 s to 1 s; trace load.f }
 
 
 @pytest.mark.parametrize(("source", "conduct"), [(2.0, {"D1", "D4"}), (-2.0, {"D2", "D3"})])
+@pytest.mark.long
 def test_a_bridge_conducts_by_two_of_its_diodes(source, conduct):
     """Four that conduct leave the current that circles in them open; where all block nothing tells the efforts of a,
     and of p and n together.

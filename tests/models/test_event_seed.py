@@ -38,7 +38,7 @@ def happened(trace, times):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("model", EVENTS)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_references(model, formulation, tmp_path):
     reference = REFERENCES[model]
     trace = run(model, tmp_path, reference["t"], formulation=formulation)
@@ -66,7 +66,7 @@ def bounce(t, h, v, g, e, least=0.0):
 @pytest.mark.parametrize(
     "changed", [{"e": 0.55, "h_0": 0.4}, {"g": 3.7, "v_0": -2.0, "M": 0.3}, {"e": 1.0, "h_0": 2.0}, {"e": 0.0}]
 )
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(2)
 def test_a_ball_with_other_parameters(changed, tmp_path):
     p = {"g": 9.81, "e": 0.8, "h_0": 1.0, "v_0": 0.0, **changed}
     times = [0.1, 0.7, 1.3, 2.4]
@@ -93,6 +93,7 @@ def test_a_ball_through_fifty_impacts_and_to_rest(tmp_path):
 
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
+@pytest.mark.one_in(2)
 def test_a_ball_beyond_its_last_impact(method, tmp_path):
     end = math.sqrt(2.0 / 9.81) * (1.0 + 0.5) / (1.0 - 0.5)  # the sum of all flights
     trace = run("bouncing_ball", tmp_path, [1.1 * end], {"e": 0.5}, accuracy=1e-6, until=repr(1.5 * end), method=method)
@@ -105,7 +106,7 @@ def test_a_ball_beyond_its_last_impact(method, tmp_path):
 
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6, 1e-8])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(2)
 def test_low_bounces_are_resolved_at_any_tolerance(rtol, tmp_path):
     """By the bdf, whose error test does not see them: each flight is e times as long as the one before it."""
     file, end = SEED / "bouncing_ball.sd", math.sqrt(2.0 / 9.81) * (1.0 + 0.8) / (1.0 - 0.8)
@@ -118,6 +119,7 @@ def test_low_bounces_are_resolved_at_any_tolerance(rtol, tmp_path):
 
 
 @pytest.mark.parametrize("changed", [{"mu": 0.11, "v_0": -2.0}, {"M": 0.7, "g": 3.7, "x_0": 1.0}])
+@pytest.mark.long
 def test_a_slide_with_other_parameters(changed, tmp_path):
     p = {"M": 2.0, "mu": 0.3, "g": 9.81, "x_0": 0.0, "v_0": 3.0, **changed}
     a, times = p["mu"] * p["g"], [0.2, 0.6, 1.1, 1.9]

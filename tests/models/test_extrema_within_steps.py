@@ -63,6 +63,7 @@ def _ends(kept, quantity):
 
 @pytest.mark.parametrize("every", ["every 1 s", "every 10 s", "every 1 ms", ""])
 @pytest.mark.parametrize("method", ["dopri", "radau", "bdf"])
+@pytest.mark.one_in(12)
 def test_a_crest_is_as_exact_as_the_run(tmp_path, every, method):
     """Rows at each second were 2 % off, as were those at the steps of dopri."""
     k = np.array([3.0, 4.0, 7.0])
@@ -99,6 +100,7 @@ def test_extrema_on_both_sides_of_impacts(tmp_path):
     np.testing.assert_allclose(_ends(single, "w"), np.transpose([-speed, 0.8 * speed]), rtol=1e-6)
 
 
+@pytest.mark.long
 def test_what_nobody_asks_is_not_sought(tmp_path):
     """End values alone: no look, the same steps."""
     file = tmp_path / "m.sd"

@@ -48,7 +48,7 @@ def named(state, system, *names):
 @pytest.mark.parametrize(("n", "k"), [(20, 1.1), (200, 0.11), (300, 1.0)])
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_a_soliton_with_tails(n, k, law, formulation):
     """Toda's lattice: V = (sinh k / cosh(k i))^2, charges ln(1 + V), currents' rates the differences of voltages.
 
@@ -85,6 +85,7 @@ model stages {
 
 
 @pytest.mark.parametrize("formulation", FOUR[:2])
+@pytest.mark.long
 def test_stages_twelve_decades_apart(formulation):
     """The small capacitor takes 3/4 A and 1/4 uA, the large one gives 1/4 uA."""
     begun = started(STAGES, formulation)
@@ -144,6 +145,7 @@ model loops {
     "read", ["", "state W: J = 0 J\n  dynamic W' = C2.e*C2.f", "state Q: C = 0 C\n  dynamic Q' = C4.f"]
 )
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(12)
 def test_two_loops_of_three_capacitors_of_which_one_is_said(formulation, read):
     """The charges that nobody said have the least sum of squares: two linear equations in the voltages b and c.  What
     reads the current of a capacitor, whose charge is a state of its own then, moves nothing (in the co_ forms C2 took
@@ -175,6 +177,7 @@ model bent {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_bent_capacitors_in_a_loop_begin_with_the_least_charges(formulation):
     """In co-Lagrangian form n0 began at 0.42 V, told as what nothing else asks for."""
 
@@ -208,6 +211,7 @@ model string {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_guesses_that_hold_to_round_off_of_large_voltages_stay(formulation):
     """300 capacitors in series of 3 kV, every charge guessed and none in the way of another: nothing moves (in the co_
     forms they did, by 20 C of up to 31).
@@ -245,6 +249,7 @@ scene s of shafts {
 """
 
 
+@pytest.mark.long
 def test_a_row_of_several_operations_rounds_more_than_once(tmp_path):
     """Where a law is steep five of these thirty were refused (E903) for 1.6e-16 of the terms."""
     (tmp_path / "m.sd").write_text(SHAFTS)
@@ -278,6 +283,7 @@ JUNCTIONS = [(f, v) for f in FOUR for v in (0.0, 0.2, 5.0, 400.0) if v < 1.0 or 
 
 @pytest.mark.parametrize(("formulation", "held"), JUNCTIONS)
 @pytest.mark.parametrize("said", [-1e-3, -10.0])
+@pytest.mark.long
 def test_a_junction_that_blocks_and_shall_conduct(held, said, formulation):
     """Newton's step on the flat side of an exponential is up to 1e80 times too long: 18 of 24 such starts were refused,
     "D.law has no solution".  The voltage of the junction is vT ln(1 + i/Is).
@@ -314,6 +320,7 @@ model net {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_a_state_that_is_known_to_1e_13(formulation):
     """Fluxes of coupled coils had 1e-13 of all that moves left in them: a start beside a steep law was refused for that
     (E903, "6e-17 of the terms is left over", one form of four).  Node 3: 0.567 A + 1.303 S (n4 - n3) = (n3 - n1)/R3.
@@ -343,7 +350,7 @@ scene on of boost {{ time 0 s to 10 ns; trace L.f, sw.e, m.e every 1 ns }}
 
 @pytest.mark.parametrize("volts", [400.0, -1e4, 1e5])
 @pytest.mark.parametrize("formulation", FOUR[2:])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(5)
 def test_nodes_guessed_far_from_a_charged_neighbour_behind_junctions(tmp_path, formulation, volts):
     """At 0 V below 400 V their junctions have no slope, above -10 kV no number: inverted laws say where they are."""
     trace = trace_of(tmp_path, BOOST.format(volts=volts), formulation=formulation)
@@ -371,7 +378,7 @@ scene on of sliding {{ time 0 s to 1 ms; trace b.f every 1 ms }}
 
 @pytest.mark.parametrize("speed", [300.0, -1e5])
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(12)
 def test_a_joint_without_mass_between_bodies_that_move(tmp_path, formulation, speed):
     """Guessed at rest it is 3000 times the creep of its friction away from both."""
     trace = trace_of(tmp_path, SLIDING.format(speed=speed), formulation=formulation)

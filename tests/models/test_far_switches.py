@@ -17,6 +17,7 @@ scene back of wall {{ time 0 s to 3.9 s; trace x, x' as v; accuracy 1e-7; method
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("law", ["F/(1 + exp(x/(1 mm)))", "F*a/(a + 2*a*exp(x/(1 mm)))", "F - F/(1 + exp(-x/(1 mm)))"])
+@pytest.mark.one_in(12)
 def test_a_soft_wall_throws_back(tmp_path, formulation, law):
     """It begins 2000 widths away; its law has a potential, so the speed comes back.  It was E903: no numbers."""
     trace = trace_of(tmp_path, WALL.format(law=law).replace("method", f"formulation {formulation}"))

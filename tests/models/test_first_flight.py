@@ -59,7 +59,7 @@ def exact():
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-4, 1e-6])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(12)
 def test_first_landing_of_what_has_rested(accuracy, formulation, exact, tmp_path):
     """Its lift was compared with what it was on its seat: no set of constraints fitted (E930)."""
     file = tmp_path / "m.sd"

@@ -59,6 +59,7 @@ def first(tmp_path, text, formulation):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.one_in(5)
 def test_springs_in_series(tmp_path, formulation):
     """A massless point between two springs: k1 x = k2 (y - x), so its flow is k2/(k1 + k2) of the body's."""
     found = first(tmp_path, SERIES, formulation)
@@ -66,12 +67,14 @@ def test_springs_in_series(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_capacitors_in_series(tmp_path, formulation):
     """One current through all: minus the coil's."""
     found = first(tmp_path, LADDER, formulation)
     assert found == pytest.approx({"i1": -2.0, "i2": -2.0, "v": 3.0}, rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_guess_on_a_singular_point_starts_alike_in_both_formulations(tmp_path):
     """What nothing determines stays at its guess: b ~ 0 is where b^2 has no slope."""
     path = ROOT / "tests" / "mutation" / "held.sd"

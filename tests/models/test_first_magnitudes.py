@@ -32,6 +32,7 @@ def watched(monkeypatch, folder, name, **options):
     return found.outcome, np.array(system.unknown_names)[carried], first[carried], met[carried]
 
 
+@pytest.mark.long
 def test_the_ring_modulator_is_sized_by_what_its_diodes_let_through(monkeypatch, tmp_path):
     """The whole of its sources on its diodes would be 1e13 times what they meet."""
     outcome, names, first, met = watched(monkeypatch, tmp_path, "benchmark/ring", scene="reference")
@@ -42,6 +43,7 @@ def test_the_ring_modulator_is_sized_by_what_its_diodes_let_through(monkeypatch,
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_a_rectifier_from_rest_needs_no_steps_to_find_its_sizes(monkeypatch, tmp_path, formulation):
     """The diode that blocks first is as large as a part of its like."""
     outcome, *_ = watched(monkeypatch, tmp_path, "gallery/rectifier_motor_slider", formulation=formulation)
@@ -82,7 +84,7 @@ FAST = """coord y: translation = 0.5 m
 @pytest.mark.filterwarnings("ignore:at times")
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(2)
 def test_what_is_a_billion_times_as_fast_tells_no_time_to_others(tmp_path, accuracy, formulation):
     """A mass near the speed of light begins at zero beside a ball at half a metre, which is not its size: its time was
     2e-9 s by that, sources behind diodes were 1e12 V, and the bridge never led: 75 % off, told as done.

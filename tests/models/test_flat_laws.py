@@ -42,7 +42,7 @@ def _text(what):
 
 @pytest.mark.parametrize("formulation", FOUR[2:])
 @pytest.mark.parametrize("what", ["R", "C", "m", "d", "literal"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_flat_law_in_the_complementary_forms(tmp_path, what, formulation):
     found, expected = (trace_of(tmp_path, _text(what), formulation=f) for f in (formulation, "lagrangian"))
     for name in ("b.e", "Rs.f", "x.f"):
@@ -76,6 +76,7 @@ _GYRATOR = "gyrator(e1 = (2 V.s/m)*f2)"
 
 
 @pytest.mark.parametrize(("law", "parameter"), [("e1 = k*f2", "k = {} V.s/m"), ("f2 = k*e1", "k = {} m/V/s")])
+@pytest.mark.long
 def test_a_modulus_of_zero_is_a_short_circuit_or_open(tmp_path, law, parameter):
     """The primal forms divide by a transconductance, the others by a transresistance: zero in the text, or set."""
     text = MODEL.replace(_GYRATOR, f"gyrator({law})")
@@ -88,7 +89,6 @@ def test_a_modulus_of_zero_is_a_short_circuit_or_open(tmp_path, law, parameter):
             assert not trace["x.f"].values.any(), formulation
 
 
-@pytest.mark.one_in(2)
 def test_a_modulus_passes_zero_where_its_law_is_turned(tmp_path):
     """b.e of two capacitors C b' = u - b - g c, C c' = g b with g = sin(2 t): it passes zero, at the start too."""
     text = """
@@ -116,6 +116,7 @@ def test_a_modulus_passes_zero_where_its_law_is_turned(tmp_path):
         assert max(np.abs(trace["b.e"] - b).max(), np.abs(trace["c.e"] - c).max()) < 1e-8, formulation
 
 
+@pytest.mark.long
 def test_an_array_with_one_flat_law(tmp_path):
     text = """
     model chain {
@@ -137,6 +138,7 @@ def test_an_array_with_one_flat_law(tmp_path):
     assert last[0] > 0.0
 
 
+@pytest.mark.long
 def test_an_inductor_of_zero_between_nodes_is_a_wire(tmp_path):
     """A fault in sysdyn in the complementary forms: what holds nothing was guessed to hold nothing."""
     text = MODEL.replace("param R", "param L0 = 0 H\n  param R").replace(
@@ -148,9 +150,9 @@ def test_an_inductor_of_zero_between_nodes_is_a_wire(tmp_path):
         assert np.abs(trace_of(tmp_path, text, formulation=formulation)["b.e"] - alone).max() < 1e-6, formulation
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("given", ["param", "discrete"])
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(12)
 def test_what_is_fixed_of_a_store_that_holds_nothing_is_not_forgotten(tmp_path, formulation, given):
     """A capacitor of 0 F at 1 V where a divider says 3 V: all forms had begun at 3 V without a word."""
     text = f"""

@@ -23,6 +23,7 @@ def test_the_last_ball_of_the_cradle_leaves_with_what_came_in(tmp_path):
     assert run["x3"][k] / 1e3 == pytest.approx(left / w * sin(w * (0.4 - second)), rel=0, abs=1e-6 * swing)
 
 
+@pytest.mark.long
 def test_the_clutch_locks_alike_by_friction_and_by_events(tmp_path):
     """One speed behind the lock, from two texts of one clutch."""
     ends = [
@@ -33,7 +34,7 @@ def test_the_clutch_locks_alike_by_friction_and_by_events(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["six_pulse_rectifier", "buck_converter", "piston_pump", "backlash_gear"])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_what_a_model_expects_holds(name, tmp_path):
     """Its own expects are closed forms, or bounds, and raise where they fail; the books close."""
     run = simulate(GALLERY / f"{name}.sd", accuracy=1e-6, o=tmp_path / "x.h5")
@@ -41,6 +42,7 @@ def test_what_a_model_expects_holds(name, tmp_path):
     assert len(run.events) > 10
 
 
+@pytest.mark.long
 def test_the_teeth_of_a_gear_with_play_keep_their_distance_and_lose_energy_at_each_knock(tmp_path):
     run = simulate(GALLERY / "backlash_gear.sd", accuracy=1e-6, o=tmp_path / "x.h5")
     assert max(abs(run["gap"].values)) <= 0.01 + 1e-9
@@ -51,6 +53,7 @@ def test_the_teeth_of_a_gear_with_play_keep_their_distance_and_lose_energy_at_ea
 
 
 @pytest.mark.parametrize("method", ["bdf", "rosenbrock"])
+@pytest.mark.long
 def test_what_relaxes_behind_an_event_within_a_row_counts(method, tmp_path):
     """The valves of the pump open into flows that follow within a millisecond, the interval of the trace."""
     file, accuracy = GALLERY / "piston_pump.sd", 1e-4
@@ -71,6 +74,7 @@ def _drawn(t, opens):
 
 
 @pytest.mark.parametrize("accuracy", [1e-9, 1.5e-9, 1e-10, 3.2e-11])
+@pytest.mark.long
 def test_values_within_the_first_step_behind_an_event_are_as_good_as_others(accuracy, tmp_path):
     """4 us behind the instant at which the valve opens, within a step of 36: they were a cubic's, whose error the step
     was not held to (estimated error 5e-9 at 1e-9, 2e-6 at 3e-11).
@@ -84,6 +88,7 @@ def test_values_within_the_first_step_behind_an_event_are_as_good_as_others(accu
 
 
 @pytest.mark.parametrize("rtol", [1e-10, 3e-12, 1e-12, 1.5e-13, 3e-14])
+@pytest.mark.one_in(5)
 def test_flows_that_are_round_off_of_displacements_do_not_stop_a_short_step(rtol, tmp_path):
     """Behind an event within a step of 1 us, where Newton's corrections of flows do not shrink any more."""
     text = (GALLERY / "piston_pump.sd").read_text().replace("0 s to 2 s", "0 s to 1.7 s").replace(" every 1 ms", "")

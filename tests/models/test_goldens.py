@@ -50,7 +50,7 @@ def test_they_are_small():
 
 
 @pytest.mark.parametrize(("golden", "turn"), [(g, k) for k, g in enumerate(GOLDENS)], ids=[g.label for g in GOLDENS])
-@pytest.mark.one_in(14)
+@pytest.mark.one_in(77)
 def test_golden(golden, turn, capsys):
     runs = [["--formulation", golden.formulations[turn % len(golden.formulations)]]]
     if LONG:

@@ -44,7 +44,7 @@ def started(tmp_path, capsys, text):
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("sign", ["+", "-"])
 @pytest.mark.parametrize("angle", [0.0, 0.6, 1.2, 2.0, 3.0, 4.4, -0.9])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_a_consistent_guess_comes_back(tmp_path, capsys, angle, sign, formulation):
     text = CRANK.format(angle=angle, guess=ROOT.format(sign=sign), formulation=formulation)
     x, th, moved = started(tmp_path, capsys, text)
@@ -54,6 +54,7 @@ def test_a_consistent_guess_comes_back(tmp_path, capsys, angle, sign, formulatio
     assert moved == []
 
 
+@pytest.mark.long
 def test_a_guess_by_an_expression_that_moved_is_noted(tmp_path, capsys):
     text = CRANK.format(angle=0.6, guess=ROOT.format(sign="-") + " - 0.02 m", formulation="lagrangian")
     x, th, moved = started(tmp_path, capsys, text)
@@ -67,6 +68,7 @@ def test_a_guess_by_an_expression_that_moved_is_noted(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_a_written_guess_stays_where_unwritten_ones_can_move(tmp_path, capsys, formulation):
     path = tmp_path / "pair.sd"
     path.write_text("""
@@ -93,6 +95,7 @@ scene go of pair { time 0 s to 10 ms; trace a, b, a', b' every 5 ms }
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+@pytest.mark.long
 def test_so_does_a_guessed_speed_along_an_edge(tmp_path, formulation):
     path = tmp_path / "edge.sd"
     path.write_text("""
@@ -131,7 +134,7 @@ scene go of charged { time 0 s to 1 ms; trace C1.e, C2.e, L.f every 0.5 ms }
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_consistent_guesses_of_stores_come_back_in_both_families(tmp_path, capsys, formulation):
     path, out = tmp_path / "charged.sd", tmp_path / "t.h5"
     path.write_text(CHARGED)
@@ -202,6 +205,7 @@ scene go of hanging { time 0 s to 0.01 s; trace x', turn', a' }
     ],
 )
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+@pytest.mark.long
 def test_what_constraints_move_moves_nothing_else(tmp_path, formulation, tie, said, speed, turns):
     """A pendulum on a trolley that is told to move hangs at rest, as guessed, though they share momentum."""
     trace = trace_of(tmp_path, HANGING.replace("TIE", tie).replace("SAID", said), formulation=formulation)
@@ -221,7 +225,7 @@ scene go of transformer { time 0 s to 0.01 s; trace K.one.f, K.two.f }
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_source_through_one_coil_leaves_the_other_as_guessed(tmp_path, formulation):
     trace = trace_of(tmp_path, TRANSFORMER, formulation=formulation)
     assert [trace[name].values[0] for name in ("K.one.f", "K.two.f")] == pytest.approx([2.0, 0.0], abs=1e-9)

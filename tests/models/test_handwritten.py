@@ -107,6 +107,7 @@ def compiled(text):
         return compile_network(network(text), gather=True)
 
 
+@pytest.mark.long
 def test_one_text_of_c_for_any_number_of_lines(effort):
     """Families and equations do not grow with a chain; what a line costs does not either (counted, not timed)."""
     short, few = effort(lambda: compiled(ladder(100)))
@@ -130,7 +131,7 @@ def test_a_grid_without_order_keeps_its_names(tmp_path):
 
 
 @pytest.mark.parametrize("of", [power_grid, mixed, lambda n: mesh(n // 8, 8)], ids=["power_grid", "mixed", "mesh"])
-@pytest.mark.one_in(12)
+@pytest.mark.long
 def test_what_is_joined_without_order_is_families_that_do_not_grow(of, effort):
     """Tables of indices tell what is joined to what: as many statements for any number of lines, each at equal cost."""
     short, few = effort(lambda: compiled(of(96)))
@@ -169,6 +170,7 @@ def test_branches_of_an_array_beside_a_grid_without_order(tmp_path, monkeypatch)
     assert (np.abs(one - other) <= 1e-8 * np.abs(other).max(axis=1, keepdims=True)).all()
 
 
+@pytest.mark.long
 def test_a_chain_of_scalars_leaves_no_full_matrix():
     """Definitions through one another are not followed without end: terms grow with the unknowns, not their square."""
 

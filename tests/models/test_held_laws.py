@@ -40,6 +40,7 @@ def valve(begin, drive):
 @pytest.mark.parametrize("method", ["auto", "bdf", "radau", "rosenbrock", "dopri"])
 @pytest.mark.parametrize(("begin", "drive"), [(2.0, 0.1), (1.0, 0.3), (3.0, 0.7)])
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-5])
+@pytest.mark.long
 def test_a_valve_that_turns_through_its_root(tmp_path, begin, drive, method, accuracy):
     trace = trace_of(tmp_path, VALVE % (begin, drive, accuracy), method=method)
     right = valve(begin, drive)(trace.time)[0]

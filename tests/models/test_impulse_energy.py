@@ -49,7 +49,7 @@ def _last(trace, *names):
 
 @pytest.mark.parametrize("way", STEPS)
 @pytest.mark.parametrize("formulation", [*FOUR, "kane"])
-@pytest.mark.one_in(6)
+@pytest.mark.long
 def test_a_source_of_velocity_that_steps_does_the_work_of_its_impulse(tmp_path, formulation, way):
     jump, step = STEPS[way]
     text = VELOCITY.replace("JUMP", jump).replace("STEP", step)
@@ -65,8 +65,8 @@ def test_a_source_of_velocity_that_steps_does_the_work_of_its_impulse(tmp_path, 
         assert pushed == pytest.approx(-(3.0 * v + 2.0 * v * swing), abs=1e-5)
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_a_source_of_voltage_that_steps_pays_for_the_charge_that_passes_at_once(tmp_path, formulation):
     passed, flows = 4.0 / 3.0, 8.0 / 3.0 * (1.0 - np.exp(-0.1))
     left = 4.0 / 3.0 * np.exp(-0.1)
@@ -93,6 +93,7 @@ scene s of m { time 0 s to 0.3 s; trace C.e as e, W, S every 10 ms; accuracy 1e-
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(5)
 def test_what_a_capacitor_takes_at_once_is_integrated_along_its_voltage(tmp_path, formulation):
     """Where nothing has inertia or displacements either, as in the complementary forms."""
     found = _run(ALONE.replace("POWER", "C.e^2*C.f"), tmp_path, formulation=formulation)
@@ -136,6 +137,7 @@ def test_sources_pay_what_stores_of_any_law_take_along_the_rise(tmp_path, formul
     assert given + one + two + lost == pytest.approx(0.0, abs=1e-7)  # 5e-4 by the mean of the flow
 
 
+@pytest.mark.long
 def test_charge_that_jumps_onto_a_capacitor_of_any_law_costs_what_it_stores(tmp_path):
     text = """\
 model m {
@@ -155,6 +157,7 @@ scene s of m { time 0 s to 0.3 s; init C2.e = 0 V
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_a_source_beside_others_pays_what_a_capacitor_of_any_law_takes(tmp_path, formulation):
     """The charges at its node add up by an integrated row, in which nobody keeps that of the source."""
     text = """\
@@ -174,6 +177,7 @@ scene s of m { time 0 s to 0.3 s
     assert sum(_last(found, "EC", "ER", "EV")) == pytest.approx(0.0, abs=1e-7)  # 0.059 J by the mean of the voltage
 
 
+@pytest.mark.long
 def test_a_mean_that_is_zero_is_no_energy_that_is(tmp_path):
     """From -3 V to 3 V the mean effort is nothing, what a capacitor of cubic law takes on the way is not."""
     text = """\
@@ -191,6 +195,7 @@ scene s of m { time 0 s to 0.4 s
     assert np.abs(found["off"].values).max() < 1e-6 * np.abs(found["V"].values).max()
 
 
+@pytest.mark.long
 def test_what_events_change_at_fixed_contents_is_no_work_of_the_store(tmp_path):
     """A stiffness that an event doubles: the store absorbs what the mass has lost, and no more."""
     text = """\
@@ -225,6 +230,7 @@ READ = (
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(5)
 def test_an_integral_that_the_model_reads_jumps_by_the_charge_that_passes_at_once(tmp_path, formulation):
     """2 V more over 2/3 F: 4/3 C.  It was refused, where its rate was no pulse of its own it stayed."""
     found = _run(READ, tmp_path, formulation=formulation)
@@ -268,7 +274,7 @@ SUMS = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("case", SUMS)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_what_all_elements_absorb_is_nothing(tmp_path, case, formulation):
     """Runs of the complementary formulations leave momenta out that nothing reads: pulses are told by their rows."""
     labels = [line.split(":")[0].strip() for line in SUMS[case].splitlines()[1:]]
@@ -298,7 +304,7 @@ scene s of m { time 0 s to 3 s
 
 @pytest.mark.parametrize("method", ["radau", "bdf"])
 @pytest.mark.parametrize("formulation", FOUR[:2])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_table_that_is_struck_many_times_does_the_work_of_each_impact(tmp_path, formulation, method):
     """The core takes such impacts by itself only where no integral gains by them: 3.6 J were missing of 7.9 J lost."""
     trace = _run(TABLE, tmp_path, formulation=formulation, method=method)
@@ -310,7 +316,7 @@ def test_a_table_that_is_struck_many_times_does_the_work_of_each_impact(tmp_path
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_what_is_sampled_at_the_start_counts(tmp_path, formulation):
     """Two capacitors that a sample charges at once: what sources gave is what stores and resistors have."""
     source = "discrete u = 1 V; every 10 ms { u := 4 V - u }; V: effort(e = u) a -> ground"

@@ -137,6 +137,7 @@ INVERTED = [(name, f) for name, (_, forms, _) in CASES.items() for f in forms]
 
 
 @pytest.mark.parametrize(("name", "formulation"), INVERTED)
+@pytest.mark.one_in(6)
 def test_an_inverse_needs_fewer_unknowns(monkeypatch, name, formulation):
     text, _, code = CASES[name]
     found = _compiled(text, formulation)
@@ -227,7 +228,7 @@ def _near(trace, expected, within, said):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", [n for n in CASES if n != "diode e(f)"])
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_against_closed_forms(tmp_path, monkeypatch, name, formulation):
     """Inverted, and with the laws kept implicit."""
     text, forms, _ = CASES[name]
@@ -241,7 +242,7 @@ def test_against_closed_forms(tmp_path, monkeypatch, name, formulation):
 
 @pytest.mark.parametrize("text", [DIODE_F, DIODE_E], ids=["f(e)", "e(f)"])
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(5)
+@pytest.mark.long
 def test_a_diode_in_both_directions(tmp_path, formulation, text):
     """Down to -1.7 V, where 1 + f/Is is 0 in doubles: the primal forms keep e implicit, closed by f(e) in both."""
     if formulation in FOUR[:2]:
@@ -250,7 +251,7 @@ def test_a_diode_in_both_directions(tmp_path, formulation, text):
 
 
 @pytest.mark.parametrize(("text", "formulation"), [(DIODE_F, f) for f in FOUR[:3]] + [(DIODE_E, f) for f in FOUR[:3]])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_wild_guess_does_no_harm(tmp_path, text, formulation):
     """exp(1000/0.025) overflows."""
     text = text.replace("init cap.e = v0", "init cap.e = v0\n  init D.e ~ 1000 V")
@@ -293,6 +294,7 @@ ARRAY = _text(
 )
 
 
+@pytest.mark.long
 def test_an_array_is_inverted_as_one(tmp_path):
     said = [d.message for d in _compiled(ARRAY, "lagrangian").notes if d.code == "N602"]
     assert said == ["the law of cap was inverted: e = asinh(q/Q0[i])*V0"]
@@ -322,7 +324,7 @@ scene run of axes { time 0 s to 3 s; accuracy 1e-7; trace Ld.f, Lq.f every 0.1 s
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("zero", [0.0, 1.0])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_a_modulus_that_goes_through_zero(tmp_path, formulation, zero):
     """Speed voltages of two axes, zero at the start or at 1 s: the complementary forms have efforts that the modulus
     multiplies, and flows that nothing is divided for.  d' = 1 - d - r q, q' = 1 - 2 q + r d by quadrature.
@@ -340,6 +342,7 @@ def test_a_modulus_that_goes_through_zero(tmp_path, formulation, zero):
 
 
 @pytest.mark.parametrize("law", ["f = on*e/R", "e = R/max(on, 1e-300)*f"])
+@pytest.mark.long
 def test_what_events_assign_decides_no_form(tmp_path, law):
     """A leak that is shut at the start, opens at 2 V and shuts at 20 ms: the law had been compiled as f = 0."""
     elements = f"""

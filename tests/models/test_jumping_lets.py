@@ -49,6 +49,7 @@ def _run(folder, base, more="", head="", **options):
 
 
 @pytest.mark.parametrize("case", JUMPS)
+@pytest.mark.one_in(6)
 def test_a_base_that_jumps_is_refused_with_where_and_what_to_write(tmp_path, case):
     base, more, where = JUMPS[case]
     with pytest.raises(api.ModelError) as refused:
@@ -61,6 +62,7 @@ def test_a_base_that_jumps_is_refused_with_where_and_what_to_write(tmp_path, cas
 
 
 @pytest.mark.parametrize("case", MEETING)
+@pytest.mark.long
 def test_branches_that_meet_make_a_kink(tmp_path, case):
     """The base begins to move at v = 1 m/s: momentum stays, so x' falls by v; x = A sin(w t + phi)."""
     found = _run(tmp_path, "x + (" + MEETING[case] + ")")
@@ -71,6 +73,7 @@ def test_branches_that_meet_make_a_kink(tmp_path, case):
     assert np.abs(found["x"].values - wanted).max() < 1e-6 * 0.15
 
 
+@pytest.mark.long
 def test_what_jumps_behind_the_end_or_for_traces_alone_is_none(tmp_path):
     assert _run(tmp_path, "x + (if t < 0.7 s then 0 m else a)").final == 1
     with pytest.raises(api.ModelError, match="E520"):
@@ -81,6 +84,7 @@ def test_what_jumps_behind_the_end_or_for_traces_alone_is_none(tmp_path):
     np.testing.assert_array_equal(found["w"].values, found["v"].values)
 
 
+@pytest.mark.long
 def test_a_damper_on_an_expression_that_jumps_is_refused_and_a_spring_is_not(tmp_path):
     text = """\
 model m {

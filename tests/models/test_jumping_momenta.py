@@ -88,10 +88,10 @@ def behind(trace, at=0.2):
     return (time > at + 1e-12) | ((np.abs(time - at) < 1e-12) & second)
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("method", ["dopri", "radau", "bdf", "rosenbrock"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
 @pytest.mark.parametrize("raised", ["road(t)", "(if t < 0.2 s then 0 m else 0.5 m/s*(t - 0.2 s))"])
+@pytest.mark.one_in(4)
 def test_a_mass_on_a_base_with_a_kink_keeps_its_momentum(raised, formulation, method, tmp_path):
     found = run(tmp_path, BASE.replace("RAISED", raised), formulation, method)
     t, later = np.asarray(found.time), behind(found)
@@ -104,6 +104,7 @@ def test_a_mass_on_a_base_with_a_kink_keeps_its_momentum(raised, formulation, me
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+@pytest.mark.one_in(2)
 def test_masses_that_share_their_inertia_with_it_keep_theirs(formulation, tmp_path):
     """p_x = 2 (x' + u') + x' + y' and p_y = x' + y' are 3 and 1 throughout."""
     found = run(tmp_path, TWO, formulation, "radau")
@@ -123,6 +124,7 @@ def test_masses_that_share_their_inertia_with_it_keep_theirs(formulation, tmp_pa
     ],
 )
 @pytest.mark.parametrize("method", ["radau", "bdf"])
+@pytest.mark.long
 def test_a_store_that_grows_at_once_keeps_its_content(text, formulation, method, tmp_path):
     found = run(tmp_path, text, formulation, method)
     assert np.abs(found["v"] - np.where(behind(found), 0.5, 1.0)).max() < 1e-9
@@ -135,6 +137,7 @@ def test_an_inertia_that_jumps_with_a_position_is_told(tmp_path):
         run(tmp_path, text, "lagrangian", "radau")
 
 
+@pytest.mark.long
 def test_the_object_of_such_a_run_is_printed(tmp_path, capsys):
     """`below_round_off` of an estimate that comes of an array."""
     text = GROWS.replace("  init", "  energy V = 1/2*(100 N/m)*x^2\n  init")

@@ -60,6 +60,7 @@ def _beside(trace, name, instant):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
 @pytest.mark.parametrize("inertia", INERTIAS.values(), ids=list(INERTIAS))
+@pytest.mark.long
 def test_momentum_stays_where_an_inertia_jumps(tmp_path, inertia, formulation):
     """2 N.s at 1 s: 2 m/s of 1 kg, 2/3 m/s of 3 kg; what is lost is supplied: 2 N*(7/3 m) of the force less 4/3 J.
 
@@ -78,6 +79,7 @@ def test_momentum_stays_where_an_inertia_jumps(tmp_path, inertia, formulation):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
 @pytest.mark.parametrize("row", ["phi rod: y - x = 0 m", "psi rod: y' - x' = 0 m/s"])
+@pytest.mark.long
 def test_an_inertia_that_jumps_pulls_along_what_hangs_on_it(tmp_path, row, formulation):
     """3 N.s at 1 s: 1 m/s of 3 kg, 0.5 m/s of 6 kg.  E930 before: momenta were kept, and the rod's row broke."""
     path = tmp_path / "m.sd"
@@ -100,10 +102,10 @@ def _held(times):
     return found
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("by_core", [True, False])
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize(("parts", "unit"), [(CAPACITOR, 1e-6), (INDUCTOR, 1e-3)], ids=["capacitor", "inductor"])
+@pytest.mark.long
 def test_what_a_store_holds_stays_where_its_law_jumps(monkeypatch, tmp_path, parts, unit, formulation, by_core):
     """A capacitance, an inductance that a sample sets each 5 ms; the energy that this takes or gives is counted.
 
@@ -130,6 +132,7 @@ def test_what_a_store_holds_stays_where_its_law_jumps(monkeypatch, tmp_path, par
         "V = (if x < 1 m then 0 J else 1 J) + (if x < 1 m then 0 N else 1 N)*x",
     ],
 )
+@pytest.mark.long
 def test_a_store_that_jumps_along_a_motion_is_not_met(tmp_path, energy):
     """No finite effort does it: what the store gains at the turning of its law is supplied by nothing."""
     inertia = "" if "T*" in energy else "energy T* = 1/2*(4 kg)*x'^2\n"
@@ -142,9 +145,9 @@ def test_a_store_that_jumps_along_a_motion_is_not_met(tmp_path, energy):
         api.simulate(path, output=tmp_path / "m.h5")
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("store", ["kinetic(p = k*f)", "potential(q = k*e)"])
+@pytest.mark.one_in(4)
 def test_what_comes_to_hold_nothing_and_holds_something_is_refused(tmp_path, store, formulation):
     """A mass drained through a damper at once in the complementary forms, a capacitor in the others, told as met."""
     domain, unit, ohm, told = ("translation", "kg", "N.s/m", "f = 2 m/s")

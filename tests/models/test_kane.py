@@ -86,6 +86,7 @@ def simulated(tmp_path, path, formulation, **options):
 
 
 @pytest.mark.parametrize("model", ["knife_edge", "rolling_disk", "em_suspension"])
+@pytest.mark.long
 def test_reference_values_without_multipliers(tmp_path, model):
     reference = REFERENCES[model]
     options = {"accuracy": 1e-6, "at": ",".join(map(repr, reference["t"])), "scene": "reference", "method": "radau"}
@@ -99,6 +100,7 @@ def test_reference_values_without_multipliers(tmp_path, model):
         assert error <= 1e-5, name
 
 
+@pytest.mark.long
 def test_a_rolling_rod_is_no_singular_configuration(tmp_path):
     """Its row of slip has the entry 1 everywhere, in momenta as in flows."""
     path = tmp_path / "model.sd"
@@ -108,6 +110,7 @@ def test_a_rolling_rod_is_no_singular_configuration(tmp_path):
 
 
 @pytest.mark.parametrize("text", [SKATES, DRIVEN], ids=["arrays", "rheonomic"])
+@pytest.mark.one_in(2)
 def test_reactions_on_request(tmp_path, text):
     path = tmp_path / "model.sd"
     path.write_text(text)
@@ -168,6 +171,7 @@ def test_a_converter_whose_current_ends_within_each_period(tmp_path, method):
     assert abs(kane["audit/energy"].values).max() <= 1e-8
 
 
+@pytest.mark.long
 def test_displacement_constraints_keep_their_multipliers(tmp_path):
     path = tmp_path / "model.sd"
     path.write_text(HELD)
@@ -237,7 +241,7 @@ scene s of m {{
 
 
 @pytest.mark.parametrize("model", ["lead_filter", "two_tank", "electrical_transformer", "fluid_transformer"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_the_complementary_form_meets_the_reference_values(tmp_path, model):
     """Balances of flows projected on the efforts that effort constraints leave free."""
     reference = REFERENCES[model]
@@ -249,6 +253,7 @@ def test_the_complementary_form_meets_the_reference_values(tmp_path, model):
         assert error <= 1e-5, name
 
 
+@pytest.mark.long
 def test_the_complementary_form_has_no_multiplier_of_an_effort_constraint(tmp_path):
     """Example 5.3 in momenta: of phi and psi only the momentum constraint keeps its multiplier."""
     reference = REFERENCES["two_tank"]

@@ -123,7 +123,7 @@ def _bytes(program, tmp_path, model, *options, sections):
 
 
 @pytest.mark.parametrize("model", [LADDER, SECTIONS, (LINE,)], ids=["ladder", "sections", "line"])
-@pytest.mark.one_in(8)
+@pytest.mark.long
 def test_a_section_of_a_large_line_takes_few_bytes_to_the_first_step(tmp_path, model):
     """What a start, a structure and a form left out hold is let go before the next is made: 4000 bytes without that;
     1920 of a line, 2220 of a ladder where stages keep what they need no more, and lists name each of their places; 1530
@@ -190,7 +190,6 @@ run(sys.argv[1:])
 """
 
 
-@pytest.mark.one_in(4)
 def test_a_large_line_chooses_what_settles_its_rows_before_it_steps(tmp_path):
     """The basis of what follows from the state stands when the first step begins, and no row within a step asks for
     slopes, where vectors and factors of the method leave no room: 200 bytes a section more while it steps.

@@ -67,6 +67,7 @@ def test_the_core_takes_transitions_of_a_large_model_as_of_a_small_one(tmp_path,
     assert asked[LARGE + 2] == asked[10]
 
 
+@pytest.mark.long
 def test_each_room_of_a_bank_switches_at_its_own_times(tmp_path):
     """The heat takes T to 45 K, the cold to 5 K, in 2000 s."""
     (tmp_path / "bank.sd").write_text(TEXTS["thermostats"])
@@ -97,6 +98,7 @@ def test_balls_of_an_array_come_to_rest_in_one_note(tmp_path, capsys, monkeypatc
     assert np.abs(np.sort(held) - rest).max() < 1e-4
 
 
+@pytest.mark.long
 def test_each_ball_bounces_as_often_as_one_alone(tmp_path):
     """By the bdf, which sees low flights by short steps alone: what another ball does meanwhile does not end them."""
     (tmp_path / "balls.sd").write_text(TEXTS["balls"])

@@ -34,6 +34,7 @@ EXCHANGER = ROOT / "models" / "gallery" / "heat_exchanger.sd"
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_a_ledger_is_zero(tmp_path, formulation):
     trace = trace_of(tmp_path, BODIES, formulation=formulation)
     assert np.ptp(trace["a.e"].values) > 40
@@ -52,6 +53,7 @@ def test_the_ledger_of_an_array(tmp_path, formulation):
     assert np.abs(trace["ledger"].values).max() < 1e-4
 
 
+@pytest.mark.long
 def test_a_ledger_tells_of_a_lost_flow(tmp_path, monkeypatch):
     """The balance of a node without the flow of the heater: its temperature is wrong, and the ledger says so."""
 
@@ -85,6 +87,7 @@ def test_no_ledger(tmp_path, text, said):
     assert any(d.code == "E102" and said in d.message for d in report)
 
 
+@pytest.mark.long
 def test_a_staircase_of_energy_is_not_met_where_the_run_ends_on_a_step(tmp_path):
     """8 of 12.5 J came from nowhere, told as met: at 9 m round-off leaves open on which step it stands."""
     path = tmp_path / "m.sd"

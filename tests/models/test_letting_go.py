@@ -83,6 +83,7 @@ def slid(t):
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
+@pytest.mark.long
 def test_a_body_leaves_a_shaken_table(tmp_path, accuracy):
     """The bdf's first step, of order 1, is off by g h^2/2: more than the gap has opened."""
     trace = run(tmp_path, TABLE, "bdf", accuracy)
@@ -90,6 +91,7 @@ def test_a_body_leaves_a_shaken_table(tmp_path, accuracy):
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
+@pytest.mark.one_in(2)
 def test_a_ladder_leaves_the_wall(tmp_path, accuracy):
     trace = run(tmp_path, LADDER, "bdf", accuracy)
     th, x = slid(trace.time)

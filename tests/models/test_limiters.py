@@ -24,7 +24,7 @@ scene s of charge {
 @ALL
 @pytest.mark.parametrize("leak", [0.0, 1e-4])
 @pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock", "auto"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_capacitor_is_charged_by_a_limited_current(tmp_path, formulation, leak, method):
     """At 1 mA + G e until nothing is left over the limiter, then by R C."""
     law = "1 mA*setsign(e)" + (" + 0.1 mS*e" if leak else "")
@@ -39,7 +39,7 @@ def test_a_capacitor_is_charged_by_a_limited_current(tmp_path, formulation, leak
 
 
 @ALL
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(2)
 def test_a_limiter_stops_an_inductor_without_a_jump(tmp_path, formulation):
     """A current within its limit is held at it, and let go where the voltage turns: the same as a pair of one-way
     constraints says.
@@ -65,7 +65,7 @@ scene s of coil { time 0 s to 30 ms; trace I.f, L.e every 0.5 ms }
 
 
 @ALL
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_limiters_of_an_array_end_one_after_the_other(tmp_path, formulation):
     text = """\
 model bank {

@@ -46,7 +46,7 @@ CASES = {
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_currents_in_a_loop_of_capacitors(tmp_path, formulation, case):
     """(Ca + Cc) a' - Cc b' = i, (Cb + Cc) b' - Cc a' = s - i, i = (b - a)/R."""
     what, law = CASES[case]
@@ -90,6 +90,7 @@ JUMPS = {
 
 
 @pytest.mark.parametrize("jump", JUMPS)
+@pytest.mark.one_in(2)
 def test_a_winding_of_many_coils(tmp_path, jump):
     """Hundreds of unknowns, each coil beside a capacitor: C v' = -D^T i - G v + u/50, L i' = D v, by the
     eigenvectors.
@@ -142,7 +143,7 @@ scene s of star {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_charge_of_a_node_follows_where_loops_say_what_the_text_does_not(tmp_path, formulation):
     """C2 and C3 are left to the loops: the charge of n1, a constant of its integrated row, is 6.5 C and not 1.75 C."""
     trace = trace_of(tmp_path, STAR, formulation=formulation)
@@ -150,6 +151,7 @@ def test_charge_of_a_node_follows_where_loops_say_what_the_text_does_not(tmp_pat
         assert np.abs(trace[name].values - volts).max() < 1e-12
 
 
+@pytest.mark.long
 def test_numbers_of_the_text_stand_while_a_start_finds_others():
     """The runtime reads the binding's own array, until it has to write there: the charge of n1 is 1.75 C in the text's
     numbers, 3.75 C in the model's.
@@ -210,7 +212,7 @@ scene s of m { time 0 s to 1 s; trace C1.q, C2.q, L1.p, L2.p%s }
 
 @pytest.mark.parametrize("traced", ["", ", C1.energy", ", L2.energy", ", C2.energy + L1.energy as all"])
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_what_is_traced_does_not_move_the_start(formulation, traced):
     """Charges q1/2 F + q2/3 F = 5 V and fluxes p1/0.25 H - p2/4 H = 2 A of least squares, whatever is written down: the
     energy with which an element began pulled at them as a store of its own would.
@@ -237,7 +239,7 @@ scene s of m { time 0 s to 1 s; trace L1.p, L2.p }
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_guess_of_a_flow_moves_the_store_of_whose_law_it_tells_no_content(formulation):
     """p + p^3 = -10: p = -2; the store beside it, of which nothing is said, was moved as far (1 Wb)."""
     begun = started(CUBIC, formulation)

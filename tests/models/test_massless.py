@@ -26,7 +26,7 @@ FILTER = "\n  ".join(
 
 @pytest.mark.parametrize("method", ["dopri", "energy"])
 @pytest.mark.parametrize("formulation", [*FOUR, "kane"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_loop_with_two_resistors(tmp_path, formulation, method):
     """C u' = -u/R + f, L f' = -u - S f: f'' + f' + 5/4 f = 0 from f = 0, f' = -1; u = -f' - f/2."""
     trace = trace_of(tmp_path, HEAD + FILTER + SCENE, scene="run", formulation=formulation, method=method)
@@ -55,7 +55,7 @@ BRIDGE = "\n  ".join(
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_bridge_of_resistors_between_two_stores(tmp_path, formulation):
     """Its currents follow from Kirchhoff's laws alone; against the exponential of the state's matrix."""
     trace = trace_of(tmp_path, HEAD + BRIDGE + SCENE, scene="run", formulation=formulation, method="dopri")
@@ -101,6 +101,7 @@ scene go of stopped {{
 
 
 @pytest.mark.parametrize("formulation", FOUR[:2])
+@pytest.mark.long
 def test_springs_without_masses_begin_at_the_stop_that_they_press_on(tmp_path, formulation):
     """Springs of 0.11 m and none push to 0.11 m: nothing moves there, and still it is beyond the stop."""
     trace = trace_of(tmp_path, STOPPED.format(free="0.11 m", force="0 N"), formulation=formulation)
@@ -133,7 +134,7 @@ scene run of turned { time 0 s to 8 s; trace c, s every 50 ms }
 
 @pytest.mark.parametrize(("method", "accuracy"), [("radau", 1e-6), ("bdf", 1e-3)])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_an_inertia_that_turns(tmp_path, formulation, method, accuracy):
     """Coordinates without inertia along themselves: at the start this is c alone, elsewhere both.  c = cos(t),
     s = sin(t); with roles as the start alone shows them radau stops and bdf takes 40 000 steps.

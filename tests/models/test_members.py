@@ -39,7 +39,7 @@ def integral(law, x):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.one_in(11)
+@pytest.mark.long
 def test_state_functions_are_integrals_of_the_law(tmp_path, name, formulation):
     edge, side, text, law, start = LAWS[name]
     given = {"kinetic": "pf", "potential": "qe", "dissipator": "ef"}[edge].replace(side, "")
@@ -96,6 +96,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_stores_of_a_loop_hold_what_they_start_with(tmp_path, formulation):
     """Inductors in parallel with different flux linkages: their energy is that of each, not of the node's momentum."""
     trace = trace_of(tmp_path, BOTH, formulation=formulation, backend="numpy")
@@ -163,6 +164,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_momentum_and_effort_of_a_point(tmp_path, formulation):
     """p = dT*/df of what moves with it, p' = e."""
     trace = trace_of(tmp_path, POINT, formulation=formulation, backend="numpy")
@@ -189,6 +191,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_all_four_variables_of_a_coordinate(tmp_path, formulation):
     words = {"STYLE": "coord", "RUNIT": "A", "RATE": "f", "CO": "T*", "STORE": "V", "UNIT": "C"}
     if formulation.startswith("co_"):
@@ -279,7 +282,7 @@ def stages():
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_components_within_components_within_an_array(tmp_path, formulation):
     """Read from within by a law, a let, an output and an init, and from outside; against the circuit's own matrix."""
     trace = trace_of(tmp_path, CELLS, formulation=formulation)

@@ -32,7 +32,7 @@ def test_a_sum_over_merged_nodes(tmp_path, backend):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_nodes_of_one_family_are_joined_each_in_its_way(tmp_path, formulation):
     """Two masses, each written by itself: the constants of their integrated rows stand side by side."""
     text = """
@@ -62,7 +62,7 @@ def test_nodes_of_one_family_are_joined_each_in_its_way(tmp_path, formulation):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("sign", ["=", "~"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_capacitors_side_by_side_at_a_source(tmp_path, formulation, sign):
     """Their charges follow from the source: guesses move, fixed values that contradict it are named."""
     text = f"""

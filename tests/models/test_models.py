@@ -40,7 +40,7 @@ def test_reduced_sizes_are_of_models_that_exist():
 
 
 @pytest.mark.parametrize("name", FILES)
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_check_is_clean(name, capsys):
     code = run(["check", "--json", "--strict", str(MODELS / f"{name}.sd")])
     found = result(capsys)
@@ -63,7 +63,7 @@ def scenes(name):
 @pytest.mark.parametrize(
     ("name", "scene"), [(name, scene) for name in FILES if not name.startswith("seed/") for scene in scenes(name)]
 )
-@pytest.mark.one_in(18)
+@pytest.mark.long
 def test_scenes_run_and_hold_what_they_expect(name, scene, tmp_path, capsys):
     output = tmp_path / "trace.h5"
     options = ["--scene", scene, "--json", "-o", str(output), *settings(name), "--max-wall", "120"]
@@ -85,6 +85,7 @@ def traced(tmp_path, name, scene, *options):
     return Trace.open(output)
 
 
+@pytest.mark.long
 def test_both_coordinate_choices_of_the_arm_give_one_motion(tmp_path):
     angles = traced(tmp_path, "gallery/two_link_arm", "angles")
     cartesian = traced(tmp_path, "gallery/two_link_arm", "cartesian")
@@ -92,6 +93,7 @@ def test_both_coordinate_choices_of_the_arm_give_one_motion(tmp_path):
         assert np.max(np.abs(angles[name].values - cartesian[name].values)) < 1e-5
 
 
+@pytest.mark.long
 def test_pendulum_swings_with_its_period(tmp_path):
     from scipy.special import ellipk
 
@@ -108,6 +110,7 @@ def test_pendulum_swings_with_its_period(tmp_path):
     assert x[0] == 1.0
 
 
+@pytest.mark.long
 def test_friction_acts_against_the_motion(tmp_path):
     trace = traced(tmp_path, "gallery/friction_book", "brakes")
     np.testing.assert_allclose(trace["ex"].values, -0.2 * 9.80665 * 2.0 / np.sqrt(5.0), rtol=1e-6)
@@ -127,6 +130,7 @@ PUBLISHED = [
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_andrews_meets_the_published_end_values(tmp_path, formulation):
     options = ("--accuracy", "1e-8", "--formulation", formulation, "--max-wall", "120")
     trace = traced(tmp_path, "benchmark/andrews", "reference", *options)
@@ -169,6 +173,7 @@ def counts(name, capsys):
     return {t["scene"]: {k: t[k] for k in ("coordinates", "m1", "m2", "dof", "index")} for t in targets}
 
 
+@pytest.mark.long
 def test_the_lead_filter_is_the_books(capsys):
     """Example 6.4: three charges, one displacement constraint, index 2; `order == 1` stands in the model."""
     found = counts("gallery/lead_filter", capsys)["charges"]
@@ -177,7 +182,7 @@ def test_the_lead_filter_is_the_books(capsys):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_the_drive_closes_its_books(tmp_path, capsys, formulation):
     """Section 6.1 from network text: n = 6, m = 2; half a second of mains, speed and position come to a period."""
     found = counts("gallery/rectifier_motor_slider", capsys)["start"]
@@ -190,6 +195,7 @@ def test_the_drive_closes_its_books(tmp_path, capsys, formulation):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_the_books_own_drive_closes_its_books(tmp_path, formulation):
     """The same in the book's seven coordinates."""
     text = (MODELS / "seed" / "rectifier_motor_crank.sd").read_text()
@@ -210,6 +216,7 @@ def line_text(n):
         return prepare(network, report).compiled.text
 
 
+@pytest.mark.long
 def test_the_line_has_one_c_text_for_every_length():
     assert line_text(10) == line_text(100_000)
 

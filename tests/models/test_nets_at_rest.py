@@ -78,7 +78,7 @@ SLOW = {("orifice", f) for f in FOUR[2:]}  # 60000 steps within the first 1e-9 s
 @pytest.mark.parametrize(
     ("name", "formulation"), [pytest.param(*c, marks=pytest.mark.long) if c in SLOW else c for c in CASES]
 )
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_valve_at_rest_begins_to_pass(tmp_path, name, formulation):
     text, slopes, begin, vessel, area = NETS[name]
     scene = f"}}\nscene go of net {{ time 0 s to 1 s; trace T{vessel}.store.e as p }}\n"
@@ -101,6 +101,7 @@ scene s of m { time 0 s to 10 s; trace a.e, b.e }
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_a_current_of_entropy_begins_at_temperatures_that_follow(tmp_path, formulation):
     """At the guesses it is 0/0; energy of both stays 50*400 + 20*280 J whatever is made of entropy."""
     trace = trace_of(tmp_path, WARM, formulation=formulation, accuracy=1e-6)

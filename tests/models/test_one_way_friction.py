@@ -26,6 +26,7 @@ TEXTS = {
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("content", TEXTS.values(), ids=TEXTS)
+@pytest.mark.one_in(5)
 def test_it_slips_back_freely_and_holds_at_last(tmp_path, content, formulation):
     """Half cycles about -8 cm with it and about 0 without: at rest at 8 cm less the third amplitude."""
     trace = trace_of(tmp_path, SPRUNG % content, formulation=formulation)
@@ -38,6 +39,7 @@ def test_it_slips_back_freely_and_holds_at_last(tmp_path, content, formulation):
     assert (trace["audit.energy"].values < 1e-6).all()
 
 
+@pytest.mark.long
 def test_a_square_of_it_is_smooth(tmp_path):
     trace = trace_of(tmp_path, SPRUNG % "1/2*(4 N.s/m)*max(s', 0 m/s)^2")
     assert not trace.events or all("slips" not in e.after for e in trace.events)

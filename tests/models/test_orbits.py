@@ -30,7 +30,7 @@ def kepler(t, ex):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("turns", [3, 8, 15])
-@pytest.mark.one_in(7)
+@pytest.mark.long
 def test_what_is_met_is_not_off_by_more_than_three_times(tmp_path, monkeypatch, formulation, turns):
     monkeypatch.chdir(tmp_path)
     end = 2.0 * np.pi * turns

@@ -76,6 +76,7 @@ def filtered(times, tau=1e-4):
 
 @pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock", "dopri"])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.long
 def test_bends_of_a_source_are_the_cores(tmp_path, python, method, formulation):
     trace = run(FILTER, tmp_path, method=method, formulation=formulation, rtol=1e-7)
     exact = filtered(trace.time)
@@ -84,6 +85,7 @@ def test_bends_of_a_source_are_the_cores(tmp_path, python, method, formulation):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.long
 def test_jumps_of_what_follows_are_the_cores_and_have_two_rows(tmp_path, python, formulation):
     trace = run(SQUARE, tmp_path, formulation=formulation, accuracy=1e-7)
     period, v, rows = 1e-3, 0.0, []
@@ -102,6 +104,7 @@ def test_jumps_of_what_follows_are_the_cores_and_have_two_rows(tmp_path, python,
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.long
 def test_states_that_jump_are_pythons(tmp_path, python, formulation):
     """Charges of a loop of a source and two capacitors: v jumps by 3 V * 2/3, and falls with 3 ms."""
     trace = run(LOOP, tmp_path, formulation=formulation, accuracy=1e-7)
@@ -111,6 +114,7 @@ def test_states_that_jump_are_pythons(tmp_path, python, formulation):
     assert set(python) == {1e-3}
 
 
+@pytest.mark.long
 def test_both_ways_write_the_same_rows(tmp_path, monkeypatch):
     mine = run(FILTER, tmp_path, method="bdf", rtol=1e-5)
     monkeypatch.setattr(integrate, "serves", lambda run: False)

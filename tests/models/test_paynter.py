@@ -158,7 +158,7 @@ LAID_OUT = [
 
 
 @pytest.mark.parametrize(("domain", "function", "place", "formulation"), LAID_OUT)
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(200)
 def test_its_own_variable_is_simulated_rightly(tmp_path, domain, function, place, formulation):
     known = STATE_FUNCTIONS[function]
     variable = names(place, domain)[known.own]
@@ -201,7 +201,7 @@ COORDINATES = {
 @pytest.mark.parametrize("place", COORDINATES)
 @pytest.mark.parametrize("domain", ["translation", "rotation", "electrical", "hydraulic"])
 @pytest.mark.parametrize("transformed", [False, True])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_coordinates_are_simulated_rightly(tmp_path, domain, place, transformed):
     """One coordinate with all three stores, the inertia (compliance) said by either of its functions."""
     functions = ["T" if transformed else "T*", "V", "D"]
@@ -231,7 +231,7 @@ def test_coordinates_are_simulated_rightly(tmp_path, domain, place, transformed)
 
 @pytest.mark.parametrize("function", ["V", "V*"])
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(12)
 def test_thermal_stores(tmp_path, function, formulation):
     """Entropy that flows into a store of a true thermal domain: e = dV/dq."""
     own = STATE_FUNCTIONS[function].own

@@ -92,7 +92,7 @@ CASES = {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_positions_and_contents(tmp_path, case, formulation):
     body, more, start = CASES[case]
     text = MASSES.format(body=body, more=more, traced=", ".join(start))
@@ -104,7 +104,7 @@ def test_positions_and_contents(tmp_path, case, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_positions_and_contents_of_families(tmp_path, formulation):
     """Positions and contents are written of some elements each; nothing but x[0] moves at the start."""
     text = """
@@ -165,7 +165,7 @@ LOOPS = {
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "co_lagrangian"])
 @pytest.mark.parametrize("case", LOOPS)
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_springs_of_families_in_loops(tmp_path, case, formulation):
     """Masses of which nothing is said move least; around each loop of springs the stretches add up to nothing."""
     body, start = LOOPS[case]
@@ -218,7 +218,7 @@ def test_a_long_chain_is_pulled_straight_at_once(monkeypatch, formulation):
 
 
 @pytest.mark.parametrize("closing", ["", "W: potential(e = 3 N/m*q) y[6] -> x[1]"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_rows_joined_along_two_offsets_begin_alike(tmp_path, closing):
     """Each over a part: what joins first tells where what comes later closes loops."""
     text = f"""
@@ -252,6 +252,7 @@ def test_a_guessed_content_goes_before_guessed_positions(formulation):
     assert [(name, guess) for name, guess, _, _ in begun.state.moved] == [("x.q", 0.1), ("y.q", 0.7)]
 
 
+@pytest.mark.long
 def test_random_springs_partly_said_begin_with_the_stretches_of_the_closed_form():
     verdicts = {seed: judged(seed) for seed in range(500 if os.environ.get("SYSDYN_LONG") else 12)}
     assert not {seed: verdict for seed, verdict in verdicts.items() if verdict not in {"agree", "contradicting"}}
@@ -297,7 +298,7 @@ scene go of cells {
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("text", [ISLAND, CELLS], ids=["secondary", "family"])
-@pytest.mark.one_in(6)
+@pytest.mark.long
 def test_parts_without_a_ground(tmp_path, text, formulation):
     """Efforts are read against the same node of the part, whatever the formulation."""
     trace = trace_of(tmp_path, text, formulation=formulation)
@@ -315,7 +316,7 @@ def test_parts_without_a_ground(tmp_path, text, formulation):
         "3 N.m*(1 - cos((x.q - y.q)/(1 m)))",
     ],
 )
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_an_energy_over_a_difference_is_a_spring(tmp_path, energy, formulation):
     text = MASSES.format(body=f"energy V = {energy}\ninit x.q = 0.001 m", more="", traced="x.f, y.f, x.q")
     trace = trace_of(tmp_path, text, formulation=formulation)
@@ -325,7 +326,7 @@ def test_an_energy_over_a_difference_is_a_spring(tmp_path, energy, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_node_without_mass_in_a_family_with_masses(tmp_path, formulation):
     """Its position is read by a law: it keeps its row."""
     text = """
@@ -355,6 +356,7 @@ def test_a_node_without_mass_in_a_family_with_masses(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_a_capacitor_of_which_nothing_is_said_is_empty(tmp_path, formulation):
     """What is said of its neighbour moves the node that they do not share."""
     text = """

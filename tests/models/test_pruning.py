@@ -81,7 +81,7 @@ def with_more(lines):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("name", UNREAD)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_an_unread_subsystem_costs_nothing(tmp_path, name, formulation):
     """The same steps within 2 as without it, the same trace, and the names of what is not there."""
     bare = _bare(formulation)
@@ -176,6 +176,7 @@ scene silent of isles { time 0 s to 0.01 ms }
     ("scene", "gone"),
     [("sx", "y z hold u w"), ("sz", "y u w"), ("su", "y z hold w"), ("whole", ""), ("silent", "")],
 )
+@pytest.mark.one_in(5)
 def test_one_statement_over_islands_is_divided(tmp_path, scene, gone):
     ran, report = attempt(tmp_path, ISLES, scene=scene, backend="numpy")
     assert ran is not None, [d.message for d in report]
@@ -186,6 +187,7 @@ def test_one_statement_over_islands_is_divided(tmp_path, scene, gone):
         assert ran.outcome.statistics["steps"] < 200  # 469 067 with the stiff one
 
 
+@pytest.mark.long
 def test_no_prune_keeps_everything(tmp_path):
     ran, _ = attempt(tmp_path, ISLES, scene="sx", until="1e-6", no_prune=True)
     assert ran.prepared.left_out == ()
@@ -210,6 +212,7 @@ scene r of m { time 0 s to 5 s; trace b.e as e, d.e }
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.one_in(2)
 def test_a_branch_that_ends_in_the_open_is_dead_where_nothing_reads_its_end(tmp_path, formulation):
     parts = _pruned(OPEN)[1]
     assert [(p.rule, [n for _, n in p.names]) for p in parts] == [
@@ -250,6 +253,7 @@ scene s of m {{ time 0 s to 1 s; trace x }}
     assert code in {d.code for d in report if d.severity == "error"}
 
 
+@pytest.mark.long
 def test_the_start_of_a_pruned_part_is_not_asked_for(tmp_path, capsys):
     """`simulate` starts what it compiles; `check` starts the whole."""
     text = """
@@ -306,6 +310,7 @@ def test_unread_families_go_whole():
     assert [b.name for b in left.branches] == ["Va", "Ra"]
 
 
+@pytest.mark.long
 def test_a_golden_keeps_the_structure_of_the_whole(tmp_path, capsys, monkeypatch):
     """What was recorded unpruned is still valid, and what the scene does not need is still watched."""
     monkeypatch.chdir(tmp_path)
@@ -327,7 +332,7 @@ def test_every_part_of_a_network_is_known_to_pruning():
 
 
 @pytest.mark.parametrize("seed", range(6))
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(12)
 def test_random_models_agree_with_and_without(tmp_path, seed):
     assert compared(seed, tmp_path).worst <= 1.0
 

@@ -183,6 +183,7 @@ def _mutated(monkeypatch, changed, old, new):
     return module.pruned
 
 
+@pytest.mark.long
 def test_a_broken_rule_is_noticed(networks, monkeypatch):
     right = _left_out(networks, pruned)
     assert right == _left_out(networks, _mutated(monkeypatch, "", "", ""))

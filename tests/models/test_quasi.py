@@ -82,6 +82,7 @@ def _near(trace, expected, within=1e-7):
 
 
 @pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.long
 def test_a_skate_driven_along_its_edge_and_heading(tmp_path, formulation):
     found = trace_of(tmp_path, SKATE, formulation=formulation)
     t = np.linspace(0.0, 3.0, 31)
@@ -96,6 +97,7 @@ def test_a_skate_driven_along_its_edge_and_heading(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.long
 def test_a_disk_driven_at_its_rim(tmp_path, formulation):
     found = trace_of(tmp_path, DISK, formulation=formulation)
     t = np.linspace(0.0, 3.0, 31)
@@ -105,6 +107,7 @@ def test_a_disk_driven_at_its_rim(tmp_path, formulation):
 
 
 @pytest.mark.parametrize("formulation", PRIMAL)
+@pytest.mark.long
 def test_without_constraint(tmp_path, formulation):
     """The same as the two works -c arc x on y and c arc y on x; Kane's form has nothing to leave out."""
     found = trace_of(tmp_path, FREE, formulation=formulation)

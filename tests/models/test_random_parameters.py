@@ -16,7 +16,7 @@ TRIED = CASES if LONG else [(name, k) for k, name in enumerate(SLICE)]
 
 
 @pytest.mark.parametrize(("name", "number"), TRIED)
-@pytest.mark.one_in(8)
+@pytest.mark.long
 def test_formulations_agree_whatever_the_parameters(name, number):
     tried = random_parameters.tried(name, number)
     assert tried.settings

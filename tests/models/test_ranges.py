@@ -75,7 +75,7 @@ scene s of m {
         ("trace pull(x.q, t/(3 s)) as u", "pull", 3.0),
     ],
 )
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_a_table_that_only_a_trace_reads_ends_the_run_there_too(tmp_path, capsys, formulation, said, table, end):
     """x = 1.5 m sin(2 t/s)."""
     path, out = tmp_path / "m.sd", tmp_path / "t.h5"
@@ -94,6 +94,7 @@ def test_a_table_that_only_a_trace_reads_ends_the_run_there_too(tmp_path, capsys
 
 
 @pytest.mark.parametrize("command", ["equations", "linearize"])
+@pytest.mark.one_in(2)
 def test_what_watches_a_table_is_no_part_of_the_model(tmp_path, capsys, command):
     path = tmp_path / "m.sd"
     path.write_text(READ.replace("SAID", "trace give(x.q) as u"), encoding="utf-8")
@@ -151,6 +152,7 @@ scene c of m { time 0 s to 1 s; trace S.energy, x.q; formulation co_hamiltonian 
 
 
 @pytest.mark.parametrize("ohm", ["0.1 mohm", "1e-12 ohm", "1 Gohm"])
+@pytest.mark.one_in(2)
 def test_the_order_of_a_stiff_model(ohm, tmp_path, capsys):
     (tmp_path / "m.sd").write_text(f"""model m {{
   node a, b: electrical

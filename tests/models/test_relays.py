@@ -20,6 +20,7 @@ scene s of relay {{ time 0 s to {end}; trace x, F every 0.1 s }}
 
 
 @PRIMAL
+@pytest.mark.one_in(2)
 def test_a_relay_of_a_position_lets_it_through(tmp_path, formulation):
     """Parabolas of a period of 4 s: the position cannot be held."""
     trace = run(tmp_path, relay("-(2 N)*setsign(x)"), formulation)
@@ -28,6 +29,7 @@ def test_a_relay_of_a_position_lets_it_through(tmp_path, formulation):
     assert np.abs(trace["x"].values - expected).max() < 1e-6
 
 
+@pytest.mark.long
 def test_a_relay_of_what_it_gives_follows_what_is_asked(tmp_path):
     """F in 2 N setsign(w - F) is w within 2 N: no state is on the way."""
     trace = run(tmp_path, relay("2 N*setsign(3 N*cos(2 rad/s*t) - F)", end="5 s"))
@@ -53,7 +55,7 @@ scene s of oven { time 0 s to 60 s; trace T, P every 1 s }
 
 @PRIMAL
 @pytest.mark.parametrize("speed", ["0.3 m/s", "0 m/s"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_relay_of_a_far_speed_is_a_sign(tmp_path, formulation, speed):
     """The force acts on the neighbour of what it reads: that goes through zero at once."""
     text = f"""\

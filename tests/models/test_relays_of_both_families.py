@@ -51,6 +51,7 @@ def _switched(times):
 
 
 @pytest.mark.parametrize("formulation", ["co_lagrangian", "co_hamiltonian", "lagrangian"])
+@pytest.mark.long
 def test_switches_alike(formulation, tmp_path):
     """It was a fault of sysdyn (exit 4) in the complementary formulations: what is traced alone has no place there."""
     (tmp_path / "m.sd").write_text(RELAY)

@@ -121,6 +121,7 @@ def test_a_divider_of_megohms_is_found_from_anywhere_by_corrections():
     assert anew(starter, 0.0, best, x, x, starter.free) == (best, False), "no state has moved: it is left as it is"
 
 
+@pytest.mark.long
 def test_a_turbulent_valve_at_rest_has_no_slope_there_and_one_under_pressure():
     """e = k f|f|: de/df = 2 k |f| is zero at rest alone."""
     for said, flat in (("0.1", 1), ("0.3", 0)):

@@ -49,6 +49,7 @@ scene run of vessels { time 0 s to 60 s; trace A.e every 1 s; accuracy 1e-5 }
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.long
 def test_a_tank_runs_dry_and_stays_so(tmp_path, method):
     """Torricelli: sqrt(h) falls with 1/40 a second; below zero the law is flat, not infinity times zero."""
     trace = trace_of(tmp_path, DRAIN, method=method)
@@ -66,6 +67,7 @@ def test_two_tanks_level(tmp_path, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.long
 def test_a_tank_fills_from_nothing(tmp_path, method):
     """With u = sqrt(h), c = 0.3, k = 0.2: t = -2/k (u + c/k ln(1 - k u/c)); the first slope is infinite."""
     trace = trace_of(tmp_path, FILL, method=method)
@@ -76,6 +78,7 @@ def test_a_tank_fills_from_nothing(tmp_path, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.long
 def test_an_orifice_between_equal_levels(tmp_path, method):
     """Its slope at the start is infinite: d = h - 1 - t/2, d' = -1/2 + 2 sqrt(-d) ends at d = -1/16."""
     trace = trace_of(tmp_path, SWING, method=method)
@@ -89,7 +92,7 @@ def test_an_orifice_between_equal_levels(tmp_path, method):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_two_vessels_in_every_formulation(tmp_path, formulation):
     """d' = -20 sqrt(d): the root of 1e5 Pa falls with 10 a second."""
     trace = trace_of(tmp_path, VESSELS, formulation=formulation)
@@ -111,7 +114,7 @@ scene run of vessels { time 0 s to 20 s; trace A.e, B.e every 0.1 s }
 
 
 @pytest.mark.parametrize("method", ["auto", "bdf", "radau", "dopri", "rosenbrock"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_flow_that_turns_through_a_square(tmp_path, method):
     """Against the law turned over, f = sqrt(d/k), by SciPy; where the flow turns the pressure has no slope."""
     trace = trace_of(tmp_path, TURNS, method=method)

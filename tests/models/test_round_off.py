@@ -19,7 +19,7 @@ from test_seed import SEED, settings_of
     ("model", "formulation"),
     [("rack_pinion", "co_lagrangian"), ("lever", "co_hamiltonian"), ("ebers_moll", "lagrangian")],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(6)
 def test_last_digits_do_not_decide(tmp_path, monkeypatch, model, formulation, seed):
     random = np.random.default_rng(seed)
     exact = start.solve
@@ -44,6 +44,7 @@ def test_last_digits_do_not_decide(tmp_path, monkeypatch, model, formulation, se
 
 
 @pytest.mark.parametrize(("method", "index"), [("bdf", "auto"), ("radau", "auto"), ("dopri", "0")])
+@pytest.mark.long
 def test_a_tolerance_without_absolute_part_at_rest(tmp_path, method, index):
     """Forced oscillators from y = y' = 0: y'' = sin t - y, all relative tolerance; y = (sin t - t cos t)/2."""
     text = """model forced {
@@ -76,6 +77,7 @@ scene go of apart {{ time 0 s to 3 s; accuracy 1e-6; trace y - x as apart, x eve
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_a_difference_of_large_numbers_says_how_well_it_is_known(tmp_path, capsys, formulation):
     path = tmp_path / "apart.sd"
     for far, said in (("7e12", True), ("7", False)):
@@ -104,6 +106,7 @@ scene s of pulse {
 
 
 @pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock", "dopri"])
+@pytest.mark.long
 def test_what_passes_between_the_rows_is_the_size_that_errors_are_relative_to(tmp_path, method):
     """b = t exp(-t), 1/e at 1 s; 4.5e-4 in the first row behind the start."""
     path = tmp_path / "pulse.sd"

@@ -17,6 +17,7 @@ NETLIST = Path(__file__).parents[1] / "cli" / "netlists" / "boost.cir"
     ("rtol", "volts", "amperes"),  # of 13 V and 1.4 A at most; the diode's current is steep in what its node holds
     [(1e-1, 0.05, np.inf), (1e-3, 0.01, 2.0), (1e-5, 1e-4, 0.1)],
 )
+@pytest.mark.long
 def test_rows_of_radau_stay_with_the_motion(tmp_path, rtol, volts, amperes):
     model = tmp_path / "boost.sd"
     assert run(["import", str(NETLIST), "-o", str(model), "--quiet"]) == 0
@@ -39,6 +40,7 @@ def test_rosenbrock_goes_on_from_what_its_steps_leave_of_a_diode(tmp_path, name,
     assert np.max(np.abs(np.asarray(rows[shown]) - wanted)) < part * np.max(np.abs(wanted))
 
 
+@pytest.mark.long
 def test_rows_of_radau_behind_a_kink_of_a_stiff_filter(tmp_path):
     """The high pass was 0.12 off at 3.07 ms, behind the source's kink."""
     model = tmp_path / "model.sd"

@@ -38,6 +38,7 @@ def _exact(times):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_a_voltage_that_samples_set_moves_no_flux(tmp_path, formulation):
     """Its integral was 48 V*on*t: 72 A too little at the first sample that opened, told as met."""
     (tmp_path / "model.sd").write_text(CHOPPER)

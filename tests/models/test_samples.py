@@ -35,7 +35,7 @@ def run(text, tmp_path):
 
 @pytest.mark.parametrize("relation", [">", ">="])
 @pytest.mark.parametrize("number", [3, 4, 6, 61, 73])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_sample_where_the_text_jumps_reads_what_is_behind(relation, number, tmp_path):
     """0.05*3 is not 0.15 of a double: no row is lost, and the instant stands twice."""
     trace = run(STEP.format(relation=relation, at=f"{0.05 * number:.2f}"), tmp_path)
@@ -45,6 +45,7 @@ def test_a_sample_where_the_text_jumps_reads_what_is_behind(relation, number, tm
     assert trace["held"].values[at].tolist() == [0.0, 1.0]
 
 
+@pytest.mark.long
 def test_samplers_that_meet_read_what_was_before(tmp_path):
     """15*0.13 and 65*0.03 are two doubles and one instant."""
     trace = run(TWO, tmp_path)
@@ -85,6 +86,7 @@ def relay(k, period, time):
 @pytest.mark.parametrize(
     ("k", "period", "method"), [(4.0, 0.02, "radau"), (4.0, 0.1, "radau"), (1000.0, 0.1, "energy")]
 )
+@pytest.mark.long
 def test_runs_between_samples_are_compared_at_them(k, period, method, tmp_path):
     """Both runs had their steps end at samples, and nothing was compared: 0, where x is off by 7e-12 to 2e-8."""
     trace = run(RELAY.format(k=k, period=period, method=method), tmp_path)

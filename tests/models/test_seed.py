@@ -119,7 +119,7 @@ def in_numpy(model, formulation):
     ("model", "formulation", "backend"),
     [(*case, backend) for case in CASES for backend in ("c", "numpy") if backend == "c" or in_numpy(*case)],
 )
-@pytest.mark.one_in(28)
+@pytest.mark.long
 def test_reference_values(tmp_path, model, formulation, backend):
     reference = REFERENCES[model]
     found = simulated(tmp_path, model, formulation=formulation, backend=backend, times=reference["t"])
@@ -135,7 +135,7 @@ def twice(model):
 
 
 @pytest.mark.parametrize(("model", "formulation"), [case for case in CASES if case[1] in twice(case[0])])
-@pytest.mark.one_in(23)
+@pytest.mark.long
 def test_reference_values_at_the_finer_accuracy(tmp_path, model, formulation):
     reference = REFERENCES[model]
     found = simulated(tmp_path, model, formulation=formulation, times=reference["t"], accuracy=FINE)
@@ -167,7 +167,7 @@ def some(model, formulation, case):
 @pytest.mark.parametrize(
     ("model", "formulation", "case"), [(*case, k) for case in CASES for k in range(3) if LONG or some(*case, k)]
 )
-@pytest.mark.one_in(51)
+@pytest.mark.long
 def test_changed_values(tmp_path, model, formulation, case):
     worst = changed(tmp_path, model, formulation, settings_of(model, case))
     assert max(worst.values()) <= ALLOWED, worst
@@ -193,7 +193,7 @@ def test_changed_values_at_the_finer_accuracy(tmp_path, model, formulation, case
         if LONG or case % 2 == k or len(formulations(model)) == 1
     ],
 )
-@pytest.mark.one_in(11)
+@pytest.mark.long
 def test_extreme_values(tmp_path, model, formulation, case):
     worst = changed(tmp_path, model, formulation, EXTREME[model][case])
     assert max(worst.values()) <= ALLOWED, worst
@@ -214,7 +214,7 @@ def witness(model, settings, times):
 
 
 @pytest.mark.parametrize("model", [m for m in MODELS if "reduced_ode" in REFERENCES[m]])
-@pytest.mark.one_in(8)
+@pytest.mark.one_in(12)
 def test_the_witness_meets_the_reference_values(model):
     reference = REFERENCES[model]
     method, rtol = STIFF.get(model, ("DOP853", 1e-12))
@@ -225,7 +225,7 @@ def test_the_witness_meets_the_reference_values(model):
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_parameters_have_the_books_names_and_values(model):
     from sysdyn.api import compile_model
 

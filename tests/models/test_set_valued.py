@@ -39,7 +39,7 @@ def block(friction, start="0 m", bounce="0"):
 @PRIMAL
 @pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock", "auto"])
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_block_stops_on_a_slope(tmp_path, formulation, method, accuracy):
     """Below the angle of friction it stays where it stops, and friction is what the weight asks for."""
     trace = run(tmp_path, block(GAMMA), formulation, accuracy, method=method)
@@ -77,6 +77,7 @@ def test_an_impact_rubs_by_its_impulse(tmp_path, formulation, start, bounce, mu)
 
 
 @PRIMAL
+@pytest.mark.one_in(2)
 def test_what_lands_and_stops_at_one_instant_sticks(tmp_path, formulation):
     """In flight either sense does nothing, and a relation of no bound seemed to let its value through: behind the last
     bounce, where the speed is round-off, both senses were driven back (E930).
@@ -105,7 +106,7 @@ scene s of belt {
 
 @PRIMAL
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(12)
 def test_sticks_and_slips_on_a_belt_as_a_dissipator_does(tmp_path, formulation, accuracy):
     """The bound falls with the speed (Stribeck): it sticks again and again."""
     law = "3 N*setsign({0})*(1 + 1/(1 + ({0})^2/(1 m^2/s^2)))"
@@ -134,7 +135,7 @@ scene s of two { time 0 s to 10 s; trace x, y every 0.1 s }
 
 @PRIMAL
 @pytest.mark.parametrize("method", ["bdf", "radau", "rosenbrock"])
-@pytest.mark.one_in(5)
+@pytest.mark.long
 def test_two_bodies_rub_on_each_other(tmp_path, formulation, method):
     """Which of both sticks is one question."""
     gammas = """implicit F, G: N ~ 0 N; work F on x; work -F on y; work G on y
@@ -157,7 +158,7 @@ def test_two_bodies_rub_on_each_other(tmp_path, formulation, method):
     "gamma g: F = 0 N; rub: effort(e = 3 N*setsign(x')) on x",
     "gamma g: F = 0 N; implicit s: 1 ~ 0; gamma h: s = setsign(x'); work -(3 N)*s on x",
 ])  # fmt: skip
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_one_friction_however_it_is_said(tmp_path, law):
     """Slips to a stop, sticks until 5 N sin 2t is 3 N, slips on."""
     text = f"""\
@@ -209,7 +210,7 @@ scene s of play { time 0 s to 2 s; trace x, y every 0.02 s }
 @pytest.mark.parametrize("friction", [
     "implicit F: N ~ 0 N; work F on y; gamma g: F = -(3 N)*setsign(y')", "rub: dissipator(e = 3 N*setsign(f)) on y",
 ])  # fmt: skip
-@pytest.mark.one_in(5)
+@pytest.mark.long
 def test_what_rubs_without_a_mass_starts_between_both_senses(tmp_path, formulation, damper, friction):
     """A spring before a friction: without a damper the play of 3/200 m (Prandtl); Euler's small steps say the same."""
     trace = run(tmp_path, PLAY.replace("DAMPER", damper).replace("FRICTION", friction), formulation)
@@ -245,6 +246,7 @@ def test_what_a_relation_leaves_open_is_refused(tmp_path):
 
 
 @PRIMAL
+@pytest.mark.long
 def test_two_frictions_on_one_body_are_their_sum(tmp_path, formulation):
     """What each takes while both hold is open, and moves nothing."""
     two = """implicit F, G: N ~ 0 N; work F + G on x; gamma g: F = -(2 N)*setsign(x'); gamma h: G = -(1 N)*setsign(x')
@@ -257,6 +259,7 @@ def test_two_frictions_on_one_body_are_their_sum(tmp_path, formulation):
 
 
 @PRIMAL
+@pytest.mark.long
 def test_frictions_of_an_array_in_components(tmp_path, formulation):
     """A component with a gamma, its own row of an array, and dissipators: one motion."""
     parts = """\
@@ -311,7 +314,7 @@ model clamp {
 scene s of clamp { time 0 s to 40 ms; trace Z.f as a, Z.e as b, b.e as c every 0.5 ms }
 """,
 ])  # fmt: skip
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_dry_friction_is_one_in_both_families(tmp_path, formulation, text):
     one, other = (run(tmp_path, text, f, method="radau") for f in ("lagrangian", formulation))
     assert len(one.events) == len(other.events) > 3
@@ -323,7 +326,7 @@ def test_dry_friction_is_one_in_both_families(tmp_path, formulation, text):
 
 
 @ALL
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_elements_of_one_label_are_said_one_by_one(tmp_path, formulation):
     """Of frictions in two loops, and of limiters by themselves, each has a sense of its own."""
     text = """\
@@ -384,6 +387,7 @@ scene s of hoop { time 0 s to 6 s; trace x, y every 0.05 s }
 
 @PRIMAL
 @pytest.mark.parametrize("method", ["radau", "bdf"])
+@pytest.mark.long
 def test_what_sticks_is_let_go_while_its_bound_falls_to_zero(tmp_path, formulation, method):
     """A clutch of 150 N.m is opened between 1.5 s and 1.6 s: its moment is what the second disc asks for up to their
     release, then what it can bear.

@@ -31,7 +31,7 @@ def _slopes(_t, state):
 
 
 @pytest.mark.parametrize("accuracy", [1e-5, 1e-6, 1e-7, 1e-8])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_a_clamp_takes_the_crest_of_every_swing(accuracy, tmp_path):
     """It conducts for 3 us of steps of 60: radau passed over some of eleven crests at half of all tolerances (E920)."""
     (tmp_path / "clamp.sd").write_text(CLAMP)
@@ -46,7 +46,7 @@ def test_a_clamp_takes_the_crest_of_every_swing(accuracy, tmp_path):
 
 
 @pytest.mark.parametrize("rtol", np.logspace(-4, -12, 17))
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(30)
 def test_at_every_tolerance(rtol, tmp_path):
     (tmp_path / "clamp.sd").write_text(CLAMP)
     trace = api.simulate(tmp_path / "clamp.sd", method="radau", rtol=float(rtol), output=tmp_path / "out.h5")
@@ -77,7 +77,7 @@ WINDOWS = {
 
 @pytest.mark.parametrize("method", ["bdf", "radau", "dopri"])
 @pytest.mark.parametrize("window", WINDOWS)
-@pytest.mark.one_in(6)
+@pytest.mark.long
 def test_a_window_as_narrow_as_the_accuracy_is_not_passed_over(window, method, tmp_path):
     """It is open for 0.2 us of steps of 30 ms: |x - c| falls below zero and comes back between two looks at a step."""
     condition, widths = WINDOWS[window]

@@ -28,6 +28,7 @@ scene charge of core {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_coils_on_one_core(tmp_path, formulation):
     """flux' = 10 V from 5 mWb = i + 50 mH j; 7.5 mH j' = -10 j - 0.5 V from 0.1 A."""
     path = tmp_path / "core.sd"

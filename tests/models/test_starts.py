@@ -23,7 +23,7 @@ GALLERY = ROOT / "models" / "gallery"
 
 @pytest.mark.parametrize("guess", [0.9, 1.2, 2.0])
 @pytest.mark.parametrize("formulation", FOUR[2:])
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(12)
 def test_a_junction_guessed_far_above_its_voltage(tmp_path, formulation, guess):
     """From 1.1 V down Newton's steps are thermal voltages: the current shrinks, but not beside its terms."""
     text = (GALLERY / "ebers_moll_amp.sd").read_text().replace("init Ce.e ~ 1.3 V", f"init Ce.e ~ {guess} V")
@@ -33,7 +33,7 @@ def test_a_junction_guessed_far_above_its_voltage(tmp_path, formulation, guess):
 
 @pytest.mark.parametrize("scene", ["shared", "dropped"])
 @pytest.mark.parametrize("start", [-2.5, -2.0, -0.8])
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(12)
 def test_parallel_cranks_that_start_elsewhere(tmp_path, scene, start):
     """Near points may not be taken on the other side of a dead centre, nor the start moved by the row left out."""
     trace = trace_of(tmp_path, GALLERY / "sixbar_redundant.sd", scene=scene, settings=(("start", f"{start} rad"),))
@@ -41,7 +41,7 @@ def test_parallel_cranks_that_start_elsewhere(tmp_path, scene, start):
 
 
 @pytest.mark.parametrize("formulation", FOUR)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_a_junction_guessed_far_above_its_voltage_is_walked_down(tmp_path, formulation):
     """The guess puts 2 V across the collector's junction: exp(124) there, one e-fold an iteration."""
     text = (ROOT / "models" / "gallery" / "ebers_moll_amp.sd").read_text()
@@ -59,6 +59,7 @@ def test_a_junction_guessed_far_above_its_voltage_is_walked_down(tmp_path, formu
     ("pattern", "formulations"),
     [("seed/*.sd", ("lagrangian", "co_lagrangian")), *([("*/*.sd", EVERY)] if os.environ.get("SYSDYN_LONG") else [])],
 )
+@pytest.mark.long
 def test_nearly_all_starts_need_the_first_strategy_alone(pattern, formulations):
     """One iteration from the guesses, in what follows from the state or with the least change of it: 95 of 100."""
     found = [strategy for *_, strategy in strategies(pattern, formulations)]
@@ -67,6 +68,7 @@ def test_nearly_all_starts_need_the_first_strategy_alone(pattern, formulations):
     assert set(found) <= {name for name, _ in STRATEGIES}
 
 
+@pytest.mark.long
 def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
     """A diode guessed beyond the range of exponentials is started from beside the guess."""
     text = (GALLERY / "diode_circuit.sd").read_text().replace("~ 0 V", "~ 100 V")
@@ -91,6 +93,7 @@ SORTS = [("scalar", 1000), ("others", 1000), ("bare", 1000), ("read", 1000), ("v
 
 
 @pytest.mark.parametrize(("sort", "number"), SORTS)
+@pytest.mark.one_in(12)
 def test_random_networks_partly_said_begin_with_the_contents_of_the_closed_form(sort, number):
     """In all formulations; what is fixed in contradiction has no start in any."""
     seeds = (*range(number if os.environ.get("SYSDYN_LONG") else 1 if sort == "arrays" else 3), *HARD[sort])
@@ -129,7 +132,7 @@ THREE = (
         (THREE + "\n  init R.f = 0.2 A", {"C1.e": 1.0, "C2.e": 18.0 / 13.0, "C3.e": 8.0 / 13.0}),
     ],
 )
-@pytest.mark.one_in(6)
+@pytest.mark.long
 def test_stores_of_which_another_says_something_hold_the_least_in_every_formulation(tmp_path, parts, held, formulation):
     """Coils in parallel by fluxes, capacitors in series by charges; constants of series classes are not zero then."""
     trace = trace_of(tmp_path, SERIES.format(parts, ", ".join(held)), formulation=formulation)
@@ -155,6 +158,7 @@ scene cool of rod {{ time 0 s to 1 s; trace u[1], u[3], u[7] every 0.1 s; accura
         "state u[1..n]: K\n  for i in 1..n { init u[i] = 2 K*sin(pi*i/(n + 1)) }",
     ],
 )
+@pytest.mark.long
 def test_states_declared_in_a_loop_start_where_each_says(tmp_path, declared):
     """The first mode of a rod between two cold ends: it falls with 2 - 2 cos(pi/8) times 3 Hz."""
     trace = trace_of(tmp_path, ROD.format(declared=declared))
@@ -178,6 +182,7 @@ scene swing of lattice { time 0 s to 2 s; trace z[2, 3] in mm as z every 0.1 s; 
 
 
 @pytest.mark.parametrize("formulation", FOUR[:2])
+@pytest.mark.long
 def test_coordinates_declared_in_two_loops(tmp_path, formulation):
     """A mode of a membrane of masses: w^2 = 9 (4 - 2 cos(pi/5) - 2 cos(2 pi/5))."""
     trace = trace_of(tmp_path, LATTICE, formulation=formulation)
@@ -210,7 +215,7 @@ scene go of coils { time 0 s to 0.1 s; accuracy 1e-6; trace K.one.f as one, K.tw
     ("text", "inertia", "formulations"),
     [(JOINED, [[2, 1], [1, 1]], FOUR[:2]), (COILS, [[1, 0.6 * 2**0.5], [0.6 * 2**0.5, 2]], FOUR)],
 )
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_flows_that_share_inertia_start_alike_in_all_formulations(tmp_path, text, inertia, formulations):
     """Momenta M f of least squares with f1 + f2 = 1."""
     down = np.array(inertia) @ [1.0, -1.0]
@@ -233,6 +238,7 @@ scene go of said { time 0 s to 0.1 s; accuracy 1e-6; trace x', y', z' }
 
 
 @pytest.mark.parametrize("formulation", FOUR[:2])
+@pytest.mark.long
 def test_a_flow_that_is_said_counts_in_what_it_holds_with_others(tmp_path, formulation):
     """x' = 0.4, y' + z' = 0.6 and the least of y'^2 + (2 y' + z')^2 + (y' + z')^2, momenta less those of x' alone."""
     trace = trace_of(tmp_path, SAID, formulation=formulation)
@@ -260,6 +266,7 @@ scene swing of cart {{ time 0 s to 0.1 s; accuracy 1e-6; trace x', a', x }}
     ["1/2*(1 kg)*(bob'^2 + y'^2)", "1/2*(1 kg)*(x'^2 + 1.2 m*cos(a)*x'*a' + (0.6 m*a')^2)"],
     ids=["lets", "whole"],
 )
+@pytest.mark.long
 def test_a_flow_that_nothing_moves_begins_at_rest(tmp_path, bob, formulation):
     """A cart under a pendulum that swings began at -0.29 m/s in Lagrange's form, at -0.48 m/s in Hamilton's."""
     trace = trace_of(tmp_path, CART.format(bob=bob), formulation=formulation)
@@ -289,6 +296,7 @@ scene go of coupled { time 0 s to 0.1 s; accuracy 1e-6; trace K.one.f as one, K.
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_the_other_coil_begins_without_a_current(tmp_path, formulation):
     """It began with -1.49 A but in Lagrange's form, where the fluxes of both were least."""
     trace = trace_of(tmp_path, COUPLED, formulation=formulation)
@@ -323,7 +331,6 @@ scene s of cut {{ time 0 s to 1 ms; trace L1.f as c1, L2.f as c2, L3.f as c3 eve
 """
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize(
     ("text", "law", "inverse", "total"),
@@ -335,6 +342,7 @@ scene s of cut {{ time 0 s to 1 ms; trace L1.f as c1, L2.f as c2, L3.f as c3 eve
     ],
     ids=["capacitors", "capacitors, one of them a curve", "inductors", "inductors, one of them a curve"],
 )
+@pytest.mark.long
 def test_what_is_not_said_is_the_least_that_stores_hold(tmp_path, text, law, inverse, total, formulation):
     """Charges of a loop around a source, fluxes at a node: the least sum of their squares, whoever the unknowns are."""
 
@@ -390,6 +398,7 @@ scene s of swing {{ time 0 s to 1 us; trace y }}
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.long
 def test_a_guess_of_any_number_of_digits(tmp_path, seed):
     """Beside laws with corners, where it was good to ten digits and more, one of eight was refused (E903)."""
     dice = np.random.default_rng(seed)

@@ -46,9 +46,9 @@ def _sides(trace, name, instant):
     return trace[name].values[at[[0, -1]]]
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("way", JUMPS)
+@pytest.mark.long
 def test_charge_is_balanced_over_a_step_in_a_loop_of_capacitors(tmp_path, way, formulation):
     """Held as a dynamic variable, the charge of N2 stayed: 0.6 C came from nowhere, told as met."""
     jumps, effort, flow = JUMPS[way]
@@ -89,7 +89,7 @@ LAWS = {  # text, charge by effort
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("second", LAWS)
 @pytest.mark.parametrize("first", LAWS)
-@pytest.mark.one_in(12)
+@pytest.mark.long
 def test_charge_that_a_step_shares_between_stores_of_any_law(tmp_path, first, second, formulation):
     """Of 1 V, then 5 V: as much charge goes through both at once; three iterations had to do, and mean slopes."""
     text = SERIES.replace("JUMPS", "").replace("UE", "(if t < 0.2 s then 1 V else 5 V)")
@@ -149,7 +149,7 @@ def _drawn(seed):
 
 @pytest.mark.parametrize("formulation", FOUR)
 @pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.one_in(8)
+@pytest.mark.long
 def test_charge_and_flux_are_balanced_over_steps_in_random_nets(tmp_path, seed, formulation):
     text, nodes, elements = _drawn(seed)
     (tmp_path / "m.sd").write_text(text)
@@ -185,8 +185,8 @@ scene s of m { time 0 s to 0.5 s
 """
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_a_source_pays_what_contents_of_any_law_take_along_the_rise(tmp_path, formulation):
     """In co-Hamilton's form the sum was off by 2 mJ, told as met, for the law of N2 does not hold on a straight way."""
     (tmp_path / "m.sd").write_text(ENERGY)

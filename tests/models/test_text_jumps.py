@@ -48,6 +48,7 @@ def current(times):
 
 @pytest.mark.parametrize("method", ["radau", "bdf"])
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_pulses_of_the_text_are_the_cores(tmp_path, monkeypatch, method, formulation):
     """400 jumps, at which a switch and a diode turn: the handler is asked for a few."""
     asked = []
@@ -60,6 +61,7 @@ def test_pulses_of_the_text_are_the_cores(tmp_path, monkeypatch, method, formula
     assert np.abs(trace["i"].values - exact).max() < 3e-6 * exact.max()
 
 
+@pytest.mark.long
 def test_the_handler_finds_the_same_pulses(tmp_path, monkeypatch):
     found = []
     for serves in (pieces.serves, lambda *_: False):
@@ -72,6 +74,7 @@ def test_the_handler_finds_the_same_pulses(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("value", ["if t > 0 s then 5 V else 0 V", "5 V*sign(t/(1 s))", "5 V*sign(sin(t/(1 s)))"])
 @pytest.mark.parametrize("method", ["auto", "bdf", "radau"])
+@pytest.mark.one_in(5)
 def test_a_source_that_steps_behind_the_start_charges_a_capacitor(tmp_path, method, value):
     """By an impulse, half of whose energy goes; both sides of the instant have a row."""
     trace = run(STEP.replace("VALUE", value), tmp_path, method=method)
@@ -82,12 +85,14 @@ def test_a_source_that_steps_behind_the_start_charges_a_capacitor(tmp_path, meth
 
 
 @pytest.mark.parametrize("value", ["if t >= 0 s then 5 V else 0 V", "5 V*(1 - mod(t, 2 s)/(4 s))"])
+@pytest.mark.long
 def test_what_holds_at_the_start_has_one_row_there(tmp_path, value):
     trace = run(STEP.replace("VALUE", value).replace("D: diode.complementary()", "D: resistor(R = 1 ohm)"), tmp_path)
     assert trace.time[:2].tolist() == pytest.approx([0.0, 0.1])
 
 
 @pytest.mark.parametrize("method", ["auto", "bdf", "radau", "rosenbrock", "dopri"])
+@pytest.mark.long
 def test_a_step_behind_the_start_of_a_smooth_model(tmp_path, method):
     text = """model m {
   state u: 1 = 0

@@ -26,6 +26,7 @@ def codes(text):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_tables_of_one_name_in_two_files_are_two_tables(tmp_path, formulation):
     (tmp_path / "parts.sd").write_text(
         "table map(x: 1) -> N linear clamp [ (0, 0), (1, 10) ]\n"
@@ -157,7 +158,7 @@ scene s of m { time 0 s to 4 s; trace L[1].c[3].e as a, L[3].c[1].e as b, K.c[2]
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_components_in_an_array_have_arrays_of_their_own_size(tmp_path, formulation):
     trace = run(tmp_path, LADDERS, formulation=formulation)
     for name, n, ohms, k in (("a", 3, 1.0, 2), ("b", 3, 3.0, 0), ("c", 2, 1.0, 1)):
@@ -221,7 +222,7 @@ scene s of m { time 0 s to 1 s; trace L[1].a[1].e as x, L[2].D[2].S.mean as mean
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_ports_that_are_arrays(tmp_path, formulation):
     trace = run(tmp_path, STARS, formulation=formulation)
     g = np.array([1, 0.5, 0.25])
@@ -268,6 +269,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("weight", [1, 10])
+@pytest.mark.long
 def test_inputs_of_a_model_are_arrays(tmp_path, weight):
     trace = run(tmp_path, FED, set={"w[2]": weight})
     assert off(trace, "z", lambda t: 4 * weight * (1 - np.exp(-t / 2))) < 1e-6
@@ -321,11 +323,13 @@ scene s of m { time 0 s to 1 s; set STATEMENT; trace sa, sb, sc, x[1..2]; accura
         ("c[n] = 7 kg; set c = 2 kg", (1111, 1111, 7222)),
     ],
 )
+@pytest.mark.one_in(5)
 def test_a_range_of_a_parameter_is_set_and_no_more(tmp_path, statement, sums):
     trace = run(tmp_path, SET.replace("STATEMENT", statement), accuracy=None)
     assert [trace[name][0] for name in ("sa", "sb", "sc")] == list(sums)
 
 
+@pytest.mark.long
 def test_the_command_line_wins_over_elements_that_the_scene_sets(tmp_path):
     text = SET.replace("STATEMENT", "a[1] = 7 kg")
     assert run(tmp_path, text, accuracy=None, set={"a": "5"})["sa"][0] == 5555
@@ -368,6 +372,7 @@ scene s of m { time 0 s to 1 s; set STATEMENT; trace X[1..3].r.f as i }
         ("X[1..2].k[1..2] = 4", (4, 4, 1)),
     ],
 )
+@pytest.mark.one_in(3)
 def test_parameters_of_a_range_of_components_are_set(tmp_path, statement, ohms):
     trace = run(tmp_path, CELLS.replace("STATEMENT", statement))
     assert [trace[f"i[{k}]"][0] for k in (1, 2, 3)] == pytest.approx([1 / r for r in ohms], rel=1e-12)

@@ -25,6 +25,7 @@ scene swing of on_a_spring {
 
 
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
+@pytest.mark.long
 def test_dopri_on_a_spring_of_a_table(tmp_path, accuracy):
     (tmp_path / "model.sd").write_text(SPRING)
     trace = api.simulate(tmp_path / "model.sd", method="dopri", accuracy=accuracy, output=tmp_path / "out.h5")

@@ -41,6 +41,7 @@ def _heights(t, e=0.8):
 
 @pytest.mark.parametrize("method", ["auto", "rosenbrock", "dopri"])
 @pytest.mark.parametrize("ball", BALLS)
+@pytest.mark.one_in(5)
 def test_ends_where_its_bounces_do(ball, method, tmp_path):
     """It fell through the floor, to -4.3 m, told as met: a flight of less than a micrometre was not seen to rise."""
     (tmp_path / "b.sd").write_text(f"model b {{\n{BALLS[ball]}}}\nscene s of b {{\n  time 0 s to 5 s\n  trace y\n}}\n")
@@ -54,6 +55,7 @@ def test_ends_where_its_bounces_do(ball, method, tmp_path):
 
 
 @pytest.mark.parametrize("method", ["auto", "bdf"])
+@pytest.mark.one_in(2)
 def test_holds_until_there(method, tmp_path):
     text = BALLS["flow"].replace("0.8", "0.95")
     (tmp_path / "b.sd").write_text(f"model b {{\n{text}}}\nscene s of b {{\n  time 0 s to 17 s\n  trace y\n}}\n")
@@ -64,6 +66,7 @@ def test_holds_until_there(method, tmp_path):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["auto", "bdf"])
+@pytest.mark.long
 def test_what_an_event_stops_is_not_thrown(formulation, method, tmp_path):
     """It begins back from the limit at rest but for round-off, however low a flight that would be."""
     text = """\

@@ -36,7 +36,7 @@ scene fall of falling {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_chain_that_falls_freely_does_not_turn(tmp_path, formulation):
     """Angular velocities and joint forces have no others of their units: round-off of weights and positions alone."""
     (tmp_path / "model.sd").write_text(LINKS)
@@ -73,7 +73,7 @@ scene shut of shorted {
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_two_gyrators_that_short_each_other(tmp_path, formulation):
     """Two ratios at the same ends leave no voltage, no turning: the flux stays, the inertia has the damper alone."""
     (tmp_path / "model.sd").write_text(SHORTED)
@@ -147,6 +147,7 @@ scene go of m {
 
 
 @pytest.mark.parametrize("formulation", FOUR)
+@pytest.mark.long
 def test_round_off_has_not_come_to_rest(tmp_path, formulation):
     """Node 1 is at 0 V by its balance: round-off was taken for what is left of a quantity that comes to rest, 892 steps
     for 29, "C.f not reached, estimated 2.8e-05" (E920), its true error 1e-14.

@@ -41,6 +41,7 @@ SIGNS = (
 
 
 @pytest.mark.parametrize("text", CHANGES)
+@pytest.mark.one_in(12)
 def test_each_kind_of_change(text):
     wanted = {ast.unparse(ast.parse(t)) for t in CHANGES[text]}
     assert wanted <= {m.text for m in mutants(text)}
@@ -48,7 +49,7 @@ def test_each_kind_of_change(text):
 
 
 @pytest.mark.parametrize("name", run.LOWERING)
-@pytest.mark.one_in(23)
+@pytest.mark.long
 def test_mutants_of_the_lowering_compile_and_differ(name):
     found = run.sites(name)
     plain = ast.unparse(ast.parse((run.ROOT / "compiler" / name).read_text()))
@@ -67,7 +68,7 @@ def test_equivalents_are_mutants():
 
 
 @pytest.mark.parametrize(("name", "function", "what", "model"), SIGNS)
-@pytest.mark.one_in(9)
+@pytest.mark.long
 def test_one_sign_dies(name, function, what, model):
     command = [sys.executable, run.__file__, "--only", name, "--function", function, "--what", what]
     ran = subprocess.run([*command, "--models", model], capture_output=True, text=True, timeout=120, check=False)

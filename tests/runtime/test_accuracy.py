@@ -19,6 +19,7 @@ def sampled(tolerance, values, steps=None):
     return Sampled(tolerance, values, np.abs(values).max(axis=0), steps)
 
 
+@pytest.mark.long
 def test_runs_that_never_agree_leave_no_estimate():
     def run(tolerance, longest):
         return sampled(tolerance, [1.0, np.nan])
@@ -41,6 +42,7 @@ def test_an_estimate_below_round_off_says_so(part, below):
 
 
 @pytest.mark.parametrize("moved", [0.0, 3e-6, 3e-3])
+@pytest.mark.one_in(2)
 def test_two_runs_with_the_same_steps_are_no_estimate(moved):
     def run(tolerance, longest):
         shifted = longest < 0.6 * LONGEST
@@ -53,6 +55,7 @@ def test_two_runs_with_the_same_steps_are_no_estimate(moved):
 
 
 @pytest.mark.parametrize(("jumps", "steps"), [(True, 90), (True, 200), (False, 90)])
+@pytest.mark.one_in(2)
 def test_steps_that_events_hold_say_nothing_of_the_tolerance(jumps, steps):
     """Of 60 random rectifiers two were off by more than what was asked, told as met, by runs with as many steps."""
     errors = []
@@ -101,6 +104,7 @@ def test_runs_with_events_that_differ_as_before_are_not_believed_by_one_that_doe
     ("steps", "events", "runs"),
     [((60, 90, 120), (9, 9, 9), 2), ((60, 90, 120), (5, 9, 9), 3), ((60, 150, 200), (0, 0, 0), 3)],
 )
+@pytest.mark.one_in(2)
 def test_a_run_that_met_what_the_one_before_has_not_seen_earns_no_credit(steps, events, runs):
     """Knocks by rosenbrock: 85 and 161 steps, 23 and 35 events; 6.3 of what was asked apart, met, 5.2 off."""
     values, made = iter([0.0, 3e-2, 3.1e-2]), iter(zip(steps, events, strict=True))
@@ -155,6 +159,7 @@ def test_a_finer_run_that_fails_is_tried_half_the_way(wall, half):
 
 
 @pytest.mark.parametrize("cause", CHANCES)
+@pytest.mark.one_in(2)
 def test_a_finer_run_that_fails_by_chance_is_tried_a_little_further(cause):
     """At an event, where half the way is no run worth its price: a rectifier was not met by 1.02 of what was asked."""
     tried = []
@@ -291,6 +296,7 @@ def test_short_runs_on_steep_laws_are_not_believed_to_fall_fast():
         ([1.0, 0.5, 0.5, 0.5], [1.0, 0.5, 0.0, 0.0], 0.0),  # they have nothing in common
     ],
 )
+@pytest.mark.one_in(3)
 def test_what_is_left_where_a_quantity_comes_to_rest_is_error(coarse, fine, left):
     one, two = (Sampled(1e-3, np.array(values)[:, None], np.ones(1), 100) for values in (coarse, fine))
     assert left_at_rest(one, two, np.array([1e-3])) == pytest.approx((1e-3 * left, left))

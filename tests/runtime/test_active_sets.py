@@ -88,6 +88,7 @@ def matrix(seed, n=6):
 
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("begun", [0, 1])
+@pytest.mark.one_in(12)
 def test_the_set_that_fits_is_the_one_there_is(seed, begun):
     """Of a positive definite matrix there is exactly one solution, from wherever one begins (Murty 1974)."""
     of = Problem(*matrix(seed))
@@ -124,6 +125,7 @@ def test_a_set_that_contradicted_itself_is_not_settled_again():
 
 
 @pytest.mark.parametrize(("operator", "sides"), [(">", (1,)), (">=", (0, 1)), ("<", (-1,)), ("<=", (-1, 0))])
+@pytest.mark.one_in(2)
 def test_a_relation_holds_by_its_side(operator, sides):
     still = [SimpleNamespace(moves=False)]
     for side in (-1, 0, 1):

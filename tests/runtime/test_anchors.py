@@ -30,16 +30,19 @@ def anchored(*parts, **more):
 
 
 @pytest.mark.parametrize("fixed", [True, False])
+@pytest.mark.long
 def test_what_is_written_and_does_not_move_is_an_anchor(fixed):
     written = {"q_x": (0.5, fixed), "f_x": (1.0, fixed)}
     assert anchored("x", "f_x**2", "4*q_x**2", initial=written) == {"q_x", "f_x"}
 
 
+@pytest.mark.long
 def test_what_nobody_wrote_stays_where_it_was_guessed_if_nothing_determines_it():
     assert anchored("x", "f_x**2", "4*q_x**2") == {"q_x", "f_x"}
     assert anchored("x", "f_x**2", "4*q_x**2", initial={"q_x": (0.5, True)}) == {"q_x", "f_x"}
 
 
+@pytest.mark.long
 def test_what_moved_for_the_sake_of_a_constraint_is_none():
     """On the rod of 5 m y goes from -2 to -4; as its flow then follows, it is none either."""
     written = {"q_x": (3.0, True), "q_y": (-2.0, False), "f_x": (1.0, True)}

@@ -41,6 +41,7 @@ def end(system, t_end=0.5, **request):
 
 @pytest.mark.parametrize("form", ["3", "2", "2v", "1", "settled", "start"])
 @pytest.mark.parametrize("n", [1, 2, 5])
+@pytest.mark.long
 def test_library_and_module_agree_and_jacobians_are_derivatives(library, form, n):
     binding = chain.binding(n)
     compiled = System(MANIFEST, binding, library, form)
@@ -97,6 +98,7 @@ def test_long_chain(library):
     assert integration.linear.contents.pivotings < 5
 
 
+@pytest.mark.long
 def test_two_carriers_give_the_same_run(library):
     binding = chain.binding(4)
     runs = [end(System(MANIFEST, binding, carrier, "2"), rtol=1e-7) for carrier in (library, load(chain.Chain))]
@@ -104,6 +106,7 @@ def test_two_carriers_give_the_same_run(library):
     assert runs[0][1].statistics.steps == runs[1][1].statistics.steps
 
 
+@pytest.mark.long
 def test_patterns_of_a_large_array_need_no_loop(effort):
     def lines(n):
         manifest = {"structure": chain.structure()}
@@ -115,6 +118,7 @@ def test_patterns_of_a_large_array_need_no_loop(effort):
     assert many <= 1.05 * few, (few, many)
 
 
+@pytest.mark.long
 def test_patterns_of_a_large_array_import_no_scipy():
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import chain_model as chain\n"
@@ -125,6 +129,7 @@ def test_patterns_of_a_large_array_import_no_scipy():
     subprocess.run([sys.executable, "-c", code, chain.__file__.rsplit("/", 1)[0]], check=True)
 
 
+@pytest.mark.long
 def test_start_of_small_models_imports_no_scipy():
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import chain_model as chain\n"

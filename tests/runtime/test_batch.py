@@ -32,6 +32,7 @@ BEGUN = np.array([[0.5, 1.0], [-2.0, 0.0], [1e-3, 5.0]])
 
 
 @pytest.mark.parametrize("method", ["dopri", "radau", "bdf"])
+@pytest.mark.long
 def test_ends_of_oscillators_from_elsewhere(method):
     made = batch(models.mass_spring(), method, options(every=0.1), keep=END)
     found = made.run(np.zeros((3, 0)), BEGUN)
@@ -43,6 +44,7 @@ def test_ends_of_oscillators_from_elsewhere(method):
         assert end == pytest.approx(oscillator(q, v, 3.0), abs=3e-6 * size)
 
 
+@pytest.mark.long
 def test_extremes_of_oscillators_from_elsewhere():
     made = batch(models.mass_spring(), "dopri", options(every=0.01), keep=EXTREMA)
     found = made.run(np.zeros((3, 0)), BEGUN)
@@ -53,6 +55,7 @@ def test_extremes_of_oscillators_from_elsewhere():
         assert (least, most) == pytest.approx((rows.min(), rows.max()), abs=3e-6 * np.hypot(q, v / 2.0))
 
 
+@pytest.mark.long
 def test_rows_that_are_kept_are_those_that_were_asked_for():
     thin = np.array([0, 7, 30])
     made = batch(models.mass_spring(), "dopri", options(every=0.1), keep=TRACES, thin=thin)
@@ -62,6 +65,7 @@ def test_rows_that_are_kept_are_those_that_were_asked_for():
         assert rows == pytest.approx(oscillator(q, v, 0.1 * thin), abs=3e-6 * np.hypot(q, v / 2.0))
 
 
+@pytest.mark.long
 def test_one_run_is_handed_back_as_a_trace():
     made = batch(models.mass_spring(), "dopri", options(every=0.1), keep=ROWS)
     trace = made.trace(np.zeros(0), np.array([-1.0, 2.0]), ())
@@ -100,6 +104,7 @@ def test_a_run_that_needs_too_many_steps_has_no_result():
         ({"max_wall": 1.0}, "the wall time of a run is limited"),
     ],
 )
+@pytest.mark.one_in(2)
 def test_what_the_core_does_not_do_is_refused_with_its_reason(more, why):
     assert obstacle(options(**more)) == why
 

@@ -26,7 +26,7 @@ def run(made, t_end, form="3", index=0, instants=(), **request):
     ("order", "tolerances"),
     [(1, (1e-4, 1e-6)), (2, (1e-5, 1e-8)), (3, (1e-6, 1e-9)), (4, (1e-7, 1e-10)), (5, (1e-10, 1e-11))],
 )
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_observed_order(order, tolerances):
     # error ~ steps^-order where no higher order is allowed
     t = np.linspace(0, 10, 21)
@@ -48,6 +48,7 @@ def test_implicit_euler_is_first_order():
     assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.long
 def test_tolerance_against_error_of_the_oscillator():
     t = np.linspace(0, 10, 21)
     exact = 0.5 * (np.cos(2 * t) + np.sin(2 * t))
@@ -60,6 +61,7 @@ def test_tolerance_against_error_of_the_oscillator():
         before = error
 
 
+@pytest.mark.long
 def test_stabilised_pendulum_keeps_its_constraints_and_energy():
     # reference values of references.json, pendulum, t = 0.4, 1, 4
     q1 = [0.2788161732553531, -0.18588523467690846, -0.12866541720223088]
@@ -77,12 +79,13 @@ def test_stabilised_pendulum_keeps_its_constraints_and_energy():
 
 
 @pytest.mark.parametrize(("form", "index"), [("2", 2), ("2v", 2), ("1", 1), ("3", 3)])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_every_index_form_of_the_pendulum(form, index):
     _, columns, _ = run(models.pendulum(), 4.0, form, index, [4.0], rtol=1e-7)
     assert abs(columns["q1"][-1] + 0.12866541720223088) < (1e-4 if form == "3" else 1e-5)
 
 
+@pytest.mark.long
 def test_hamiltonian_agrees_with_lagrangian():
     for make in (models.pendulum, models.dc_motor, models.mass_spring):
         form, index = ("2", 2) if make is models.pendulum else ("3", 1)
@@ -91,6 +94,7 @@ def test_hamiltonian_agrees_with_lagrangian():
         assert values[0] == pytest.approx(values[1], rel=1e-6)
 
 
+@pytest.mark.long
 def test_index_two_circuit_of_massless_coordinates():
     # references.json, lead_filter at t = 1
     _, columns, _ = run(models.lead_filter(), 1.0, "3", 2, rtol=1e-8)
@@ -98,6 +102,7 @@ def test_index_two_circuit_of_massless_coordinates():
     assert columns["f_3"][-1] == pytest.approx(0.000756465238384, rel=1e-6)
 
 
+@pytest.mark.long
 def test_valves_through_zero_slope_and_stiff_diode():
     # references.json, nonlinear_fluid at t = 60
     _, columns, _ = run(models.nonlinear_fluid(), 60.0, "3", 2, rtol=1e-8)
@@ -109,12 +114,14 @@ def test_valves_through_zero_slope_and_stiff_diode():
     assert 2e-5 < values[1] < 5e-5
 
 
+@pytest.mark.long
 def test_energy_balance_counts_dissipation_and_supply():
     rows, _, _ = run(models.dc_motor(), 0.6, "3", 1, np.linspace(0, 0.6, 7), rtol=1e-9)
     # the two implicit efforts exchange power: 12 f_c + (e_2 f_a - e_1 f_c) is the supply, less what the resistors take
     assert np.abs(rows[:, 6]).max() < 1e-6 * rows[:, 5].max()
 
 
+@pytest.mark.long
 def test_work_counters_are_deterministic():
     counters = [run(models.slider_crank(), 4.0, "2", 2, rtol=1e-6)[2].statistics for _ in range(2)]
     assert counters[0] == counters[1]
@@ -123,6 +130,7 @@ def test_work_counters_are_deterministic():
     assert counters[0].jacobian_evaluations < counters[0].steps // 4
 
 
+@pytest.mark.long
 def test_dense_output_between_steps_is_as_good_as_at_steps():
     t = np.linspace(0, 10, 501)
     _, columns, _ = run(models.mass_spring(), 10.0, instants=t, rtol=1e-8)
@@ -159,6 +167,7 @@ def test_a_residual_that_is_not_finite_cuts_the_step_and_then_fails_with_its_row
     assert caught.value.time == pytest.approx(0.5, abs=1e-6)
 
 
+@pytest.mark.long
 def test_escape_to_infinity_is_a_typed_failure():
     with pytest.raises(SolverFailure) as caught:
         run(decay(lambda t, s: s * s), 2.0)
@@ -181,6 +190,7 @@ def test_singular_model_names_unknown_and_row():
     assert "y" in f"{caught.value.unknown} {caught.value.row}"
 
 
+@pytest.mark.long
 def test_scaled_models_behave_alike():
     # the same oscillator in nano and mega units: the same steps
     counters = []
@@ -198,6 +208,7 @@ def test_scaled_models_behave_alike():
     assert counters[0] == counters[1] == counters[2]
 
 
+@pytest.mark.long
 def test_memory_is_released():
     manifest, binding, module = models.mass_spring()
     system = System(manifest, binding, load(module))

@@ -127,6 +127,7 @@ def two_stores(stiff, leak):
 
 
 @pytest.mark.parametrize(("stiff", "leak", "wide"), [(2.0, 0.5, False), (1e9, 1e-9, True), (1e12, 1e-12, True)])
+@pytest.mark.one_in(2)
 def test_a_slow_motion_beside_a_fast_one_keeps_its_digits(stiff, leak, wide):
     """s^2 + (k + 1 + d) s + k d = 0: of -(k + 1) and about -d."""
     matrices, chosen, names = two_stores(stiff, leak), np.array([0, 1]), ("x", "y")
@@ -178,6 +179,7 @@ MINIMUM, SADDLE = Energy("minimum", (1.0,), True), Energy("saddle", (-1.0, 1.0),
         (0.0, 0.0, Energy("saddle", (-1.0, 1.0), False), ("undecided", "linearisation")),
     ],
 )
+@pytest.mark.one_in(5)
 def test_what_both_methods_say_of_an_oscillator(stiffness, damping, energy, expected):
     """x'' + d x' + k x = 0."""
     a, none = np.array([[0.0, 1.0], [-stiffness, -damping]]), np.zeros((2, 0))
@@ -205,6 +207,7 @@ def test_directions_that_nothing_feels_say_nothing():
         (0.0, "f_a**2", "minimum", 2.0 * G, False),
     ],
 )
+@pytest.mark.one_in(2)
 def test_the_energy_of_a_pendulum_at_rest(angle, content, kind, stiffness, conservative):
     """V = -2 g cos a of 2 kg on 1 m."""
     made = models.small("a", "f_a**2", f"-2*{G}*cos(q_a)", content, initial={"q_a": (angle, True), "f_a": (0, True)})
@@ -226,6 +229,7 @@ def test_the_energy_of_a_pendulum_at_rest(angle, content, kind, stiffness, conse
         ("1", [("phi_acceleration rod", "kappa_rod")]),
     ],
 )
+@pytest.mark.long
 def test_where_a_constraint_does_not_hold_its_multiplier_is_zero(form, expected):
     system = system_of(models.pendulum(), form)
     (family,) = system.description.families_of("kappa")
@@ -237,6 +241,7 @@ def test_where_a_constraint_does_not_hold_its_multiplier_is_zero(form, expected)
     assert [k for _, k in found] == [places[name] for _, name in expected]
 
 
+@pytest.mark.long
 def test_no_switches_switch_no_rows():
     system = system_of(models.pendulum())
     assert [part.size for part in switch_rows(system.description, system.form)] == [0, 0, 0, 0]
@@ -272,6 +277,7 @@ def test_a_fixed_value_goes_before_a_guess_of_the_same():
         assert written.tolist() == [False, False, True, True, True, False]
 
 
+@pytest.mark.long
 def test_a_guess_that_moved_is_told_with_what_asked_for_it():
     """A point on a rod of 5 m, fixed at x = 3, guessed at y = -3.9: it starts at -4."""
     made = models.small(

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from sysdyn import api
 
 COIL = """
@@ -17,6 +18,7 @@ scene s of coil { time 0 s to 50 ms; trace L.f as i every 0.5 ms }
 """
 
 
+@pytest.mark.long
 def test_a_current_that_follows_a_resistor(tmp_path: Path):
     """Its estimate at the ends of steps of 1 ms is damped by 1 / (h R / L): by that alone it is 2.2e-4 off between."""
     file = tmp_path / "m.sd"

@@ -34,6 +34,7 @@ def matrices(kind, n, rng):
 
 @pytest.mark.parametrize("number", [float, complex])
 @pytest.mark.parametrize("kind", ["line", "net", "faint"])
+@pytest.mark.one_in(5)
 def test_factors_of_a_sum_are_those_of_its_entries_bit_by_bit(kind, number):
     """In room of the caller that others wrote to, with the scale of the columns held by another one or by themselves,
     chosen pivots and those of the matrix before.
@@ -74,6 +75,7 @@ def test_factors_of_a_sum_are_those_of_its_entries_bit_by_bit(kind, number):
 
 
 @pytest.mark.parametrize("n", [0, 1, 3, 100])
+@pytest.mark.one_in(2)
 def test_an_array_is_what_it_was_bit_by_bit(n):
     """Of stretches, and where there are too many: zeros of both signs and what is no number included."""
     rest = np.repeat([0.0, -0.0, np.nan, 3.0, np.inf], n)
@@ -101,7 +103,7 @@ def test_a_start_that_is_put_away_is_the_same_start():
 
 
 @pytest.mark.parametrize("large", [True, False])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_points_settle_in_what_radau_does_not_read_between_its_steps(monkeypatch, large):
     """Rows at steps and within them write into right sides and stages: the run is the one that is not looked at.  Its
     constraints drift, so that nothing puts the stages right.

@@ -26,6 +26,7 @@ def failed(made, method):
 
 
 @METHODS
+@pytest.mark.long
 def test_what_runs_away_is_named(method):
     """a' = a^2 from 1 is 1/(1 - t); b beside it falls."""
     found, y = failed(
@@ -41,6 +42,7 @@ def test_what_runs_away_is_named(method):
 
 
 @METHODS
+@pytest.mark.long
 def test_the_flow_of_a_mass_that_vanishes_is_named(method):
     """Its momentum stays: (1 - t) v = 1, so y = -log(1 - t)."""
     initial = {"q_x": (0, True), "f_x": (0, True), "q_y": (0, True), "f_y": (1, True)}
@@ -51,6 +53,7 @@ def test_the_flow_of_a_mass_that_vanishes_is_named(method):
 
 
 @METHODS
+@pytest.mark.one_in(2)
 def test_a_row_that_is_no_number_is_named(method):
     """x'' = log(1 - t) ends at 1 s, where x' = -1 and x = -1/4."""
     rest = {"q_x": (0, True), "f_x": (0, True)}

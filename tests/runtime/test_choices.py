@@ -52,6 +52,7 @@ def facts(index):
     return SimpleNamespace(index=index)
 
 
+@pytest.mark.long
 def test_the_explicit_method_is_first_where_rates_follow_and_of_index_1_one_without_newtons_iteration():
     spring = written(models.mass_spring())
     assert tried(spring, "3", 1) == (["dopri 0", "rosenbrock 3", "radau 3", "bdf 3"], NOT_STIFF)
@@ -68,6 +69,7 @@ def test_the_explicit_method_is_first_where_rates_follow_and_of_index_1_one_with
         ({"accuracy": None}, True),
     ],
 )
+@pytest.mark.one_in(3)
 def test_fine_accuracies_ask_for_more_stages(more, tried_too):
     found, _ = tried(written(models.mass_spring()), "3", 1, replace(AUTO, **more))
     assert ("rosenbrock 3" in found) == tried_too
@@ -89,6 +91,7 @@ def test_where_the_underlying_equation_was_asked_for_the_implicit_methods_take_o
     assert found == (["dopri 0", "radau 0", "bdf 0"], NOT_STIFF)
 
 
+@pytest.mark.long
 def test_without_an_explicit_equation_the_reason_names_what_has_no_rate():
     """A node of springs without a mass, and a torque that follows from a current through algebra alone."""
     found, why = tried(written(models.springs()), "3", 1)
@@ -105,6 +108,7 @@ def said(model):
     return system, consistent_start(system, 0.0)
 
 
+@pytest.mark.long
 def test_steep_laws_are_the_bdfs_before_radaus_of_many_unknowns_too():
     many = said(STEEP.replace("  C:", "  for k in 1..60 { E[k]: diode() b -> ground }\n  C:"))
     assert many[0].unknowns > SMALL
@@ -137,6 +141,7 @@ scene s of m {{ time 0 s to 3600 s; trace vessel.e }}
         ("f = 1e-9 m^3/s*(exp(e/(0.01 Pa)) - 1)", "bdf 2"),
     ],
 )
+@pytest.mark.long
 def test_steep_laws_that_do_not_turn_need_no_newton_iteration(law, first):
     made = said(PIPES.format(law=law))
     assert tried(made, "2", 2)[0][0] == first
@@ -165,6 +170,7 @@ def test_steep_laws_that_do_not_turn_need_no_newton_iteration(law, first):
         ("1", 3, "auto", ("1", 1)),
     ],
 )
+@pytest.mark.one_in(12)
 def test_the_form_and_its_index(wanted, index, method, found):
     assert choose_index(wanted, facts(index), method)[:2] == found
 
@@ -206,12 +212,14 @@ def unknown(made):
     return list(rateless(other, start)), list(obstacle(other, start)), found.form.name, list(left)
 
 
+@pytest.mark.long
 def test_masses_have_rates_and_what_springs_alone_hold_has_none():
     assert unknown(models.mass_spring()) == ([], [], "0", [])
     assert unknown(models.pendulum()) == ([], [], "0", [])
     assert unknown(models.springs())[0] == ["f_y"]
 
 
+@pytest.mark.long
 def test_a_massless_coordinate_that_a_constraint_determines_is_solved_for():
     """y = 2 x without inertia: the constraint itself, not its second derivative, gives y."""
     made = models.small(
@@ -220,6 +228,7 @@ def test_a_massless_coordinate_that_a_constraint_determines_is_solved_for():
     assert unknown(made)[0] == []
 
 
+@pytest.mark.long
 def test_the_current_of_a_capacitor_is_solved_for_from_kirchhoffs_law_as_it_is():
     """Of three coordinates without inertia no constraint that is differentiated gives a rate; the node gives a flow."""
     made = models.lead_filter()
@@ -229,6 +238,7 @@ def test_the_current_of_a_capacitor_is_solved_for_from_kirchhoffs_law_as_it_is()
     assert (form, left) == (f"0/{node}", [])
 
 
+@pytest.mark.long
 def test_two_capacitors_in_parallel_have_no_underlying_equation():
     tied = models.small("a b", 0, "q_a**2/2 + q_b**2/2", phi={"tie": "q_a - q_b - 1"})
     found, missing, form, left = unknown(tied)

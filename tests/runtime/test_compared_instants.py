@@ -29,6 +29,7 @@ def test_few_rows_are_all_kept():
 
 
 @pytest.mark.parametrize("chunk", [1, 7, 1000])
+@pytest.mark.long
 def test_a_long_stream_is_thinned_evenly_whatever_its_chunks(chunk):
     thinned, every = Thinned(), np.arange(3000.0)
     for k in range(0, every.size, chunk):

@@ -19,6 +19,7 @@ def of_rank(random, m, n, k, spread):
 
 @pytest.mark.parametrize("shape", [(1, 1), (3, 7), (7, 3), (20, 20), (32, 30)])
 @pytest.mark.parametrize("spread", [1.0, 1e-5])
+@pytest.mark.one_in(5)
 def test_rank_and_nearest_solution(shape, spread):
     random = np.random.default_rng(4)
     for k in range(1, min(shape) + 1, 3):
@@ -84,6 +85,7 @@ def test_a_leak_in_a_sum_of_conductances_is_known_as_far_as_its_digits_reach():
 
 
 @pytest.mark.parametrize("leak", [1e-3, 1e-12, 1e-25, 1e-170, 1e-300])
+@pytest.mark.one_in(3)
 def test_a_node_that_leakage_alone_holds(leak):
     """Nodes 1, 2 by 3 S with each other, by a leak and thrice a leak with ground; currents as rows of their own.  One
     leak's current into node 1: 1/4 V at both, 1e-17 V apart.
@@ -158,6 +160,7 @@ def test_what_is_no_number_is_said():
     ("e", "index"),
     [([[1.0]], 0), ([[0.0]], 1), ([[0.0, 1.0], [0.0, 0.0]], 2), (np.diag([1.0, 1.0], 1), 3), (np.eye(6), 0)],
 )
+@pytest.mark.one_in(3)
 def test_index_of_pencils_in_weierstrass_form(e, index):
     """N x' + x has the nilpotency of N as its index, in any bases and units."""
     e = np.array(e)
@@ -192,6 +195,7 @@ def test_order_is_a_permutation_that_fills_little(kind):
     assert found <= (3 * n if kind == "line" else 0.7 * fill(matrix, np.arange(n)))
 
 
+@pytest.mark.long
 def test_matchings_are_as_large_as_can_be():
     random = np.random.default_rng(0)
     for _ in range(200):
@@ -212,6 +216,7 @@ def test_matchings_are_as_large_as_can_be():
 
 
 @pytest.mark.parametrize("kind", ["line", "grid", "backwards", "random"])
+@pytest.mark.one_in(2)
 def test_a_matching_looks_at_each_entry_a_few_times(kind):
     """Chains in which each column could drive the one before it from its row: one search through all of them each."""
     random, n = np.random.default_rng(2), 40_000

@@ -28,6 +28,7 @@ def observed(errors):
     return np.log2(np.divide(errors[:-1], errors[1:]))
 
 
+@pytest.mark.long
 def test_order_eight_on_a_smooth_ode():
     errors = []
     for h in (0.4, 0.2, 0.1):
@@ -49,6 +50,7 @@ def test_values_between_steps_have_order_seven():
     assert (observed(errors) > 6.8).all()
 
 
+@pytest.mark.long
 def test_multipliers_between_steps():
     t = np.append(np.linspace(0.01, 0.39, 20), INSTANTS)
     for rtol, allowed in ((1e-6, 1e-8), (1e-12, 1e-12)):
@@ -58,6 +60,7 @@ def test_multipliers_between_steps():
 
 
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_error_falls_with_the_tolerance(form):
     errors, steps = [], []
     for rtol in (1e-9, 1e-12):
@@ -71,12 +74,14 @@ def test_error_falls_with_the_tolerance(form):
 
 
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_energy_is_integrated_with_the_order_of_the_method(form):
     rows = dopri(models.dc_motor(form), 0.6, np.linspace(0, 0.6, 7), rtol=1e-9)[0]
     assert np.abs(rows[:, 6]).max() < 1e-9 * rows[:, 5].max()
 
 
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_the_balance_of_energy_between_steps_is_as_good_as_at_them(form):
     """Ten rows a step share the powers at eight of its points; each by itself they were a thousand times as far off."""
     rows = dopri(models.pendulum(form), 4.0, np.linspace(0.0, 4.0, 401), rtol=1e-6)[0]
@@ -98,7 +103,7 @@ def drift(made, t_end, form, method, rtol):
 
 
 @pytest.mark.parametrize("family", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_no_drift_over_a_long_span(family):
     # without projection 0.3 and 0.6 (seed README, section 6, 12)
     assert drift(models.pendulum(family), 400.0, "0", "dopri", 1e-4) < 1e-14
@@ -107,13 +112,14 @@ def test_no_drift_over_a_long_span(family):
 
 @pytest.mark.parametrize("method", ["bdf", "radau"])
 @pytest.mark.parametrize("form", ["1", "0"])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_differentiated_rows_are_projected_after_each_step(monkeypatch, method, form):
     assert drift(models.pendulum(angle=2.0), 40.0, form, method, 1e-4) < 1e-12
     monkeypatch.setattr(settlers, "PROJECTED", ())
     assert drift(models.pendulum(angle=2.0), 40.0, form, method, 1e-4) > 1e-3
 
 
+@pytest.mark.long
 def test_counters_are_deterministic():
     found = [dopri(models.slider_crank(), 4.0, rtol=1e-8)[2].statistics for _ in range(2)]
     assert found[0] == found[1]
@@ -146,6 +152,7 @@ def test_stiffness_is_seen(tmp_path):
     assert simulated(tmp_path, stiff(100.0), method="dopri").method == "dopri"
 
 
+@pytest.mark.long
 def test_a_system_much_faster_than_its_motion_is_left_to_radau(tmp_path):
     """What follows at 100/s a motion of 1/s holds an explicit method to short steps, though none is at the boundary."""
     left = simulated(tmp_path, stiff(100.0), index="0", accuracy=1e-6)
@@ -156,6 +163,7 @@ def test_a_system_much_faster_than_its_motion_is_left_to_radau(tmp_path):
     assert abs(Trace.open(tmp_path / "t.h5")["a"][-1] - other) < 2e-6
 
 
+@pytest.mark.long
 def test_index_zero_takes_dopri_and_dopri_index_zero(tmp_path):
     for options in ({"index": "0"}, {"method": "dopri"}, {"index": "0", "method": "dopri"}):
         outcome = simulated(tmp_path, models.pendulum(), accuracy=1e-9, at=tuple(INSTANTS), **options)
@@ -177,6 +185,7 @@ def test_what_has_no_underlying_equation_is_refused(tmp_path):
     assert simulated(tmp_path, models.slider_crank(m1=0.0), 0.5, index="0").method == "dopri"
 
 
+@pytest.mark.long
 def test_a_step_ends_where_the_text_jumps():
     made = models.small(
         "x",
@@ -189,6 +198,7 @@ def test_a_step_ends_where_the_text_jumps():
     assert columns["x"][-1] == pytest.approx(0.5 * (3.0 - 1.2345) ** 2, rel=1e-12)
 
 
+@pytest.mark.long
 def test_a_rail_that_jumps_between_stages_is_passed_in_small_steps():
     """No stage sees it: the projection would carry the mass across, 2 m in no time, and no error test would know."""
     made = models.small(
@@ -205,6 +215,7 @@ def test_a_rail_that_jumps_between_stages_is_passed_in_small_steps():
     assert columns["x"][-1] == pytest.approx(np.cos(3.0), abs=1e-5)
 
 
+@pytest.mark.long
 def test_sparse_and_dense_factors_give_the_same(monkeypatch):
     system = System({"structure": chain.structure()}, chain.binding(6), load(chain.Chain), "0")
     state = consistent_start(system, 0.0)
@@ -219,7 +230,7 @@ def test_sparse_and_dense_factors_give_the_same(monkeypatch):
 
 
 @pytest.mark.parametrize("policy", ["drop", "minimum_norm"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_redundant_constraints(tmp_path, policy):
     one = {"one": "q_x**2 + q_y**2 - 1"}
     both = {**one, "two": "q_x**2/2 + q_y**2/2 - 1/2"}

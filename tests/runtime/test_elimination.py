@@ -58,6 +58,7 @@ def test_definitions_are_followed_one_after_the_other():
     assert dict(zip(names, y.tolist(), strict=True)) == {"q_x": 0.0, "f_x": 2.0, "e_1": 24.0, "e_2": 8.0}
 
 
+@pytest.mark.long
 def test_what_bends_or_carries_the_state_stays():
     system = chain(bent=("two",))
     rows = [system.row_label(k).label for k in np.flatnonzero(affine(system))]
@@ -124,6 +125,7 @@ def test_displacements_that_nothing_reads(potential, gone):
     assert [system.name(int(k)) for k in found.unread] == gone
 
 
+@pytest.mark.long
 def test_constraints_that_their_rates_hold():
     assert steady(system_of("x y", "f_x**2", phi={"belt": "q_x - 2*q_y - 1"}).description)
     assert not steady(system_of("x y", "f_x**2", phi={"rod": "q_x**2 + q_y**2 - 1"}, bent=("rod",)).description)

@@ -108,7 +108,7 @@ def test_displacements_and_multipliers(form):
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-8])
 @pytest.mark.parametrize("made", [cartesian, minimal])
-@pytest.mark.one_in(8)
+@pytest.mark.long
 def test_energy_and_constraints_over_many_periods(made, rtol):
     t_end = (150.0 if LONG else 40.0) * SWING
     rows, _, finished = energy(made(), t_end, np.linspace(0.0, t_end, 100), rtol=rtol)
@@ -161,6 +161,7 @@ def test_an_invariant_that_nothing_projects_does_not_drift():
 
 
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_the_balance_is_closed_where_energy_is_lost_and_supplied(form):
     rows = energy(models.dc_motor(form), 0.6, np.linspace(0, 0.6, 61), rtol=1e-6)[0]
     # from rest there is no energy that a move could change: the row within the first step has its quadrature's error
@@ -182,6 +183,7 @@ def test_the_estimate_includes_the_phase(tmp_path):
     assert outcome.error_estimate > error / 3.0
 
 
+@pytest.mark.long
 def test_a_step_grows_again_behind_what_was_rough():
     made = models.small(
         "x",
@@ -195,6 +197,7 @@ def test_a_step_grows_again_behind_what_was_rough():
     assert finished.statistics.steps < 700
 
 
+@pytest.mark.long
 def test_counters_are_deterministic():
     found = [energy(models.slider_crank(), 4.0, rtol=1e-8)[2].statistics for _ in range(2)]
     assert found[0] == found[1]
@@ -264,6 +267,7 @@ scene s of junction { time 0 s to 60 ps; trace a.e; accuracy 1e-5; solver energy
 """A flux whose current has no inverse at a quarter of a quantum: there no step can be halved in Lagrange's form."""
 
 
+@pytest.mark.long
 def test_a_first_step_whose_halves_cannot_be_made_is_not_tried_for_ever(tmp_path):
     """A process of its own: nothing within it could end a step that does not."""
     (tmp_path / "j.sd").write_text(JUNCTION)

@@ -40,7 +40,7 @@ def impacts(r, number):
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["radau", "bdf"])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_ball_bounces_at_the_exact_instants(tmp_path, formulation, method):
     trace = run(BALL, tmp_path, formulation=formulation, method=method, accuracy=1e-9)
     times, after = impacts(0.8, 4)
@@ -75,7 +75,7 @@ scene s of leak {
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("how", [("bdf", "1"), ("radau", "1"), ("bdf", "0"), ("rosenbrock", "auto"), ("dopri", "auto")])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_a_resistance_jumps_in_every_index_form(tmp_path, formulation, how):
     """No flow has inertia: each follows anew, also where the rates of derived constraints stand beside them."""
     method, index = how
@@ -122,7 +122,7 @@ scene s of rope {
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian"])
 @pytest.mark.parametrize("method", ["radau", "bdf"])
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(5)
 def test_a_current_that_jumps_past_a_limit_with_its_source_trips(tmp_path, formulation, method):
     """The current follows from the source by the circuit's equations: no relation reads the text that jumps."""
     trace = run(TRIP, tmp_path, formulation=formulation, method=method, accuracy=1e-6)
@@ -138,6 +138,7 @@ def test_a_current_that_jumps_past_a_limit_with_its_source_trips(tmp_path, formu
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+@pytest.mark.long
 def test_a_rope_breaks_where_its_force_jumps_past_what_it_bears(tmp_path, formulation):
     trace = run(ROPE, tmp_path, formulation=formulation, accuracy=1e-8)
     assert trace["x"][-1] == pytest.approx(0.5 * (5.0 / 2.0) * 2.0**2, rel=1e-8)
@@ -161,6 +162,7 @@ scene s of two_point {
 
 
 @pytest.mark.parametrize("method", ["radau", "bdf"])
+@pytest.mark.long
 def test_a_threshold_that_is_met_at_a_sample_is_passed(tmp_path, method):
     """At 1.3 s a sample is due and the lower threshold is met: the law does not rest upon it, for its memory turns."""
     trace = run(TWO_POINT, tmp_path, method=method, accuracy=1e-6)
@@ -171,6 +173,7 @@ def test_a_threshold_that_is_met_at_a_sample_is_passed(tmp_path, method):
 
 
 @pytest.mark.parametrize("beside", ["every 0.1 s { s := s + 1 }", "work (if t < 0.5 s then 0 N else 1e-12 N) on h"])
+@pytest.mark.one_in(2)
 def test_an_impact_at_the_instant_of_a_sample_or_a_jump_is_counted(tmp_path, beside):
     """The first impact is at 0.5 s, the next at 1.3 s."""
     text = BALL.replace("= 1 m\n", "= 1/2*(9.81 m/s^2)*(0.5 s)^2\n").replace("2.5 s", "1.45 s")
@@ -202,6 +205,7 @@ scene s of slot {
 
 
 @pytest.mark.parametrize("method", ["auto", "radau", "bdf"])
+@pytest.mark.one_in(5)
 def test_a_narrow_slot_is_seen_in_every_turn_of_a_long_step(tmp_path, method):
     """The angle grows evenly, so steps are many turns long; the slot is open for 3.2 ms of each second."""
     trace = run(SLOT, tmp_path, method=method)

@@ -40,7 +40,7 @@ def at(system, **values):
         ("1e-9*f_x**2/2 + 2e-3*f_x*f_y + 1e3*f_y**2/2", (None, None)),  # the same in ug and t
     ],
 )
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(12)
 def test_inertia_is_negative_where_the_matrix_is_indefinite(kinetic, least, form):
     system = system_of(models.small("x y", kinetic, form=form))
     found = negative_inertia(system, at(system))
@@ -92,6 +92,7 @@ def test_an_effort_that_its_law_leaves_open_at_rest():
         ),
     ],
 )
+@pytest.mark.long
 def test_initial_values_a_model_takes(made, expected):
     system = system_of(made())
     owners = {f.owner for f in system.description.families if f.kind == "q"}
@@ -99,6 +100,7 @@ def test_initial_values_a_model_takes(made, expected):
     assert order_and_manifold(system, consistent_start(system, 0.0), idle) == expected
 
 
+@pytest.mark.long
 def test_rates_that_only_a_difference_has():
     """T* = (a' - b')^2/2 + c'^2/2: c'' is determined, neither a'' nor b'' is, nor what is made of them."""
     system = system_of(

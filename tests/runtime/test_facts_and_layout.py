@@ -19,6 +19,7 @@ def system(index="3", family="lagrangian"):
     return System(made[0], made[1], load(made[2]), index)
 
 
+@pytest.mark.long
 def test_kinds_groups_and_names_of_a_rod():
     of = system()
     assert (of.unknowns, of.rows) == (5, 5)
@@ -29,6 +30,7 @@ def test_kinds_groups_and_names_of_a_rod():
     assert of.row_label(int(np.flatnonzero(of.of_groups("phi"))[0])).label == "rod"
 
 
+@pytest.mark.long
 def test_the_stabilised_form_has_its_multipliers_behind_those_as_written():
     of = system("2")
     assert of.are("nu").tolist() == [False] * 5 + [True]
@@ -36,6 +38,7 @@ def test_the_stabilised_form_has_its_multipliers_behind_those_as_written():
     assert not of.are("kappa")[-1]
 
 
+@pytest.mark.long
 def test_families_are_those_of_which_some_unknown_is_asked_for():
     """By where they begin, against the family of each unknown; nu is of none, and the largest is asked of it too."""
     of = system("2")
@@ -58,7 +61,7 @@ def test_what_is_made_once_is_made_again_once_it_was_let_go():
 
 @pytest.mark.parametrize("family", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("index", ["3", "2", "0", "settled"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_every_slope_stands_in_the_pattern(index, family):
     """Entries of the pattern are the slopes by central differences, and there is none beside them."""
     of, random = system(index, family), np.random.default_rng(3)
@@ -74,6 +77,7 @@ def test_every_slope_stands_in_the_pattern(index, family):
 
 
 @pytest.mark.parametrize("index", ["3", "settled", "start"])
+@pytest.mark.long
 def test_a_layout_is_that_of_its_blocks(index):
     """All entries of all calls, and nothing else but rows q' - f and such as may read "multiplier = 0"."""
     of = system(index)
@@ -90,6 +94,7 @@ def test_a_layout_is_that_of_its_blocks(index):
 
 
 @pytest.mark.parametrize("family", ["lagrangian", "hamiltonian"])
+@pytest.mark.long
 def test_the_mass_matrix_by_its_entries(family):
     """T* = f_x^2 + f_y^2 + f_x f_y/2: M = [2, 1/2; 1/2, 2], from f' in dynamics or from p - M f."""
     settled = system("settled", family)
@@ -103,6 +108,7 @@ def test_the_mass_matrix_by_its_entries(family):
 
 
 @pytest.mark.parametrize("index", ["3", "2", "1"])
+@pytest.mark.one_in(2)
 def test_a_large_system_has_no_room_for_entries_that_stands_idle(monkeypatch, index):
     """The core finds it for each Jacobian, of both sides and of one alone; the numbers are those of a small one."""
     small = system(index)

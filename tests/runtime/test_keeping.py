@@ -105,7 +105,7 @@ def test_faults_of_files_are_told_with_their_path(tmp_path):
 
 def test_the_head_of_a_row_is_as_long_in_the_core_as_in_what_reads_it():
     header = Path(__file__).parents[2] / "runtime" / "core" / "run" / "run.h"
-    counted = int(re.search(r"#define SD_ROW_HEAD (\d+)", header.read_text(encoding="utf-8"))[1])
+    counted = int(re.search(r"SD_ROW_HEAD = (\d+)", header.read_text(encoding="utf-8"))[1])
     assert counted == lib.ROW_HEAD == BEFORE
 
 
@@ -119,6 +119,7 @@ def test_parameters_of_one_unit_and_of_several_come_back(tmp_path):
     assert Trace.open(kept.path).parameters == {"m": (2.0, "kg"), "a\u2215b": (3.0, "kg"), "k": (4.0, "N/m")}
 
 
+@pytest.mark.long
 def test_each_of_many_parameters_keeps_its_own_number_and_unit(tmp_path):
     units = ("F", "ohm", "kg*m^2/s^2")
     given = tuple(Parameter(f"C{k}.C", (-1.0) ** k * np.exp(0.37 * k), units[k % 3]) for k in range(300))

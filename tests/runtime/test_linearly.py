@@ -35,6 +35,7 @@ def test_rows_that_contradict_each_other_are_left_where_no_move_changes_anything
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-9, 1e9])
+@pytest.mark.long
 def test_a_state_beside_its_constraint_is_no_point(unit):
     """A speed that is held at `unit`: it is there, a thousandth beside it, or held at two speeds at once."""
     one, two = {"one": f"f_x - {unit}"}, {"one": f"f_x - {unit}", "two": f"f_x - {2.0 * unit}"}
@@ -47,6 +48,7 @@ def test_what_is_said_twice_can_be_met():
     assert not asked(1.0, "x", "f_x**2/2", psi={"one": "f_x - 1", "two": "2*f_x - 2"})
 
 
+@pytest.mark.long
 def test_of_laws_that_bend_nothing_is_said():
     """A flow without inertia behind a cubic law: f_y^3 = -1 has a point, and f_y^2 = -1 none; neither is linear."""
     for law in ("f_y**3", "f_y**2"):

@@ -43,10 +43,10 @@ def worst(path, formulation, trace, folder):
     return np.abs(trace["y"].values - exact).max() / np.abs(exact).max()
 
 
-@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("source", [SINE, PULSE, "1 V"])
 @pytest.mark.parametrize("accuracy", [1e-1, 1e-2, 1e-3, 1e-5, 1e-7])
+@pytest.mark.long
 def test_a_run_is_told_no_better_than_it_is(accuracy, source, formulation, tmp_path):
     path = written(tmp_path, source=source)
     trace = simulate(path, formulation=formulation, accuracy=accuracy, output=tmp_path / "t.h5")
@@ -59,6 +59,7 @@ def test_a_run_is_told_no_better_than_it_is(accuracy, source, formulation, tmp_p
     )  # of a pulse in the midst of rest a finer run is told up to 5 times too good
 
 
+@pytest.mark.long
 def test_what_is_faint_beside_the_source_is_met(tmp_path):
     more = "G: resistor(R = 0.01 ohm) v[n] -> ground"
     path = written(tmp_path, more=more, source=PULSE.replace("0.5 s", "0.75 s"), traced="v[n].e as y, v[1].e as near")

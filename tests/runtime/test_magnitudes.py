@@ -51,6 +51,7 @@ def test_the_largest_of_a_group(group, given, found):
     assert largest_of_group(np.array(group, dtype=int), np.array(given, dtype=float)).tolist() == found
 
 
+@pytest.mark.long
 def test_unknowns_are_alike_by_kind_and_unit():
     units = {"q_x": "m", "q_y": "rad", "q_z": "m", "f_x": "m/s", "f_y": "rad/s", "f_z": "m/s"}
     system = system_of(models.small("x y z", "f_x**2 + f_y**2 + f_z**2", units=units))
@@ -68,6 +69,7 @@ def rod(**more):
     return system, y, system.jacobian(0.0, y, np.zeros_like(y))[0]
 
 
+@pytest.mark.long
 def test_round_off_of_a_constraint_is_that_of_its_largest_term():
     """Slopes are 6 and -8, the terms 18 and 32: of x nothing is known below 32 eps/6, of y below 32 eps/8."""
     system, y, jy = rod()
@@ -80,6 +82,7 @@ def test_what_stands_in_no_constraint_is_known():
     assert (unresolved(system, y, system.jacobian(0.0, y, y)[0]) == 0.0).all()
 
 
+@pytest.mark.long
 def test_noise_of_flows_is_that_of_displacements_over_a_step_and_multipliers_balance_it():
     """Steps of 0.1 s: dampers make forces of 0.5 and 2 N s/m of it, kappa balances the larger by its slopes 6, 8."""
     system, y, jy = rod()
@@ -107,11 +110,13 @@ def after(met, magnitude, *, nominal=None, span=10.0):
 WENT_BY = {"q_x": 5.0, "q_y": 5.0, "f_x": 1.0, "f_y": 1.0, "kappa_rod": 7.0}
 
 
+@pytest.mark.long
 def test_magnitudes_shrink_to_what_was_met_and_never_grow():
     found = after({"q_x": 2.0, "q_y": 9.0, "f_x": 0.5, "f_y": 0.25, "kappa_rod": 1e-20}, WENT_BY)
     assert found == {"q_x": 2.0, "q_y": 5.0, "f_x": 0.5, "f_y": 0.25, "kappa_rod": 7.0}  # kappa keeps its own
 
 
+@pytest.mark.long
 def test_a_thousandth_of_its_like_is_the_least_and_a_millionth_of_what_it_went_by():
     found = after({"q_x": 2.0, "q_y": 1e-9, "f_x": 0.5, "f_y": 0.0}, WENT_BY)
     assert (found["q_y"], found["f_y"]) == pytest.approx((2e-3, 5e-4), rel=1e-14)
@@ -119,6 +124,7 @@ def test_a_thousandth_of_its_like_is_the_least_and_a_millionth_of_what_it_went_b
     assert (still["q_x"], still["q_y"]) == pytest.approx((5e-6, 5e-6), rel=1e-14, abs=0.0)
 
 
+@pytest.mark.long
 def test_flows_that_are_round_off_count_by_their_displacements_over_the_span():
     """q of 2 m in 10 s: a tenth of 0.2 m/s, and of that a thousandth."""
     found = after({"q_x": 2.0, "q_y": 1.0, "f_x": 1e-9, "f_y": 1e-10}, WENT_BY)
@@ -149,6 +155,7 @@ def told(request, kept=None, index=2):
     return system, found, Told(system, request, Given(np.array([5.0, 5.0, 1.0, 1.0, 1e6])), found, kept)
 
 
+@pytest.mark.long
 def test_an_absolute_tolerance_asks_nothing_below_the_round_off_of_a_magnitude():
     atol = told(Request(1.0, np.zeros(0), atol=1e-8))[2].atol
     assert atol.tolist() == [1e-8] * 4 + [1e6 * ROUND_OFF]
@@ -158,6 +165,7 @@ def test_an_absolute_tolerance_asks_nothing_below_the_round_off_of_a_magnitude()
     assert told(Request(1.0, np.zeros(0)))[2].atol is None
 
 
+@pytest.mark.long
 def test_of_fewer_unknowns_their_own_are_told_and_nothing_pulls_at_their_displacements():
     kept = np.array([1, 3, 4], dtype=np.int32)  # q_y, f_y, kappa_rod
     _, found, made = told(Request(1.0, np.zeros(0), atol=1e-8), kept)
@@ -169,6 +177,7 @@ def test_of_fewer_unknowns_their_own_are_told_and_nothing_pulls_at_their_displac
 
 
 @pytest.mark.parametrize(("method", "groups"), [("bdf", True), ("radau", False)])
+@pytest.mark.long
 def test_flows_of_which_differences_alone_are_states_are_told_to_the_bdf_as_groups(method, groups):
     """Inertia of a difference of two flows, beside one of its own."""
     system = system_of(models.small("a b c", "(f_a - f_b)**2/2 + f_c**2/2", 0, "f_a**2"))
@@ -216,6 +225,7 @@ def driver(observe, *, reads, rates=(), **asked):
         ("q_x", ["q_x"], [], {"audited": True}, 0),
     ],
 )
+@pytest.mark.long
 def test_rows_of_the_state_alone_need_not_be_settled(observe, reads, rates, more, bare):
     assert driver({"z": observe}, reads=reads, rates=rates, **more).driver.run.bare == bare
 
@@ -229,10 +239,12 @@ def test_rows_of_the_state_alone_need_not_be_settled(observe, reads, rates, more
         (["q_x"], {"audited": True}, 0),
     ],
 )
+@pytest.mark.long
 def test_the_audit_is_left_to_the_run_that_is_kept_where_nothing_reads_it(reads, more, unsummed):
     assert driver({"z": "q_x"}, reads=reads, **more).driver.run.unsummed == unsummed
 
 
+@pytest.mark.long
 def test_rows_are_handed_over_once_and_the_largest_is_remembered():
     """From rest at (3, -4) it sinks for more than a second."""
     run, rows = driver({"z": "q_y"}, reads=["q_y"]), []

@@ -36,6 +36,7 @@ def rows(folder: Path, source: str, branch: str, method: str, asked: str):
 
 @pytest.mark.parametrize("method", ["radau", "bdf", "rosenbrock"])
 @pytest.mark.parametrize("branch", BRANCHES)
+@pytest.mark.long
 def test_many_rows_are_where_single_ones_are(branch, method, tmp_path):
     """Steps do not depend on rows: eleven alone are settled one by one, and 2001 have them among theirs."""
     source = "5 V*sin(2*pi*40 Hz*t)"
@@ -57,6 +58,7 @@ PULSES = {
 
 @pytest.mark.parametrize("method", ["radau", "bdf"])
 @pytest.mark.parametrize("pulse", PULSES)
+@pytest.mark.long
 def test_a_pulse_between_nodes_is_seen_by_its_rows(pulse, method, tmp_path):
     """What follows from the time alone is exact at each row, however narrow: 20 V for 0.03 ms beside a quiet filter."""
     trace = rows(tmp_path, f"1 V + 20 V*{pulse}", "linear", method, "every 0.01 ms")
@@ -67,6 +69,7 @@ def test_a_pulse_between_nodes_is_seen_by_its_rows(pulse, method, tmp_path):
     assert np.abs(trace["c"].values - 0.6 * trace["b"].values).max() < 1e-9
 
 
+@pytest.mark.long
 def test_a_row_of_a_steep_law_is_measured_as_its_last_move_leaves_it(monkeypatch, tmp_path):
     """Rates that follow flows are put with each move: what was measured behind the last one is what the row tells."""
     kept = []

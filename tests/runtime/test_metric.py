@@ -38,7 +38,7 @@ def integrated(made, method):
 
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize("method", ["bdf", "radau"])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_the_unit_of_length_changes_nothing(form, method):
     one, counted = integrated(bar(1.0, form), method)
     other, again = integrated(bar(1024.0, form), method)
@@ -48,7 +48,7 @@ def test_the_unit_of_length_changes_nothing(form, method):
 
 
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_factors_are_inertias_and_one_where_there_is_one_unit(form):
     integration, _ = integrated(bar(1.0, form), "bdf")
     np.testing.assert_allclose(integration.system.kinematic_scale, [2.0 / 0.3, 2.0 / 0.3, 1.0], rtol=1e-12)

@@ -28,6 +28,7 @@ def named(of):
     return {of.name(k): label.get(int(row)) for k, row in enumerate(own_rows(of)) if row >= 0}
 
 
+@pytest.mark.long
 def test_each_unknown_of_a_rod_has_its_row():
     found = named(system("3"))
     assert found["q_x"][0] == found["q_y"][0] == "dynamics"
@@ -36,6 +37,7 @@ def test_each_unknown_of_a_rod_has_its_row():
     assert found["kappa_rod"] == ("phi", "rod")
 
 
+@pytest.mark.long
 def test_momenta_have_their_definitions():
     found = named(system("3", "hamiltonian"))
     assert found["p_x"][0] == found["p_y"][0] == "momentum"
@@ -44,13 +46,14 @@ def test_momenta_have_their_definitions():
 
 @pytest.mark.parametrize("index", ["0", "1", "2", "3"])
 @pytest.mark.parametrize("family", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_no_row_belongs_to_two(index, family):
     own = own_rows(system(index, family))
     known = own[own >= 0]
     assert np.unique(known).size == known.size
 
 
+@pytest.mark.long
 def test_what_stores_couple_and_constraints_react_with_stands_on_both_sides_of_the_diagonal():
     """Forces k (x - y) and reactions kappa dphi/dq: the part of displacements and multipliers is symmetric."""
     of = system("3")

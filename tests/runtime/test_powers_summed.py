@@ -28,6 +28,7 @@ OMEGA = 2.0 * math.pi
 
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6])
+@pytest.mark.long
 def test_what_a_known_flow_dissipates(rtol, tmp_path):
     """x' = sin(omega t) solves no equation: r int x'^2 = r (t/2 - sin(2 omega t)/(4 omega)) tests the sums alone."""
     (tmp_path / "d.sd").write_text(DRIVEN.replace("FLOW", "sin(2*pi*1 Hz*t)"))
@@ -39,6 +40,7 @@ def test_what_a_known_flow_dissipates(rtol, tmp_path):
     assert np.abs(trace["audit.energy"].values).max() < 0.1 * rtol * exact[-1]
 
 
+@pytest.mark.long
 def test_a_pulse_within_steps_is_not_taken_for_what_the_steps_before_it_were(tmp_path):
     """A flow that rests and then rises by exp(-((t - 1)/0.02)^2): r int x'^2 = r 0.02 sqrt(pi/2)."""
     (tmp_path / "d.sd").write_text(DRIVEN.replace("FLOW", "exp(-((t - 1 s)/(20 ms))^2)"))
@@ -68,6 +70,7 @@ def _looks(rows):
     return len(seen) - before, steps
 
 
+@pytest.mark.long
 def test_rows_within_a_step_take_the_powers_that_its_integral_took():
     """A row looks at its own energies and no more: the polynomial of powers is there, of its step and those before."""
     (few, steps), (many, same) = _looks(5), _looks(81)

@@ -38,7 +38,7 @@ def test_order_five_on_a_smooth_ode():
 
 
 @pytest.mark.parametrize(("form", "index", "order"), [("2", 2, 5), ("2v", 2, 5), ("1", 1, 5), ("3", 3, 3)])
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_order_on_the_pendulum_in_every_index_form(form, index, order):
     errors = []
     for h in (0.05, 0.025):
@@ -47,6 +47,7 @@ def test_order_on_the_pendulum_in_every_index_form(form, index, order):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.2)
 
 
+@pytest.mark.long
 def test_values_between_steps_have_the_order_of_the_steps():
     t = np.linspace(1.013, 9.97, 197)
     errors = []
@@ -56,6 +57,7 @@ def test_values_between_steps_have_the_order_of_the_steps():
     assert (np.log2(np.divide(errors[:-1], errors[1:])) > 4.5).all()
 
 
+@pytest.mark.long
 def test_tolerance_against_error_and_work():
     t = np.linspace(0, 10, 101)
     for rtol, allowed, steps in ((1e-4, 1e-3, 70), (1e-8, 1e-6, 300), (1e-12, 1e-10, 1300)):
@@ -65,7 +67,7 @@ def test_tolerance_against_error_and_work():
 
 
 @pytest.mark.parametrize(("form", "index"), [("2", 2), ("2v", 2), ("1", 1), ("3", 3)])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_pendulum_with_step_control(form, index):
     rows, columns, finished = run(models.pendulum(), 4.0, form, index, INSTANTS, method="radau", rtol=1e-9)
     assert np.abs(columns["q1"] - Q1).max() < (1e-5 if form == "3" else 1e-7)
@@ -86,6 +88,7 @@ def test_index_two_circuit_valves_and_a_stiff_diode():
     assert values[0] == pytest.approx(values[1], rel=1e-5)
 
 
+@pytest.mark.long
 def test_sparse_and_dense_factors_give_the_same(monkeypatch):
     system = System({"structure": chain.structure()}, chain.binding(6), load(chain.Chain), "2")
     state = consistent_start(system, 0.0)
@@ -99,6 +102,7 @@ def test_sparse_and_dense_factors_give_the_same(monkeypatch):
     assert np.abs(found[0] - found[1])[:, ROW_HEAD:].max() < 1e-7
 
 
+@pytest.mark.long
 def test_counters_are_deterministic_and_energy_balances():
     counters = [run(models.slider_crank(), 4.0, "2", 2, rtol=1e-6, method="radau")[2].statistics for _ in range(2)]
     assert counters[0] == counters[1]
@@ -117,6 +121,7 @@ def test_failures_are_typed():
 
 
 @pytest.mark.parametrize("accuracy", [1e-6, 1e-9, 1e-11])
+@pytest.mark.long
 def test_accuracy_is_met(tmp_path, accuracy):
     manifest, binding, module = models.pendulum()
     path = tmp_path / "t.h5"

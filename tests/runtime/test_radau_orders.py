@@ -84,7 +84,7 @@ def test_order_on_a_smooth_ode(stages, steps, order):
 
 
 @pytest.mark.parametrize("stages", [5, 7])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_order_on_the_pendulum(stages):
     """Of coordinates and multipliers 2 s - 1 with the constraint's rates, s where the constraint alone is asked."""
     steps = (0.4, 0.2)
@@ -99,6 +99,7 @@ def test_order_on_the_pendulum(stages):
 
 
 @pytest.mark.parametrize(("rtol", "allowed", "steps"), [(1e-6, 1e-5, 60), (1e-9, 1e-8, 80), (1e-12, 1e-11, 150)])
+@pytest.mark.one_in(5)
 def test_stages_that_pay_are_taken(rtol, allowed, steps):
     """By itself the oscillator takes a fraction of the steps of three stages, as accurate between them."""
     t = np.linspace(0, 10, 101)
@@ -109,6 +110,7 @@ def test_stages_that_pay_are_taken(rtol, allowed, steps):
     assert with_three.statistics.steps > 2 * finished.statistics.steps
 
 
+@pytest.mark.long
 def test_round_off_ends_no_run():
     """Newton's corrections of seven stages are coarser; below what they resolve the pendulum's run still ends."""
     _, columns, _ = run(models.pendulum(), 4.0, "2", 2, INSTANTS, method="radau", rtol=1e-16)

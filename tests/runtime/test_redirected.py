@@ -14,6 +14,7 @@ from sysdyn.runtime.model.system import System
 
 
 @pytest.mark.parametrize("index", ["3", "2", "0"])
+@pytest.mark.long
 def test_each_entry_stands_where_it_was_sent(index):
     """A random order of places: J'[place[k]] = J[k] for both parts, and nothing else is written."""
     kinetic, potential = "f_x**2 + f_y**2 + f_x*f_y/2", "3*(q_x - q_y)**2 + q_y**4"

@@ -55,6 +55,7 @@ def run(made, path, redundancy, **options):
     return outcome, {name: np.asarray(trace[name])[at] for name in trace.names}
 
 
+@pytest.mark.long
 def test_a_constraint_stated_twice_is_redundant_and_named():
     facts = facts_of(pendulum())
     assert (facts.redundant, facts.rank, facts.dof, facts.singular) == (1, 1, 1, 0)
@@ -73,7 +74,7 @@ def single():
 @pytest.mark.parametrize("index", ["auto", "3", "2v", "1"])
 @pytest.mark.parametrize("redundancy", ["drop", "minimum_norm"])
 @pytest.mark.parametrize("method", ["radau", "bdf"])
-@pytest.mark.one_in(64)
+@pytest.mark.long
 def test_the_motion_is_that_of_one_rod(tmp_path, redundancy, index, method):
     accuracy = 1e-6 if index == "3" or method == "bdf" else 1e-8
     _, found = run(pendulum(), tmp_path / "t.h5", redundancy, index=index, method=method, accuracy=accuracy)
@@ -87,6 +88,7 @@ def test_the_motion_is_that_of_one_rod(tmp_path, redundancy, index, method):
         assert found["k2"] == pytest.approx(2 * found["k1"], abs=1e-9)
 
 
+@pytest.mark.long
 def test_several_dependent_groups():
     made = pendulum(third="3*(q_1**2 + q_2**2 - 1)")
     facts = facts_of(made)
@@ -156,6 +158,7 @@ scene s of rods { time 0 s to 1 s; redundancy minimum_norm; trace x }
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "kane"])
+@pytest.mark.one_in(2)
 def test_three_parallel_rods_are_one_too_many_in_every_formulation(formulation, tmp_path):
     """Points nearby were 1e11 rad away in Hamilton's form, where the balance of a turning that is nothing made the size
     of its angle (E512): the beam swings as a pendulum does.

@@ -36,6 +36,7 @@ def at_start(made):
 
 
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_what_relaxes_gets_as_far_as_its_damper_lets_it(form):
     quick = 1e-6
     system, yd, jy, jyd = at_start(damped(form, quick))
@@ -53,6 +54,7 @@ def test_what_relaxes_gets_as_far_as_its_damper_lets_it(form):
 
 
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
+@pytest.mark.one_in(2)
 def test_like_is_compared_by_effort_and_flow(form):
     system, _, jy, jyd = at_start(damped(form, 1e-3))
     found = np.zeros(system.unknowns)

@@ -54,6 +54,7 @@ def test_a_run_that_ends_where_it_begins_is_its_start():
     assert arrival(of, start, structure(of, start), Options(None, 0.0, 0.0))[1] is start
 
 
+@pytest.mark.long
 def test_an_arrival_lies_on_the_constraint():
     """A point on a rod of 1 m, let go at 1 rad: the rod is as long as it was, its tension what the point needs."""
     of = system(
@@ -87,6 +88,7 @@ def test_an_origin_has_rates_of_what_is_differentiated_and_magnitudes():
     assert np.array_equal(found.jy, before)
 
 
+@pytest.mark.long
 def test_what_round_off_leaves_open_is_that_of_the_terms_of_constraints():
     """q_x = 1e8 - q_y: what is left of one is known to the round-off of 1e8."""
     of = system(
@@ -112,6 +114,7 @@ def resting(of, tangible=("x",), **first):
         ("Piecewise((3*(q_x + 2)**2, q_x < 0), (3*(q_x - 1)**2, True))", [-2.0, 1.0], range(2, 20)),
     ],
 )
+@pytest.mark.one_in(2)
 def test_points_of_the_piece_that_was_searched_are_not_searched_again(potential, states, sought):
     """Straight rows lead from anywhere to one state; two pieces of one slope are told apart by their values."""
     of = resting(system("x", "f_x**2/2", potential, initial=SWINGING), q_x=1.7)
@@ -121,6 +124,7 @@ def test_points_of_the_piece_that_was_searched_are_not_searched_again(potential,
     assert len(begun) in sought
 
 
+@pytest.mark.long
 def test_a_double_well_rests_in_both_and_between_them():
     """V = (q^2 - 4)^2: 0 and -+2."""
     of = system("x", "f_x**2/2", "(q_x**2 - 4)**2", initial=SWINGING)
@@ -130,6 +134,7 @@ def test_a_double_well_rests_in_both_and_between_them():
     assert len(rests(resting(of, q_x=1.7), 40, 1)) == 1
 
 
+@pytest.mark.long
 def test_an_angle_of_rest_lies_within_a_turn_and_half_a_turn_is_one_whatever_its_sign():
     of = system("x", "f_x**2/2", "-9.81*cos(q_x)", initial=SWINGING, units={"q_x": "rad", "f_x": "rad/s"})
     found = rests(resting(of, q_x=6.0), 20)

@@ -46,7 +46,7 @@ def test_order_five_on_a_smooth_ode():
 
 
 @pytest.mark.parametrize("family", ["lagrangian", "hamiltonian"])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_order_five_of_constraints_whose_matrix_moves(family):
     errors = []
     for h in (0.1, 0.05, 0.025):
@@ -55,6 +55,7 @@ def test_order_five_of_constraints_whose_matrix_moves(family):
     assert (observed(errors) > 4.8).all()
 
 
+@pytest.mark.long
 def test_inertia_that_depends_on_the_position():
     # a bead on a wheel's spoke: E = dF/dyd moves; closed form r = r0 cosh(w t), w = 3 held by a constraint on the flow
     made = models.small(
@@ -92,7 +93,7 @@ def test_values_between_steps_have_order_five_too():
 
 @pytest.mark.parametrize("rate", [1.0, 1e3, 1e5])
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_error_within_steps_of_what_is_pulled_to_a_source(rate, rtol):
     # steps alone would not see it: whatever they are, their ends lie on the source
     t = np.linspace(0, 10, 501)
@@ -101,6 +102,7 @@ def test_error_within_steps_of_what_is_pulled_to_a_source(rate, rtol):
     assert finished.statistics.steps < 500
 
 
+@pytest.mark.long
 def test_tolerance_against_error_and_work():
     t = np.linspace(0, 10, 101)
     for rtol, steps in ((1e-3, 25), (1e-6, 65), (1e-9, 250)):
@@ -110,6 +112,7 @@ def test_tolerance_against_error_and_work():
 
 
 @pytest.mark.parametrize("part", [1.0, 1e-2])
+@pytest.mark.long
 def test_a_run_opens_with_the_step_that_the_one_before_found_fit(part):
     """With another tolerance too: as exact as one that looks for it, in fewer steps."""
     draft = rosenbrock(models.mass_spring(), 2.0, rtol=1e-4)[2]
@@ -134,6 +137,7 @@ def test_a_stiff_diode_as_the_others_have_it():
 
 
 @pytest.mark.parametrize(("rtol", "steps"), [(1e-4, 40), (1e-7, 55), (1e-10, 110)])
+@pytest.mark.long
 def test_what_follows_from_a_state_may_jump_with_its_law(rtol, steps):
     """s' = -e, e = s above 0.5 and 2 s below: no step is so short that e changes little within it."""
     law = {"law": "e_g - (1.5 - 0.5*tanh(1e20*(s_s - 0.5)))*s_s"}
@@ -144,12 +148,14 @@ def test_what_follows_from_a_state_may_jump_with_its_law(rtol, steps):
     assert finished.statistics.steps < steps
 
 
+@pytest.mark.long
 def test_constraints_hold_to_round_off_at_index_one():
     rows, columns, _ = rosenbrock(models.pendulum(), 4.0, INSTANTS, "1", rtol=1e-6)
     assert rows[:, 7].max() < 1e-14
     assert np.abs(columns["q1"][:3] - Q1).max() < 1e-6
 
 
+@pytest.mark.long
 def test_higher_index_is_refused_or_differentiated(tmp_path):
     with pytest.raises(NoSuchForm, match="index 1, and index 2 was asked for"):
         simulated(tmp_path, models.pendulum(), 1.0, method="rosenbrock", index="2")
@@ -168,6 +174,7 @@ def test_failures_are_typed():
     assert caught.value.cause == "singular"
 
 
+@pytest.mark.long
 def test_the_same_run_twice():
     found = [rosenbrock(models.diode_circuit(), 0.05, rtol=1e-5)[2].statistics for _ in range(2)]
     assert found[0] == found[1]
@@ -190,13 +197,14 @@ def test_auto_takes_it_for_cheap_accuracy_and_more_stages_for_dear_one(tmp_path)
 
 
 @pytest.mark.parametrize("rate", [1e7, 1e9])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_auto_leaves_it_where_equations_are_nearly_of_index_two(tmp_path, rate):
     outcome, trace = simulated(tmp_path, relaxing(rate), 10.0, accuracy=1e-3)
     assert outcome.met
     assert np.abs(trace["q_x"].values - relaxed(rate, np.asarray(trace.time))).max() < 1e-3
 
 
+@pytest.mark.long
 def test_auto_leaves_it_where_loose_runs_have_nothing_in_common(tmp_path):
     outcome, trace = simulated(tmp_path, van_der_pol(), 1500.0, accuracy=1e-3, sample_steps=True)
     assert outcome.met

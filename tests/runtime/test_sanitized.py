@@ -16,6 +16,7 @@ SLICE = {
 }
 
 
+@pytest.mark.long
 def test_a_slice_of_the_core_has_no_fault(tmp_path):
     files = [f"tests/runtime/{name}" for name in SLICE]
     chosen = " or ".join(part for parts in SLICE.values() for part in parts)
@@ -26,6 +27,7 @@ def test_a_slice_of_the_core_has_no_fault(tmp_path):
 
 @pytest.mark.parametrize("flags", [FLAGS, SOONER], ids=["all", "sooner"])
 @pytest.mark.parametrize("fault", ["a[n] = 1.0", "shift = 1 << (n + 31)", "a[0] = *(double *)(v[n] = 0)"])
+@pytest.mark.long
 def test_the_sanitizers_see_a_fault(tmp_path, fault, flags):
     source = tmp_path / "fault.c"
     source.write_text(

@@ -44,6 +44,7 @@ def both(settler, y, yd):
     return found
 
 
+@pytest.mark.long
 def test_what_follows_from_the_state_is_the_same_by_both_ways(settler):
     settler, y, yd, _ = settler
     rng = np.random.default_rng(1)
@@ -57,6 +58,7 @@ def test_what_follows_from_the_state_is_the_same_by_both_ways(settler):
     assert np.abs(ad - bd)[settler.rates].max() <= 1e-8 * np.abs(bd).max()
 
 
+@pytest.mark.long
 def test_a_state_off_its_constraints_moves_least_unless_slack_is_given(settler):
     settler, y, yd, _ = settler
     state = settler._state[: y.size]
@@ -73,6 +75,7 @@ def test_a_state_off_its_constraints_moves_least_unless_slack_is_given(settler):
     assert basic < 10.0 * least
 
 
+@pytest.mark.long
 def test_a_basis_that_was_refused_is_tried_again_later(settler):
     settler, y, yd, _ = settler
     core = settler.core.contents
@@ -86,6 +89,7 @@ def test_a_basis_that_was_refused_is_tried_again_later(settler):
     assert not all(tried[: AGAIN // 2])
 
 
+@pytest.mark.long
 def test_a_draft_is_content_with_what_it_asks_for(settler):
     """A residual that a draft takes for none ends the search: no other weights, no other point, no failure."""
     settler, y, yd, _ = settler
@@ -121,6 +125,7 @@ def _least_change(x, u, size, length):
     return z.reshape(2, 2, links)
 
 
+@pytest.mark.long
 def test_links_that_turn_ask_for_no_other_pivots():
     """Of a chain slopes like x_i - x_(i-1) vanish while links turn: pivots are chosen once, not at every second point,
     and the points are those of least change.

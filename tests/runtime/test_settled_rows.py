@@ -51,6 +51,7 @@ def test_two_balances_for_one_rate_say_more_than_that():
 
 
 @pytest.mark.parametrize(("seen", "left"), [("f_1", True), ("e_1", False)])
+@pytest.mark.long
 def test_rates_that_observers_read_must_be_left(seen, left):
     """The rate of e_1 = 2 f_3 follows from that of f_3 alone: where it is read f_3 stays."""
     law = {"implicit": ("1",), "gamma": {"law": "e_1 - 2*f_3"}, "observe": {seen: seen}}

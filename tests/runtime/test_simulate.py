@@ -37,7 +37,7 @@ def outcome(made, path, t_end, **options):
 
 @pytest.mark.parametrize("name", END)
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
-@pytest.mark.one_in(7)
+@pytest.mark.long
 def test_accuracy_is_met(name, accuracy, tmp_path):
     make, t_end, values = END[name]
     result = outcome(make(), tmp_path / "o.h5", t_end, accuracy=accuracy, every=t_end / 40)
@@ -53,7 +53,7 @@ def test_accuracy_is_met(name, accuracy, tmp_path):
 
 @pytest.mark.parametrize("name", ["lead_filter", "fluid_tank"])
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
-@pytest.mark.one_in(5)
+@pytest.mark.long
 def test_where_little_happens_the_estimate_holds(name, accuracy, tmp_path):
     make, t_end, _ = END[name]
     options = {"every": t_end / 200}
@@ -66,6 +66,7 @@ def test_where_little_happens_the_estimate_holds(name, accuracy, tmp_path):
     assert max(errors) <= result.error_estimate <= accuracy
 
 
+@pytest.mark.long
 def test_the_run_behind_a_draft_begins_with_the_step_that_the_draft_found(tmp_path):
     make, t_end, values = END["pendulum"]
     options = {"every": t_end / 40, "method": "dopri"}
@@ -91,6 +92,7 @@ def test_trace_of_accepted_steps_holds_the_instants_asked_for(tmp_path):
         outcome(models.pendulum(), tmp_path / "p.h5", 4.0, at=(5.0,))
 
 
+@pytest.mark.long
 def test_expert_mode_is_one_run(tmp_path):
     result = outcome(models.mass_spring(), tmp_path / "o.h5", 10.0, rtol=1e-6, atol=1e-9)
     assert result.error_estimate is None
@@ -100,6 +102,7 @@ def test_expert_mode_is_one_run(tmp_path):
     assert trace.attributes["atol"] == 1e-9
 
 
+@pytest.mark.long
 def test_an_accuracy_that_cannot_be_reached_is_not_met(tmp_path):
     result = outcome(models.slider_crank(), tmp_path / "o.h5", 1.0, accuracy=1e-15, every=0.1)
     assert result.final
@@ -109,6 +112,7 @@ def test_an_accuracy_that_cannot_be_reached_is_not_met(tmp_path):
     assert missed.value == result.error_estimate < 1e-9
 
 
+@pytest.mark.long
 def test_accuracy_on_one_quantity(tmp_path):
     given = {"accuracy": 1e-2, "every": 0.1, "method": "bdf"}
     loose = outcome(models.slider_crank(), tmp_path / "a.h5", 2.0, **given)
@@ -144,6 +148,7 @@ def test_interruption_leaves_what_was_computed(tmp_path):
     assert trace.time[-1] == pytest.approx(seen[-1] * 1e6), "all that was said to be done"
 
 
+@pytest.mark.long
 def test_two_runs_without_timings_are_equal_byte_for_byte(tmp_path):
     for name in "ab":
         outcome(
@@ -157,6 +162,7 @@ def test_two_runs_without_timings_are_equal_byte_for_byte(tmp_path):
     assert not list(tmp_path.glob(".*"))
 
 
+@pytest.mark.long
 def test_statistics_and_timings(tmp_path):
     result = outcome(models.pendulum(), tmp_path / "o.h5", 4.0)
     attributes = Trace.open(tmp_path / "o.h5").attributes
@@ -171,6 +177,7 @@ def test_statistics_and_timings(tmp_path):
 @pytest.mark.parametrize(
     ("wanted", "form"), [("auto", "2"), ("3", "3"), ("2", "2"), ("2v", "2v"), ("1", "1"), ("0", "0")]
 )
+@pytest.mark.long
 def test_index_option(wanted, form, tmp_path):
     result = outcome(models.pendulum(), tmp_path / "o.h5", 1.0, index=wanted, rtol=1e-6)
     assert result.index == form
@@ -185,6 +192,7 @@ def test_options_that_do_not_exist(tmp_path):
     assert choose_index is not None
 
 
+@pytest.mark.long
 def test_steps_without_a_row_cost_no_more_than_what_is_new_in_them(tmp_path):
     """A row moves its point onto the constraints, by residuals of their second derivatives; a step without one only
     where some quantity is larger than before, so that the nominals are those of all steps.

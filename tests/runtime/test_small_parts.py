@@ -45,6 +45,7 @@ def groups(form):
     return [name for name, _, _ in form.groups]
 
 
+@pytest.mark.long
 def test_an_index_form_has_the_rows_that_its_name_says():
     description = system().description
     assert groups(plan(description, "3")) == ["dynamics", "dynamics", "phi"]
@@ -103,6 +104,7 @@ def test_the_least_multipliers_of_a_row_written_twice_share_its_force():
     )
 
 
+@pytest.mark.long
 def test_displacements_of_one_unit_have_one_metric_and_of_two_that_of_their_inertia():
     alike = system("2")
     y = point(alike, q_1=3.0, q_2=-4.0)
@@ -116,6 +118,7 @@ def test_displacements_of_one_unit_have_one_metric_and_of_two_that_of_their_iner
     assert found == pytest.approx([1.0, 50.0])  # 2 kg and 100 kg m^2
 
 
+@pytest.mark.long
 def test_roles_of_a_point_on_a_rod():
     """Index 3: displacements are tested as they are, flows with h, the tension not at all; it weighs with h^2."""
     of = system()
@@ -131,6 +134,7 @@ def test_roles_of_a_point_on_a_rod():
 
 
 @pytest.mark.parametrize(("name", "stages", "pairs"), [("bdf", 3, 0), ("radau", 3, 1), ("radau", 7, 3)])
+@pytest.mark.long
 def test_a_method_steps_the_unknowns_of_its_system_with_a_complex_matrix_a_pair_of_stages(name, stages, pairs):
     of = system("1")
     order = net_order_of(of)
@@ -157,6 +161,7 @@ def test_round_off_of_a_quantity_is_that_of_its_terms():
     assert not vast.ledgers.any()
 
 
+@pytest.mark.long
 def test_equations_of_a_start_are_rows_and_unknowns_of_the_settled_form():
     starter = Starter(system())
     known = starter.equations

@@ -133,6 +133,7 @@ def test_what_is_made_once_is_made_again_where_it_was_forgotten():
         assert len(made) == number
 
 
+@pytest.mark.long
 def test_multipliers_pivot_in_the_columns_of_what_they_move():
     """A chain of links x[i] - x[i - 1] = given; x[0] carries the state, each other x has the link before it."""
     links = 4 * SMALL

@@ -51,7 +51,7 @@ def started(made, t0=0.0):
 
 
 @pytest.mark.parametrize("name", REFERENCES)
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_consistent_values_of_the_seed(name):
     make, values, rates = REFERENCES[name]
     system, state = started(make())
@@ -64,6 +64,7 @@ def test_consistent_values_of_the_seed(name):
     assert np.abs(system.residual(0.0, state.y, state.yd)).max() < 1e-8 * max(1.0, np.abs(state.y).max())
 
 
+@pytest.mark.long
 def test_guesses_move_and_say_for_whom_fixed_values_do_not():
     system, state = started(models.slider_crank())
     moved = {name: (before, after, why) for name, before, after, why in state.moved}
@@ -124,6 +125,7 @@ def test_effort_constraint_without_solution_is_named():
     assert caught.value.residual == pytest.approx(3.1, rel=1e-3)
 
 
+@pytest.mark.long
 def test_valve_at_rest_and_diode_that_overflows():
     _, state = started(models.nonlinear_fluid())
     assert state.residual < 1e-11
@@ -143,6 +145,7 @@ def test_valve_at_rest_and_diode_that_overflows():
         assert voltage == pytest.approx(0.025 * np.log((100 - voltage) / 1e-14 + 1), rel=1e-9)
 
 
+@pytest.mark.long
 def test_redundant_rows_are_tolerated():
     made = models.small(
         "x y",
@@ -157,6 +160,7 @@ def test_redundant_rows_are_tolerated():
     assert kappa[0] + 2 * kappa[1] == pytest.approx(9.81 * np.cos(1) / 2, rel=1e-10)
 
 
+@pytest.mark.long
 def test_missing_fixed_values_are_counted():
     manifest, binding, module = models.pendulum()
     binding["initial"] = [item for item in binding["initial"] if item["family"] != "f_x"]
@@ -166,6 +170,7 @@ def test_missing_fixed_values_are_counted():
     assert "f_x" in guesses
 
 
+@pytest.mark.long
 def test_junction_currents_of_1e_12_at_the_guess():
     # seed system ebers_moll: the guess's currents are 1e-12 A, the start's 1.6e-3 A
     made = models.small(

@@ -30,6 +30,7 @@ def by_name(found, values):
     return dict(zip(found.system.unknown_names, values, strict=False))
 
 
+@pytest.mark.long
 def test_unknowns_are_those_of_y_and_the_rates_that_rows_read():
     found = starter()
     names = found.system.unknown_names
@@ -44,6 +45,7 @@ def test_unknowns_are_those_of_y_and_the_rates_that_rows_read():
         assert (one == other).all()
 
 
+@pytest.mark.long
 def test_rows_hold_the_constraint_and_its_derivatives():
     """At (3, -4) with flow (4, 3) the rod is met and not stretched; its acceleration asks for f'.q = -25."""
     found = starter()
@@ -73,6 +75,7 @@ def test_what_carries_inertia_is_state_and_the_tension_follows():
     assert not by_name(found, found.free[: found.n])["q_1"]
 
 
+@pytest.mark.long
 def test_momenta_are_paired_with_their_flows_and_flows_weigh_by_them():
     found = starter(form="hamiltonian")
     momenta, flows = with_flows(found.system)
@@ -88,6 +91,7 @@ def test_momenta_are_paired_with_their_flows_and_flows_weigh_by_them():
     assert inertial_rows(found.settled).any()
 
 
+@pytest.mark.long
 def test_magnitudes_of_what_is_zero_balance_their_rows():
     """No tension is guessed: in magnitudes of its own the weight of 19.62 N is what q_2 times it has to balance."""
     found = starter()
@@ -98,6 +102,7 @@ def test_magnitudes_of_what_is_zero_balance_their_rows():
     assert scale["kappa_rod"] == pytest.approx(2.0 * 9.81 / 8.0)
 
 
+@pytest.mark.long
 def test_the_written_state_moves_before_what_is_unsaid():
     """Levels: what the text says of what stores hold (momenta first), then of anything else and of positions, what it
     does not say, what holds nothing; fixed unknowns are in none.
@@ -142,6 +147,7 @@ def test_dependent_rows_are_those_of_any_size(seed):
     assert dependent(reactions(matrix)).tolist() == [1, 3]
 
 
+@pytest.mark.long
 def test_dependent_rows_of_a_large_matrix_are_as_many_as_its_rank_lacks():
     """Three random entries a row: no row in its turn alone stands in some column, and the rank is that of the SVD."""
     random, m, n = np.random.default_rng(0), 900, 910

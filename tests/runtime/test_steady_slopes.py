@@ -31,6 +31,7 @@ scene s of discharge {{
         ("1/2*r*x'^2/(1 + x^2/(1 C)^2)", 1.0 / math.sqrt(2.0 * math.exp(10.0) - 1.0), False),
     ],
 )
+@pytest.mark.long
 def test_only_slopes_that_change_are_taken_again(content, end, steady, method, tmp_path):
     (tmp_path / "d.sd").write_text(DISCHARGE.format(content=content))
     asked = ["simulate", str(tmp_path / "d.sd"), "--method", method, "--rtol", "1e-8", "-o", str(tmp_path / "d.h5")]

@@ -128,6 +128,7 @@ def kinks(t):
     ("text", "exact", "ratio"),
     [(LEAD, lead, 0.5), (SPRING, spring, 0.5), (PULSES, pulses, 30.0), (KINKS, kinks, 8.0)],
 )
+@pytest.mark.long
 def test_closed_forms(text, exact, ratio, tmp_path):
     # the error test alone finds long jumps, at the cost of rejected steps; short pulses it may miss
     errors = []
@@ -138,6 +139,7 @@ def test_closed_forms(text, exact, ratio, tmp_path):
     assert errors[1] > ratio * errors[0]
 
 
+@pytest.mark.long
 def test_accuracy_is_met_and_the_right_value_stands_at_the_instant(tmp_path):
     t, columns, _ = run(LEAD, tmp_path, accuracy=1e-6)
     assert np.abs(columns["u"] - lead(t)).max() < 5e-6
@@ -148,6 +150,7 @@ def test_accuracy_is_met_and_the_right_value_stands_at_the_instant(tmp_path):
     assert np.abs(columns["e"]).max() < 1e-8
 
 
+@pytest.mark.long
 def test_a_velocity_that_steps_keeps_positions_and_the_energy_books(tmp_path):
     def rates(t, s):
         x, y, vx, vy = s
@@ -172,6 +175,7 @@ def test_a_velocity_that_steps_keeps_positions_and_the_energy_books(tmp_path):
 
 
 @pytest.mark.parametrize("formulation", ["lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian"])
+@pytest.mark.long
 def test_a_state_is_kept_where_its_rate_jumps_beyond_every_magnitude(formulation, tmp_path):
     # R/L is 4e6 times what the span resolves: i' = 5e6 A/s after 0 A
     t, columns, _ = run(COIL, tmp_path, rtol=1e-8, formulation=formulation)
@@ -232,7 +236,7 @@ def saw(t):
 
 
 @pytest.mark.parametrize("method", ["rosenbrock", "radau", "bdf", "dopri", "energy"])
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(5)
 def test_no_step_sees_what_holds_from_the_end_on(method, tmp_path):
     """A saw tooth falls where the run ends: the last step ends before it, the last row stands behind it."""
     t, columns, outcome = run(SAW, tmp_path, accuracy=1e-6, method=method)
@@ -267,6 +271,7 @@ scene s of m { time 0 s to 2 ms; trace L.f as i }
 """
 
 
+@pytest.mark.long
 def test_round_off_about_an_instant_is_on_neither_side_of_it(tmp_path):
     """The flux of a coil behind a comparator: a step from the old side of it took 20 V for -20 V (6 % off)."""
     path = tmp_path / "m.sd"
@@ -308,6 +313,7 @@ scene s of m {{ time 0 s to {end}; trace x, x' as v }}
         (">= T", "0.2 s", 3.0),
     ],
 )
+@pytest.mark.one_in(5)
 def test_an_event_at_the_last_instant_happens(asked, end, speed, tmp_path):
     """No step crosses the end of the scene: `when t >= T` there was left out, as if it were strict."""
     path = tmp_path / "m.sd"

@@ -27,7 +27,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_index_and_freedom(name):
     make, index, dof = CASES[name]
     manifest, binding, module = make()
@@ -57,6 +57,7 @@ def test_laws_that_are_flat_at_rest_determine_what_is_monotone(content, index):
     assert {"f_x", "f_y"} <= set(facts.undetermined)
 
 
+@pytest.mark.long
 def test_redundant_rows_are_named_with_coefficients():
     manifest, binding, module = models.small(
         "x y",

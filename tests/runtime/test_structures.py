@@ -13,6 +13,7 @@ CORE = Path(__file__).parents[2] / "runtime" / "core"
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+@pytest.mark.long
 def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs = [("Frame", "sd_frame"), ("Call", "sd_call"), ("System", "sd_system"), ("Linear", "sd_linear")]
     pairs += [("Ivp", "sd_ivp"), ("Bdf", "sd_bdf"), ("Radau", "sd_radau"), ("Stepper", "sd_stepper")]
@@ -23,7 +24,13 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
         ("Ledgers", "sd_ledgers"),
         ("Record", "sd_record"),
     ]
-    pairs += [("Many", "sd_many"), ("Pass", "sd_pass"), ("Region", "sd_region"), ("RunClaim", "sd_claim")]
+    pairs += [
+        ("Rules", "sd_rules"),
+        ("Many", "sd_many"),
+        ("Pass", "sd_pass"),
+        ("Region", "sd_region"),
+        ("RunClaim", "sd_claim"),
+    ]
     pairs += [("RunSamples", "sd_samples"), ("Modes", "sd_modes"), ("Mode", "sd_mode"), ("Held", "sd_held")]
     pairs += [("Strike", "sd_strike"), ("Corners", "sd_corners"), ("Extrema", "sd_extrema")]
     pairs += [("Transition", "sd_transition"), ("Contact", "sd_contact"), ("Kink", "sd_kink"), ("Piece", "sd_piece")]

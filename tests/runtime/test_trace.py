@@ -31,6 +31,7 @@ def written(path, **options):
     return simulate(manifest, binding, load(module), Options(path, 0.0, 4.0, **{**settings, **options}))
 
 
+@pytest.mark.long
 def test_layout(tmp_path):
     path = tmp_path / "o.h5"
     written(path)
@@ -53,6 +54,7 @@ def test_layout(tmp_path):
     assert np.asarray(trace["q1"]).shape == trace.time.shape
 
 
+@pytest.mark.long
 def test_parameters_are_read_without_objects_for_each(tmp_path, monkeypatch):
     """A ladder of 1000 cells has 2000: h5py's objects took two thirds of the time to open its trace."""
     path, made = tmp_path / "o.h5", []
@@ -87,6 +89,7 @@ def test_parameters_of_others_are_read_or_refused(tmp_path):
             del file[f"parameters/{'none' if wrong is None else 'more'}"]
 
 
+@pytest.mark.long
 def test_opens_in_xarray(tmp_path):
     xarray = pytest.importorskip("xarray")
     path = tmp_path / "o.h5"
@@ -130,6 +133,7 @@ except TraceError as error:
 """
 
 
+@pytest.mark.long
 def test_a_full_disk_is_an_error_and_no_signal(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", LIMITED, str(tmp_path / "o.h5")], capture_output=True, text=True, check=False
@@ -168,7 +172,7 @@ simulate(manifest, binding, load(module), Options({path!r}, 0.0, 1e9, every=None
 
 
 @pytest.mark.parametrize("flush", [0.8, 0.01])
-@pytest.mark.one_in(2)
+@pytest.mark.long
 def test_a_killed_run_leaves_a_readable_trace(tmp_path, flush):
     random.seed(int(flush * 100))
     for k in range(2):

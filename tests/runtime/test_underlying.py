@@ -74,6 +74,7 @@ def test_the_seed_has_them():
 
 
 @pytest.mark.parametrize(("key", "k", "name"), list(cases()))
+@pytest.mark.one_in(5)
 def test_slopes_are_those_of_the_independent_solution(key, k, name):
     system, form = made(key, k)
     values = VALUES[name]
@@ -147,6 +148,7 @@ def test_projection_is_the_least_change_in_the_metric_of_the_inertia():
         "slider_crank|hamiltonian|1",
     ],
 )
+@pytest.mark.one_in(5)
 def test_accepted_points_stay_on_the_constraints(name):
     key, _, label = name.split("|")
     number = next(c.values[1] for c in cases() if c.values[2] == name)
@@ -231,6 +233,7 @@ scene s of m { time 0 s to 1 s; trace x, y }
 
 
 @pytest.mark.parametrize(("mass", "constant"), [("2 kg", True), ("2 kg*(1 + (y/(1 m))^2)", False)])
+@pytest.mark.long
 def test_a_constant_inertia_is_factorised_once_in_a_short_run(tmp_path, mass, constant):
     """Of twelve stages a step; what varies is factorised at each."""
     file = tmp_path / "m.sd"

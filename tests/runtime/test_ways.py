@@ -41,7 +41,7 @@ STEEP = "exp(e_1/0.025 - 28) + e_1 - 10"
 
 @pytest.mark.parametrize("name", ["newton", "rows_as_written", "homotopy"])
 @pytest.mark.parametrize("guess", [0.0, 1.0, 17.0])
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_each_way_leads_up_to_a_steep_law_and_down_it(name, guess):
     """From 0 V the first step would lead to 10 V and exp(372), from 17 V its exponent is 652."""
     starter, x, free = at_rest(driven(STEEP), e_1=guess)
@@ -79,6 +79,7 @@ def test_linear_rows_are_not_sought_along_detours(law, bent):
     assert found == ([name for name, _ in STRATEGIES] if bent else ["newton", "largest_scales"])
 
 
+@pytest.mark.long
 def test_the_way_that_was_taken_stays_with_the_state():
     assert consistent_start(driven(STEEP), 0.0).strategy == "newton"
     assert consistent_start(driven("e_1**2 - 4"), 0.0).strategy == "newton"

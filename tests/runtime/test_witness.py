@@ -80,6 +80,7 @@ def given(made):
 
 @pytest.mark.parametrize("form", ["lagrangian", "hamiltonian"])
 @pytest.mark.parametrize(("stiff", "loss"), [(4.0, 0.3), (1e12, 1e3), (1e-12, 1e-9)])
+@pytest.mark.long
 def test_modes_of_two_masses_twelve_decades_apart_are_all_there(stiff, loss, form):
     """x'' = -c x' - k x beside y'' = -y - 0.1 y': roots of two quadratics."""
     made = models.small(

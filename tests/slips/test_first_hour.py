@@ -23,7 +23,7 @@ TURNS = {
 
 
 @pytest.mark.parametrize("name", TRIES)
-@pytest.mark.one_in(4)
+@pytest.mark.long
 def test_it_runs_within_three_tries(name, tmp_path, capsys):
     *wrong, right = sorted(FOLDER.glob(f"{name}.*.sd"))
     assert len(wrong) <= 2

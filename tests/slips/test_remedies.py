@@ -80,6 +80,7 @@ def findings(text):
 @pytest.mark.parametrize(
     ("base", "old", "wrong", "code", "help_", "right"), CASES, ids=[f"{c[0]}: {c[2]!r}" for c in CASES]
 )
+@pytest.mark.one_in(30)
 def test_one_error_at_its_line_and_its_remedy(base, old, wrong, code, help_, right):
     whole = BASES[base]
     assert old in whole
@@ -92,7 +93,7 @@ FOLLOWED = [c for c in CASES if c[5]]
 
 
 @pytest.mark.parametrize("case", FOLLOWED, ids=[f"{c[0]}: {c[5]!r}" for c in FOLLOWED])
-@pytest.mark.one_in(6)
+@pytest.mark.long
 def test_a_model_that_follows_the_remedy_runs(case, tmp_path, capsys):
     base, old, *_, right = case
     (tmp_path / "m.sd").write_text(BASES[base].replace(old, right, 1))

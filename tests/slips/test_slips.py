@@ -13,13 +13,14 @@ from sysdyn.cli.main import run
 
 
 @pytest.mark.parametrize("slip", SLIPS, ids=[f"{s.kind}: {s.new.strip()[:40]!r}" for s in SLIPS])
-@pytest.mark.one_in(6)
+@pytest.mark.one_in(77)
 def test_a_slip_is_told_once_and_well(slip):
     found = answer(slip)
     assert (found.points, found.wrong) == (3, ()), [(d.code, d.message, d.help) for d in found.findings]
 
 
 @pytest.mark.parametrize("name", BASES)
+@pytest.mark.one_in(12)
 def test_a_right_model_has_no_finding(name):
     assert [d for d in check(BASES[name]) if d.severity != "note"] == []
 
@@ -33,7 +34,7 @@ def test_every_class_has_slips():
 
 
 @pytest.mark.parametrize("name", STOPS)
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(5)
 def test_a_run_that_stops_speaks_the_same_language(name, tmp_path, capsys):
     """One error with its code, at the author's line, the function or cause with its value, and the last good state."""
     stop = STOPS[name]
@@ -67,6 +68,7 @@ scene s of m {
 
 
 @pytest.mark.parametrize("read", ["a.e", "a.e - 0.5*b.e", "abs(c.e)", "a.e + b.e - c.e"])
+@pytest.mark.long
 def test_an_effort_without_reference_is_noted(read):
     """Where one effort is read by itself; never where differences are, nor once the network is grounded."""
     text = FLOATING.replace("R1.f,", f"R1.f, {read} as read,")

@@ -30,7 +30,7 @@ CASES = {
 
 
 @pytest.mark.parametrize(("row", "formulation"), CASES.values(), ids=CASES)
-@pytest.mark.one_in(79)
+@pytest.mark.one_in(522)
 def test_response(row, formulation, tmp_path, record_property):
     record_property("error", row.check(tmp_path, formulation))
 
@@ -53,6 +53,7 @@ def test_nothing_of_the_prelude_lacks_a_row():
     assert [i.name.name for i in items if isinstance(i, syntax.Const) and i.name.name not in texts] == []
 
 
+@pytest.mark.long
 def test_a_row_uses_its_component():
     rows = [row for table in TABLES.values() if table is not prelude_table.ROWS for row in table]
     assert [row.component for row in rows if row.component not in names(row.text)] == []

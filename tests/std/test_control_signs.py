@@ -36,6 +36,7 @@ def traced(kind, gains, sign, folder):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("derivative", [0.0, KD])
+@pytest.mark.long
 def test_pid(sign, derivative, tmp_path):
     """Of a plant that falls where the output rises the gains are negative: the loop is the mirror of the other."""
     given = (sign * g for g in (KP, KI, derivative))
@@ -68,6 +69,7 @@ def test_pid(sign, derivative, tmp_path):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("kind", ["sampled_pi", "sampled_pid"])
+@pytest.mark.long
 def test_sampled(kind, sign, tmp_path):
     """A plain loop over samples; between them the plant is exact."""
     rate = "" if kind == "sampled_pi" else f", kd = {sign * 0.05} A.s/V"
@@ -88,6 +90,7 @@ def test_sampled(kind, sign, tmp_path):
 
 
 @pytest.mark.parametrize(("lo", "hi"), [(-2.0, 3.0), (3.0, -2.0)])
+@pytest.mark.long
 def test_switches(lo, hi, tmp_path):
     """A relay and a hysteresis whose outputs rise or fall with the input sin t."""
     path = tmp_path / "s.sd"

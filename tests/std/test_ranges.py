@@ -102,6 +102,7 @@ REFUSED = (
 
 
 @pytest.mark.parametrize("element", REFUSED)
+@pytest.mark.one_in(39)
 def test_refused(element, tmp_path):
     found, report = traced(tmp_path, network(f"{NODES}  E: {element}\n", 1.0, "t"), (1.0,))
     assert found is None
@@ -110,6 +111,7 @@ def test_refused(element, tmp_path):
     assert " E." in refused[0].message
 
 
+@pytest.mark.long
 def test_every_requirement_has_a_row():
     rows = [names(f"model m {{{NODES}  E: {element}\n}}")[0] for element in REFUSED]
     wanted = {

@@ -152,7 +152,7 @@ def model_in_si(request, tmp_path_factory):
 
 
 @pytest.mark.parametrize("system", [s for s in SYSTEMS if s != "SI"])
-@pytest.mark.one_in(18)
+@pytest.mark.long
 def test_same_numbers_in_every_coherent_system(model_in_si, system, tmp_path, record_property):
     model, wanted = model_in_si
     error = difference(values(tmp_path, system, model), wanted)
@@ -262,7 +262,7 @@ PREFIXED = {
 
 
 @pytest.mark.parametrize("model", PREFIXED)
-@pytest.mark.one_in(3)
+@pytest.mark.long
 def test_prefixed_units(model, tmp_path, record_property):
     prefixed, plain, units = PREFIXED[model]
     texts = [
@@ -319,6 +319,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("domain", [d for d in LOOPS if d != "rotation"])
+@pytest.mark.long
 def test_unit_variables_fit_every_domain(domain, tmp_path, record_property):
     wanted, found = (accepted(tmp_path, loop(*LOOPS[d])) for d in ("rotation", domain))
     error = difference(found, wanted)

@@ -41,7 +41,7 @@
 
 #include <stdint.h>
 
-enum { SD_CONTRACT = 3 };
+#define SD_CONTRACT 3
 
 typedef struct sd_frame {
     const double *p;
