@@ -39,7 +39,7 @@ def exact(time, inertia, mass, rod):
 @pytest.mark.parametrize(("inertia", "mass"), [(1.0, 1.0), (1.0, 1e-2), (100.0, 1.0)])
 @pytest.mark.parametrize("rod", [1.00001, 1.0000001])
 def test_the_slider_stays_on_its_branch_or_the_run_is_refused(tmp_path, inertia, mass, rod, formulation, method):
-    """Branches are 2 sqrt(2 (rod - 1)) m apart there, 9 and 0.9 mm: steps of any accuracy passed from one to the other."""
+    """Branches are 2 sqrt(2 (rod - 1)) m apart there, 9 and 0.9 mm: steps of any accuracy passed over."""
     refused = 0
     for accuracy in (1e-2, 1e-4):
         (tmp_path / "m.sd").write_text(CRANK % {"J": inertia, "m": mass, "rod": rod, "span": SPAN})
