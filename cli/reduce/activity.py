@@ -103,7 +103,8 @@ def activities(
 def _sorted(trace: Trace, parts: Sequence[Part], ran: Ran) -> Activities:
     found = [(part, variation(trace.time, trace[part.name])) for part in parts]
     total = float(sum(value for part, value in found if part.role != "through"))
-    energies = {part.name: share.energy for part, share in zip(parts, shares(trace, parts), strict=True)}
+    # shares of jumps follow those of the parts, and are no part of the model
+    energies = {part.name: share.energy for part, share in zip(parts, shares(trace, parts), strict=False)}
     items = [
         Activity(
             part.label, part.branch, part.role, value,

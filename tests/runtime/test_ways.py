@@ -79,7 +79,6 @@ def test_linear_rows_are_not_sought_along_detours(law, bent):
     assert found == ([name for name, _ in STRATEGIES] if bent else ["newton", "largest_scales"])
 
 
-@pytest.mark.long
 def test_the_way_that_was_taken_stays_with_the_state():
     assert consistent_start(driven(STEEP), 0.0).strategy == "newton"
     assert consistent_start(driven("e_1**2 - 4"), 0.0).strategy == "newton"

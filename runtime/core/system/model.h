@@ -41,7 +41,7 @@
 
 #include <stdint.h>
 
-#define SD_CONTRACT 3
+enum { SD_CONTRACT = 3 };
 
 typedef struct sd_frame {
     const double *p;
