@@ -4,6 +4,8 @@
 #include <math.h>
 
 #define INSTANT 1e-10 /* of a step: within it no mode grows */
+#define INSTANT_ABOVE 1e-5 /* the same where the index is above 1: in less, round-off of what cancels tells the sign, which
+                            * is asked for behind restarts alone */
 #define FEW 100.0 /* steps whose lengths, each rounded, still add up to the span */
 
 void sd_stepper_start(sd_stepper *stepper, double t, const double *y, const double *yd)
@@ -82,6 +84,15 @@ static int factorise_at(const sd_ivp *ivp, sd_linear *linear, const double *jy, 
     return sd_linear_factor(linear, g, scale);
 }
 
+/* whether an unknown is a multiplier, or follows as one does: the index is above 1 */
+static int has_multipliers(const sd_ivp *ivp)
+{
+    for (int32_t i = 0; i < ivp->n; i++)
+        if (ivp->power[i] != 0)
+            return 1;
+    return 0;
+}
+
 int sd_outgrown(sd_ivp *ivp, sd_linear *linear, const double *jy, const double *jyd, double lead, double *g, const double *scale)
 {
     const int at_step = sd_linear_orientation(linear);
@@ -91,8 +102,14 @@ int sd_outgrown(sd_ivp *ivp, sd_linear *linear, const double *jy, const double *
         ivp->resting = 0;
     if (!at_step || at_step == ivp->orientation || ivp->resting >= SD_RESTS || ivp->fixed_h > 0.0)
         return SD_FINE;
+    const int above = has_multipliers(ivp);
+    if (above && ivp->taken > 0) {
+        ivp->orientation = at_step;
+        return SD_FINE;
+    }
     /* a mode that grows, or rows that others have replaced since the sign was taken (an event) */
-    const int at_once = factorise_at(ivp, linear, jy, jyd, lead / INSTANT, g, scale) ? 0 : sd_linear_orientation(linear);
+    const double at = lead / (above ? INSTANT_ABOVE : INSTANT);
+    const int at_once = factorise_at(ivp, linear, jy, jyd, at, g, scale) ? 0 : sd_linear_orientation(linear);
     ivp->orientation = at_once ? at_once : at_step;
     if (at_once && at_once != at_step) {
         ivp->outgrown = 1;

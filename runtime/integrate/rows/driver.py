@@ -31,8 +31,8 @@ SWIFT = 100.0
 output, where it relaxes at once (smooth motions: up to ten).
 """
 FEW, FEW_ROWS = 400, 1
-"""Unknowns and constraints up to which the branch is watched.  Of several that fold at once (chains of cranks as long as
-their rods that lie flat) one curve through the singular place is not told from two branches beside it."""
+"""Unknowns and constraints up to which the branch is watched.  Of several that fold at once (chains of cranks as long
+as their rods that lie flat) one curve through the singular place is not told from two branches beside it."""
 CREDIT = 16
 """Rows that are looked at before it shows that few of them meet their sums."""
 
