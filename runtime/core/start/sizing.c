@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define CANCELLED (64.0 * DBL_EPSILON) /* of a slope beside it: one that terms which cancel have left */
 #define ROUND_OFF 1e-12 /* of the largest of the same unit: smaller ones are what is left of a zero */
 #define NOTHING 1e-18   /* of the largest of the same kind and unit: less was written as a zero (starts clean what they leave) */
 #define FRESH 1e-9      /* of what a rate makes of a quantity in the time scale so far: a start below it is round-off */
@@ -365,6 +366,27 @@ static int bounded(const sd_sizing *s, sd_system *system, const sd_order *order,
     return 0;
 }
 
+/* slope [entries] := 0 where it is round-off beside others of its row and of its column alike: a crank at its dead centre moves
+ * its slider by 1e-17 m/rad, and what that would balance has no bound.  1: no memory */
+static int clear_round_off(const sd_system *system, double *slope)
+{
+    double *largest = calloc((size_t)system->rows + 1, sizeof *largest); /* of each row */
+    if (!largest)
+        return 1;
+    for (int32_t e = 0; e < system->entries; e++)
+        largest[system->row[e]] = sd_larger(largest[system->row[e]], fabs(slope[e]));
+    for (int32_t j = 0; j < system->unknowns; j++) {
+        double most = 0.0;
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            most = sd_larger(most, fabs(slope[e]));
+        for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
+            if (fabs(slope[e]) <= CANCELLED * fmin(most, largest[system->row[e]]))
+                slope[e] = 0.0;
+    }
+    free(largest);
+    return 0;
+}
+
 int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span, const double *y, const double *yd,
                   double *jy, double *jyd, const double *rate, const sd_order *order, int spent, double *found,
                   double *tau)
@@ -395,8 +417,9 @@ int sd_magnitudes(const sd_sizing *s, sd_system *system, double t0, double span,
     int none = !memory || !carries;
     if (!none) {
         sd_jacobian(system, t0, y, yd, NULL, own_jy, own_jyd);
+        none = clear_round_off(system, own_jy);
         carriers(s, own_jyd, carries);
-        none = sd_compliance(s, own_jy, own_jyd, divisor);
+        none |= sd_compliance(s, own_jy, own_jyd, divisor);
     }
     if (none) {
         free(first);
