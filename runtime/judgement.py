@@ -121,9 +121,9 @@ class Cancelled:
 def cancelled(
     nominal: Mapping[str, float],
     seen: Mapping[str, float],
-    ranges: Mapping[str, float],
     asked: float | None,
     estimate: float | None,
+    ranges: Mapping[str, float],
 ) -> Iterator[Cancelled]:
     """Quantities whose terms (nominal) cancel so far that the error, relative to the terms, is more than the accuracy
     asked of the rows (seen) themselves; what is nothing but round-off of its terms is zero by symmetry.  And those that

@@ -195,7 +195,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     estimate = achieved.error_estimate if achieved is not None else None
     ranges = {name: moves for name, moves in writer.ranges().items() if name not in options.to_range}
     terms = runs.quantities.terms(finished.largest)
-    lost = tuple(cancelled(terms, writer.seen(), ranges, options.accuracy, estimate))
+    lost = tuple(cancelled(terms, writer.seen(), options.accuracy, estimate, ranges))
     below = achieved is not None and achieved.below_round_off
     told = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
     told |= {"steps": finished.statistics.steps, "extrema": _extrema(runs)}

@@ -85,7 +85,7 @@ def _versions() -> Iterator[Finding]:
 
 def _core() -> Iterator[Finding]:
     try:
-        from sysdyn.runtime import _core as core  # type: ignore[attr-defined]
+        from sysdyn.runtime import _core as core
     except ImportError as error:
         yield Finding("core", "error", str(error), f"install {distribution.NAME} again: the core is built then")
         return

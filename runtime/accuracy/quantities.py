@@ -41,7 +41,8 @@ class Quantities:
         traced = set(self.names)
         self.meters = tuple(name for name, _ in options.accuracy_on if name in METERS and name not in traced)
         self.compared = (*self.names, *self.meters)
-        self.to_range: Ints = np.flatnonzero([name in options.to_range for name in self.names])
+        ranged = [k for k, name in enumerate(self.names) if name in options.to_range]
+        self.to_range: Ints = np.array(ranged, dtype=np.int64)
         self._beside: tuple[Floats, Floats, Floats] | None = None
 
     @property

@@ -126,7 +126,9 @@ def _resolved(starter: Starter, t: float, x: Floats) -> bool:
     coil is empty.
     """
     state = starter.written & ~starter.following(t, x) & (starter.guess != 0.0)
-    if (np.abs(starter.guess) < EPS * starter.largest_alike(x))[state].any():
+    guess = np.abs(starter.guess)  # what was guessed as round-off (the cosine of a right angle) stays that
+    lost = (guess < EPS * starter.largest_alike(x)) & (guess >= EPS * starter.largest_alike(guess))
+    if lost[state].any():
         return False
     of = starter.groups("initial")[starter.rows]
     said = np.abs(starter.residual(t, np.zeros_like(x)))

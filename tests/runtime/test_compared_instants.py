@@ -164,12 +164,12 @@ def test_a_quantity_that_misses_its_accuracy_is_named():
 
 def test_a_difference_of_large_terms_is_told_where_their_error_is_too_much_of_it():
     """Terms of 1000 known to 1e-6 are known to 1e-3, too little for 0.1 to 1e-4, enough for it to 2e-2."""
-    (found,) = cancelled({"d": 1000.0}, {"d": 0.1}, 1e-4, 1e-6)
+    (found,) = cancelled({"d": 1000.0}, {"d": 0.1}, 1e-4, 1e-6, {})
     assert (found.quantity, found.terms) == ("d", 1000.0)
     assert found.known == pytest.approx(1e-3)
-    assert not list(cancelled({"d": 1000.0}, {"d": 0.1}, 2e-2, 1e-6))
-    assert not list(cancelled({"d": 1000.0}, {"d": 10.0}, 1e-9, 1e-6))  # one hundredth has not cancelled
-    assert not list(cancelled({"d": 1000.0}, {"d": 1e-13}, 1e-4, 1e-6))  # a zero by symmetry
+    assert not list(cancelled({"d": 1000.0}, {"d": 0.1}, 2e-2, 1e-6, {}))
+    assert not list(cancelled({"d": 1000.0}, {"d": 10.0}, 1e-9, 1e-6, {}))  # one hundredth has not cancelled
+    assert not list(cancelled({"d": 1000.0}, {"d": 1e-13}, 1e-4, 1e-6, {}))  # a zero by symmetry
 
 
 def test_what_an_event_is_late_by_counts_where_values_move():

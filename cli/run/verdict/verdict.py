@@ -256,7 +256,9 @@ def unkicked(prepared: Prepared, started: Started, outcome: Outcome, report: Rep
     system, state = started.system, started.state
     if system.unknowns > UNKICKED or moving(system, state) or (trace := outcome.traced) is None:
         return
-    if any(np.ptp(trace[name].values) > 0.0 for name in trace.names if not name.startswith("audit.")):
+    if any(
+        (trace[name].values != trace[name].values[0]).any() for name in trace.names if not name.startswith("audit.")
+    ):
         return
     rate, name = growth(system, state)
     folds = rate * (outcome.reached - state.t)

@@ -50,6 +50,7 @@ class SceneReader:
         self._lost = False  # whether the scene has lost a statement, or what it traces
         self._found: dict[str, object] = {}
         self._accuracies: dict[str, Node] = {}
+        self._ranged: list[str] = []
         self._targets: set[tuple[str, str]] = set()
 
     def levels(self, scene: syntax.Scene) -> None:
@@ -320,7 +321,8 @@ class SceneReader:
             raise self.resolver.fail("E106", f"the accuracy of '{twice[0]}' is asked for twice", s.span)
         said |= dict.fromkeys(names, value)
         if s.to_range:
-            self._found["to_range"] = (*self._found.get("to_range", ()), *names)
+            self._ranged += names
+            self._found["to_range"] = tuple(self._ranged)
         self._found["accuracy_on"] = tuple(said.items())
 
     def _traced_as(self, target: syntax.Expr) -> str | None:
