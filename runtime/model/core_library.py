@@ -196,7 +196,7 @@ def _load() -> Any:
         "sd_least_norm_apply": (c.c_int, [_P, _D, _P, _P]),
         "sd_run_new": (c.POINTER(Run), [_P, _P, _I, _I, _I, _I]),
         "sd_ledgers_clear": (None, [_P]),
-        "sd_branches_new": (_P, [_P, _P, _I, _P, _I]),
+        "sd_branches_new": (_P, [_P, _P, _I, _I]),
         "sd_branches_free": (None, [_P]),
         "sd_extrema_begin": (None, [_P]),
         "sd_run_free": (None, [_P]),

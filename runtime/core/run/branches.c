@@ -1,4 +1,4 @@
-/* Branches of holonomic constraints: see branches.h. */
+/* Branches of a holonomic constraint: see branches.h. */
 #include "run/branches.h"
 #include "system/condensed.h"
 
@@ -13,26 +13,24 @@
 #define APART 16.0     /* parts of the chord that are left: points further from each other are of two branches */
 #define CORRECTIONS 12 /* onto the constraints, from the middle of a chord */
 #define CLOSE 1e-10    /* of magnitudes: the last of these corrections */
-#define SINGULAR 1e-13 /* of its largest entry: a pivot that is round-off, of rows that depend on each other */
 
-sd_branches *sd_branches_new(sd_settle *settle, const sd_stepper *stepper, int32_t extended, const int32_t *row, int32_t rows)
+sd_branches *sd_branches_new(sd_settle *settle, const sd_stepper *stepper, int32_t extended, int32_t row)
 {
     const int32_t n = (extended > stepper->n ? extended : stepper->n) + 8;
-    const size_t m = (size_t)rows, unknowns = (size_t)settle->unknowns, entries = (size_t)settle->system->entries;
-    const size_t all = (size_t)sd_whole_lanes(settle->rows) + m;
+    const size_t unknowns = (size_t)settle->unknowns, entries = (size_t)settle->system->entries;
+    const size_t rows = (size_t)sd_whole_lanes(settle->rows);
     sd_branches *b = calloc(1, sizeof *b);
-    double *next = calloc(3 * m * unknowns + m * m + all + 2 * entries + 5 * unknowns + 4 * (size_t)n + 1, sizeof *next);
+    double *next = calloc(rows + 2 * entries + 8 * unknowns + 4 * (size_t)n + 1, sizeof *next);
     if (!b || !next) {
         free(b);
         free(next);
         return NULL;
     }
-    *b = (sd_branches){.settle = settle, .row = row, .rows = rows, .memory = next, .before = next};
-    b->now = b->before + m * unknowns;
-    b->middle = b->now + m * unknowns;
-    b->product = b->middle + m * unknowns;
-    b->rest = b->product + m * m;
-    b->jy = b->rest + all;
+    *b = (sd_branches){.settle = settle, .row = row, .memory = next, .before = next};
+    b->now = b->before + unknowns;
+    b->middle = b->now + unknowns;
+    b->rest = b->middle + unknowns;
+    b->jy = b->rest + rows;
     b->jyd = b->jy + entries;
     b->z = b->jyd + entries;
     b->zd = b->z + unknowns;
@@ -67,89 +65,40 @@ static void take_point(sd_branches *b, const double *y, const double *yd)
     sd_settle_take_point(b->settle, y, yd, b->z, b->zd);
 }
 
-static void exchange(double *a, double *b)
-{
-    const double was = *a;
-    *a = *b;
-    *b = was;
-}
-
-/* normals [rows][unknowns] at z, zd; 0: a slope is no number */
-static int take_normals(sd_branches *b, double t, double *normals)
+/* normal [unknowns] at z, zd; 0: a slope is no number */
+static int take_normal(sd_branches *b, double t, double *normal)
 {
     sd_system *system = b->settle->system;
     const int32_t unknowns = b->settle->unknowns;
     if (sd_jacobian(system, t, b->z, b->zd, b->settle->scale, b->jy, b->jyd) >= 0)
         return 0;
-    memset(normals, 0, (size_t)b->rows * (size_t)unknowns * sizeof *normals);
+    memset(normal, 0, (size_t)unknowns * sizeof *normal);
     for (int32_t j = 0; j < unknowns; j++)
         for (int32_t e = system->column[j]; e < system->column[j + 1]; e++)
-            for (int32_t k = 0; k < b->rows; k++)
-                if (b->row[k] == system->row[e])
-                    normals[(size_t)k * unknowns + j] = b->jy[e] * b->settle->scale[j];
+            if (system->row[e] == b->row)
+                normal[j] = b->jy[e] * b->settle->scale[j];
     return 1;
 }
 
-/* det(M N^T) by elimination with exchanges, and x [rows] := its solution for the right side x (NULL: none); 0 where round-off
- * tells the sign */
-static double determinant(const sd_branches *b, const double *m, const double *n, double *x)
+static double product(const sd_branches *b, const double *m, const double *n)
 {
-    const int32_t rows = b->rows, unknowns = b->settle->unknowns;
-    double *a = b->product, found = 1.0, most = 0.0;
-    for (int32_t i = 0; i < rows; i++)
-        for (int32_t k = 0; k < rows; k++) {
-            double sum = 0.0;
-            for (int32_t j = 0; j < unknowns; j++)
-                sum += m[(size_t)i * unknowns + j] * n[(size_t)k * unknowns + j];
-            a[i * rows + k] = sum;
-            most = fmax(most, fabs(sum));
-        }
-    for (int32_t c = 0; c < rows; c++) {
-        int32_t best = c;
-        for (int32_t i = c + 1; i < rows; i++)
-            best = fabs(a[i * rows + c]) > fabs(a[best * rows + c]) ? i : best;
-        const double pivot = a[best * rows + c];
-        if (!(fabs(pivot) > SINGULAR * most))
-            return 0.0;
-        for (int32_t k = c; k < rows && best != c; k++)
-            exchange(&a[c * rows + k], &a[best * rows + k]);
-        if (x && best != c)
-            exchange(&x[c], &x[best]);
-        found *= best != c ? -pivot : pivot;
-        for (int32_t i = c + 1; i < rows; i++) {
-            const double part = a[i * rows + c] / pivot;
-            for (int32_t k = c; k < rows; k++)
-                a[i * rows + k] -= part * a[c * rows + k];
-            if (x)
-                x[i] -= part * x[c];
-        }
-    }
-    for (int32_t c = rows - 1; x && c >= 0; c--) {
-        for (int32_t k = c + 1; k < rows; k++)
-            x[c] -= a[c * rows + k] * x[k];
-        x[c] /= a[c * rows + c];
-    }
-    return found;
+    double sum = 0.0;
+    for (int32_t j = 0; j < b->settle->unknowns; j++)
+        sum += m[j] * n[j];
+    return sum;
 }
 
-/* z moved onto the constraints the shortest way, `middle` the normals there; 0: that leads nowhere */
+/* z moved onto the constraint the shortest way, `middle` the normal there; 0: that leads nowhere */
 static int project(sd_branches *b, double t)
 {
-    const int32_t rows = b->rows, unknowns = b->settle->unknowns;
-    const double *scale = b->settle->scale;
-    double *x = b->rest + sd_whole_lanes(b->settle->rows);
     for (int k = 0; k < CORRECTIONS; k++) {
-        double moved = 0.0;
+        double moved = 0.0, square = 0.0;
         sd_residual(b->settle->system, t, b->z, b->zd, b->rest);
-        for (int32_t i = 0; i < rows; i++)
-            x[i] = b->rest[b->row[i]];
-        if (!take_normals(b, t, b->middle) || determinant(b, b->middle, b->middle, x) == 0.0)
+        if (!take_normal(b, t, b->middle) || !((square = product(b, b->middle, b->middle)) > 0.0))
             return 0;
-        for (int32_t j = 0; j < unknowns; j++) {
-            double step = 0.0;
-            for (int32_t i = 0; i < rows; i++)
-                step += b->middle[(size_t)i * unknowns + j] * x[i];
-            b->z[j] -= step * scale[j];
+        for (int32_t j = 0; j < b->settle->unknowns; j++) {
+            const double step = b->middle[j] * (b->rest[b->row] / square);
+            b->z[j] -= step * b->settle->scale[j];
             moved = fmax(moved, fabs(step));
         }
         if (moved <= CLOSE)
@@ -182,7 +131,7 @@ static int halve(sd_branches *b, double t)
     return 0;
 }
 
-/* Normals turn between the points `at` (normals `before`) and z: whether these are of two branches, not of one curve */
+/* Normals turn between the points `at` (normal `before`) and z: whether these are of two branches, not of one curve */
 static int are_two(sd_branches *b, double t)
 {
     const size_t size = (size_t)b->settle->unknowns * sizeof(double);
@@ -193,7 +142,7 @@ static int are_two(sd_branches *b, double t)
         if (!halve(b, t)) /* no curve leads from one to the other */
             return 1;
         part *= LARGER;
-        memcpy(determinant(b, b->before, b->middle, NULL) < 0.0 ? b->far : b->near, b->z, size);
+        memcpy(product(b, b->before, b->middle) < 0.0 ? b->far : b->near, b->z, size);
         if (distance(b, b->near, b->far) > APART * part)
             return 1;
     }
@@ -209,14 +158,14 @@ static int has_moved(const sd_branches *b)
     return 0;
 }
 
-/* the normals in `now` are those to compare with, of the point in z */
+/* the normal in `now` is the one to compare with, of the point in z */
 static void keep(sd_branches *b)
 {
     double *swap = b->before;
     b->before = b->now;
     b->now = swap;
     memcpy(b->at, b->z, (size_t)b->settle->unknowns * sizeof *b->at);
-    b->size = pow(fabs(determinant(b, b->before, b->before, NULL)), 0.5 / b->rows);
+    b->size = sqrt(product(b, b->before, b->before));
     b->most = fmax(b->most, b->size);
 }
 
@@ -227,7 +176,7 @@ void sd_branches_leave(sd_branches *b, const sd_stepper *stepper)
     if (stepper->ivp->steps == 0)
         b->most = 0.0;
     take_point(b, b->y, b->yd);
-    if ((!b->begun || stepper->ivp->taken == 0 || has_moved(b)) && take_normals(b, b->t, b->now)) {
+    if ((!b->begun || stepper->ivp->taken == 0 || has_moved(b)) && take_normal(b, b->t, b->now)) {
         keep(b);
         b->begun = 1;
     }
@@ -241,10 +190,10 @@ int sd_branches_follow(sd_branches *b, sd_stepper *stepper)
     take_point(b, b->end, b->end_d);
     if (b->size >= SHORT * b->most && !has_moved(b))
         return 1;
-    if (!take_normals(b, stepper->ivp->t, b->now))
+    if (!take_normal(b, stepper->ivp->t, b->now))
         return 1;
     const double t = stepper->ivp->t;
-    if (determinant(b, b->before, b->now, NULL) < 0.0) {
+    if (product(b, b->before, b->now) < 0.0) {
         if (are_two(b, t)) {
             sd_settle_point(b->settle, b->t, b->y, b->yd); /* rates of a start are those of the equations */
             stepper->start(stepper->self, b->t, b->y, b->yd, 0.25 * (t - b->t));

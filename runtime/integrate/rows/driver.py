@@ -30,9 +30,9 @@ SWIFT = 100.0
 """Of the tolerance: what is observed would move by more of its largest in a step, by the equations beside the dense
 output, where it relaxes at once (smooth motions: up to ten).
 """
-FEW, FEW_ROWS = 400, 1
-"""Unknowns and constraints up to which the branch is watched.  Of several that fold at once (chains of cranks as long
-as their rods that lie flat) one curve through the singular place is not told from two branches beside it."""
+FEW = 400
+"""Unknowns up to which the branch of a constraint is watched.  Of several that fold at once (chains of cranks as long
+as their rods, which lie flat) one curve through the place is not told from two branches: they are not watched."""
 CREDIT = 16
 """Rows that are looked at before it shows that few of them meet their sums."""
 
@@ -129,18 +129,16 @@ class Driver:
         run.row, run.room = lib.pointer(self.rows), self.rows.shape[0]
 
     def _branches(self, request: Request, method: Method, settler: Settler) -> None:
-        """Watches that steps stay on the branch of constraints of displacements that hold throughout."""
+        """Watches that steps stay on the branch of a constraint of displacements, where there is one alone."""
         self.branches: int | None = None
         contacts = () if request.events is None else request.events.contacts
         if any(contact.kind == "phi" for contact in contacts) or settler.system.unknowns > FEW:
             return
-        rows = np.flatnonzero(settler.left_of(settler.system.of_groups("phi"))).astype(np.int32)
-        if not 0 < rows.size <= FEW_ROWS:
+        rows = np.flatnonzero(settler.left_of(settler.system.of_groups("phi")))
+        if rows.size != 1:
             return
-        self._phi = rows
-        self.branches = lib.core.sd_branches_new(
-            settler.core, method.stepper, self.system.form.extended, lib.pointer(rows), rows.size
-        )
+        extended = self.system.form.extended
+        self.branches = lib.core.sd_branches_new(settler.core, method.stepper, extended, int(rows[0]))
         if not self.branches:
             raise MemoryError
         self.run.branches = self.branches
