@@ -29,6 +29,8 @@ UNTOLD = tuning.SAME
 
 BESIDE = 1e-20
 """m/s and the like: a flow in the plane that is no flow yet, and has a direction."""
+WIDER = 4.0
+"""Times that flow, where steps leave more open of the speed than it covers."""
 SHORTEST = 1e-150
 """Seconds; the square of less is no double."""
 EDGE = 2.0
@@ -57,6 +59,7 @@ class Contacts:
         # idle ones that stand against their guard, for something would be open else (determined.py)
         self.spared: frozenset[int] = frozenset()
         self.time = 0.0
+        self.resolution = 0.0  # the tolerance of the steps, of the largest flows
         places = self.switches.places
         kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
         for kind in sorted(kinds):
@@ -211,7 +214,19 @@ class Contacts:
         """The direction of a slip in the plane, as a flow."""
         size = float(np.hypot(*along))
         if size > 0.0:
-            self.p[list(contact.direction)] = BESIDE * along / size
+            self.p[list(contact.direction)] = max(BESIDE, self._unresolved(contact)) * along / size
+
+    def _unresolved(self, contact: Contact) -> float:
+        """The speed (m/s and the like) that steps leave open of friction in the plane: of the largest terms of its
+        flows, as a block on a moving table has the speed of the table.
+        """
+        return self.resolution * float(np.hypot(*self.observer.largest[list(contact.aim[:2])]))
+
+    def _moves(self, contact: Contact, values: Floats) -> bool:
+        """Whether the speed of friction in the plane is one."""
+        speed = contact.aim[4]
+        covered = float(np.hypot(*self.p[list(contact.direction)]))
+        return bool(values[speed] > max(self.observer.zero(speed), self._unresolved(contact), WIDER / 2 * covered))
 
     def halting(self, touched: Sequence[int]) -> list[int]:
         """The contacts of those touched which slip in a plane."""
@@ -340,14 +355,12 @@ class Contacts:
         return float(values[c.bound] if c.kind == "friction" else values[c.upper] + np.hypot(*values[list(c.aim[2:4])]))
 
     def _planar(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
-        zero, speed = self.observer.zero, values[c.aim[4]]
+        zero = self.observer.zero
         if self.active[k]:
             return bool(values[c.upper] < -zero(c.multiplier) or self._overstrained(k, impulse))
         if self.p[c.sense] == 0.0:
             return True
-        if speed > zero(c.aim[4]):
-            return bool(values[c.value] < 0.0)
-        return bool(values[c.rate] < -zero(c.rate))
+        return bool(values[c.value] < 0.0 or (not self._moves(c, values) and values[c.rate] < -zero(c.rate)))
 
     def passed(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> Floats:
         """Impulses of flow [contacts]: what passed inequalities of flows where displacements jumped; none at a start,
@@ -374,11 +387,14 @@ class Contacts:
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""
         contact = self.contacts[k]
-        moves = contact.kind == "planar" and values[contact.aim[4]] > self.observer.zero(contact.aim[4])
-        if moves and not self.active[k]:
-            self._direct(contact, values[list(contact.aim[:2])])
-            self.p[contact.sense] = 1.0
-            return
+        if contact.kind == "planar" and not self.active[k]:
+            if self._moves(contact, values):
+                self._direct(contact, values[list(contact.aim[:2])])
+                self.p[contact.sense] = 1.0
+                return
+            if self.p[contact.sense] != 0.0 and values[contact.rate] >= -self.observer.zero(contact.rate):
+                self.p[list(contact.direction)] *= WIDER  # it slips on: what steps leave open has turned it
+                return
         slips = contact.kind == "friction" and not self.active[k]
         if slips and k in self.through:
             self.p[contact.sense] = -self.p[contact.sense] or np.sign(values[contact.rate]) or 1.0

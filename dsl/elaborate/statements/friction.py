@@ -244,17 +244,17 @@ def _stick_in_plane(
     for label, flow in zip(labels, flows, strict=True):
         frame.said(Constraint("psi", label, at, flow, loops, unit, place))
     multipliers = tuple(ex.var(label, "mu", *at) for label in labels)
-    along = ex.div(ex.add(*(ex.mul(a, b) for a, b in zip(n, flows, strict=True))), ex.call("hypot", *n))
-    value = ex.sub(along, ex.scale(0.5, node))
+    beside = [ex.add(f, d) for f, d in zip(flows, n, strict=True)]
+    forward = ex.add(*(ex.mul(d, b) for d, b in zip(n, beside, strict=True)))
+    along = ex.div(forward, ex.call("hypot", *n))
+    value = ex.sub(along, ex.scale(0.5, ex.call("hypot", *beside)))
     draft = Draft(
         name, at, loops, "planar", place, unit, value, ex.call("hypot", *multipliers), bound=bound, sense=sense,
         rate=time_derivative(along), aim=(*flows, *multipliers, node), direction=n,
     )  # fmt: skip
     frame.parts.drafts.append(draft)
     frame.parts.drafts.append(Draft(labels[1], at, loops, "follows", place, unit, flows[1], multipliers[1]))
-    beside = [ex.add(f, d) for f, d in zip(flows, n, strict=True)]
-    forward = ex.call("sign", ex.add(*(ex.mul(d, b) for d, b in zip(n, beside, strict=True))))
-    return ex.mul(forward, ex.call("hypot", *beside))
+    return ex.mul(ex.call("sign", forward), ex.call("hypot", *beside))
 
 
 def _rates(root: Node) -> bool:

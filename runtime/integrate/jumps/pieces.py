@@ -60,6 +60,7 @@ class Pieces:
         self.handler.restart = run.settlers.restart
         run.settlers.restart.sums = all(contact.kind == "guarded" for contact in plan.contacts)
         self.handler.contacts.size(run.sizes.magnitude, run.sizes.time)
+        self.handler.contacts.resolution = run.request.rtol
         method = run.method.contents
         if np.isfinite(plan.turns):
             run.driver.run.turns, method.h_max = plan.turns, min(method.h_max, FOLLOWED * plan.turns)
