@@ -13,7 +13,7 @@ import click
 from sysdyn.cli.failures import OF_RUNS, SOLVER, USAGE, envelope, plain, shown, worst
 from sysdyn.cli.progress import RUN, ProgressLine
 from sysdyn.cli.streams import put
-from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, ModelError, Report, shortened
+from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, ModelError, Report, limit_findings
 
 WHEN = ("auto", "always", "never")
 ROUTINE = ("N501", "N601", "N602", "N603", "N604")
@@ -82,7 +82,7 @@ class Console:
 
     def finish(self, code: int = 0) -> int:
         """Show the findings; the exit code (1 where there are errors)."""
-        found = shortened(self.report.diagnostics)
+        found = limit_findings(self.report.diagnostics)
         if self.report.failed:
             typed = any(d.severity == "error" and d.place and d.place.source.typed for d in self.report)
             code = worst((code or 1, USAGE if typed else 0))

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysdyn.dsl.elaborate.authors import told
+from sysdyn.dsl.elaborate.authors import point_at_author
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.scenes import stopping
@@ -119,17 +119,17 @@ def network(
     """
     try:
         with deep(), at_rest(), budget.drawn(document.file.source.text):
-            elaborator, reader = _elaborated(document, model, scene, report, settings, levels, moved)
+            elaborator, reader = _elaborate(document, model, scene, report, settings, levels, moved)
             try:
-                return _judged(elaborator, reader, scene, report, required=required, outputs=outputs)
+                return _build_network(elaborator, reader, scene, report, required=required, outputs=outputs)
             finally:
-                report.retold(lambda found: told(elaborator, found))
+                report.retold(lambda found: point_at_author(elaborator, found))
     except (budget.SpentError, NoDerivativeError) as spent:
         report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
         return None
 
 
-def _judged(
+def _build_network(
     elaborator: Elaborator,
     reader: SceneReader,
     scene: syntax.Scene | None,
@@ -147,16 +147,16 @@ def _judged(
             reader.command(source, trace, SceneReader.trace)
     if _unread(elaborator, scene):
         return None  # what is missing would be found missing again, in other words
-    stopping.watched(elaborator, reader.observations)
+    stopping.watch_tables(elaborator, reader.observations)
     elaborator.quadratures()
-    elaborator.derived()
+    elaborator.add_derivatives()
     checks.run(elaborator, report, required=required)
     checks.set_valued_results(elaborator, reader.observations, report)
     exact_claims(elaborator, report)
     _begin(elaborator, read_scene)
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
-        switches.expanded(elaborator, known)
+        switches.expand_events(elaborator, known)
     bound_values.run(elaborator, known, report, reader.observations)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
@@ -166,7 +166,7 @@ def _judged(
     return None if report.failed or _incomplete(report) else found
 
 
-def _elaborated(
+def _elaborate(
     document: Document,
     model: syntax.Model,
     scene: syntax.Scene | None,
@@ -208,11 +208,11 @@ def at_authors(network: Network, found: Iterable[Diagnostic]) -> tuple[Diagnosti
     again = document(source, Report())
     levels = [(choice.path, choice.chosen) for choice in network.levels]
     with deep(), budget.drawn(source.text), ex.fresh():
-        elaborator, _ = _elaborated(again, again.models[network.model], None, Report(), (), levels)
-        return tuple(told(elaborator, found))
+        elaborator, _ = _elaborate(again, again.models[network.model], None, Report(), (), levels)
+        return tuple(point_at_author(elaborator, found))
 
 
-def asked(
+def conditions_on_numbers(
     document: Document,
     model: syntax.Model,
     scene: syntax.Scene | None,
@@ -221,7 +221,7 @@ def asked(
 ) -> Asked:
     """What a text without errors asks of its numbers."""
     with deep(), budget.drawn(document.file.source.text):
-        elaborator, reader = _elaborated(document, model, scene, Report(), settings, levels)
+        elaborator, reader = _elaborate(document, model, scene, Report(), settings, levels)
         return Asked(elaborator, reader.elements)
 
 
@@ -237,7 +237,7 @@ def listing(
 
     try:
         with deep(), budget.drawn(document.file.source.text):
-            elaborator, reader = _elaborated(document, model, scene, report, (), levels)
+            elaborator, reader = _elaborate(document, model, scene, report, (), levels)
             if report.failed:
                 return None
             parameters = elaborator.parts.parameters
@@ -345,7 +345,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
         try:
             if isinstance(value.operand if isinstance(value, syntax.Negative) else value, syntax.Number):
                 return resolver.scalar(value).node.data  # type: ignore[no-any-return]
-            node = resolver.wanted(value, dimension, "E208", f"{name} is in {{}}, wants {common(dimension)}")
+            node = resolver.scalar_of(value, dimension, "E208", f"{name} is in {{}}, wants {common(dimension)}")
         except Failed:
             return None
         found = Values({}).number(node)

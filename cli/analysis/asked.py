@@ -19,7 +19,7 @@ from sysdyn.cli.run.start.starting import Started, start
 from sysdyn.cli.run.verdict.verdict import stopped
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.scenes.stopping import unwatched
+from sysdyn.dsl.elaborate.scenes.stopping import drop_measuring_states
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.calculus import moving, rate_name, time_derivative
 from sysdyn.dsl.model.network import Network
@@ -89,7 +89,7 @@ def compiled(
                 unasked = frozenset(asked).difference(names)
                 more = (*names, *(name for name in asked if name not in names))
                 network = read(report=Report(), outputs=more) or network
-            network = replace(unwatched(network), statics=(), expectations=(), goldens=())
+            network = replace(drop_measuring_states(network), statics=(), expectations=(), goldens=())
             network = _with_rates(network, moves)
             prepared = prepare(network, inner, formulation=request.formulation, backend=request.backend, gather=False)
     report.extend(inner if prepared else targets.unsupported(inner))

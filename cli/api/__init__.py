@@ -240,7 +240,7 @@ def check(text: str, name: str = "<text>") -> list[Diagnostic]:
     for target in targets.all_targets(document, report):
         with ex.fresh():
             checked(target, report)
-    for _, own in alone.judged(document):
+    for _, own in alone.check_unused_components(document):
         report.extend(own)
     return list(report.diagnostics)
 

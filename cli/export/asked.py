@@ -12,7 +12,7 @@ from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.scenes.stopping import unwatched
+from sysdyn.dsl.elaborate.scenes.stopping import drop_measuring_states
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.model.failures import NoSuchForm
@@ -27,7 +27,7 @@ def network_of(request: Request, report: Report) -> Network | None:
     asked = target.document, target.model, target.scene, inner, request.settings
     network = load.network(*asked, levels=request.levels, required=required)
     report.extend(inner if network else targets.unsupported(inner))
-    return None if network is None else unwatched(network)
+    return None if network is None else drop_measuring_states(network)
 
 
 def formed_of(prepared: Prepared, index: str | None, report: Report) -> Formed | None:

@@ -14,7 +14,7 @@ from sysdyn.dsl.model import units
 from sysdyn.dsl.model.functions import FUNCTIONS
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
 from sysdyn.dsl.names.names import VALUES
-from sysdyn.dsl.parser.parse import expected
+from sysdyn.dsl.parser.parse import expected_words
 from sysdyn.dsl.text.source import SourceText, Span
 from sysdyn.dsl.tree import syntax
 
@@ -56,7 +56,7 @@ def complete(document: Document, offset: int) -> list[dict[str, Any]]:
     if (match := _DECLARED.match(statement)) is not None:
         return _domains(document) if match[1] in _DOMAINS else _units()
     inside = isinstance(sight.item_at(document, offset), (syntax.Model, syntax.Component))
-    words = expected(SourceText(source.name, source.text[:start]))
+    words = expected_words(SourceText(source.name, source.text[:start]))
     if inside and (match := _LABEL.match(statement)) is not None and match[1] not in words:
         return _components(document)
     return [*_arguments(document, statement), *_expression(document, offset, words)]
@@ -85,7 +85,7 @@ def _modules(head: str) -> list[dict[str, Any]]:
 
 
 def _units() -> list[dict[str, Any]]:
-    return [_item(name, UNIT, units.si_text(found[0])) for name in units.names() if (found := units.known(name))]
+    return [_item(name, UNIT, units.si_text(found[0])) for name in units.names() if (found := units.find_unit(name))]
 
 
 def _domains(document: Document) -> list[dict[str, Any]]:

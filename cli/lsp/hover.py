@@ -60,7 +60,7 @@ def _code(code: str) -> str:
 def _said(document: Document, word: sight.Word) -> list[str]:
     """What is known of a word, one text for each of its declarations."""
     if document.marks.unit(word.start):
-        found = units.known(word.name)
+        found = units.find_unit(word.name)
         return [] if found is None else [f"`{word.name}`: {float(found[1]):.12g} {units.si_text(found[0])}"]
     declared = sight.find(document, word)
     if declared:

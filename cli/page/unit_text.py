@@ -6,7 +6,7 @@ import re
 from fractions import Fraction
 from functools import lru_cache
 
-from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, Unit, known, multiply, raised
+from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, Unit, find_unit, multiply, power_of
 
 _TOKEN = re.compile(r"\s*(?:(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)|([^\W\d_]+|%)|(\*\*|[./*^()+-]))")
 _LONGEST = 200
@@ -78,7 +78,7 @@ def _factor(tokens: list[re.Match[str]], k: int) -> tuple[Unit, int]:
         unit = Unit(NONE, Fraction(number), "")
     elif name:
         name = _ALIASES.get(name, name)
-        found = known(name)
+        found = find_unit(name)
         unit = Unit(*found, name) if found else Unit(((name, Fraction(1)),), Fraction(1), name)
     else:
         raise ValueError(operator)
@@ -86,7 +86,7 @@ def _factor(tokens: list[re.Match[str]], k: int) -> tuple[Unit, int]:
     if not -30 <= power <= 30:
         raise ValueError("power")
     scale = unit.scale**power if isinstance(power, int) else Fraction(float(unit.scale) ** float(power))
-    return Unit(raised(unit.dimension, power), scale, ""), k
+    return Unit(power_of(unit.dimension, power), scale, ""), k
 
 
 def _power(tokens: list[re.Match[str]], k: int) -> tuple[int | Fraction, int]:

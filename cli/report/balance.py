@@ -19,7 +19,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.calculus import differential, rate
 from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, sub, substitute, var
 from sysdyn.dsl.model.network import Branch, Dynamic, Energy, Initial, Loop, Network, Observation, State, Work
-from sysdyn.dsl.model.rewriting import summed
+from sysdyn.dsl.model.rewriting import sum_over_loops
 from sysdyn.dsl.model.units import si
 from sysdyn.dsl.text.diagnostics import ModelError, Place
 from sysdyn.runtime.trace.trace import Trace
@@ -133,7 +133,9 @@ def _of_branches(branches: Sequence[Branch]) -> Iterator[list[Part]]:
         if first.kind not in ROLES or first.domain.pseudo:
             continue
         power = [
-            summed(mul(var(b.name, "be", *b.at), var(b.name, "bf", *b.at)), b.loops) for b in pieces if b.kind in ROLES
+            sum_over_loops(mul(var(b.name, "be", *b.at), var(b.name, "bf", *b.at)), b.loops)
+            for b in pieces
+            if b.kind in ROLES
         ]
         label = f"{shown(name)}{_ranges(pieces)}"
         yield [Part(f"power of {name}", label, ROLES[first.kind], True, add(*power), first.place, first.domain.name)]
@@ -183,7 +185,7 @@ def _named(loops: Sequence[Loop], body: Node) -> Node:
     """A sum over canonical loops, whose variables get names of their own."""
     change = {index(loop.index): index(f"of{loop.index}") for loop in loops}
     renamed = [Loop(f"of{loop.index}", substitute(loop.first, change), substitute(loop.last, change)) for loop in loops]
-    return summed(substitute(body, change), renamed)
+    return sum_over_loops(substitute(body, change), renamed)
 
 
 def _along(expression: Node, kinds: Sequence[str]) -> Node:

@@ -136,7 +136,7 @@ def begin(prepared: Prepared, options: Options, report: Report, *, checked: bool
         return None
     number = started.system.form.written
     if number * budget.STEPPED > budget.there():
-        need, most = (budget.shown(amount) for amount in (number * budget.STEPPED, budget.there()))
+        need, most = (budget.format_bytes(amount) for amount in (number * budget.STEPPED, budget.there()))
         text = f"a run of {number} unknowns needs {need}, and there are {most}"
         report.error("E119", text, prepared.network.place, help="fewer elements")
         return None

@@ -19,7 +19,7 @@ from sysdyn.cli.spice.starts import across_sources, held_nodes
 from sysdyn.cli.spice.temperature import Heat
 from sysdyn.cli.spice.windings import Cores, component, coupled
 from sysdyn.cli.spice.writing import Names, names, quantity, wrapped
-from sysdyn.dsl.elaborate.files import exported
+from sysdyn.dsl.elaborate.files import library_components
 from sysdyn.dsl.elaborate.instances.instances import BUILTINS
 from sysdyn.dsl.text.decoding import MAX_BYTES
 from sysdyn.dsl.text.diagnostics import Report
@@ -76,7 +76,7 @@ class Writer:
         for node, (_, card) in self.netlist.initial.items():
             if "." not in node and node not in calls.uses[self.netlist.top].nodes:
                 self.report.error("E941", f".ic of '{node}': there is no such node", card.place)
-        library = {name for name, module in exported().items() if module == "electrical"}
+        library = {name for name, module in library_components().items() if module == "electrical"}
         coils = max((len(_coils(circuit)) for circuit in calls.uses), default=0)
         given = Names(library.union(BUILTINS, LOCAL, (f"coils_{n}" for n in range(2, coils + 1))), "x_")
         initial = {node: volt for node, (volt, _) in self.netlist.initial.items()} if self.netlist.uic else {}

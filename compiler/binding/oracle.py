@@ -19,11 +19,11 @@ from sysdyn.compiler.model.terms import has_reduction
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import (
     Node,
+    combine_terms,
     const,
     index,
     is_const,
     rebuild,
-    reduced,
     substitute,
     topological,
     topological_unbound,
@@ -139,7 +139,7 @@ class Oracle:
                 continue
             first, last = (round(float(v[0])) for v in over((), bounds, self.binding.parameters.lookup))
             parts = [substitute(body, {name: const(float(k))}) for k in range(first, last + 1)]
-            done[node] = reduced(node.data[0], parts)
+            done[node] = combine_terms(node.data[0], parts)
         return done[root]
 
     def _kernels(self, name: str) -> tuple[Kernel, ...]:

@@ -32,7 +32,7 @@ from sysdyn.compiler.forms.meters.observing import (
 from sysdyn.compiler.forms.momenta import given, inertial, jumping, resolved, shared
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
-from sysdyn.dsl.model.calculus import derivative, differential, gradient, moved, moving, time_derivative
+from sysdyn.dsl.model.calculus import derivative, differential, gradient, moving, parameter_rates, time_derivative
 from sysdyn.dsl.model.calculus import rate as rate_of
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node, add, is_const, neg, ordered_variables, substitute, var, variables
@@ -160,7 +160,7 @@ def _speeds(model: EnergyModel) -> dict[str, tuple[tuple[Node, ...], Node]]:
 def total_rate(root: Node) -> Node:
     """Total derivative by t, the derivatives of multipliers among its variables."""
     seeds = {n: rate_of(n) or var(*n.data[:2], *n.args, order=1) for n in ordered_variables(root)}
-    return differential(root, moved(root) | seeds)
+    return differential(root, parameter_rates(root) | seeds)
 
 
 class _Lowering:

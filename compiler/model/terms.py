@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from sysdyn.dsl.model.expression import (
     Node,
     add,
+    combine_terms,
     const,
     index,
     is_const,
@@ -22,7 +23,6 @@ from sysdyn.dsl.model.expression import (
     product,
     reads,
     rebuild,
-    reduced,
     reduction,
     scale,
     substitute,
@@ -168,7 +168,7 @@ def _elements(node: Node, args: tuple[Node, ...], place: Place, what: str) -> No
     parts = [substitute(body, {index(name): const(k)}) for k in range(int(first.data), int(last.data) + 1)]
     if not parts and operator not in ("sum", "prod"):
         raise ModelError([Diagnostic("N608", f"the {operator} over an empty range", place)])
-    return reduced(operator, parts)
+    return combine_terms(operator, parts)
 
 
 def summands(root: Node) -> list[Node]:

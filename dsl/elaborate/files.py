@@ -15,7 +15,7 @@ from sysdyn.dsl.elaborate.tables import read_table
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.dependence import in_order
 from sysdyn.dsl.model.network import Table
-from sysdyn.dsl.model.units import NONE, Unit, known, multiply, si
+from sysdyn.dsl.model.units import NONE, Unit, find_unit, multiply, si
 from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.resolve import Resolver
@@ -50,7 +50,7 @@ def _written_in(unit: _Declared) -> list[str]:
 
 
 @cache
-def exported() -> dict[str, str]:
+def library_components() -> dict[str, str]:
     """The components of the standard library, with the module that each is in."""
     found = {}
     for path in sorted(LIBRARY.glob("*.sd")):
@@ -78,7 +78,7 @@ def _hides_function(symbol: Symbol) -> bool:
     return isinstance(symbol, (FunctionSymbol, TableSymbol)) and symbol.name in dim.FUNCTIONS
 
 
-def _stepped(table: Table, held: tuple[str, ...]) -> dict[str, Table]:
+def _grid_tables(table: Table, held: tuple[str, ...]) -> dict[str, Table]:
     """The tables that stand for one: of two arguments that hold, each is taken down to its point of the grid, where
     the bilinear table has the value itself.
     """
@@ -106,9 +106,11 @@ class FileScope:
             if isinstance(item, syntax.Broken):
                 scope.broken |= item.names
                 if "std" in item.names:  # an import that could not be read: what hangs on it is not reported again
-                    scope.broken |= {name for name, module in exported().items() if module in item.names}
+                    scope.broken |= {name for name, module in library_components().items() if module in item.names}
         units = [item for item in file.items if isinstance(item, (syntax.UnitAlias, syntax.UnitBase))]
-        for unit in self._ordered(units, scope, file.source):  # units first: everything else is written in them
+        for unit in self._dependency_order(
+            units, scope, file.source
+        ):  # units first: everything else is written in them
             self._unit(unit, scope, file.source)
         for item in file.items:
             for symbol in self._symbols(item, scope, file.source):
@@ -132,7 +134,7 @@ class FileScope:
         """N102: from here on the name means what this file says."""
         self.report.note("N102", f"'{name}' of this file hides the '{name}' that the language has", place)
 
-    def _ordered(self, units: Sequence[_Declared], scope: Scope, source: SourceText) -> Iterator[_Declared]:
+    def _dependency_order(self, units: Sequence[_Declared], scope: Scope, source: SourceText) -> Iterator[_Declared]:
         """The units of a text, each behind those that it is written in; E105 of one that needs itself."""
         first: dict[str, _Declared] = {}
         for unit in units:
@@ -152,14 +154,14 @@ class FileScope:
         if name in scope.units:
             self.report.error("E106", f"unit '{name}' is declared twice", Place(source, item.name.span))
             return
-        if known(name) is not None:
+        if find_unit(name) is not None:
             self._hides(name, Place(source, item.name.span))
         if isinstance(item, syntax.UnitBase):
             scope.units[name] = Unit(((name, 1),), Fraction(1), name)
         else:
             resolver = Resolver(self.report)
             try:
-                with resolver.within(scope, source):
+                with resolver.entering_scope(scope, source):
                     value = resolver.scalar(item.value)
             except Failed:
                 scope.broken.add(name)
@@ -204,10 +206,10 @@ class FileScope:
                 self.scope.units[word.name] = unit
             elif symbol is not None:
                 self._imported[id(symbol)] = Place(source, word.span)
-                self._continued(symbol, word, source)
+                self._warn_of_extrapolation(symbol, word, source)
                 yield symbol
             else:
-                other = exported().get(word.name)
+                other = library_components().get(word.name)
                 near = None if other else nearest(word.name, module.symbols)
                 text = ".".join(item.module.names)
                 help_ = f"nearest exported name: '{near}'" if near else f"it exports {', '.join(module.symbols)}"
@@ -215,7 +217,7 @@ class FileScope:
                 self.report.error("E103", f"'{word.name}' is not in {text}", Place(source, word.span), help=help_)
                 self.scope.broken |= {word.name} | ({near} - self.scope.symbols.keys() if near else set())
 
-    def _continued(self, symbol: Symbol, word: syntax.Word, source: SourceText) -> None:
+    def _warn_of_extrapolation(self, symbol: Symbol, word: syntax.Word, source: SourceText) -> None:
         """W302: a table that is read here, and that the text which holds its data continues beyond them."""
         table = self.tables.get(symbol.key) if isinstance(symbol, TableSymbol) else None
         if table is not None and table.outside == "extend" and source is self.file.source:
@@ -322,7 +324,7 @@ class FileScope:
         yield TableSymbol(item.name.name, key, arguments, result.dimension, place, held)
         table = read_table(item, units, result, source, self.report)
         if table is not None:
-            self.tables |= _stepped(replace(table, name=key), held)
+            self.tables |= _grid_tables(replace(table, name=key), held)
 
     def _key(self, name: str, source: SourceText) -> str:
         """What a table is called among those of all files: by its own name in the model's, else with its module's."""

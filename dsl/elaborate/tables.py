@@ -71,7 +71,7 @@ def _written(item: syntax.Table, units: list[Unit], source: SourceText, report: 
             report.error("E206", message, Place(source, row.span), help=f"each row is ({heads})")
             raise Failed
         texts = [n.text.replace(" ", "") for n in row.numbers]
-        rows.append(tuple(_scaled(t, u) for t, u in zip(texts, units, strict=True)))
+        rows.append(tuple(_to_base_unit(t, u) for t, u in zip(texts, units, strict=True)))
     return rows
 
 
@@ -104,7 +104,7 @@ def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report
         try:
             if len(cells) != len(units):
                 raise ValueError
-            rows.append(tuple(_scaled(c, u) for c, u in zip(cells, units, strict=True)))
+            rows.append(tuple(_to_base_unit(c, u) for c, u in zip(cells, units, strict=True)))
         except (ValueError, ZeroDivisionError, OverflowError):
             if rows or number > 1 or any(_NUMBER.fullmatch(c) for c in cells):  # else the names of the columns
                 message = f"table {item.name.name}: line {number} of '{item.file}' is not {len(units)} numbers"
@@ -115,7 +115,7 @@ def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report
     return rows
 
 
-def _scaled(text: str, unit: Unit) -> float:
+def _to_base_unit(text: str, unit: Unit) -> float:
     if _NUMBER.fullmatch(text) is None:  # Python takes 1_0 and figures of other scripts too
         raise ValueError(text)
     value = float(text)

@@ -93,11 +93,11 @@ def _reduce(node: Node, first: int, last: int, lookup: Callable[[Node], float]) 
     operator, name = node.data
     me = index(name)
 
-    def at(i: int) -> float:
+    def term(i: int) -> float:
         return evaluate([node.args[2]], lambda n: float(i) if n is me else lookup(n))[0]
 
     budget.charge(budget.TERM * max(last - first, 0), f"the terms of a {operator} one by one")
-    items = [at(i) for i in range(first, last + 1)]
+    items = [term(i) for i in range(first, last + 1)]
     match operator:
         case "sum":
             return math.fsum(items)

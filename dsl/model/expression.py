@@ -317,7 +317,7 @@ def reduction(operator: str, name: str, first: Node, last: Node, body: Node) -> 
     return _make("reduce", (operator, name), (first, last, body))
 
 
-def reduced(operator: str, parts: Sequence[Node]) -> Node:
+def combine_terms(operator: str, parts: Sequence[Node]) -> Node:
     """The same written out: sum, prod, min or max of its parts."""
     return add(*parts) if operator == "sum" else mul(*parts) if operator == "prod" else call(operator, *parts)
 
@@ -327,7 +327,7 @@ def reduced(operator: str, parts: Sequence[Node]) -> Node:
 
 def topological(roots: Iterable[Node]) -> list[Node]:
     """All nodes below the roots, arguments before users, in a deterministic order."""
-    return _ordered(roots, bodies=True)
+    return _post_order(roots, bodies=True)
 
 
 def nodes_of(root: Node) -> Sequence[Node]:
@@ -347,16 +347,16 @@ def reads(root: Node, parameters: Container[str]) -> bool:
 
 def topological_unbound(roots: Iterable[Node]) -> list[Node]:
     """Like `topological`, but does not enter the bodies of reductions (their loop variable is not bound there)."""
-    return _ordered(roots, bodies=False)
+    return _post_order(roots, bodies=False)
 
 
 @lru_cache(maxsize=128)
 def order_of(roots: tuple[Node, ...]) -> tuple[Node, ...]:
     """The same, kept for a while: of what is evaluated again and again (samples of a law, bisections of an instant)."""
-    return tuple(_ordered(roots, bodies=False))
+    return tuple(_post_order(roots, bodies=False))
 
 
-def _ordered(roots: Iterable[Node], *, bodies: bool) -> list[Node]:
+def _post_order(roots: Iterable[Node], *, bodies: bool) -> list[Node]:
     seen: set[Node] = set()
     order: list[Node] = []
     for root in roots:

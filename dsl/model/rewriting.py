@@ -119,7 +119,7 @@ def with_literal_ranges(network: Network, number: Callable[[Node], float]) -> Ne
         return rebuild(node, args)
 
     def change(root: Node) -> Node:
-        found = {n: _within(n, literal) for n in _nonlinear(root)}
+        found = {n: _rebuild(n, literal) for n in _nonlinear(root)}
         found = {n: new for n, new in found.items() if new is not n}
         done.update(found)
         return substitute(root, found) if found else root
@@ -128,7 +128,7 @@ def with_literal_ranges(network: Network, number: Callable[[Node], float]) -> Ne
     return replace(new, literal=True) if done else network
 
 
-def _within(root: Node, change: Callable[[Node, tuple[Node, ...]], Node]) -> Node:
+def _rebuild(root: Node, change: Callable[[Node, tuple[Node, ...]], Node]) -> Node:
     made: dict[Node, Node] = {}
     for node in topological([root]):
         made[node] = change(node, tuple(made[a] for a in node.args))
@@ -161,7 +161,7 @@ def _nonlinear(root: Node) -> list[Node]:
     return list(found)
 
 
-def summed(body: Node, loops: Sequence[Loop]) -> Node:
+def sum_over_loops(body: Node, loops: Sequence[Loop]) -> Node:
     """The sum of what stands under loops, over all of them."""
     for loop in reversed(loops):
         body = reduction("sum", loop.index, loop.first, loop.last, body)

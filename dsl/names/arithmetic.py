@@ -9,7 +9,7 @@ from fractions import Fraction
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.units import NONE, Dimension, multiply, raised
+from sysdyn.dsl.model.units import NONE, Dimension, multiply, power_of
 from sysdyn.dsl.names.context import Context, Value
 from sysdyn.dsl.names.symbols import Definition, Typed, Vector
 from sysdyn.dsl.text.diagnostics import Related
@@ -113,7 +113,7 @@ class Arithmetic(Context):
         if abs(exact) > 100:
             raise self.fail("E204", f"the exponent {exponent.node} of a quantity is out of reason", e.exponent.span)
         power: Fraction | int = int(exact) if exact.denominator == 1 else exact
-        dimension = tuple((k, int(v) if v == int(v) else v) for k, v in raised(base.dimension, power))
+        dimension = tuple((k, int(v) if v == int(v) else v) for k, v in power_of(base.dimension, power))
         return Typed(ex.power(base.node, exponent.node), dimension)
 
     def _signal_of(self, e: syntax.Expr) -> tuple[str, str] | None:

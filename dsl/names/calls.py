@@ -45,11 +45,11 @@ class Calls(Context):
     def _reduction(self, e: syntax.Reduction) -> Value:
         first, last = self.whole_number(e.lower, "a bound"), self.whole_number(e.upper, "a bound")
         if self._indexes_list(e):
-            return self._unrolled(e, first, last)
+            return self._unroll(e, first, last)
         with self.loop(e.index.name, first, last, unique=True) as loop:
-            return self._reduced(e, loop)
+            return self._reduce_over(e, loop)
 
-    def _reduced(self, e: syntax.Reduction, loop: Loop) -> Typed:
+    def _reduce_over(self, e: syntax.Reduction, loop: Loop) -> Typed:
         """The reduction over a loop in sight, cut where it runs over several statements of one label."""
         try:
             body = self.scalar(e.body)
@@ -58,8 +58,8 @@ class Calls(Context):
                 raise
             parts = []
             for part in several.parts:
-                with self.narrowed(several, part) as inner:
-                    parts.append(self._reduced(e, inner))
+                with self.narrowing(several, part) as inner:
+                    parts.append(self._reduce_over(e, inner))
             nodes = [p.node for p in parts]
             if e.op in ("sum", "prod"):
                 return Typed(ex.add(*nodes) if e.op == "sum" else ex.mul(*nodes), parts[0].dimension)
@@ -79,7 +79,7 @@ class Calls(Context):
                     return True
         return False
 
-    def _unrolled(self, e: syntax.Reduction, first: Node, last: Node) -> Value:
+    def _unroll(self, e: syntax.Reduction, first: Node, last: Node) -> Value:
         """A reduction whose body takes elements of a list: written out, so that its bounds must be numbers (E806)."""
         if not (ex.is_const(first) and ex.is_const(last)):
             message = "the body takes elements of a list, so the bounds must be numbers"
@@ -128,7 +128,7 @@ class Calls(Context):
                 raise self.fail("E101", f"'{e.name}' is a value, no function", e.span, help=meant)
             remedy = habits.function(e.name, texts)
             if remedy is not None and not self.scope.is_broken(e.name):
-                raise self.remedied("E101", f"unknown function '{e.name}'", e.span, remedy)
+                raise self.fail_with_remedy("E101", f"unknown function '{e.name}'", e.span, remedy)
             near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
             help_ = f"nearest name in scope: '{near}'" if near else f"fn {e.name}(x: 1) -> 1 = ... declares one"
             if self.scope.is_broken(e.name):
@@ -166,7 +166,7 @@ class Calls(Context):
             return Typed(ex.add(values[0].node, ex.const(273.15)), dim.result(name, NONE))
         return Typed(ex.call(name, *(v.node for v in values)), dim.result(name, common))
 
-    def _divided(self, e: object) -> str | None:
+    def _hint_of_division(self, e: object) -> str | None:
         """What is meant by a quantity whose last unit is a variable in sight too: `300 K/T` is not divided by it."""
         if not isinstance(e, syntax.Quantity) or len(e.unit.factors) < 2:
             return None
@@ -179,7 +179,7 @@ class Calls(Context):
     def _not_plain(self, name: str, dimension: Dimension | None, e: syntax.Expr) -> None:
         text = self.source.text[e.span.start : e.span.end]
         help_ = f"{name}({text}/(1 {dim.show(dimension)}))" if len(text) < 60 else None
-        divided = next(filter(None, map(self._divided, walk(e))), None)
+        divided = next(filter(None, map(self._hint_of_division, walk(e))), None)
         if divided is not None:
             raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=divided)
         if help_ and dimension == dim.TIME:
@@ -206,7 +206,7 @@ class Calls(Context):
             total = self.add(total, _times(x, y), e.span)
         if e.name == "dot":
             return total
-        return Typed(ex.sqrt(total.node), None if total.dimension is None else dim.halved(total.dimension))
+        return Typed(ex.sqrt(total.node), None if total.dimension is None else dim.square_root(total.dimension))
 
     def _arguments(self, name: str, heads: Sequence[Head], e: syntax.Call) -> list[Value]:
         if len(heads) != len(e.args):
@@ -217,7 +217,7 @@ class Calls(Context):
         for (head, dimension, size), arg in zip(heads, e.args, strict=True):
             message = f"argument '{head}' of {name} is in {{}}, wants {dim.show(dimension)}"
             if size is None:
-                values.append(Typed(self.wanted(arg.value, dimension, "E206", message), dimension))
+                values.append(Typed(self.scalar_of(arg.value, dimension, "E206", message), dimension))
                 continue
             value = self.resolve(arg.value)
             if not isinstance(value, Vector) or len(value.items) != size:
@@ -277,7 +277,7 @@ class Calls(Context):
         try:
             with self.space(space), self.bound(arguments):
                 message = f"function '{name}' is declared {dim.show(result)} but its value is {{}}"
-                return self.wanted(definition.value, result, "E207", message)
+                return self.scalar_of(definition.value, result, "E207", message)
         finally:
             self._active.pop()
 

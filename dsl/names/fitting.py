@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.unit_habits import common
-from sysdyn.dsl.model.units import NONE, Dimension, known, multiply, si_text
+from sysdyn.dsl.model.units import NONE, Dimension, find_unit, multiply, si_text
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Scope, UnknownSymbol
 from sysdyn.dsl.text.source import SourceText
@@ -41,7 +41,7 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
     if have is None or want is None:
         return None
     pairs = [*zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False)]
-    divided = next(filter(None, (_divided(sight, e, factor) for e, factor in pairs)), None)
+    divided = next(filter(None, (_hint_of_division(sight, e, factor) for e, factor in pairs)), None)
     divided = divided or _by_quantities(sight, have, want, within)
     if divided:
         return divided
@@ -62,7 +62,7 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
             level = level.outer
     # a prime is forgotten more often than it is too much
     rates = [_rate(sight, e, factor, powers) for powers in (-1, 1) for e, factor in pairs]
-    others = [refitted(sight.scope, e, factor) for e, factor in pairs if factor]
+    others = [fitting_unit(sight.scope, e, factor) for e, factor in pairs if factor]
     said = [*filter(None, (*rates, *others))]
     if not said and within and want == NONE and have:  # a number is wanted
         text = sight.written(within[0])
@@ -70,7 +70,7 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
     return said[0] if said else None
 
 
-def _divided(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | None:
+def _hint_of_division(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | None:
     """A quantity by the last unit of which a variable of that name is meant: `4 N/V` beside `param V: m`."""
     stack: list[object] = [expression]
     while stack:
@@ -80,7 +80,7 @@ def _divided(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | 
         if last is None or last.op != "/" or last.exponent != 1:
             continue
         assert isinstance(e, syntax.Quantity)
-        symbol, unit = sight.scope.find(last.name), known(last.name)
+        symbol, unit = sight.scope.find(last.name), find_unit(last.name)
         own = symbol.dimension if isinstance(symbol, (ParameterSymbol, UnknownSymbol)) and not symbol.shape else None
         if own and unit and factor in ((meant := dim.quotient(unit[0], own)), dim.quotient(NONE, meant)):
             before = e.unit.text.rpartition("/")[0]
@@ -147,7 +147,7 @@ def _dimension(unit: syntax.Unit) -> Dimension | None:
     """The dimension of a unit that is made of the language's own; None for any other."""
     dimension = NONE
     for factor in unit.factors:
-        found = known(factor.name)
+        found = find_unit(factor.name)
         if found is None:
             return None
         dimension = multiply(dimension, found[0], -factor.exponent if factor.op == "/" else factor.exponent)
@@ -231,19 +231,19 @@ def in_unit(number: syntax.Expr, wanted: Dimension) -> str:
         return f"write '{text} min', or '{text} s' where seconds are meant"
     if common(wanted) == "K":
         return f"celsius({text}), or '{text} K' where kelvins are meant"
-    return f"write '{text} {_prefixed(inner, common(wanted))}'" if wanted else f"write '{text}', a number"
+    return f"write '{text} {_keep_prefix(inner, common(wanted))}'" if wanted else f"write '{text}', a number"
 
 
-def _prefixed(number: syntax.Number | syntax.Quantity, unit: str) -> str:
+def _keep_prefix(number: syntax.Number | syntax.Quantity, unit: str) -> str:
     """A unit with the prefix that the quantity was written with, where it bears one: uF of `1 uH`."""
     names = [factor.name for factor in number.unit.factors] if isinstance(number, syntax.Quantity) else []
     alone = names[0] if len(names) == 1 and names != ["kg"] else ""  # the k of kg says nothing of sizes
-    whole, base = (known(name) for name in (alone, alone[1:]))
-    prefixed = bool(whole and base and whole[0] == base[0] and whole[1] != base[1] and known(alone[0] + unit))
+    whole, base = (find_unit(name) for name in (alone, alone[1:]))
+    prefixed = bool(whole and base and whole[0] == base[0] and whole[1] != base[1] and find_unit(alone[0] + unit))
     return alone[0] + unit if prefixed else unit
 
 
-def refitted(scope: Scope, expression: syntax.Expr, factor: Dimension) -> str | None:
+def fitting_unit(scope: Scope, expression: syntax.Expr, factor: Dimension) -> str | None:
     """The unit with which a parameter of a product fits, or the factor that is missing in it."""
     inner: object = expression
     while isinstance(inner, (syntax.Negative, syntax.Group)):

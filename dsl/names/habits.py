@@ -6,8 +6,8 @@ import re
 import unicodedata
 from collections.abc import Callable
 
-from sysdyn.dsl.model.unit_habits import UNGROUPED, chained, common, grouped
-from sysdyn.dsl.model.units import Dimension, known
+from sysdyn.dsl.model.unit_habits import UNGROUPED, common, find_parenthesized, find_product
+from sysdyn.dsl.model.units import Dimension, find_unit
 from sysdyn.values import dataclass
 
 _NAMES = {
@@ -104,12 +104,12 @@ def name(word: str, text: str, offset: int, moves: Callable[[str], bool]) -> Rem
             return Remedy(f"{base}'", f"{base}'")
     if len(word) > 1 and word[0] == "d" and moves(word[1:]):
         return Remedy(f"{word[1:]}'")
-    if known(word) is not None:
-        quantity = grouped(text, offset)
+    if find_unit(word) is not None:
+        quantity = find_parenthesized(text, offset)
         if quantity is not None:
             said = f"{quantity.right}: {UNGROUPED}"
             return Remedy(said, quantity.right, (quantity.start, quantity.end))
-        quantity = chained(text, offset)
+        quantity = find_product(text, offset)
         if quantity is not None:
             said = f"{quantity.right}: a unit is written without spaces, its factors are joined by dots"
             return Remedy(said, quantity.right, (quantity.start, quantity.end))
@@ -144,7 +144,7 @@ def variable(domain: str, word: str) -> str | None:
     return _VARIABLES.get(domain, {}).get(word)
 
 
-def blamed(said: object) -> str | None:
+def unitless_parameter(said: object) -> str | None:
     """The parameter that `unitless` says the same of, wherever it is read."""
     name, found, _ = said.partition("' is a number without unit") if isinstance(said, str) else ("", "", "")
     return f"unit of {name[1:]}" if found else None

@@ -66,7 +66,7 @@ def law_of(
     kind = _EDGES.get(frozenset((side, others[0])))
     if kind is None:
         raise _off_diagram(context, side, others[0], span)
-    if wanted in ("effort", "flow") and _controlled(context, branch, value, node):
+    if wanted in ("effort", "flow") and _is_controlled(context, branch, value, node):
         if side != wanted[0]:
             raise context.fail("E303", f"the law of {wanted} source '{branch.name}' gives {side}", span)
         return LawOf(wanted, side, node)
@@ -113,7 +113,7 @@ def _in_dimension(context: Context, branch: BranchSymbol, side: str, value: synt
     return context.fitting(read, value, dimension, "E208", message)
 
 
-def _controlled(context: Context, branch: BranchSymbol, value: syntax.Expr, law: Node) -> bool:
+def _is_controlled(context: Context, branch: BranchSymbol, value: syntax.Expr, law: Node) -> bool:
     """Whether a law reads an input, time or another element: that of a controlled source, whatever else it reads."""
     for name in walk(value):
         symbol = context.scope.find(name.name) if isinstance(name, syntax.Name) else None
@@ -180,7 +180,7 @@ def ratio_of(
     name = me.name.partition("#")[0]
     message = f"law of '{name}': {side} is in {dim.show(dimension)}, the law in {{}}"
     with context.virtually():
-        node, signals = signals_held(context.wanted(value, dimension, "E208", message))
+        node, signals = signals_held(context.scalar_of(value, dimension, "E208", message))
     far = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == partner.family.name}
     near = [
         n for n in ex.variables(node) if n.op == "var" and n.data[0] == me.family.name and n.data[1] in ("be", "bf")

@@ -6,8 +6,8 @@ import re
 from collections.abc import Container
 from fractions import Fraction
 
-from sysdyn.dsl.model.unit_habits import PREFIXED, cased, declaration, respelled, scaled
-from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, PREFIXES, Dimension, Unit, known, multiply, names, si_text
+from sysdyn.dsl.model.unit_habits import PREFIXED, case_variants, correct_spelling, declaration, expand_suffix
+from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, PREFIXES, Dimension, Unit, find_unit, multiply, names, si_text
 from sysdyn.dsl.names.symbols import Scope, nearest
 from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
@@ -38,7 +38,7 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, b
         if factor.name == "degC" and len(unit.factors) == 1 and factor.exponent == 1:
             return DEGREE_CELSIUS
         declared = scope.unit(factor.name)
-        found = (declared.dimension, declared.scale) if declared else known(factor.name)
+        found = (declared.dimension, declared.scale) if declared else find_unit(factor.name)
         if found is None and scope.is_broken(factor.name):
             return None
         if found is None:
@@ -46,7 +46,7 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, b
                 scope.miss()  # grown to its number, as in 10k: that has been said (E114)
                 return None
             in_sight = factor.name in bound or scope.find(factor.name) is not None
-            _unknown(unit, factor, in_sight, Place(source, factor.span), report)
+            _report_factor(unit, factor, in_sight, Place(source, factor.span), report)
             return None
         power = factor.exponent if factor.op == "." else -factor.exponent
         dimension = multiply(dimension, found[0], power)
@@ -61,7 +61,7 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, b
     return Unit(dimension, scale, si_text(dimension) if solved else unit.text)
 
 
-def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place: Place, report: Report) -> None:
+def _report_factor(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place: Place, report: Report) -> None:
     """Report a factor of a unit that nobody declared, with what is near."""
     if factor.name.startswith("$"):
         report.error(
@@ -78,7 +78,7 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
     help_: str | None
     edit = None
     alone = number is not None and len(unit.factors) == 1 and factor.exponent == 1
-    plain = scaled("1" + factor.name) if alone and factor.name.isalpha() else None
+    plain = expand_suffix("1" + factor.name) if alone and factor.name.isalpha() else None
     before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
     if in_sight and before:
         sign = "/" if factor.op == "/" else "*"
@@ -92,7 +92,7 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
         help_ = f"{number.group().strip()}{plain[1:]}, or with its unit, as in '1 {example}'"
     else:
         help_ = _meant(unit, factor)
-        right = respelled(unit.text)
+        right = correct_spelling(unit.text)
         if right is not None:
             edit = Edit(Place(place.source, unit.span), right)
     report.error("E201", message, place, help=help_, edit=edit)
@@ -103,20 +103,20 @@ _SPELLED = dict.fromkeys(("celsius", "Celsius", "centigrade"), "degC")
 
 def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     """The unit as it is written here: by rewriting; else the line that would declare it, else the nearest name."""
-    right = _SPELLED.get(unit.text) or respelled(unit.text)
+    right = _SPELLED.get(unit.text) or correct_spelling(unit.text)
     if right is not None:
         return f"write '{right}'"
-    alone = respelled(factor.name)
+    alone = correct_spelling(factor.name)
     if alone is not None:
         return f"write '{alone}' for '{factor.name}'"
-    several = cased(factor.name)
+    several = case_variants(factor.name)
     if several:
         return f"write {' or '.join(repr(unit) for unit in several)}"
     line = declaration(factor.name)
     if line is not None:
         return f"declare it at the top of the file: {line}"
     prefix, base = factor.name[:1], factor.name[1:]
-    if prefix in PREFIXES and known(base) is not None:
+    if prefix in PREFIXES and find_unit(base) is not None:
         return f"{base} takes no prefix: 1e{PREFIXES[prefix]} {base}"
     near = nearest(factor.name, (*names(), "mm", "km", "kN", "kohm", "mA", "uF", "degC"))
     return f"nearest unit: '{near}'" if near and len(factor.name) > 1 else "sysdyn help units lists them"

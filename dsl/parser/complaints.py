@@ -115,7 +115,7 @@ Complaint = tuple[str, str, str | None]
 """Code, message, help."""
 
 
-def quoted(text: str, kind: str = "") -> str:
+def quote_token(text: str, kind: str = "") -> str:
     """What was found, for a message."""
     if kind == "<end>":
         return "the end of the file"
@@ -146,7 +146,7 @@ def first_token(text: str, kind: str, body: str) -> Complaint:
         return "E113", "';' ends nothing here", None
     if text == "{":
         return "E109", "a statement cannot begin with '{'", "the '{' at the end of the line above"
-    return "E109", f"a statement cannot begin with {quoted(text, kind)}", _CONTINUE
+    return "E109", f"a statement cannot begin with {quote_token(text, kind)}", _CONTINUE
 
 
 def connection() -> Complaint:
@@ -162,7 +162,7 @@ def conditional(after: str) -> Complaint:
     return "E110", message, "(if ... then ... else ...)"
 
 
-def unknown(word: str, after: str, body: str, text: str = "") -> Complaint:
+def unknown_statement(word: str, after: str, body: str, text: str = "") -> Complaint:
     """A statement whose first word begins no statement of this body; `after` is what stands behind it in the text."""
     here = _HERE[body]
     if word not in _OWN[body]:
@@ -241,9 +241,9 @@ def _is_component(name: str, text: str) -> bool:
     return re.search(rf"\bimport\b[\w\s,]*?\b{name}\b|^\s*component\s+{name}\b", text, re.MULTILINE) is not None
 
 
-def expected(accepted: Collection[str], kind: str, text: str, line: str, word: str = "") -> Complaint:
+def unexpected_token(accepted: Collection[str], kind: str, text: str, line: str, word: str = "") -> Complaint:
     """A token that does not fit, with what would; `line` is the line up to it, `word` begins the statement."""
-    said = f"expected {_listed(accepted)}, found {quoted(text, kind)}"
+    said = f"expected {_describe_terminals(accepted)}, found {quote_token(text, kind)}"
     shape = SHAPES.get(word)
     if word == "let" and text in ("^", "*", "+", "-", "/") and "=" not in line:
         return "E113", "a let names one value; a constraint has a label", "phi name: ... = ... of displacements"
@@ -285,7 +285,7 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
     return "E113", said, _hint(kind, text, line, accepted) or shape
 
 
-def _listed(accepted: Collection[str]) -> str:
+def _describe_terminals(accepted: Collection[str]) -> str:
     """Terminals in the author's terms."""
     rest = set(accepted)
     parts: list[str] = []

@@ -57,7 +57,7 @@ class Faults:
             self._error(("E113", row, "(0, 0), (1, 2)"), self._token())
         elif bracket is not None:
             self._not_closed(bracket)
-        elif (slip := foreign.around(scanner.text, scanner.start, scanner.end, kind)) is not None:
+        elif (slip := foreign.find_slip(scanner.text, scanner.start, scanner.end, kind)) is not None:
             self._error(slip.complaint, self._token(), slip.meant, slip.span)
         elif kind == "<fault>":
             self._error(self._character(text, body, start), self._token())
@@ -76,14 +76,14 @@ class Faults:
             what = "level x = name" if body == "statement" else "level name { }"
             self._error(("E107", f"'{what}' belongs in {where}, not in {here}", None), Span(start, start + 5))
         elif word and word not in self._words_here(size) and after[:1] not in (":", "["):
-            self._unknown(word, after, body, start)
+            self._report_statement(word, after, body, start)
         elif kind == ":" and after.startswith((":", "[")) and word in self._words_here(size):
             self._no_label(word, after, start)
         else:
             accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
             before = scanner.text[: scanner.start].rstrip()
             line = before[before.rfind("\n") + 1 :]
-            complaint = complaints.expected(accepted, kind, text, line, word)
+            complaint = complaints.unexpected_token(accepted, kind, text, line, word)
             self.nameless = "has a label" in complaint[1]
             self._error(complaint, self._token())
 
@@ -95,16 +95,16 @@ class Faults:
         number = re.search(r"[0-9.]+$", before)
         return (*complaint[:2], f"{number[0]} percent") if text == "%" and number is not None else complaint
 
-    def _unknown(self, word: str, after: str, body: str, start: int) -> None:
+    def _report_statement(self, word: str, after: str, body: str, start: int) -> None:
         """A word that begins no statement: a slip of one, another language's, or what goes on from the line above."""
         from sysdyn.dsl.parser import foreign
 
-        complaint = complaints.unknown(word, after, body, self.scanner.text)
+        complaint = complaints.unknown_statement(word, after, body, self.scanner.text)
         netlist = foreign.spice(word, after) if body == "statement" and complaint[::2] == ("E113", None) else None
         if netlist is not None:
             complaint = (complaint[0], "an element is written with its label, its parameters named", netlist)
         continues = after[:1] in ("=", ",") or not after.strip()
-        if after.startswith("->") or (complaint[0] == "E113" and continues and self._indented(start)):
+        if after.startswith("->") or (complaint[0] == "E113" and continues and self._is_indented(start)):
             complaint = complaints.connection()
             if self._told_above(start):
                 return
@@ -147,7 +147,7 @@ class Faults:
             and self.scanner.column(start) == self.scanner.column(last.span.start)
         )
 
-    def _indented(self, start: int) -> bool:
+    def _is_indented(self, start: int) -> bool:
         """Whether the statement stands further right than the one before it, those that continue it left out."""
         states, starts = self.automaton.states, self.automaton.starts
         size, _ = self.automaton.body()

@@ -5,8 +5,16 @@ from __future__ import annotations
 import re
 import unicodedata
 
-from sysdyn.dsl.model.unit_habits import PREFIXED, TIMES_TIME, UNGROUPED, chained, grouped, respelled, scaled
-from sysdyn.dsl.model.units import known
+from sysdyn.dsl.model.unit_habits import (
+    PREFIXED,
+    TIMES_TIME,
+    UNGROUPED,
+    correct_spelling,
+    expand_suffix,
+    find_parenthesized,
+    find_product,
+)
+from sysdyn.dsl.model.units import find_unit
 from sysdyn.dsl.parser.complaints import Complaint
 from sysdyn.dsl.parser.lexing import EXPONENT
 from sysdyn.dsl.text.source import Span
@@ -34,10 +42,10 @@ class Slip:
     span: Span | None = None
 
 
-def glued(number: str, unit: str) -> tuple[str, str | None]:
+def explain_suffix(number: str, unit: str) -> tuple[str, str | None]:
     """What is meant by a number with something grown to it (`3kg`, `5Nm`, `10k`), and what it is for certain."""
-    plain = scaled(number + unit)
-    if plain is not None and known(unit) is None:
+    plain = expand_suffix(number + unit)
+    if plain is not None and find_unit(unit) is None:
         digits, _, exponent = plain.partition("e")
         example = PREFIXED.get(f"e{exponent}")
         return f"{plain}, or with its unit, as in '{digits} {example}'" if example else plain, None
@@ -48,7 +56,7 @@ def glued(number: str, unit: str) -> tuple[str, str | None]:
         return f"{int(number + unit, 0)}: numbers are written in digits of ten", None
     if re.fullmatch(r"[dD][0-9]+", unit):
         return f"{number}e{unit[1:]} for a power of ten, {number} {unit[0]}^{unit[1:]} for one of a unit", None
-    right = unit if known(unit.partition(".")[0].partition("/")[0].partition("^")[0]) else respelled(unit)
+    right = unit if find_unit(unit.partition(".")[0].partition("/")[0].partition("^")[0]) else correct_spelling(unit)
     if right:
         return f"{number} {right}", f"{number} {right}"
     return f"{number} {unit}, or {number}*{unit} for a product", None
@@ -64,7 +72,7 @@ def spice(word: str, after: str) -> str | None:
     return f"{word}: {part} {ends[0]} -> {ends[1]}"
 
 
-def around(text: str, start: int, end: int, kind: str) -> Slip | None:
+def find_slip(text: str, start: int, end: int, kind: str) -> Slip | None:
     """The slip at a token start..end that other languages explain; None for any other."""
     sign = text[start:end]
     first = text.rfind("\n", 0, start) + 1
@@ -82,14 +90,14 @@ def around(text: str, start: int, end: int, kind: str) -> Slip | None:
         said = f"'{sign} = ...' is an argument of its own: a comma stands before it"
         span = Span(first + len(line.rstrip()), end)
         return Slip(("E113", said, f", {sign} = ..."), f", {sign}", span)
-    unclosed = _unclosed(text, Span(start, end), line) if kind == "<name>" else None
+    unclosed = _unclosed_parameters(text, Span(start, end), line) if kind == "<name>" else None
     if unclosed is not None:
         return Slip(unclosed)
-    quantity = grouped(text, start) if kind in ("<name>", "<number>", "(") else None
+    quantity = find_parenthesized(text, start) if kind in ("<name>", "<number>", "(") else None
     if quantity is not None:
         said = f"'{text[quantity.start : quantity.end]}': {UNGROUPED}"
         return Slip(("E113", said, f"write '{quantity.right}'"), quantity.right, Span(quantity.start, quantity.end))
-    quantity = chained(text, start)
+    quantity = find_product(text, start)
     apart = quantity is not None and text[quantity.start : quantity.end] != quantity.right
     if quantity is not None and apart and (kind == "<name>" or sign in ("·", "⋅", "×", "*")):
         written = text[quantity.start : quantity.end]
@@ -117,7 +125,7 @@ def _known_sign(text: str, span: Span, kind: str, line: str) -> Slip | None:
         return Slip(found)
     if sign == "0" and line.rstrip().endswith("->"):
         return Slip(("E113", "the reference of every domain has a name", "ground"), "ground")
-    if kind == "<name>" and line.rstrip().endswith((")", "]")) and known(sign) is not None:
+    if kind == "<name>" and line.rstrip().endswith((")", "]")) and find_unit(sign) is not None:
         unit = _UNIT.match(text, span.start)
         shown = unit.group() if unit else sign
         if line.rstrip().endswith("]"):
@@ -149,7 +157,7 @@ _ELEMENT = re.compile(r"\s*[\w\[\], +-]+:\s*([\w.]+)\s*(\(.*\))?\s*(.*)$")
 """An element's line up to a token: component, parameters, what stands behind them."""
 
 
-def _unclosed(text: str, span: Span, line: str) -> Complaint | None:
+def _unclosed_parameters(text: str, span: Span, line: str) -> Complaint | None:
     """A first node behind parameters that are not closed: `resistor(R = 1 ohm a -> b`."""
     found = _ELEMENT.match(line)
     if found is None or re.match(r"[\w.]*(?:\[[^\]]*\])?\s*->", text[span.end :]) is None:

@@ -124,7 +124,7 @@ def build_tables(*, strict: bool = False) -> Tables:
                 goto.append((symbol, number[target]))
                 continue
             by_action.setdefault(code, set()).update(kinds[symbol])
-        states.append(_numbered(by_action, lookaheads))
+        states.append(_number_lookaheads(by_action, lookaheads))
         gotos.append(tuple(sorted(goto)))
     return Tables(
         final=str(number[automaton.end_states["start"]]),
@@ -167,7 +167,9 @@ def _symbol(entry: tuple[str, Any]) -> str:
     return entry[0]
 
 
-def _numbered(by_action: dict[int, set[str]], lookaheads: dict[tuple[str, ...], int]) -> tuple[tuple[int, int], ...]:
+def _number_lookaheads(
+    by_action: dict[int, set[str]], lookaheads: dict[tuple[str, ...], int]
+) -> tuple[tuple[int, int], ...]:
     """Actions of a state with the number of the set of terminals that each is taken on."""
     sets = {action: tuple(sorted(terminals)) for action, terminals in by_action.items()}
     return tuple((action, lookaheads.setdefault(sets[action], len(lookaheads))) for action in sorted(sets))

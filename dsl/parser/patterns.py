@@ -75,7 +75,7 @@ class Patterns:
         scanner = automaton.scanner
         start = scanner.start
         if start == scanner.statement and kind != "<newline>":
-            self._at(start)
+            self._begin_line(start)
         elif self._key is not None:
             unit = scanner.unit if kind == "<quantity>" else None
             begin = self._begin
@@ -84,7 +84,7 @@ class Patterns:
             if start >= self._end:
                 self._learn(kind)
 
-    def _at(self, start: int) -> None:
+    def _begin_line(self, start: int) -> None:
         """A line begins here."""
         automaton = self._automaton
         text = automaton.source.text
@@ -180,7 +180,7 @@ def _recipe(below: int, first: int, tokens: Sequence[Token]) -> Recipe | None:
             base = len(stack) - length
             if base < 0:
                 if token.kind == "<newline>":
-                    return _packed(tokens, rules, stack, closed)
+                    return _pack_recipe(tokens, rules, stack, closed)
                 return None
             start, end = (stack[base].start, stack[-1].end) if length else (stack[-1].end, stack[-1].end)
             value = stack[-1].value
@@ -209,10 +209,10 @@ def _recipe(below: int, first: int, tokens: Sequence[Token]) -> Recipe | None:
             opened.append(token)
         elif token.kind in ")]":
             closed = opened[-1].kind, opened.pop().start, token.end
-    return _packed(tokens, rules, stack, closed)
+    return _pack_recipe(tokens, rules, stack, closed)
 
 
-def _packed(
+def _pack_recipe(
     tokens: Sequence[Token],
     rules: Sequence[tuple[Build | None, tuple[int, ...], int, int]],
     stack: Sequence[_Entry],

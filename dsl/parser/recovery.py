@@ -49,23 +49,23 @@ class Recovery(Faults):
 
     # --- slips that are mended ---
 
-    def checked(self, kind: str) -> str:
+    def correct_terminal(self, kind: str) -> str:
         """The terminal that was read, or the one that is obviously meant."""
         scanner, automaton = self.scanner, self.automaton
         if kind == "<quantity>" and scanner.glued:
-            kind = self._glued()
+            kind = self._split_quantity()
         elif kind == "<newline>" and automaton.accepts("{") and not automaton.accepts(kind):
-            return self._opened(kind)
+            return self._supply_brace(kind)
         elif kind in self.reserved and kind in ("true", "false"):
             return "<name>" if automaton.accepts("<name>") else kind
         elif kind not in automaton.row or kind in _SLIPS:
             if automaton.accepts(kind):
                 return kind
             if kind == "==" and automaton.accepts("="):
-                self._error(("E111", f"'==' compares; {self._defined()}", "="), self._token(), "=")
+                self._error(("E111", f"'==' compares; {self._hint_of_equals()}", "="), self._token(), "=")
                 kind = "="
             elif kind == ":=" and automaton.accepts("="):
-                self._error(("E113", f"':=' assigns at an event; {self._defined()}", "="), self._token(), "=")
+                self._error(("E113", f"':=' assigns at an event; {self._hint_of_equals()}", "="), self._token(), "=")
                 kind = "="
             elif kind == "=" and automaton.accepts(":="):
                 self._error(("E113", "an action assigns with ':='", ":="), self._token(), ":=")
@@ -89,7 +89,7 @@ class Recovery(Faults):
                 kind = "=="
         return kind
 
-    def _opened(self, kind: str) -> str:
+    def _supply_brace(self, kind: str) -> str:
         """A head without its brace, which stands on the next line or is missing before a block further right."""
         scanner, automaton = self.scanner, self.automaton
         start = self._statement_start()
@@ -105,26 +105,26 @@ class Recovery(Faults):
             return kind
         accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
         line = scanner.text[start : scanner.start].rstrip()
-        self._error(complaints.expected(accepted, kind, "\n", line, word), self._token())
+        self._error(complaints.unexpected_token(accepted, kind, "\n", line, word), self._token())
         scanner.open_block()
         return "{"
 
-    def _glued(self) -> str:
+    def _split_quantity(self) -> str:
         """A number with its unit grown to it: read as a quantity."""
         scanner = self.scanner
         scanner.glued = False
         unit = scanner.unit or (scanner.end, scanner.end)
         text = scanner.text
-        word = complaints.quoted(text[scanner.start : scanner.end])
+        word = complaints.quote_token(text[scanner.start : scanner.end])
         from sysdyn.dsl.parser import foreign
 
-        help_, meant = foreign.glued(text[scanner.start : unit[0]], text[unit[0] : unit[1]])
+        help_, meant = foreign.explain_suffix(text[scanner.start : unit[0]], text[unit[0] : unit[1]])
         self._error(("E114", f"{word}: a number and its unit are separated by a space", help_), self._token(), meant)
         if meant is None:  # what is grown to it is no unit: one may follow
             scanner.unit_behind()
         return "<quantity>" if self.automaton.accepts("<quantity>") else "<number>"
 
-    def _defined(self) -> str:
+    def _hint_of_equals(self) -> str:
         """What the author writes where '=' is wanted."""
         word, _ = self._first_word(self.scanner.statement)
         if word in ("phi", "psi", "gamma"):

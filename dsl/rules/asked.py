@@ -86,7 +86,7 @@ class Asked:
             waiting = [v for name in new if (p := self._parameters.get(name)) is not None for v in p.values]
         return frozenset(found)
 
-    def of(self, names: frozenset[str]) -> Conditions:
+    def conditions_of(self, names: frozenset[str]) -> Conditions:
         """The conditions on these parameters."""
         if names not in self._of:
             mine = [(c, loops) for c, loops, read in self._conditions if read & names]
@@ -105,7 +105,7 @@ class Asked:
 
     def holds(self, numbers: Mapping[Key, float]) -> bool:
         """Whether every condition holds with these numbers."""
-        mine = self.of(frozenset(key if isinstance(key, str) else str(key[0]) for key in numbers))
+        mine = self.conditions_of(frozenset(key if isinstance(key, str) else str(key[0]) for key in numbers))
         scalar = all(isinstance(key, str) for key in numbers)
         if scalar and not all(b.compared(numbers[b.name], b.limit) for b in mine.bounds):
             return False

@@ -48,7 +48,9 @@ def constraints(model: Elaborator, report: Report) -> None:
         implicit = [n for n in nodes if letter(n) in ("e", "kappa", "mu")]
         flows = [n for n in nodes if letter(n) == "f"]
         if implicit:
-            report.error("E502", f"{what} contains {_named(implicit[0])}", constraint.place, help="it is a gamma")
+            report.error(
+                "E502", f"{what} contains {_describe_unknown(implicit[0])}", constraint.place, help="it is a gamma"
+            )
         elif constraint.kind == "phi" and flows:
             report.error("E501", f"{what} contains the flow {flows[0]}", constraint.place, help="it is a psi")
         elif constraint.kind == "phi" and not [n for n in nodes if letter(n) == "q"]:
@@ -66,7 +68,7 @@ def constraints(model: Elaborator, report: Report) -> None:
                 report.error("E503", message, constraint.place, help=help_)
 
 
-def _named(node: Node) -> str:
+def _describe_unknown(node: Node) -> str:
     kind = {"e": "the implicit unknown", "kappa": "the multiplier", "mu": "the multiplier"}[letter(node)]
     return f"{kind} {node}"
 

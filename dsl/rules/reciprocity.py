@@ -40,7 +40,7 @@ def reciprocity(network: Network, known: Values, report: Report) -> None:
     for branches in stores.values():
         for branch in branches:
             if branch.name not in several:
-                _lost(branch, report)
+                _check_store_law(branch, report)
 
 
 def _pairs(stores: dict[str, list[Branch]]) -> Iterator[tuple[Branch, Branch, Node]]:
@@ -64,7 +64,7 @@ def _pairs(stores: dict[str, list[Branch]]) -> Iterator[tuple[Branch, Branch, No
             yield one, other, ex.sub(derivative(one.law, node), derivative(other.law, mine))
 
 
-def _lost(branch: Branch, report: Report) -> None:
+def _check_store_law(branch: Branch, report: Report) -> None:
     """E304: the law of a store may not depend on another displacement or momentum."""
     assert branch.law is not None
     for other in unknowns_of(branch.law, "q p"):

@@ -26,7 +26,7 @@ def state_functions(network: Network, report: Report) -> None:
         elif rates:
             message = f"{energy.function} contains {rates[0]}, a second derivative: accelerations are results, not data"
             report.error("E518", message, energy.place)
-        elif not _misplaced(energy, unknowns, diagram, report):
+        elif not _report_misplaced(energy, unknowns, diagram, report):
             _own(energy, unknowns, diagram, report)
             _kinetic(energy, unknowns, diagram, report)
     for branch in network.branches:
@@ -36,12 +36,12 @@ def state_functions(network: Network, report: Report) -> None:
             report.error("E307", message, branch.place, help="a potential store, or a dissipator")
 
 
-def _misplaced(energy: Energy, unknowns: list[Node], diagram: Diagram, report: Report) -> bool:
+def _report_misplaced(energy: Energy, unknowns: list[Node], diagram: Diagram, report: Report) -> bool:
     """Whether a variable stands there that the function does not have; reported."""
     function = STATE_FUNCTIONS[energy.function]
     for node in unknowns:
         letter = diagram.letter(node)
-        allowed = function.allowed(complementary=node.data[0] in diagram.complementary)
+        allowed = function.allowed_letters(complementary=node.data[0] in diagram.complementary)
         if letter == "s" or (letter in allowed and node.data[1] != "e"):
             continue
         if letter not in LETTERS or node.data[1] == "e":

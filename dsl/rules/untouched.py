@@ -8,7 +8,7 @@ Box = tuple[tuple[float, float], ...]
 """First and last of each index, both ends included."""
 
 
-def untouched(whole: Box, boxes: Sequence[Box]) -> Box | None:
+def first_gap(whole: Box, boxes: Sequence[Box]) -> Box | None:
     """The first box of elements of the whole that are in none of the boxes; None where each is in one."""
     if not whole:
         return None if boxes else ()
@@ -24,12 +24,12 @@ def untouched(whole: Box, boxes: Sequence[Box]) -> Box | None:
         opened = [box for box in opened if box[0][1] >= begin]
         inner = [box[1:] for box in opened]
         if inner != known[0] or not inner:
-            known = inner, untouched(whole[1:], inner)
+            known = inner, first_gap(whole[1:], inner)
         if known[1] is not None:
             return ((begin, end), *known[1])
     return None
 
 
-def shown(box: Box) -> str:
+def box_text(box: Box) -> str:
     """A box as the author writes its elements."""
     return ", ".join(f"{first:g}" if first == last else f"{first:g}..{last:g}" for first, last in box)

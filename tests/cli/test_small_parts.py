@@ -221,7 +221,7 @@ def test_pages_are_kept_where_the_process_ends_with_its_command(monkeypatch):
 
     monkeypatch.setattr(ctypes, "CDLL", lambda _: Library)
     for kept in (False, True):
-        monkeypatch.setattr(memory, "kept", lambda kept=kept: kept)
+        monkeypatch.setattr(memory, "is_keeping", lambda kept=kept: kept)
         memory.keep_pages()
     assert asked == [(-1, -1), (-4, 0)]  # M_TRIM_THRESHOLD, M_MMAP_MAX of malloc.h
 

@@ -44,7 +44,7 @@ def file_checked(asked: tuple[str, bool, bool]) -> Checked:
                 if explain:
                     said.append(("data", f"{path}: {target.name}: " + _passivity(summary)))
         parts = dict[str, bool]()
-        for name, own in alone.judged(document):
+        for name, own in alone.check_unused_components(document):
             report.extend(own)
             parts[name] = not own.failed and not wrong
             if parts[name]:

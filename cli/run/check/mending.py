@@ -36,7 +36,7 @@ def _found(source: SourceText) -> list[Diagnostic]:
     for target in all_targets(document, report):
         with ex.fresh():
             load.network(target.document, target.model, target.scene, report, required=False)
-    for _, own in alone.judged(document):
+    for _, own in alone.check_unused_components(document):
         report.extend(own)
     return [d for d in report if d.severity == "error"]
 

@@ -193,14 +193,16 @@ class Loaded:
         nodes, request = dict[Any, ex.Node](), self.request
         with ex.fresh(nodes):
             model, scene = self.target.model, self.target.scene
-            return load.asked(self.target.document, model, scene, request.settings, request.levels), nodes
+            return load.conditions_on_numbers(
+                self.target.document, model, scene, request.settings, request.levels
+            ), nodes
 
     def allowed(self, keys: Sequence[Any], values: Floats) -> NDArray[np.bool_]:
         """Which rows of numbers [k, keys] the text does not refuse."""
         asked, nodes = self._asked
         fine = np.ones(len(values), dtype=bool)
         with ex.fresh(nodes):
-            mine = asked.of(frozenset(key if isinstance(key, str) else str(key[0]) for key in keys))
+            mine = asked.conditions_of(frozenset(key if isinstance(key, str) else str(key[0]) for key in keys))
             column = {key: values[:, j] for j, key in enumerate(keys)}
             if not mine.plain or not all(isinstance(key, str) for key in keys):
                 rows = (dict(zip(keys, row, strict=True)) for row in values.tolist())

@@ -19,12 +19,12 @@ from sysdyn.dsl.model.calculus import time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
     add,
+    combine_terms,
     const,
     index,
     linear,
     param,
     rebuild,
-    reduced,
     reduction,
     scale,
     sub,
@@ -186,7 +186,7 @@ class Rewriter:
             self._check(found, {name: own})
             halves = _halves(Loop(name, *ends), found.at)
             parts = [self._reduced(node, (h.first, h.last), ranges, active) for h in halves]
-        return reduced(operator, parts)
+        return combine_terms(operator, parts)
 
     def _read(self, node: Node, ranges: Ranges, active: tuple[Node, ...]) -> Node:
         if node in active:

@@ -108,12 +108,12 @@ def nodes(bundle: BundleNode) -> Iterator[tuple[str, NodeSymbol]]:
             yield from ((f".{name}{path}", node) for path, node in nodes(member))
 
 
-def grounded(name: str, wanted: BundleSymbol, place: Place) -> BundleNode:
+def ground_bundle(name: str, wanted: BundleSymbol, place: Place) -> BundleNode:
     """A port of several nodes, each of them bound to its domain's ground."""
     members: dict[str, NodeSymbol | PortSymbol | BundleNode] = {}
     for member, kind in wanted.members:
         if isinstance(kind, BundleSymbol):
-            members[member] = grounded(member, kind, place)
+            members[member] = ground_bundle(member, kind, place)
         else:
             members[member] = PortSymbol(member, End(None, (), kind), place)
     return BundleNode(name, members, place)

@@ -147,7 +147,7 @@ class Connections(Statements):
         """One end: a node, a port, a coordinate of a common-flow domain, or ground (None without a domain)."""
         if isinstance(e, syntax.Name) and e.name == "ground":
             return None if domain is None else End(None, (), domain)
-        found = self.resolver.located(e)
+        found = self.resolver.locate(e)
         symbol = None if found is None else found.symbol
         if found is None or symbol is None:
             root = e
@@ -185,7 +185,7 @@ class Connections(Statements):
         nodes = [n for n in self.scope.names() if isinstance(self.scope.find(n), (NodeSymbol, PortSymbol))]
         near = nearest(root.name, nodes)
         if near is not None or domain is None or nearest(root.name, ("ground", "gnd", "GND", "vss")):
-            return self.resolver.unknown(root.name, root.span)
+            return self.resolver.report_unknown(root.name, root.span)
         if self.scope.is_broken(root.name):
             return Failed()
         message, help_ = f"unknown name '{root.name}': no node is called so", f"node {root.name}: {domain.name}"
@@ -220,7 +220,7 @@ class Connections(Statements):
     def _domain_on(self, e: syntax.Expr, value: Typed) -> DomainSymbol | None:
         """Domain of one coordinate, branch or node; else the one domain whose displacement has that dimension."""
         inner = e.expr if isinstance(e, syntax.Group) else e
-        found = self.resolver.located(inner.base if isinstance(inner, syntax.Member) and inner.name == "q" else inner)
+        found = self.resolver.locate(inner.base if isinstance(inner, syntax.Member) and inner.name == "q" else inner)
         if found is not None and isinstance(found.symbol, (UnknownSymbol, BranchSymbol, NodeSymbol)):
             return found.symbol.domain
         if found is not None and isinstance(found.symbol, PortSymbol):

@@ -28,7 +28,7 @@ class Body:
     def __iter__(self) -> Iterator[Nested]:
         return iter(self.statements)
 
-    def of(self, kinds: Kinds) -> tuple[Nested, ...]:
+    def statements_of(self, kinds: Kinds) -> tuple[Nested, ...]:
         """The statements of these kinds, in their order."""
         found = self._kinds.get(kinds)
         if found is None:
@@ -58,7 +58,7 @@ class Interface:
         self.inputs: dict[str, syntax.Input] = {}
         self.ports: dict[str, syntax.Port] = {}
         self.branches: dict[str, syntax.Branch] = {}
-        for statement, _ in body.of((syntax.Param, syntax.Input, syntax.Port, syntax.Branch)):
+        for statement, _ in body.statements_of((syntax.Param, syntax.Input, syntax.Port, syntax.Branch)):
             match statement:
                 case syntax.Param():
                     self.parameters[statement.decl.name] = statement

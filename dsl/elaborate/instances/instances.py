@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from itertools import pairwise
 
-from sysdyn.dsl.elaborate.files import FileScope, exported
+from sysdyn.dsl.elaborate.files import FileScope, library_components
 from sysdyn.dsl.elaborate.instances.head import Body, Interface
 from sysdyn.dsl.elaborate.instances.levels import choose_level, elsewhere
 from sysdyn.dsl.elaborate.instances.moulds import Moulds, charge
@@ -61,22 +61,22 @@ class Instances(Ports):
     def announce(self, body: Body) -> None:
         """Enter the labels of all instances, then elaborate each (or earlier, when another asks for it)."""
         waiting = []
-        unfinished = self._unfinished(body)
-        for statement, loops in body.of(syntax.Instance):
+        unfinished = self._unread_elements(body)
+        for statement, loops in body.statements_of(syntax.Instance):
             assert isinstance(statement, syntax.Instance)
             try:
                 if id(statement) in unfinished:
                     raise Failed
-                waiting.append(self._announced(statement, loops))
+                waiting.append(self._plan(statement, loops))
             except Failed:
                 self.scope.broken.add(statement.decl.name)
         for do in waiting:
             do()
         self.scope.announced.clear()
 
-    def _unfinished(self, body: Body) -> list[int]:
+    def _unread_elements(self, body: Body) -> list[int]:
         """Elements whose connections stand, indented, on a line that could not be read: nothing is said of them."""
-        if not body.of(syntax.Broken):
+        if not body.statements_of(syntax.Broken):
             return []
         text = self.current.source.text
         pairs = pairwise(statement for statement, _ in body)
@@ -84,7 +84,7 @@ class Instances(Ports):
             id(s) for s, then in pairs if isinstance(then, syntax.Broken) and _column(text, then) > _column(text, s)
         ]
 
-    def _announced(self, s: syntax.Instance, loops: tuple[syntax.For, ...]) -> Callable[[], None]:
+    def _plan(self, s: syntax.Instance, loops: tuple[syntax.For, ...]) -> Callable[[], None]:
         """What is to be done of an instance when it is read or its turn comes: a builtin, or a component."""
         name = s.component.names[0]
         symbol = self.scope.component(name)
@@ -97,7 +97,7 @@ class Instances(Ports):
             if self.scope.is_broken(name):
                 raise Failed
             components = [n for n in self.scope.names() if isinstance(self.scope.component(n), ComponentSymbol)]
-            library = exported()
+            library = library_components()
             near = name if name in library else nearest(name, (*components, *BUILTINS, *library))
             help_ = f"nearest name in scope: '{near}'" if near else "sysdyn std lists the library"
             if near in library and near not in components:
@@ -201,7 +201,7 @@ class Instances(Ports):
         self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: Body
     ) -> None:
         """Arguments and connections, then the statements of the body, in the space of the instance."""
-        head, broken, place = body.head, body.of(syntax.Broken), self.place(s.span)
+        head, broken, place = body.head, body.statements_of(syntax.Broken), self.place(s.span)
         with self._unread() if broken else nullcontext():
             arguments, inputs = self._arguments(s, component, head, space)
             self.connect(Asked(s, component, head, space, inputs))
@@ -214,10 +214,12 @@ class Instances(Ports):
                 self.scope.broken |= statement.names
             self.declare_parameters(body, arguments)
             self.port_shapes(s, head)
-            self._required(s, place, component, head, arguments)
+            self._require_values(s, place, component, head, arguments)
         if head.inputs:
             self.bind_inputs(s, space, head, inputs)
-        with self.entering(space) if body.with_loops(DECLARED) or body.of(syntax.Instance) else nullcontext():
+        with (
+            self.entering(space) if body.with_loops(DECLARED) or body.statements_of(syntax.Instance) else nullcontext()
+        ):
             self.declare_all(body, self.declare)
             self.bodies.append((space, body))
             self.announce(body)
@@ -282,7 +284,7 @@ class Instances(Ports):
             found[arg.name] = Argument(arg.value, value, bare, Place(self.resolver.source, arg.span))
         return found, inputs
 
-    def _required(
+    def _require_values(
         self, s: syntax.Instance, place: Place, component: ComponentSymbol, head: Interface, given: dict[str, Argument]
     ) -> None:
         for name, statement in head.parameters.items():

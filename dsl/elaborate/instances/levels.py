@@ -42,7 +42,7 @@ def choose_level(
         raise Failed
     if len(levels) > 1:
         frame.choices[path] = LevelChoice(path, chosen, tuple(levels), free)
-    bodies = {name: _extended(frame, component, levels, level, ()) for name, level in levels.items()}
+    bodies = {name: _inherit_statements(frame, component, levels, level, ()) for name, level in levels.items()}
     described = {name: (level, bodies[name]) for name, level in levels.items()}
     level_ports(component.name, described, component.source, frame.report)
     return chosen, (*base, *bodies[chosen])
@@ -60,7 +60,7 @@ def elsewhere(component: ComponentSymbol, chosen: str | None) -> dict[str, str]:
     return found
 
 
-def _extended(
+def _inherit_statements(
     frame: Instances,
     component: ComponentSymbol,
     levels: dict[str, syntax.Level],
@@ -76,7 +76,7 @@ def _extended(
         message = f"level '{level.name.name}' extends '{name}', which is no other level of '{component.name}'"
         frame.report.error("E802", message, Place(component.source, level.extends.span))
         raise Failed
-    inherited = _extended(frame, component, levels, parent, (*chain, level.name.name))
+    inherited = _inherit_statements(frame, component, levels, parent, (*chain, level.name.name))
     own = {key: b for b in level.body if (key := _label(b)) is not None}
     kept = []
     for statement in inherited:

@@ -156,8 +156,8 @@ class Moulds:
             return
         space, key = symbol.spaces[0], self._key(s, body, here.scope)
         if key not in self._moulds:
-            held = [_held(it, space, name, given=name in given) for name in body.head.parameters]
-            branch, (law, _) = space.scope.symbols[""], body.of(syntax.Law)[0]
+            held = [_cast_parameter(it, space, name, given=name in given) for name in body.head.parameters]
+            branch, (law, _) = space.scope.symbols[""], body.statements_of(syntax.Law)[0]
             assert isinstance(branch, BranchSymbol)
             assert isinstance(law, syntax.Law)
             if None in held:
@@ -197,14 +197,14 @@ class Moulds:
 def charge(it: Instances, s: syntax.Instance, component: ComponentSymbol) -> None:
     """An instance counts, whichever way it takes."""
     try:
-        budget.within(len(it.current.chain), "components are")
+        budget.check_depth(len(it.current.chain), "components are")
         budget.unfold(budget.INSTANCE, f"instances of component '{component.name}'")
     except budget.SpentError as spent:
         spent.place = spent.place or it.place(s.span)
         raise
 
 
-def _held(it: Instances, space: Space, name: str, *, given: bool) -> Held | None:
+def _cast_parameter(it: Instances, space: Space, name: str, *, given: bool) -> Held | None:
     """A parameter as an instance has it; None where another may have it otherwise."""
     parameter, symbol = it.parts.parameters.get(f"{space.path}.{name}"), space.scope.symbols.get(name)
     if parameter is None or not isinstance(symbol, ParameterSymbol) or symbol.truth:
@@ -243,7 +243,7 @@ def required_of(it: Elaborator, space: Likeness, body: Body) -> None:
         for node, place, written in mould.required:
             it.parts.requirements.append(CastRequirement(node, space.path, place, written))
         return
-    before, first, said = _learnt(it), len(it.parts.requirements), body.of(syntax.Require)
+    before, first, said = _learnt(it), len(it.parts.requirements), body.statements_of(syntax.Require)
     with it.entering(space):
         it.each(said, it.require)
     own = it.parts.requirements[first:]

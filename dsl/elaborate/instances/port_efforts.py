@@ -15,7 +15,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Constraint, Energy, Loop, Work
-from sysdyn.dsl.model.rewriting import summed
+from sysdyn.dsl.model.rewriting import sum_over_loops
 from sysdyn.dsl.names.reactions import reaction
 from sysdyn.dsl.names.symbols import End, Space
 from sysdyn.dsl.text.diagnostics import Place
@@ -46,7 +46,7 @@ def conjugate_of(parts: NetworkBuilder, space: Space, end: End, *, rates: bool =
         for terminal, sign in ((branch.plus, 1.0), (branch.minus, -1.0)):
             if terminal is not None and terminal.node == name:
                 own = ex.scale(sign, ex.var(branch.name, f"b{held}", *branch.at))
-                terms.append(summed(_where(terminal.at, end.at, own), branch.loops[around:]))
+                terms.append(sum_over_loops(_where(terminal.at, end.at, own), branch.loops[around:]))
     said = [s for owner, all_ in parts.owned.items() for s in all_ if _inside(owner, s.loops, space)]
     along = [b for b in parts.branches if b.on is not None and _inside(b.name, b.loops, space)]
     if end.node.family.shape and space.scope.symbols.get(end.node.name) is end.node:  # a port that is an array
@@ -67,11 +67,15 @@ def conjugate_of(parts: NetworkBuilder, space: Space, end: End, *, rates: bool =
     if coordinate is not None and coordinate.complementary:
         raise NotSaidError("acts on a momentum coordinate", end.node.place)
     q, f, p = (ex.var(name, letter if coordinate else f"n{letter}", *end.at) for letter in "qfp")
-    terms += [summed(ex.mul(ex.var(b.name, "be", *b.at), derivative(b.on, q)), b.loops[around:]) for b in along if b.on]
+    terms += [
+        sum_over_loops(ex.mul(ex.var(b.name, "be", *b.at), derivative(b.on, q)), b.loops[around:])
+        for b in along
+        if b.on
+    ]
     jumps = {draft.label: draft.place for draft in parts.drafts if draft.kind in ("phi", "psi", "guarded")}
     for s in said:
         if any({q, f, p} & ex.variables(root) for root in _roots(s)):
-            terms.append(summed(_asked(s, q, f, jumps, rates=rates), s.loops[around:]))
+            terms.append(sum_over_loops(_effort_of_statement(s, q, f, jumps, rates=rates), s.loops[around:]))
     return ex.add(*terms)
 
 
@@ -97,7 +101,9 @@ def _roots(s: Energy | Work | Constraint) -> Sequence[Node]:
     return (s.on, s.effort) if isinstance(s, Work) else (s.expression,)
 
 
-def _asked(s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Place], *, rates: bool) -> Node:
+def _effort_of_statement(
+    s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Place], *, rates: bool
+) -> Node:
     """The effort that a statement asks of the node: it is taken from where it acts."""
     if isinstance(s, Work):
         return ex.neg(ex.mul(s.effort, derivative(s.on, q)))

@@ -45,7 +45,7 @@ class Asked:
     bound: set[str] = field(default_factory=set)
 
 
-def declared(statement: syntax.Port, name: str) -> syntax.Decl:
+def port_declaration(statement: syntax.Port, name: str) -> syntax.Decl:
     """A port's own name and indices, in a statement of several."""
     return next(d for d in statement.decls if d.name == name)
 
@@ -152,7 +152,7 @@ class Ports(Inputs):
             message = f"'{word.name}' is not a domain"
             self.report.error("E202", message, Place(space.source, word.span))
             raise Failed
-        if declared(statement, name).indices:
+        if port_declaration(statement, name).indices:
             space.scope.symbols[name] = self._array_bound(s, name, wanted, value)
             return
         bound_to = self.end(value, wanted)
@@ -162,7 +162,7 @@ class Ports(Inputs):
 
     def _array_bound(self, s: syntax.Instance, name: str, wanted: DomainSymbol, value: syntax.Expr) -> NodeSymbol:
         """A port that is an array: the array of nodes that it is bound to, under the port's name."""
-        found = self.resolver.located(value)
+        found = self.resolver.locate(value)
         symbol = None if found is None else found.symbol
         coordinate = symbol if isinstance(symbol, UnknownSymbol) else None
         if coordinate is not None:
@@ -179,11 +179,11 @@ class Ports(Inputs):
     def port_shapes(self, s: syntax.Instance, head: Interface) -> None:
         """E805: ports that are arrays have the bounds of the nodes that they are bound to."""
         for name, statement in head.ports.items():
-            decl, symbol = declared(statement, name), self.scope.symbols.get(name)
+            decl, symbol = port_declaration(statement, name), self.scope.symbols.get(name)
             if not decl.indices or not isinstance(symbol, NodeSymbol):
                 continue
-            bounds = [tuple(map(self.given, b)) for b in self.shape(decl)]
-            others = [tuple(map(self.given, b)) for b in symbol.family.shape]
+            bounds = [tuple(map(self.with_instance_parameters, b)) for b in self.shape(decl)]
+            others = [tuple(map(self.with_instance_parameters, b)) for b in symbol.family.shape]
             if bounds != others:
                 shown = [", ".join(f"{to_text(a)}..{to_text(b)}" for a, b in pairs) for pairs in (bounds, others)]
                 message = f"port '{name}' of '{s.decl.name}' runs over {shown[0]}, its nodes over {shown[1]}"
@@ -194,8 +194,8 @@ class Ports(Inputs):
         """A port of several nodes, bound to a bundle of the same members or to ground."""
         place = self.place(value.span)
         if isinstance(value, syntax.Name) and value.name == "ground":
-            return bundles.grounded(name, wanted, place)
-        found = self.resolver.located(value)
+            return bundles.ground_bundle(name, wanted, place)
+        found = self.resolver.locate(value)
         if found is None or not isinstance(found.symbol, BundleNode) or not bundles.fits(wanted, found.symbol):
             message = f"port '{name}' of '{s.decl.name}' is a bundle {wanted.name}, '{self._text(value)}' is none"
             members = ", ".join(f"{m}: {kind.name}" for m, kind in wanted.members)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from sysdyn.dsl.elaborate.statements.parameters import Argument
 from sysdyn.dsl.model import dimensions as dim
-from sysdyn.dsl.model.units import NONE, Dimension, Unit, known, multiply, raised, si_text
+from sysdyn.dsl.model.units import NONE, Dimension, Unit, find_unit, multiply, power_of, si_text
 from sysdyn.dsl.names.symbols import Space, Typed
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
@@ -50,7 +50,7 @@ def solve_units(
             continue
         if given is not None:
             equations.append(_equation(unit, given, name, space))
-    for name, dimension in _solved(frame, s, names, equations, places).items():
+    for name, dimension in _solve_units(frame, s, names, equations, places).items():
         space.scope.units[name] = Unit(dimension, Fraction(1), si_text(dimension))
 
 
@@ -64,12 +64,12 @@ def _equation(unit: syntax.Unit, given: Dimension, name: str, space: Space) -> E
             exponents[factor.name] = exponents.get(factor.name, Fraction(0)) + power
         elif factor.name != "1":
             own = space.scope.unit(factor.name)
-            found = own.dimension if own else (known(factor.name) or (NONE, 1))[0]
+            found = own.dimension if own else (find_unit(factor.name) or (NONE, 1))[0]
             rest = multiply(rest, found, -power)
     return exponents, rest, name
 
 
-def _solved(
+def _solve_units(
     frame: Instances,
     s: syntax.Instance,
     names: set[str],
@@ -77,7 +77,7 @@ def _solved(
     places: Mapping[str, Place | syntax.Span],
 ) -> dict[str, Dimension]:
     """What the variables are; E209 where equations do not tell, or contradict each other."""
-    found = _eliminated(names, equations)
+    found = _eliminate(names, equations)
     if isinstance(found, str):
         message = f"unit variable {found} of '{s.decl.name}' is not determined"
         raise frame.resolver.fail("E209", message, s.span, help="give an input or parameter that has it")
@@ -86,21 +86,21 @@ def _solved(
     odd = {
         e[2]: rest
         for e in equations
-        if isinstance(rest := _eliminated(names, [o for o in equations if o is not e]), dict)
+        if isinstance(rest := _eliminate(names, [o for o in equations if o is not e]), dict)
     }
     if len(odd) == 1:  # the others agree
         ((name, rest),) = odd.items()
         exponents, left, _ = next(e for e in equations if e[2] == name)
         for variable, power in exponents.items():
             left = multiply(left, rest[variable], -power)
-        missing = dim.show(raised(left, -1))
+        missing = dim.show(power_of(left, -1))
         message = f"'{name}' of '{s.decl.name}' contradicts what the others say of its unit"
         raise frame.resolver.fail("E209", message, places.get(name, s.span), help=f"a factor in {missing} is missing")
     message = _contradiction(s.decl.name, *found, equations)
     raise frame.resolver.fail("E209", message, s.span)
 
 
-def _eliminated(
+def _eliminate(
     names: set[str], equations: list[Equation]
 ) -> dict[str, Dimension] | tuple[Equation, dict[str, Equation]] | str:
     """Gaussian elimination, one variable after the other: what they are; an equation that contradicts, and what each
@@ -117,9 +117,9 @@ def _eliminated(
         told[variable] = pivot
         factor = pivot[0][variable]
         exponents = {k: v / factor for k, v in pivot[0].items() if k != variable and v}
-        value = raised(pivot[1], 1 / factor)
+        value = power_of(pivot[1], 1 / factor)
         solved.append((variable, exponents, value))
-        rows = [_without(r, variable, exponents, value) for r in rows]
+        rows = [_substitute(r, variable, exponents, value) for r in rows]
     wrong = next((r for r in rows if r[1]), None)
     if wrong is not None:
         return wrong, told
@@ -138,11 +138,11 @@ def _contradiction(label: str, wrong: Equation, told: dict[str, Equation], equat
     first = told.get(variable)
     if first is None or any(len(e[0]) > 1 or abs(e[0][variable]) != 1 for e in (first, alone)):
         return f"the unit variables of '{label}' contradict each other at '{wrong[2]}' (off by {dim.show(wrong[1])})"
-    one, other = (dim.show(raised(e[1], 1 / e[0][variable])) for e in (first, alone))
+    one, other = (dim.show(power_of(e[1], 1 / e[0][variable])) for e in (first, alone))
     return f"unit variable {variable} of '{label}' is {one} by '{first[2]}' and {other} by '{wrong[2]}'"
 
 
-def _without(row: Equation, variable: str, exponents: dict[str, Fraction], value: Dimension) -> Equation:
+def _substitute(row: Equation, variable: str, exponents: dict[str, Fraction], value: Dimension) -> Equation:
     power = row[0].get(variable, Fraction(0))
     if not power:
         return row

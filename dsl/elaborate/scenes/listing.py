@@ -120,7 +120,7 @@ def _unit(elaborator: Elaborator, source: SourceText, expression: syntax.Expr) -
     resolver = elaborator.resolver
     report, resolver.report = resolver.report, Report()
     try:
-        with resolver.within(elaborator.space.scope, source):
+        with resolver.entering_scope(elaborator.space.scope, source):
             value = resolver.resolve(expression)
     except Failed:
         return None

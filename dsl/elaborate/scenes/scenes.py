@@ -20,7 +20,7 @@ from sysdyn.dsl.model.network import ElementSetting, Observation, Scene
 from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
 from sysdyn.dsl.names.failures import Failed, SeveralError
-from sysdyn.dsl.names.habits import blamed
+from sysdyn.dsl.names.habits import unitless_parameter
 from sysdyn.dsl.names.symbols import Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
@@ -90,14 +90,14 @@ class SceneReader:
                     self.model.space.scope.broken |= statement.names
                     self._lost = True
                 elif type(statement) in table:
-                    self.guarded(lambda s: table[type(s)](self, s), statement)
+                    self.carry_out(lambda s: table[type(s)](self, s), statement)
 
     def command(self, source: SourceText, s: _Said, do: Callable[[SceneReader, _Said], None]) -> None:
         """A `--set` or `--outputs` of the command line."""
-        with self.model.entering(self.model.space), self.resolver.within(self.model.space.scope, source):
-            self.guarded(lambda statement: do(self, statement), s)
+        with self.model.entering(self.model.space), self.resolver.entering_scope(self.model.space.scope, source):
+            self.carry_out(lambda statement: do(self, statement), s)
 
-    def guarded(self, do: Callable[..., None], statement: syntax.SceneStatement | syntax.TraceItem) -> None:
+    def carry_out(self, do: Callable[..., None], statement: syntax.SceneStatement | syntax.TraceItem) -> None:
         """Carry out one statement; what fails has been reported."""
         try:
             do(statement)
@@ -124,7 +124,7 @@ class SceneReader:
     # -- span and numbers ----------------------------------------------------------------------------------
 
     def _constant(self, expression: syntax.Expr, dimension: Dimension, what: str) -> Node:
-        node = self.resolver.wanted(expression, dimension, "E208", f"{what} is in {{}}, wants {dim.show(dimension)}")
+        node = self.resolver.scalar_of(expression, dimension, "E208", f"{what} is in {{}}, wants {dim.show(dimension)}")
         for inner in ex.topological([node]):
             if inner.op in ("var", "time"):
                 raise self.resolver.fail("E807", f"{what} depends on '{inner}': it must be a constant", expression.span)
@@ -233,7 +233,7 @@ class SceneReader:
                 raise self.resolver.fail("E912", message, s.every.span, help="every 10 ms")
             self._once("every", every, s.every.span)
         for item in s.items:
-            self.guarded(self._items, item)
+            self.carry_out(self._items, item)
 
     def _items(self, item: syntax.TraceItem) -> None:
         """A traced expression; of `x[1..n].e` each element."""
@@ -277,7 +277,7 @@ class SceneReader:
         if value.dimension is not None and unit.dimension != value.dimension:
             message = f"'{format_expression(item.expr)}' is in {dim.show(value.dimension)}, not {unit.text}"
             missing = self.resolver.missing(value.dimension, unit.dimension, item.expr)
-            help_ = missing if blamed(missing) else f"in {common(value.dimension)}"
+            help_ = missing if unitless_parameter(missing) else f"in {common(value.dimension)}"
             help_ = "in rad or deg of an angle, in percent, or without 'in'" if value.dimension == NONE else help_
             help_ = "in rad/s, deg/s or rpm of a speed of rotation, in Hz" if help_ == "in s^-1" else help_
             help_ = "in degC" if unit.text == "C" and help_ == "in K" else help_

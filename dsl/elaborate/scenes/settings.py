@@ -67,7 +67,7 @@ class Settings:
                 whole = replace(s.target, base=target) if isinstance(s.target, syntax.Item) else target
                 self.parameter(replace(s, target=whole))
             return
-        found = self.resolver.located(s.target)
+        found = self.resolver.locate(s.target)
         symbol = None if found is None else found.symbol
         if isinstance(symbol, Unsupported):
             raise Failed
@@ -94,7 +94,7 @@ class Settings:
         if own and symbol is not None:
             near, started = None, " or ".join(f"set {p} = ..." for p in own[:3])
         help_ = f"nearest: '{near}'" if near else started
-        owner = self.resolver.located(s.target.base) if isinstance(s.target, syntax.Member) else None
+        owner = self.resolver.locate(s.target.base) if isinstance(s.target, syntax.Member) else None
         if owner is not None and isinstance(owner.symbol, InstanceSymbol) and owner.symbol.spaces:
             other = owner.symbol.spaces[0].elsewhere.get(last)
             help_ = f"level {other} of '{shown.rpartition('.')[0]}' has it" if other else help_
@@ -126,7 +126,10 @@ class Settings:
         if around or not self._all(parameter, found.indices):
             at += [self._chosen(symbol, i) for i in found.indices]
         if around and not found.indices:  # of a component in an array: each element
-            bounds = ([self.model.given(ex.substitute(b, found.change)) for b in pair] for pair in symbol.shape)
+            bounds = (
+                [self.model.with_instance_parameters(ex.substitute(b, found.change)) for b in pair]
+                for pair in symbol.shape
+            )
             at += [tuple(ex.const(float(k)) for k in range(round(a.data), round(b.data) + 1)) for a, b in bounds
                    if ex.is_const(a) and ex.is_const(b)]  # fmt: skip
         nodes = tuple(i.node for i in items)

@@ -65,7 +65,7 @@ class Declarations(Parameters):
         if late := [s for s in statements if _takes_its_unit(s[0])]:
             named = {s.decl.name: (s, at) for s, at in late if isinstance(s, syntax.State | syntax.Discrete)}
             self.each(late if len(named) < len(late) else self.by_dependence(named), do)
-        self.each(body.of(BEGINNING), self.begin)
+        self.each(body.statements_of(BEGINNING), self.begin)
 
     def declare(self, statement: syntax.Statement) -> None:
         """One declaration; statements of other kinds are passed over."""
@@ -76,7 +76,7 @@ class Declarations(Parameters):
                 unit = self.unit(statement.unit)
                 for decl in statement.decls:
                     family = self.current.family(decl.name, self.shape(decl))
-                    self._unknown(decl, "e", family, unit.dimension, None, False)
+                    self._enter_unknown(decl, "e", family, unit.dimension, None, False)
                     self.parts.unknowns.append(Unknown(family.name, family.whole, unit, self.place(decl.span)))
             case syntax.State():
                 self._state(statement)
@@ -91,7 +91,7 @@ class Declarations(Parameters):
             case syntax.Discrete():
                 events.discrete(self, statement)
 
-    def _unknown(
+    def _enter_unknown(
         self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, domain: DomainSymbol | None, co: bool
     ) -> None:
         self.enter(UnknownSymbol(decl.name, kind, family, dimension, domain, co, self.place(decl.span)))
@@ -135,7 +135,7 @@ class Declarations(Parameters):
         conjugate, effort = (domain.displacement, domain.flow) if co else (domain.momentum, domain.effort)
         for decl in statement.decls:
             family = self.current.family(decl.name, self.shape(decl))
-            self._unknown(decl, "q", family, own.dimension, domain, co)
+            self._enter_unknown(decl, "q", family, own.dimension, domain, co)
             place = self.place(decl.span)
             self.parts.coordinates.append(
                 Coordinate(
@@ -174,7 +174,7 @@ class Declarations(Parameters):
         outer = len(self.resolver.loops)
         with ExitStack() as stack:
             at = tuple(
-                self.looped(index) or ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", *bounds)).index)
+                self.loop_index(index) or ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", *bounds)).index)
                 for k, (index, bounds) in enumerate(zip(decl.indices, family.shape, strict=True))
             )
             target = ex.var(family.name, kind, *family.prefix, *at)
@@ -224,7 +224,7 @@ class Declarations(Parameters):
             first = value.items[0] if isinstance(value, Vector) else value
             unit = si((first.dimension or NONE) if first is not None else NONE)
         family = self.current.family(decl.name, self.shape(decl))
-        self._unknown(decl, "s", family, unit.dimension, None, False)
+        self._enter_unknown(decl, "s", family, unit.dimension, None, False)
         self.parts.states.append(State(family.name, family.whole, unit, self.place(decl.span)))
 
     def _definition(self, statement: syntax.Let | syntax.Output | syntax.Quasi) -> None:

@@ -174,12 +174,16 @@ def _enter(frame: ElaborationContext, draft: EventDraft) -> None:
 def event_of(frame: ElaborationContext, draft: EventDraft, change: dict[Node, Node]) -> Event:
     """One element of an event, with its watched values; change: numbers for the loop variables."""
 
-    def of(node: Node) -> Node:
+    def in_element(node: Node) -> Node:
         return ex.substitute(node, change) if change else node
 
-    condition = None if draft.condition is None else _watched(frame, of(draft.condition), draft.place)
-    period = None if draft.period is None else of(draft.period)
-    actions = [(of(a.target), watch(frame, of(a.value), a.dimension, a.place), a.place) for a in draft.actions]
+    condition = (
+        None if draft.condition is None else _compare_observations(frame, in_element(draft.condition), draft.place)
+    )
+    period = None if draft.period is None else in_element(draft.period)
+    actions = [
+        (in_element(a.target), watch(frame, in_element(a.value), a.dimension, a.place), a.place) for a in draft.actions
+    ]
     return Event(draft.name, condition, period, tuple(Action(*a) for a in actions), draft.place)
 
 
@@ -187,7 +191,7 @@ def _discretes(frame: ElaborationContext, root: Node) -> bool:
     return ex.reads(root, frame.parts.discretes)
 
 
-def _watched(frame: ElaborationContext, condition: Node, place: Place) -> Node:
+def _compare_observations(frame: ElaborationContext, condition: Node, place: Place) -> Node:
     """The condition with every comparison as one of an observation with zero."""
     change: dict[Node, Node] = {}
     for node in ex.topological([condition]):
@@ -270,7 +274,7 @@ def _instead(frame: ElaborationContext, node: Node) -> str:
 # -- constraints that hold at times --------------------------------------------------------------------------
 
 
-def guarded(frame: ElaborationContext, s: syntax.Constraint, constraint: Constraint) -> Constraint:
+def guard_constraint(frame: ElaborationContext, s: syntax.Constraint, constraint: Constraint) -> Constraint:
     """The constraint as a row; where it holds at times only, the switch that says when."""
     guard = restitution = None
     for item in s.guards:
@@ -278,7 +282,7 @@ def guarded(frame: ElaborationContext, s: syntax.Constraint, constraint: Constra
             guard = _guard(frame, item)
         else:
             message = f"{s.kind} {s.decl.name}: restitution is in {{}}, wants a ratio"
-            restitution = frame.resolver.wanted(item.expr, NONE, "E208", message)
+            restitution = frame.resolver.scalar_of(item.expr, NONE, "E208", message)
             if ex.variables(restitution) or _discretes(frame, restitution):
                 message = f"{s.kind} {s.decl.name}: restitution is one number for the whole run; it reads what moves"
                 help_ = "a parameter; of several, a phi each, 'while' a discrete condition holds"

@@ -156,7 +156,7 @@ def _close(
     name, at = s.data[0], loop_indices(loops)
     holds = _sense(frame, f"{name} holds", at, loops, place)
     row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, slips)
-    frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
+    frame.add_statement(Constraint("gamma", name, at, row, loops, si(NONE), place))
     left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
     bound = ex.neg(factor) if absorbs else ex.call("abs", factor)
     aimed = not absorbs and any(n.data[1] in ("kappa", "mu") for n in ex.variables(factor) if n.op == "var")
@@ -242,7 +242,7 @@ def _stick_in_plane(
     )
     labels = (name, f"{name} across")
     for label, flow in zip(labels, flows, strict=True):
-        frame.said(Constraint("psi", label, at, flow, loops, unit, place))
+        frame.add_statement(Constraint("psi", label, at, flow, loops, unit, place))
     multipliers = tuple(ex.var(label, "mu", *at) for label in labels)
     along = ex.div(ex.add(*(ex.mul(a, b) for a, b in zip(n, flows, strict=True))), ex.call("hypot", *n))
     value = ex.sub(along, ex.scale(0.5, node))
@@ -289,6 +289,6 @@ def _stick(
     """Dry friction: a set-valued effort with its bound and the sense of the motion."""
     (at, loops), (value, bound, sense) = where, what
     unit = si(NONE)
-    frame.said(Constraint("psi", name, at, value, loops, unit, place))
+    frame.add_statement(Constraint("psi", name, at, value, loops, unit, place))
     multiplier = ex.var(name, "mu", *at)
     frame.parts.drafts.append(Draft(name, at, loops, "friction", place, unit, value, multiplier, element, bound, sense))

@@ -122,7 +122,10 @@ class Inputs(Elements):
         for name, statement in head.inputs.items():
             with self.entering(space):
                 unit = self.unit(statement.unit)
-                shape = tuple((self.given(a), self.given(b)) for a, b in self.shape(statement.decl))
+                shape = tuple(
+                    (self.with_instance_parameters(a), self.with_instance_parameters(b))
+                    for a, b in self.shape(statement.decl)
+                )
             place, path = self.place(s.span), space.family(name).name
             if not space.prefix and path in self.given_inputs:
                 self._give(name, unit, shape, space, self.given_inputs[path])

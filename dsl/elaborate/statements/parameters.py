@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from typing import TypeVar
 
 from sysdyn.dsl.elaborate.instances.head import Body
-from sysdyn.dsl.elaborate.parts import ElaborationContext, declared
+from sysdyn.dsl.elaborate.parts import ElaborationContext, declarations_of
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.dependence import in_order
@@ -57,7 +57,7 @@ class Parameters(ElaborationContext):
     def _first(self, body: Body) -> dict[str, Stated]:
         """The parameters of a body by their names; E106 where there are two of one."""
         found: dict[str, Stated] = {}
-        for statement, loops in body.of(syntax.Param):
+        for statement, loops in body.statements_of(syntax.Param):
             assert isinstance(statement, syntax.Param)
             name = statement.decl.name
             if name in found:
@@ -189,7 +189,7 @@ class Parameters(ElaborationContext):
         if not names:
             return
         own = {n.index.name for n in walk(statement.value) if isinstance(n, syntax.Reduction)}
-        others = {d.name for other, _ in body if not isinstance(other, syntax.Param) for d in declared(other)}
+        others = {d.name for other, _ in body if not isinstance(other, syntax.Param) for d in declarations_of(other)}
         for name in names:
             if name.name in others - own - self.resolver.sight().keys():
                 what = statement.decl.name

@@ -48,8 +48,8 @@ class Statements(Declarations):
         if s.kind == "gamma":
             node = friction.relation(self, node, ex.const(0.0), family.name, self.resolver.loops, place, si(dimension))
         constraint = Constraint(s.kind, family.name, at, node, self.resolver.loops, si(dimension), place)
-        constraint = events.guarded(self, s, constraint)
-        self.said(constraint)
+        constraint = events.guard_constraint(self, s, constraint)
+        self.add_statement(constraint)
         self.resolver.constraints.setdefault(family.name, []).append(constraint)
 
     def _sides(self, what: str, left: Typed, right: Typed, where: syntax.Expr, *within: syntax.Expr) -> Dimension:
@@ -72,16 +72,16 @@ class Statements(Declarations):
 
     def _energy(self, s: syntax.Energy) -> None:
         node = self._wants(f"energy {s.function}", s.value, dim.ENERGY)
-        self.said(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
+        self.add_statement(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
 
     def _content(self, s: syntax.Content) -> None:
         node = self._wants(f"content {s.function}", s.value, dim.POWER)
         loops, place = self.resolver.loops, self.place(s.span)
         if s.function != "D":
-            self.said(Energy(s.function, node, loops, place))
+            self.add_statement(Energy(s.function, node, loops, place))
             return
         for part, inside in _parts(node, loops):
-            self.said(Energy("D", friction.set_valued(self, part, inside, place), inside, place))
+            self.add_statement(Energy("D", friction.set_valued(self, part, inside, place), inside, place))
 
     def _work(self, s: syntax.Work) -> None:
         effort = self.resolver.scalar(s.effort)
@@ -101,7 +101,7 @@ class Statements(Declarations):
                 raise self.resolver.fail("E208", message, s.effort.span, help=help_)
         along = self.virtual(on.node, "quasi(w): w", s.on.span) if quasi else ((ex.const(1.0), on.node),)
         for coefficient, node in along:
-            self.said(Work(ex.mul(effort.node, coefficient), node, self.resolver.loops, self.place(s.span)))
+            self.add_statement(Work(ex.mul(effort.node, coefficient), node, self.resolver.loops, self.place(s.span)))
 
     def _quasi(self, on: syntax.Call) -> Typed:
         """The quasi-velocity w of quasi(w), in the dimension of the displacement along it."""
@@ -166,7 +166,7 @@ class Statements(Declarations):
         """`init ref = value`, in a model or (override) in a scene."""
         outer = len(self.resolver.loops)
         with ExitStack() as stack:
-            target = self._sliced(s.target, stack)
+            target = self._loop_over_slice(s.target, stack)
             self.in_parts(lambda: self._initial(s, target, override, outer), s.span)
 
     def _initial(self, s: syntax.Init, target_syntax: syntax.Expr, override: bool, outer: int) -> None:
@@ -188,12 +188,12 @@ class Statements(Declarations):
             begun = Initial(one, value, fixed, loops, self.place(s.span), unit=si(dimension).text)
             self.add_initial(begun, override)
 
-    def _sliced(self, target: syntax.Expr, stack: ExitStack) -> syntax.Expr:
+    def _loop_over_slice(self, target: syntax.Expr, stack: ExitStack) -> syntax.Expr:
         """`x[1..n].f` becomes a loop over x[i].f."""
         if isinstance(target, syntax.Member):
-            return syntax.Member(self._sliced(target.base, stack), target.name, target.span)
+            return syntax.Member(self._loop_over_slice(target.base, stack), target.name, target.span)
         if isinstance(target, syntax.Prime):
-            return syntax.Prime(self._sliced(target.base, stack), target.span)
+            return syntax.Prime(self._loop_over_slice(target.base, stack), target.span)
         if isinstance(target, syntax.Item) and any(isinstance(i, syntax.Range) for i in target.indices):
             at: list[syntax.Index] = []
             for k, index in enumerate(target.indices):
@@ -228,14 +228,14 @@ class Statements(Declarations):
         moment = s.moment or "always"
         at = None
         if s.at is not None:
-            at = self.resolver.wanted(s.at, dim.TIME, "E208", "expect at: an instant is wanted, {} found")
+            at = self.resolver.scalar_of(s.at, dim.TIME, "E208", "expect at: an instant is wanted, {} found")
         self.resolver.statics = moment == "static"
         try:
             left, right = self.resolver.scalar(s.left), self.resolver.scalar(s.right)
             what = f"expect {self.source_text(s.left.span)[:40]}"
             dimension = self._sides(what, left, right, s.right, s.left, s.right)
             message = f"expect: within is in {{}}, wants {dim.show(dimension)}"
-            within = None if s.within is None else self.resolver.wanted(s.within, dimension, "E208", message)
+            within = None if s.within is None else self.resolver.scalar_of(s.within, dimension, "E208", message)
         finally:
             self.resolver.statics = False
         for side, node in ((s.left, left.node), (s.right, right.node)) if moment == "static" else ():
@@ -253,7 +253,7 @@ class Statements(Declarations):
 
     def golden(self, s: syntax.Golden) -> None:
         """`expect golden`, in a model or in a scene."""
-        within = self.resolver.wanted(s.within, NONE, "E208", "expect golden: within is a ratio, {} found")
+        within = self.resolver.scalar_of(s.within, NONE, "E208", "expect golden: within is a ratio, {} found")
         self.parts.goldens.append(Golden(s.file, within, self.place(s.span)))
 
 
