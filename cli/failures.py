@@ -70,7 +70,7 @@ def _say(error: BaseException, code: int, message: str, arguments: Sequence[str]
     elif code == INTERRUPTED:
         print("interrupted", file=sys.stderr)
     else:
-        print(shown(f"sysdyn: {message}"), file=sys.stderr)
+        print(printable_message(f"sysdyn: {message}"), file=sys.stderr)
         if isinstance(error, click.UsageError) and error.ctx is not None:
             print(f"try '{error.ctx.command_path} --help'", file=sys.stderr)
     if code == FAULT and os.environ.get("SYSDYN_DEBUG"):
@@ -85,7 +85,7 @@ def _asks_for_json(arguments: Sequence[str]) -> bool:
 
 def classify(error: BaseException) -> tuple[int, str]:
     """Exit code and message."""
-    if _interrupted(error):
+    if _is_interruption(error):
         return INTERRUPTED, "interrupted"
     if isinstance(error, click.UsageError):
         return USAGE, error.format_message()
@@ -105,7 +105,7 @@ def classify(error: BaseException) -> tuple[int, str]:
     return FAULT, f"a fault in sysdyn: {type(error).__name__}: {error} ({how})"
 
 
-def _interrupted(error: BaseException | None) -> bool:
+def _is_interruption(error: BaseException | None) -> bool:
     """By Ctrl-C, which Python wraps into an error of its own where it falls into the making of a class."""
     while error is not None:
         if isinstance(error, (KeyboardInterrupt, click.Abort)):
@@ -120,7 +120,7 @@ def _where(error: BaseException) -> str:
     return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}; " if frames else ""
 
 
-def shown(message: str) -> str:
+def printable_message(message: str) -> str:
     """A message for a terminal: names of files, models and data sets may hold control characters."""
     from sysdyn.dsl.text.render import printable
 

@@ -165,9 +165,9 @@ def _defaults(given: Sequence[str]) -> dict[str, Any]:
     """What the project's configuration says, for a command that runs."""
     if not given or given[0] not in COMMANDS or not {"-h", "--help"}.isdisjoint(given):
         return {}
-    from sysdyn.cli.project.config import configured
+    from sysdyn.cli.project.config import project_defaults
 
-    return configured(given, COMMANDS)
+    return project_defaults(given, COMMANDS)
 
 
 ONCE = 10.0
@@ -197,7 +197,7 @@ def _ended_like_an_interruption(last: bool) -> Iterator[None]:
             until = time.monotonic() + ONCE
             raise KeyboardInterrupt
 
-    def told(lost: sys.UnraisableHookArgs) -> None:
+    def raise_again(lost: sys.UnraisableHookArgs) -> None:
         """Python drops what is raised where an object is taken apart: the interruption comes again, behind that."""
         nonlocal until
         interrupted = lost.exc_type is not None and issubclass(lost.exc_type, KeyboardInterrupt)
@@ -209,7 +209,7 @@ def _ended_like_an_interruption(last: bool) -> Iterator[None]:
 
     for number in own:
         signal.signal(number, heard)
-    sys.unraisablehook = told
+    sys.unraisablehook = raise_again
     try:
         yield
     finally:

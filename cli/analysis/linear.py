@@ -111,7 +111,7 @@ def loose_of(found: Found) -> NDArray[np.bool_]:
     return quadratures(found.system, tangible)
 
 
-def linearised(found: Found, inputs: Sequence[Input], index: str = "3", watched: Sequence[int] = ()) -> Linear:
+def linearise(found: Found, inputs: Sequence[Input], index: str = "3", watched: Sequence[int] = ()) -> Linear:
     """The linearisation at the state of `found`; watched: places of unknowns that are outputs too, the last ones.
 
     Raises NoLinearisation.
@@ -125,7 +125,7 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3", watched:
     labels = tuple(name + (f"[{','.join(map(str, at))}]" if at else "") for name, at in inputs)
     if deeper := [label for label, slope in zip(labels, slopes, strict=True) if slope.deeper]:
         raise NoLinearisation(f"the equations need a third rate of {', '.join(deeper)}")
-    names, out = _with(_outputs(found, slopes), system, watched)
+    names, out = _append_unknowns(_outputs(found, slopes), system, watched)
     by_input = tuple(
         _columns(rows.starter.settled.form, found, [(s, order) for s in slopes]) for order in range(FIRST, LAST + 1)
     )
@@ -135,7 +135,7 @@ def linearised(found: Found, inputs: Sequence[Input], index: str = "3", watched:
     small = witnessed(Given(rows, system, state, by_input, out, labels, loose_of(found)), pencil, fixed=fixed)
     own = modes(small.a, small.decomposed)
     stores, energies = _energies(found, small, own, names)
-    kept = _asked(found, names)
+    kept = _requested_places(found, names)
     names, small, out = tuple(names[k] for k in kept), _rows(small, kept), _seen(out, kept)
     form = system if index == "3" else system.another(index)
     descriptor = _descriptor(form, found, slopes, out, labels)
@@ -151,7 +151,7 @@ def _units(network: Network) -> dict[str, str]:
     return inputs | {o.name: o.unit.text for o in network.observations}
 
 
-def _with(
+def _append_unknowns(
     seen: tuple[tuple[str, ...], Outputs], system: System, watched: Sequence[int]
 ) -> tuple[tuple[str, ...], Outputs]:
     """The outputs, and unknowns behind them."""
@@ -163,7 +163,7 @@ def _with(
     return (*names, *(system.name(int(k)) for k in watched)), Outputs(*both, (one, rate, twice))
 
 
-def _asked(found: Found, names: Sequence[str]) -> list[int]:
+def _requested_places(found: Found, names: Sequence[str]) -> list[int]:
     """Places of the outputs that were asked for, without what is observed of stores alone."""
     return [k for k, name in enumerate(names) if name not in found.prepared.unasked]
 

@@ -7,9 +7,9 @@ from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.analysis.asked import Found, compiled, of_nodes
-from sysdyn.cli.analysis.linear import linearised, loose_of
-from sysdyn.cli.analysis.states import at, resting
+from sysdyn.cli.analysis.asked import Found, compile_target, of_nodes
+from sysdyn.cli.analysis.linear import linearise, loose_of
+from sysdyn.cli.analysis.states import model_at_rest, resting
 from sysdyn.cli.page.columns import complex_text
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.request.targets import still
@@ -121,11 +121,15 @@ def equilibria(
             whole, spent = tried / (tries + 1), now - began
             progress(whole, spent * (1.0 - whole) / whole if spent > 1.0 else None)
 
-    made = compiled(request, report, (), of_nodes, (), still)
+    made = compile_target(request, report, (), of_nodes, (), still)
     if made is None:
         return None
     found, states, why = resting(*made, tries, advance=advance)
-    return found, tuple(replace(_judged(found, rest), efforts=_efforts(at(found, rest))) for rest in states), why
+    return (
+        found,
+        tuple(replace(_equilibrium_of(found, rest), efforts=_efforts(model_at_rest(found, rest))) for rest in states),
+        why,
+    )
 
 
 def _efforts(here: Found) -> dict[str, tuple[float, Unit]]:
@@ -144,8 +148,8 @@ def _efforts(here: Found) -> dict[str, tuple[float, Unit]]:
     }
 
 
-def _judged(found: Found, rest: Rest) -> Equilibrium:
-    here = at(found, rest)
+def _equilibrium_of(found: Found, rest: Rest) -> Equilibrium:
+    here = model_at_rest(found, rest)
     system = here.system
     n = system.form.written
     names = dict(zip(system.unknown_names[:n], map(float, rest.state.y), strict=True))
@@ -155,7 +159,7 @@ def _judged(found: Found, rest: Rest) -> Equilibrium:
     if sampled is not None:
         return Equilibrium(rest, names, kinds, units, None, f"eigenvalues do not know what '{sampled}' does")
     try:
-        small = linearised(here, ()).reduced
+        small = linearise(here, ()).reduced
     except NoLinearisation as error:
         return Equilibrium(rest, names, kinds, units, None, str(error))
     primal = found.prepared.formulation in ("lagrangian", "hamiltonian")

@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.api.compiled import Module, by_name, compile_model, known, shown, written
+from sysdyn.api.compiled import Module, by_name, check_choices, compile_model, parameters_of_text, written
 from sysdyn.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.analysis.resting import Equilibrium
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run.check.checking import checked
+from sysdyn.cli.run.check.checking import check_target
 from sysdyn.cli.run.many.loaded import Loaded, shortly, text_of
 from sysdyn.cli.run.request import targets
 from sysdyn.cli.run.request.asked import Request
@@ -75,18 +75,18 @@ def simulate(path: str | Path, *, unmet: str = "raise", **options: Any) -> Trace
     trace's file (a default as the command's); unmet: "warn" where a run that is not met shall warn instead of raising
     `NotMet`.  Returns the trace.
     """
-    _known(unmet)
+    _check_unmet(unmet)
     report = Report()
     ran = run(_request(path, options), report)
-    return _handed(ran, report, unmet)
+    return _trace_or_raise(ran, report, unmet)
 
 
-def _known(unmet: str) -> None:
+def _check_unmet(unmet: str) -> None:
     if not isinstance(unmet, str) or unmet not in ("raise", "warn"):
         raise UsageError(f"unmet {shortly(unmet)}: raise or warn")
 
 
-def _handed(ran: Ran | None, report: Report, unmet: str) -> Trace:
+def _trace_or_raise(ran: Ran | None, report: Report, unmet: str) -> Trace:
     """The trace of a run that came to its end, or what stopped it."""
     if ran is None or ran.exit == 1:
         raise ModelError(report.diagnostics)
@@ -112,7 +112,7 @@ class Model:
     def __init__(self, loaded: Loaded) -> None:
         self._loaded = loaded
         prepared = loaded.first.prepared
-        self.parameters = shown(prepared.binding.values)
+        self.parameters = parameters_of_text(prepared.binding.values)
         self.traced = prepared.network.traced
         self.formulation = prepared.formulation
 
@@ -133,15 +133,15 @@ class Model:
         options: `accuracy`, `rtol`, `atol`, `method`, `step`, `index`, `max_steps`, `max_wall`, `output` that
         differ from those of `load`.  Raises as `simulate` does.
         """
-        _known(unmet)
+        _check_unmet(unmet)
         if not options.keys() <= _RUN:
             raise UsageError(f"run() has no option {', '.join(sorted(options.keys() - _RUN))}: give it to load()")
         given = {name: value for name, value in {"until": until, "at": at, **options}.items() if value is not None}
         report, values = Report(), _settings({} if set is None else set)
         if given:
-            return _handed(self._loaded.run(values, report, alone=True, **_changes(given)), report, unmet)
+            return _trace_or_raise(self._loaded.run(values, report, alone=True, **_changes(given)), report, unmet)
         found = self._loaded.trace(values, report)
-        return found if isinstance(found, Trace) else _handed(found, report, unmet)
+        return found if isinstance(found, Trace) else _trace_or_raise(found, report, unmet)
 
     def sweep(
         self,
@@ -239,7 +239,7 @@ def check(text: str, name: str = "<text>") -> list[Diagnostic]:
     document = load_.document(SourceText(name, text), report)
     for target in targets.all_targets(document, report):
         with ex.fresh():
-            checked(target, report)
+            check_target(target, report)
     for _, own in alone.check_unused_components(document):
         report.extend(own)
     return list(report.diagnostics)
@@ -251,7 +251,7 @@ def _request(path: object, options: dict[str, Any]) -> Request:
     settings = given.pop("set", given.pop("settings", None))
     settings = () if settings is None else settings
     given["settings"] = tuple((name, text_of(value)) for name, value in _settings(settings).items())
-    return _made(Request, path, **_changes(given))
+    return _make_request(Request, path, **_changes(given))
 
 
 def _settings(settings: Any) -> dict[str, Any]:
@@ -265,12 +265,12 @@ def _settings(settings: Any) -> dict[str, Any]:
     return found
 
 
-def _made(make: Any, *arguments: Any, **options: Any) -> Request:
+def _make_request(make: Any, *arguments: Any, **options: Any) -> Request:
     try:
         request: Request = make(*arguments, **options)
     except TypeError as error:
         raise UsageError(str(error).replace("Request.__init__()", "simulate()")) from None
-    known(request.formulation, request.backend, request.index)
+    check_choices(request.formulation, request.backend, request.index)
     return request
 
 

@@ -79,7 +79,7 @@ def binding_c(tables: Tables, following: Following, form: DescriptorForm) -> str
         *(_core(name) for name in names),
         *(f"#undef sd_{name}" for name in _RENAMED),
         _TYPES,
-        *_declared(tables),
+        *_prototypes(tables),
         emit_c(following.program, form, head="/* what follows from given parameters */"),
         *_whole(tables),
         (HERE / "outside.c").read_text(encoding="ascii"),
@@ -98,7 +98,7 @@ def _core(name: str) -> str:
     return f"/* ---- {name} ---- */\n" + re.sub(r'(?m)^#include "[^"]*"\n', "", text)
 
 
-def _declared(tables: Tables) -> Iterable[str]:
+def _prototypes(tables: Tables) -> Iterable[str]:
     """Prototypes of the blocks."""
     systems = [tables.system, *([tables.start.system] if tables.start else [])]
     found: dict[str, None] = {}
@@ -220,7 +220,7 @@ def _whole(tables: Tables) -> Iterable[str]:
     yield ints("written_at", tables.at)
     if tables.state:
         yield from _state(tables.state, system)
-    yield from _observed(tables)
+    yield from _output_tables(tables)
     yield from _groups(tables)
     if start is not None:
         yield from _start(start)
@@ -250,7 +250,7 @@ def _state(state: State, system: Assembled) -> Iterable[str]:
     yield f"static const sd_matrix_form matrix_form = {{{sizes}, {arrays.format(order=order)}, m_magnitude}};"
 
 
-def _observed(tables: Tables) -> Iterable[str]:
+def _output_tables(tables: Tables) -> Iterable[str]:
     if not tables.outputs:
         return
     yield ints("audit_at", tables.audit_at)

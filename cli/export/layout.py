@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.cli.export.starts import start_tables
-from sysdyn.cli.export.tables import NOTHING, Call, Group, Output, State, Tables, assembled
+from sysdyn.cli.export.tables import NOTHING, Call, Group, Output, State, Tables, assembly_tables
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.start.starting import Started
 from sysdyn.compiler.binding.following import Following, following
@@ -95,7 +95,7 @@ def tables(formed_: Formed) -> tuple[Tables, Following]:
         written=system.form.written,
         followed=system.another("start").unknowns,
         at=system.form.at,
-        system=assembled(system),
+        system=assembly_tables(system),
         state=inner,
         start=start_tables(formed_.written, state),
         groups=tuple(_group(group, system) for group in found.groups),

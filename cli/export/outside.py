@@ -146,10 +146,10 @@ def sd_mass(t: float, y: Any, yd: Any, p: Any = None) -> _Floats:
 
 def sd_follow(p: Any) -> _Floats:
     """The parameters p with what follows from others (param b = 2*a) and constants of integrated rows written anew."""
-    return _followed(np.array(_model().parameters(p)), [])
+    return _apply_following(np.array(_model().parameters(p)), [])
 
 
-def _followed(p: _Floats, replaced: list[tuple[slice, _Floats]]) -> _Floats:
+def _apply_following(p: _Floats, replaced: list[tuple[slice, _Floats]]) -> _Floats:
     """What follows written into p, in the order in which it is used; what is replaced does not follow."""
     m = _model()
     y = np.zeros(m.tables["followed"] + 1)
@@ -165,7 +165,7 @@ def parameters(**changed: float) -> _Floats:
     known = {item["name"]: slice(item["place"], item["place"] + item["size"]) for item in m.said["parameters"]}
     for name, value in changed.items():
         p[known[name]] = np.ravel(value)
-    return _followed(m.parameters(p), [(known[name], p[known[name]].copy()) for name in changed])
+    return _apply_following(m.parameters(p), [(known[name], p[known[name]].copy()) for name in changed])
 
 
 def sd_outputs(t: float, y: Any, yd: Any, p: Any = None) -> _Floats:

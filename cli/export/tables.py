@@ -153,7 +153,7 @@ class Tables:
     audit_at: Ints
 
 
-def assembled(system: System) -> Assembled:
+def assembly_tables(system: System) -> Assembled:
     """The tables of a system."""
     form, slots = system.form, system.slots
     calls = tuple(

@@ -9,9 +9,9 @@ from html import escape
 
 from sysdyn.cli.compare.diffing import differences, headline, table
 from sysdyn.cli.golden.book import Golden
-from sysdyn.cli.golden.checking import Case, loaded, tolerance_of
+from sysdyn.cli.golden.checking import Case, load_golden, tolerance_of
 from sysdyn.cli.golden.recording import Recorded
-from sysdyn.cli.golden.structures import changed
+from sysdyn.cli.golden.structures import describe_change
 from sysdyn.cli.page.document import document
 from sysdyn.cli.page.document import table as html_table
 from sysdyn.runtime.comparison.verdict import Incomparable
@@ -25,7 +25,7 @@ def what_changed(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str |
     """(one line, all of it) of what differs between what is kept and what was found; None: nothing."""
     lines, first = [], None
     try:
-        verdict = differences(loaded(golden), found.trace, tolerance_of(golden))
+        verdict = differences(load_golden(golden), found.trace, tolerance_of(golden))
         if not verdict.equal:
             first = headline(verdict)
             lines += [first, table(verdict)]
@@ -44,7 +44,7 @@ def what_changed(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str |
             continue
         facts = dict.fromkeys((*kept[name], *new[name]))
         lines += [
-            f"{name}: {changed(k, kept[name].get(k), new[name].get(k))}"
+            f"{name}: {describe_change(k, kept[name].get(k), new[name].get(k))}"
             for k in facts
             if kept[name].get(k) != new[name].get(k)
         ]

@@ -274,11 +274,11 @@ def _formulations(
                     continue  # not expressible
                 text = f"{name}: {message}; --formulation {base.formulation} leaves it out"
                 raise Refused(text) from Stopped(code, message, finding)
-            verdict = _within(ran, golden, tolerance)
+            verdict = _differences_from(ran, golden, tolerance)
             while verdict.worst is not None and _margin(verdict) > HALF and accuracy > tolerance.rtol * CHECKED / 50.0:
                 accuracy /= 10.0
                 ran = run(replace(wanted, accuracy=accuracy), between(golden.time))
-                verdict = _within(ran, golden, tolerance)
+                verdict = _differences_from(ran, golden, tolerance)
             if _margin(verdict) > HALF:
                 assert verdict.worst is not None
                 raise Refused(f"{name} differs from {base.formulation}: {sentence(verdict.worst)}")
@@ -297,7 +297,7 @@ def _one(asked: tuple[Request, float, Floats]) -> Run | tuple[int, str, str]:
         return stopped.code, str(stopped), stopped.finding
 
 
-def _within(one: Run, golden: Arrays, tolerance: Tolerance) -> Verdict:
+def _differences_from(one: Run, golden: Arrays, tolerance: Tolerance) -> Verdict:
     return differences(common(golden, set(one.trace.values)), one.trace, tolerance.part(HALF))
 
 

@@ -96,7 +96,7 @@ def _largest(values: Floats) -> float:
 
 def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
     """As `cli.running.run`, but the trace holds the steps and the instants that are wanted here."""
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     if target is None:
         return None
     prepared = ready(request, target, report)

@@ -170,7 +170,7 @@ def accounts(name: str) -> Accounts:
     return told
 
 
-def shown(result: Checked) -> list[Diagnostic]:
+def visible_findings(result: Checked) -> list[Diagnostic]:
     """The findings that `check` shows."""
     kept = limit_findings(Report(result.found).diagnostics)
     return [d for d in kept if d.severity == "error" or d.code not in ROUTINE]

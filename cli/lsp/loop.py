@@ -31,7 +31,7 @@ def run(source: int, target: int) -> int:
             pipe = server.checker.pipe
             ready = wait([source] if pipe is None else [source, pipe], left)
             if pipe is not None and pipe in ready:
-                server.checked(*server.checker.answer())
+                server.publish_check(*server.checker.answer())
             if source in ready:
                 data = os.read(source, CHUNK)
                 if not data:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.load import Document, Listing
 from sysdyn.dsl.model.network import Parameter
@@ -112,7 +112,7 @@ def _lines(a: dict[str, Any]) -> list[str]:
 
 
 def _section(title: str, rows: Sequence[tuple[str, ...]]) -> list[str]:
-    return ["", title, *(f"  {line}" for line in aligned(rows).splitlines())] if rows else []
+    return ["", title, *(f"  {line}" for line in align(rows).splitlines())] if rows else []
 
 
 def _parameter_row(p: dict[str, Any]) -> tuple[str, ...]:

@@ -55,7 +55,7 @@ def _prose(text: str) -> str:
     for line in [*text.splitlines(), ""]:
         if line.startswith("```"):
             if fence is not None:
-                made.append(_fenced(fence, lines))
+                made.append(_code_block(fence, lines))
             fence, lines = (line.removeprefix("```") if fence is None else None), []
         elif fence is not None or line.strip():
             lines.append(line)
@@ -65,7 +65,7 @@ def _prose(text: str) -> str:
     return "\n".join(made)
 
 
-def _fenced(said: str, lines: Sequence[str]) -> str:
+def _code_block(said: str, lines: Sequence[str]) -> str:
     kind, _, what = said.partition(" ")
     text = "\n".join(lines)
     shown = block(text) if kind == "sd" else f'<pre class="source plain">{escape(text)}</pre>'

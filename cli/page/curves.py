@@ -61,16 +61,16 @@ class Frame:
         """Pixels from the left."""
         return LEFT + (time - self.low) / (self.high - self.low) * (WIDTH - LEFT - RIGHT)
 
-    def down(self, value: Any) -> Any:
+    def y_pixels(self, value: Any) -> Any:
         """Pixels from the top."""
         return HEIGHT - BOTTOM - (value - self.bottom) / (self.top - self.bottom) * (HEIGHT - TOP - BOTTOM)
 
     def points(self, x: Floats, y: Floats) -> list[str]:
         """A line's points."""
-        return [f"{u:.1f},{v:.1f}" for u, v in zip(self.across(x), self.down(y), strict=True)]
+        return [f"{u:.1f},{v:.1f}" for u, v in zip(self.across(x), self.y_pixels(y), strict=True)]
 
 
-def framed(low: float, high: float, values: Sequence[Floats]) -> Frame | None:
+def frame_around(low: float, high: float, values: Sequence[Floats]) -> Frame | None:
     """The frame around some values; None where there is nothing to draw."""
     if not values or not high > low:
         return None
@@ -88,7 +88,7 @@ def axes(frame: Frame, time_unit: str, unit: str) -> list[str]:
         parts.append(f'<line class="grid" x1="{u:.1f}" x2="{u:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>')
         parts.append(f'<text x="{u:.1f}" y="{HEIGHT - BOTTOM + 14}" text-anchor="middle">{label}</text>')
     for value, label in ticks(frame.bottom, frame.top, 5):
-        v = frame.down(value)
+        v = frame.y_pixels(value)
         parts.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{v:.1f}" y2="{v:.1f}"/>')
         parts.append(f'<text x="{LEFT - 6}" y="{v + 4:.1f}" text-anchor="end">{label}</text>')
     right = f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 6}" text-anchor="end">time [{escape(time_unit)}]</text>'

@@ -53,7 +53,7 @@ SAID = ("accuracy", "formulation", "index", "level", "method", "redundancy", "sc
 """What a scene says, with words of its own or as the scene that is named."""
 
 
-def configured(arguments: Sequence[str], commands: Iterable[str]) -> dict[str, Any]:
+def project_defaults(arguments: Sequence[str], commands: Iterable[str]) -> dict[str, Any]:
     """What the project's file says, as click's map of defaults for each of the commands; {} where there is none.
 
     Raises UsageError with file and key where the file says what it cannot.

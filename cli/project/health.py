@@ -111,7 +111,7 @@ def _compiler() -> Iterator[Finding]:
 def _cache() -> Iterator[Finding]:
     from sysdyn.compiler.program import cache
 
-    folder, wanted = cache.folder(), cache.wanted()
+    folder, wanted = cache.folder(), cache.requested_folder()
     entries = [p.stat().st_size for p in folder.glob("model-*.so")]
     said = f"{folder}: {len(entries)} models, {sum(entries) / 1e6:.1f} of {cache.limit() / 1e6:.0f} MB"
     if folder != wanted:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.report.balance import Part, observed, shares
+from sysdyn.cli.report.balance import Part, add_observations, shares
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.request.asked import Request, of_these_alone, options_of
 from sysdyn.cli.run.request.targets import Target
@@ -74,7 +74,7 @@ def activities(
         options = options_of(request, target, prepared, report, began, progress) if prepared else None
         if prepared is None or options is None or report.failed:
             return None
-        network, parts = observed(prepared.network)
+        network, parts = add_observations(prepared.network)
         if not parts:
             report.error("E608", "the powers of the elements cannot be written: there is none, or they are too many",
                          prepared.network.place)  # fmt: skip
@@ -97,10 +97,10 @@ def activities(
     if ran is None or not ran.outcome.final:
         report.extend(inner)
         return None
-    return _sorted(ran.outcome.traced, parts, ran)
+    return _rank_activities(ran.outcome.traced, parts, ran)
 
 
-def _sorted(trace: Trace, parts: Sequence[Part], ran: Ran) -> Activities:
+def _rank_activities(trace: Trace, parts: Sequence[Part], ran: Ran) -> Activities:
     found = [(part, variation(trace.time, trace[part.name])) for part in parts]
     total = float(sum(value for part, value in found if part.role != "through"))
     # shares of jumps follow those of the parts, and are no part of the model

@@ -97,7 +97,7 @@ def reduce(
     if request.rtol is not None or request.atol is not None:
         raise UsageError("reduce measures errors: --accuracy says what is wanted")
     began = time.monotonic()
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     if target is None:
         return None
     found = activities(request, target, report, folder, began, None, budget)
@@ -137,7 +137,7 @@ class _Reduction:
             return None
         self.reference = ran.outcome.traced
         full = self._cost(self.target)
-        reduced, error, ended = self._tried(text)
+        reduced, error, ended = self._reduce_text(text)
         cost = full
         if reduced != text:
             final = self._target(reduced)
@@ -146,7 +146,7 @@ class _Reduction:
         found = self.found
         return Reduced(self.target.name, self.accuracy, found, tuple(self.trials), reduced, error, full, cost, ended)
 
-    def _tried(self, original: str) -> tuple[str, float, bool]:
+    def _reduce_text(self, original: str) -> tuple[str, float, bool]:
         """The reduced text, its error, whether the budget sufficed."""
         text, error, misses = original, 0.0, 0
         gone: set[str] = set()
@@ -186,12 +186,12 @@ class _Reduction:
         return () if network is None else edits.candidates(target, network, self.found.items)
 
     def _variants(self, target: Target, text: str, candidate: edits.Candidate) -> list[tuple[str, str]]:
-        made = [("left out", edits.without(target, text, candidate))]
-        one = edits.merged(target, text, candidate)
+        made = [("left out", edits.remove_statement(target, text, candidate))]
+        one = edits.merge_nodes(target, text, candidate)
         if one is not None:
             made.append(("ends one", one))
         if candidate.joined:
-            made.append(("joined", edits.joined(target, text, candidate)))
+            made.append(("joined", edits.replace_by_zero_source(target, text, candidate)))
         clean = []
         for how, new in made:
             after = self._target(new)

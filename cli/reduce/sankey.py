@@ -79,12 +79,12 @@ def flows(items: Iterable[Activity]) -> Flows:
         side[a.domain].setdefault((_component(a), a.role), []).append(abs(a.energy))
     passes = tuple(p for label, ends in sides.items() for p in _passes(label, ends))
     size = {
-        name: max(_total(enters[name]) + _moved(passes, name, into=True),
-                  _total(leaves[name]) + _moved(passes, name, into=False))
+        name: max(_total(enters[name]) + _passed_energy(passes, name, into=True),
+                  _total(leaves[name]) + _passed_energy(passes, name, into=False))
         for name in enters
     }  # fmt: skip
     least = THIN * max(size.values(), default=0.0)
-    net = {n: _moved(passes, n, into=True) - _moved(passes, n, into=False) for n in enters}
+    net = {n: _passed_energy(passes, n, into=True) - _passed_energy(passes, n, into=False) for n in enters}
     order = sorted(enters, key=lambda name: (net[name], name))
     buses = (Bus(n, size[n], _stubs(enters[n], least), _stubs(leaves[n], least)) for n in order if size[n] > 0.0)
     return Flows(tuple(buses), tuple(p for p in passes if p.energy > 0.0))
@@ -100,7 +100,7 @@ def _total(stubs: Mapping[tuple[str, str], Sequence[float]]) -> float:
     return sum(map(sum, stubs.values()))
 
 
-def _moved(passes: Iterable[Pass], name: str, *, into: bool) -> float:
+def _passed_energy(passes: Iterable[Pass], name: str, *, into: bool) -> float:
     return sum(p.energy for p in passes if (p.target if into else p.source) == name and p.source != p.target)
 
 

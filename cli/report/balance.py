@@ -69,7 +69,7 @@ class Share:
     place: Place | None
 
 
-def observed(network: Network) -> tuple[Network, tuple[Part, ...]]:
+def add_observations(network: Network) -> tuple[Network, tuple[Part, ...]]:
     """The network with a quadrature and an observation of each part; what cannot be written is left out."""
     parts: list[Part] = []
     for found in (*_of_branches(network.branches), *_of_statements(network)):
@@ -137,11 +137,11 @@ def _of_branches(branches: Sequence[Branch]) -> Iterator[list[Part]]:
             for b in pieces
             if b.kind in ROLES
         ]
-        label = f"{shown(name)}{_ranges(pieces)}"
+        label = f"{author_name(name)}{_ranges(pieces)}"
         yield [Part(f"power of {name}", label, ROLES[first.kind], True, add(*power), first.place, first.domain.name)]
 
 
-def shown(name: str) -> str:
+def author_name(name: str) -> str:
     """The name of a branch as an author knows it: `emf#2` is side 2 of emf."""
     own, _, side = name.partition("#")
     return f"{own}, side {side}" if side else own
@@ -178,10 +178,10 @@ def _measure(statement: Energy | Work) -> tuple[str, bool, Node]:
         return "in", True, neg(_work(statement))
     if statement.function in ("D", "G"):
         return "out", True, _content(statement)
-    return "held", False, _stored(statement)
+    return "held", False, _stored_energy(statement)
 
 
-def _named(loops: Sequence[Loop], body: Node) -> Node:
+def _sum_with_own_names(loops: Sequence[Loop], body: Node) -> Node:
     """A sum over canonical loops, whose variables get names of their own."""
     change = {index(loop.index): index(f"of{loop.index}") for loop in loops}
     renamed = [Loop(f"of{loop.index}", substitute(loop.first, change), substitute(loop.last, change)) for loop in loops]
@@ -193,18 +193,18 @@ def _along(expression: Node, kinds: Sequence[str]) -> Node:
     return differential(expression, {f: f for f in local_variables(expression, kinds)})
 
 
-def _stored(statement: Energy) -> Node:
+def _stored_energy(statement: Energy) -> Node:
     pieces = []
     for term in terms(flows(statement.expression), statement.loops, statement.place):
         kinds = _RATES.get(statement.function)
         value = term.expression if kinds is None else sub(_along(term.expression, kinds), term.expression)
-        pieces.append(_named(term.loops, value))
+        pieces.append(_sum_with_own_names(term.loops, value))
     return add(*pieces)
 
 
 def _content(statement: Energy) -> Node:
     found = terms(flows(statement.expression), statement.loops, statement.place)
-    return add(*(_named(t.loops, _along(t.expression, _RATES[statement.function])) for t in found))
+    return add(*(_sum_with_own_names(t.loops, _along(t.expression, _RATES[statement.function])) for t in found))
 
 
 def _work(statement: Work) -> Node:
@@ -213,8 +213,8 @@ def _work(statement: Work) -> Node:
     for term in split(on, nest, statement.place):
         moving = local_variables(term.expression, ("q", "nq", "bq"))
         speed = differential(term.expression, {q: r for q in moving if (r := rate(q)) is not None})
-        pieces.append(_named(term.loops[len(nest) :], speed))
-    return _named(nest, mul(effort, add(*pieces)))
+        pieces.append(_sum_with_own_names(term.loops[len(nest) :], speed))
+    return _sum_with_own_names(nest, mul(effort, add(*pieces)))
 
 
 # ---- the section

@@ -86,7 +86,7 @@ def _positions(
     for _ in range(3 * SWEEPS):
         for layer in layers:
             wanted = [_mean([y[u] for u in neighbours[v]], y[v]) for v in layer]
-            for vertex, at in zip(layer, _apart(wanted, [size[v] for v in layer]), strict=True):
+            for vertex, at in zip(layer, _space_out(wanted, [size[v] for v in layer]), strict=True):
                 y[vertex] = at
     return y
 
@@ -95,7 +95,7 @@ def _mean(values: Sequence[float], default: float) -> float:
     return sum(values) / len(values) if values else default
 
 
-def _apart(wanted: Sequence[float], size: Sequence[float]) -> list[float]:
+def _space_out(wanted: Sequence[float], size: Sequence[float]) -> list[float]:
     """The places nearest to those wanted at which neighbours do not overlap: pool adjacent violators."""
     shift, total = [0.0], 0.0
     for a, b in pairwise(size):

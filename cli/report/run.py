@@ -6,7 +6,7 @@ import numpy as np
 from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
 from sysdyn.cli.run.start.author import names_of
-from sysdyn.cli.run.start.starting import moved
+from sysdyn.cli.run.start.starting import changes_by_start
 from sysdyn.compiler.binding.certificate import certificate
 from sysdyn.runtime.model.description import BESIDE
 from sysdyn.runtime.structure.order import freedom
@@ -54,7 +54,7 @@ def start(study: Study) -> str:
     """What the start changed, and where it begins."""
     state, system = study.started.state, study.started.system
     parts = []
-    moves = moved(study.prepared, state)
+    moves = changes_by_start(study.prepared, state)
     if moves:
         rows = [[escape(n), f"{before:.6g}", f"{after:.6g}", escape(why)] for n, before, after, why in moves]
         more = f'<p class="soft">… {len(rows) - SHOWN} more</p>' if len(rows) > SHOWN else ""

@@ -70,7 +70,7 @@ class _Colours:
     def __init__(self) -> None:
         self._known: dict[str, str] = {}
 
-    def of(self, domain: str) -> str:
+    def colour_of(self, domain: str) -> str:
         """The colour of a domain."""
         return self._known.setdefault(domain, COLOURS[len(self._known) % len(COLOURS)])
 
@@ -85,7 +85,7 @@ def _vertices(study: Study, colours: _Colours) -> dict[str, Vertex]:
     found: dict[str, Vertex] = {}
 
     def dot(name: str, shape: Shape, domain: str, place: Place) -> None:
-        found[f"n {name}"] = Vertex(f"n {name}", name + _extent(shape), "", colours.of(domain), place, False)
+        found[f"n {name}"] = Vertex(f"n {name}", name + _extent(shape), "", colours.colour_of(domain), place, False)
 
     for node in n.nodes:
         dot(node.name, node.shape, node.domain.name, node.place)
@@ -115,7 +115,7 @@ def _branch(found: dict[str, Vertex], branch: Branch, kinds: dict[str, str], col
     """A branch as a box, or as one side of the box of its coupling."""
     own, _, side = branch.name.partition("#")
     key = f"b {own}"
-    colour = colours.of(branch.domain.name)
+    colour = colours.colour_of(branch.domain.name)
     vertex = found.get(key)
     if vertex is None:
         small = kinds.get(branch.name, "") or _SIGNS.get(branch.kind, branch.kind)
@@ -242,16 +242,16 @@ def _box(study: Study, vertex: Vertex, x: float, y: float) -> str:
         body.append(f'<path class="wire" stroke="{vertex.colour}" d="M{u:.0f} {y + 17:.0f}v8{bars}"/>')
         body.append(f'<text class="small" x="{u + 4:.0f}" y="{y + 25:.0f}">{escape(mark)}</text>')
     title = f"<title>{escape(vertex.label)}</title>"
-    return _linked(study, vertex.place, title + "".join(body))
+    return _link(study, vertex.place, title + "".join(body))
 
 
 def _dot(study: Study, vertex: Vertex, x: float, y: float) -> str:
     circle = f'<circle class="node" cx="{x:.0f}" cy="{y:.0f}" r="5.5" fill="{vertex.colour}"/>'
     text = f'<text class="label" x="{x:.0f}" y="{y - 10:.0f}" text-anchor="middle">{_short(vertex.label, 16)}</text>'
-    return _linked(study, vertex.place, f"<title>{escape(vertex.label)}</title>{circle}{text}")
+    return _link(study, vertex.place, f"<title>{escape(vertex.label)}</title>{circle}{text}")
 
 
-def _linked(study: Study, place: Place | None, body: str) -> str:
+def _link(study: Study, place: Place | None, body: str) -> str:
     address = study.address(place)
     return f"<g>{body}</g>" if address is None else f'<a href="{address}">{body}</a>'
 

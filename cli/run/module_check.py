@@ -57,18 +57,18 @@ def _compare(prepared: Prepared, started: Started, until: float) -> None:
     for block in prepared.compiled.form.blocks:
         sample = oracle.sample(block, points)
         module = _module_rows(whole, oracle, block, points, sample.rows)
-        wrong = _apart(module, sample, points)
+        wrong = _differing_points(module, sample, points)
         if wrong.any():  # perhaps terms of terms cancel: their rounding is no difference
             sample = oracle.sample(block, points, careful=True)
-            wrong = _apart(module, sample, points) & ~_beyond(points, prepared.binding.p)
+            wrong = _differing_points(module, sample, points) & ~_beyond(points, prepared.binding.p)
         if wrong.any():
             k, row = np.argwhere(wrong)[0]
             place = int(sample.rows[row])
             values = float(module[k, row]), float(sample.value[k, row])
-            raise ModuleFault(_told(prepared, oracle, block, place, values))
+            raise ModuleFault(_difference_text(prepared, oracle, block, place, values))
 
 
-def _apart(found: Array, sample: Sample, points: Points) -> NDArray[np.bool_]:
+def _differing_points(found: Array, sample: Sample, points: Points) -> NDArray[np.bool_]:
     """Where both differ by more than rounding [points, rows of the sample]; found: the module's rows there."""
     with np.errstate(invalid="ignore"):
         apart = np.abs(found - sample.value)
@@ -147,7 +147,9 @@ def _module_rows(system: System, oracle: SampledRows, block: Block, points: Poin
     return found
 
 
-def _told(prepared: Prepared, oracle: SampledRows, block: Block, place: int, values: tuple[float, float]) -> str:
+def _difference_text(
+    prepared: Prepared, oracle: SampledRows, block: Block, place: int, values: tuple[float, float]
+) -> str:
     family = int(np.searchsorted(oracle.to, place, side="right")) - 1
     row = prepared.compiled.form.rows[family]
     where = f", {row.place.file}:{row.place.start[0]}" if row.place else ""

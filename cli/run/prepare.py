@@ -11,7 +11,7 @@ from typing import Any
 
 from sysdyn.compiler.binding.binding import Binding, places_of
 from sysdyn.compiler.formulations import choose
-from sysdyn.compiler.network.pruning import Removal, pruned
+from sysdyn.compiler.network.pruning import Removal, prune_network
 from sysdyn.compiler.pipeline import CompiledModel, compile_network
 from sysdyn.compiler.program import build
 from sysdyn.dsl import load
@@ -116,7 +116,7 @@ def prepare(
     """
     cpu = time.process_time()
     whole, place = network, None
-    network, left_out = pruned(whole) if prune else (whole, ())
+    network, left_out = prune_network(whole) if prune else (whole, ())
     if left_out and not _well_formed(whole, report):
         return None
     if formulation is None:
@@ -127,7 +127,7 @@ def prepare(
     if found:
         return None
     try:
-        compiled, made, backend = _compiled(network, chosen, backend, report, traced, gather)
+        compiled, made, backend = _compile_and_load(network, chosen, backend, report, traced, gather)
         binding = compiled.bind()
     except ModelError as error:
         report.extend(load.at_authors(network, error.diagnostics))
@@ -150,7 +150,7 @@ def _well_formed(network: Network, report: Report) -> bool:
     return not any(d.severity == "error" for d in found)
 
 
-def _compiled(
+def _compile_and_load(
     network: Network, formulation: str, backend: str, report: Report, traced: bool, gather: bool
 ) -> tuple[CompiledModel, Carrier, str]:
     if backend == "c":

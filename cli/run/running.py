@@ -20,7 +20,7 @@ from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import Started, start
 from sysdyn.cli.run.verdict.expectations import Claim, judge
-from sysdyn.cli.run.verdict.verdict import author_place, differences, stopped, unkicked, verdict
+from sysdyn.cli.run.verdict.verdict import author_place, differences, note_rest, report_stop, verdict
 from sysdyn.compiler.forms.kane import repeats
 from sysdyn.dsl import load
 from sysdyn.dsl.model import budget
@@ -63,13 +63,13 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
     check_tolerances(request)
     if request.output and request.file != "-" and _same(request.output, request.file):
         raise UsageError(f"-o {request.output} is the model itself")
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     if target is None:
         return None
     output = request.output or default_output(request.file, target.scene.name.name if target.scene else "")
     if Path(output).is_file() and not replaceable(output):
         raise UsageError(f"-o {output} exists and is no trace of sysdyn: give another name, or remove it")
-    request, locked = _locked(request, target, report)
+    request, locked = _apply_lock(request, target, report)
     with ex.fresh():
         prepared = ready(request, target, report)
         options = None if prepared is None else options_of(request, target, prepared, report, began, progress)
@@ -78,12 +78,12 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
         return None if prepared is None or options is None else integrate(target, prepared, options, report)
 
 
-def _locked(request: Request, target: Target, report: Report) -> tuple[Request, lock.Taken | None]:
+def _apply_lock(request: Request, target: Target, report: Report) -> tuple[Request, lock.Taken | None]:
     """The request with what the file's lock says where neither it nor the scene does."""
     held = None if request.no_lock else lock.read(request.file, target, __version__, report)
     if held is None:
         return request, None
-    found = lock.taken(held, target, request.formulation, request.index, request.method, request.levels)
+    found = lock.settings_from_lock(held, target, request.formulation, request.index, request.method, request.levels)
     return replace(
         request,
         formulation=request.formulation or found.formulation,
@@ -112,7 +112,7 @@ def ready(request: Request, target: Target, report: Report) -> Prepared | None:
         message = f"formulation {prepared.formulation}: the same rows as Lagrange's, no flow constraint is left out"
         inner.error("E607", message, prepared.network.place)
         prepared = None
-    report.extend(inner if prepared else targets.unsupported(inner))
+    report.extend(inner if prepared else targets.refuse_unsupported(inner))
     return prepared
 
 
@@ -181,7 +181,7 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
         if not isinstance(error.partial, Outcome):
             raise
         outcome = error.partial
-        failure = stopped(target, prepared, started, error, report, options)
+        failure = report_stop(target, prepared, started, error, report, options)
     found = Report()
     claims = judge(prepared, outcome, found, finished=outcome.reached >= options.t_end)
     if outcome.judgement is None or outcome.met:
@@ -193,5 +193,5 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
         verdict(target, prepared, started, outcome, report)
         differences(prepared, outcome.cancelled, report)
         zeno(prepared, outcome.events, report)
-        unkicked(prepared, started, outcome, report)
+        note_rest(prepared, started, outcome, report)
     return Ran(target, prepared, started, outcome, claims, code, failure)

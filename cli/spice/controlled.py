@@ -10,7 +10,7 @@ from sysdyn.cli.spice.netlist import Card, Unreadable, value
 from sysdyn.cli.spice.writing import plain, quantity
 
 
-def controlled(kind: str, letter: str, unit: str, *, by_current: bool) -> Callable[[Card, Scope], Element]:
+def controlled_source(kind: str, letter: str, unit: str, *, by_current: bool) -> Callable[[Card, Scope], Element]:
     """E, G, F, H: an effort or a flow that is a gain or a polynomial of voltages or currents."""
 
     def element(card: Card, scope: Scope) -> Element:
@@ -90,9 +90,9 @@ def _between(scope: Scope, plus: str, minus: str) -> str:
 
 
 CONTROLLED: dict[str, Callable[[Card, Scope], Element]] = {
-    "e": controlled("effort", "e", "", by_current=False),
-    "g": controlled("flow", "f", "S", by_current=False),
-    "f": controlled("flow", "f", "", by_current=True),
-    "h": controlled("effort", "e", "ohm", by_current=True),
+    "e": controlled_source("effort", "e", "", by_current=False),
+    "g": controlled_source("flow", "f", "S", by_current=False),
+    "f": controlled_source("flow", "f", "", by_current=True),
+    "h": controlled_source("effort", "e", "ohm", by_current=True),
 }
 """By the first letter of a name."""

@@ -86,7 +86,7 @@ class Details:
     given: dict[str, str]
     rest: tuple[str, ...]
 
-    def left(self, *read: str) -> tuple[str, ...]:
+    def unread_words(self, *read: str) -> tuple[str, ...]:
         """What a device does not read."""
         return (*self.rest, *(n for n in self.given if n not in (*read, "area", "m", "ic", "temp", "dtemp")))
 
@@ -144,7 +144,7 @@ def _passive(kind: str, letter: str, unit: str, state: str, state_unit: str) -> 
         )
         factor *= said.times if kind == "capacitor" else 1.0 / said.times
         line = f"{name}: {kind}({letter} = {_amount(scope, amount, unit, factor)}) {a} -> {b}"
-        left = tuple(w for w in said.left("tc", "tc 2", "tc1", "tc2", "ic 2", "ac", "noisy") if w != "ac")
+        left = tuple(w for w in said.unread_words("tc", "tc 2", "tc1", "tc2", "ic 2", "ac", "noisy") if w != "ac")
         initial: tuple[str, ...] = ()
         if state and card.head not in scope.driven:
             initial = (f"init {name}.{_initial(state, state_unit, words, said, scope)}",)
@@ -178,7 +178,7 @@ def _source(unit: str) -> Callable[[Card, Scope], Element]:
     def element(card: Card, scope: Scope) -> Element:
         words = enough(card, 3)
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
-        shape = _shape(_behind(card, 3), scope, unit)
+        shape = _shape(_words_after(card, 3), scope, unit)
         if shape.component:
             line = f"{name}: {shape.component}({shape.arguments}) {a} -> {b}"
             return Element((line,), () if shape.local else (shape.component,), (shape.component,) * shape.local)
@@ -187,7 +187,7 @@ def _source(unit: str) -> Callable[[Card, Scope], Element]:
     return element
 
 
-def _behind(card: Card, count: int) -> list[str]:
+def _words_after(card: Card, count: int) -> list[str]:
     """What stands behind so many words and the brackets among them."""
     words = list(card.words)
     while count and words:

@@ -93,10 +93,10 @@ def number(text: str) -> float | None:
     found = _NUMBER.fullmatch(text)
     if found is None:
         return None
-    return scaled(found[1], (found[2] or "").lower())
+    return scale_number(found[1], (found[2] or "").lower())
 
 
-def scaled(text: str, scale: str) -> float:
+def scale_number(text: str, scale: str) -> float:
     """A number with the letters of a scale; one of ten as if it were written out, so that 0.1n is 1e-10."""
     if scale == "mil":
         return float(text) * SCALES[scale]
@@ -139,7 +139,7 @@ def _value(text: str, known: Mapping[str, float]) -> float:
         raise Unreadable(f"an expression of more than {MOST} characters")
 
     def written(match: re.Match[str]) -> str:
-        return repr(scaled(match[1], match[2] or ""))
+        return repr(scale_number(match[1], match[2] or ""))
 
     try:
         with warnings.catch_warnings():

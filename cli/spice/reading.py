@@ -84,7 +84,7 @@ class Reader:
         elif head in ASKED:
             self._asked.append(card)
         elif head in (".print", ".plot", ".save", ".probe"):
-            self.netlist.shown += _shown(words[1:])
+            self.netlist.shown += _output_names(words[1:])
         elif head in (".include", ".inc", ".lib"):
             self._include(source, card)
         elif head in SKIPPED:
@@ -229,7 +229,7 @@ def _nodes(words: tuple[str, ...], known: Mapping[str, float]) -> list[tuple[str
     return found
 
 
-def _shown(words: tuple[str, ...]) -> list[str]:
+def _output_names(words: tuple[str, ...]) -> list[str]:
     """`v(a)`, `v(a,b)`, `i(v1)` as `v a`, `v a b`, `i v1`."""
     text = " ".join(w for w in words if w != "tran")
     parts = text.replace("(", " ( ").replace(")", " ) ").split()

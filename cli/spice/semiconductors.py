@@ -40,7 +40,7 @@ def _diode(card: Card, scope: Scope) -> Element:
     current = v.get("is", 1e-14) * said.times * heat.saturation(v.get("eg", 1.11), v.get("xti", 3.0), emission)
     given = f"Is = {quantity(current, 'A')}, vT = {quantity(emission * heat.volt, 'V')}"
     read = ("is", "n", "rs", "eg", "xti", "tnom", "trs1", "trs2", "trs")
-    left = (*_beyond(model, read), *said.left())
+    left = (*_beyond(model, read), *said.unread_words())
     ohms = v.get("rs", 0.0) / said.times * heat.resistance(v.get("trs1", v.get("trs", 0.0)), v.get("trs2", 0.0))
     if ohms > 0.0:
         inner = f"{name}_in"
@@ -73,7 +73,7 @@ def _bipolar(card: Card, scope: Scope) -> Element:
     )
     c, b, e = (scope.node(w) for w in words[1:4])
     name = scope.name[card.head]
-    left = (*_beyond(model, ("is", "bf", "br", "nf", "nr", "eg", "xti", "xtb", "tnom")), *said.left("ic 2"))
+    left = (*_beyond(model, ("is", "bf", "br", "nf", "nr", "eg", "xti", "xtb", "tnom")), *said.unread_words("ic 2"))
     if v.get("nr", 1.0) != v.get("nf", 1.0):
         left = ("nr", *left)
     if b in (c, e) and c != e:  # one junction is short: the other is a diode
@@ -121,7 +121,7 @@ def _sizes(said: Details, v: Mapping[str, float]) -> tuple[str, ...]:
     """What a card says beside width and length, where its model reads it."""
     unread = JUNCTIONS if not CAPACITIES & v.keys() else set()
     unread = unread if "rsh" in v else unread | {"nrd", "nrs"}
-    return tuple(w for w in said.left("w", "l", "ic 2") if w not in unread)
+    return tuple(w for w in said.unread_words("w", "l", "ic 2") if w not in unread)
 
 
 SEMICONDUCTORS: dict[str, Callable[[Card, Scope], Element]] = {"d": _diode, "q": _bipolar, "m": _mos}

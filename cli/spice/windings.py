@@ -14,7 +14,7 @@ Factors = dict[tuple[str, str], str]
 """Coupling factors by two coils."""
 
 
-def _said(card: Card, coils: Mapping[str, Card]) -> tuple[tuple[str, ...], str]:
+def _coils_and_factor(card: Card, coils: Mapping[str, Card]) -> tuple[tuple[str, ...], str]:
     """`K1 L1 L2 ... k`: coils and the factor of any two of them."""
     words = enough(card, 4)
     names, factor = words[1:-1], words[-1]
@@ -42,7 +42,7 @@ class Cores:
         before, on = set[tuple[str, str]](), dict[str, list[str]]()
         for card in (c for c in cards if c.head.startswith("k")):
             try:
-                self._said[card.head] = _said(card, coils)
+                self._said[card.head] = _coils_and_factor(card, coils)
             except Unreadable:
                 continue  # told where the card is read
             twos = _twos(self._said[card.head][0])
@@ -71,10 +71,10 @@ class Cores:
         core[1].extend(found)
         self.branches |= {coil: (first, _branch(k, len(found))) for k, coil in enumerate(found)}
 
-    def of(self, card: Card) -> tuple[str, list[str], Factors]:
+    def core_of(self, card: Card) -> tuple[str, list[str], Factors]:
         """The first card of the core that a card tells of, its coils, their factors.  Unreadable."""
         if card.head not in self._said:
-            _said(card, self.coils)
+            _coils_and_factor(card, self.coils)
         if again := self._again.get(card.head):
             raise Unreadable(f"'{card.head}': {' and '.join(again)} are coupled already")
         return self._core[card.head]
@@ -84,9 +84,9 @@ def _branch(k: int, coils: int) -> str:
     return ("one", "two")[k] if coils == 2 else f"c{k + 1}"
 
 
-def coupled(card: Card, scope: Scope, cores: Cores) -> Element:
+def coupled_coils(card: Card, scope: Scope, cores: Cores) -> Element:
     """The coils of a core as one element, at the first of its cards."""
-    first, names, factors = cores.of(card)
+    first, names, factors = cores.core_of(card)
     if first != card.head:
         return Element(())
     name, size = scope.name[card.head], len(names)
@@ -105,7 +105,7 @@ def coupled(card: Card, scope: Scope, cores: Cores) -> Element:
         branch = _branch(k, size)
         ends.append(f"{branch} = {scope.node(words[1])} -> {scope.node(words[2])}")
         said = details(words[4:], scope, areas=False)
-        left += [*said.left(), *(n for n in ("m", "temp", "dtemp") if n in said.given)]
+        left += [*said.unread_words(), *(n for n in ("m", "temp", "dtemp") if n in said.given)]
         currents.append(said.number("ic", scope))
         at = f"f {'~' if whole else '='} {quantity(currents[-1], 'A')}" if scope.uic else "e = 0 V"
         initial.append(f"init {name}.{branch}.{at}")

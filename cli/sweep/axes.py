@@ -55,7 +55,7 @@ class Axis:
         """It is a distribution."""
         return bool(self.quantile)
 
-    def at(self, u: Numbers) -> Numbers:
+    def values_at(self, u: Numbers) -> Numbers:
         """Values of a distribution at probabilities u."""
         return DISTRIBUTIONS[self.quantile](u, self.first, self.second)
 
@@ -80,10 +80,10 @@ def axis(text: str, evaluate: Evaluate) -> Axis:
         raise UsageError(f"--over {name}={said}: a distribution is written --over '{name}~{said}'")
     if ".." in said and not name.startswith("level "):
         return _grid(name, said, evaluate)
-    return listed(name, _parts(said), evaluate)
+    return list_axis(name, _parts(said), evaluate)
 
 
-def listed(name: str, texts: Sequence[str], evaluate: Evaluate) -> Axis:
+def list_axis(name: str, texts: Sequence[str], evaluate: Evaluate) -> Axis:
     """A list of expressions."""
     if not all(texts):
         raise UsageError(f"--over {name}: an empty value")

@@ -87,7 +87,7 @@ class _Crew:
                     self.ready.put((None, item))  # its result came through
                     continue
                 self.client.cancel([item.future], force=True)
-                named += self._died(item.chunk)
+                named += self._handle_death(item.chunk)
         for address in there - set(self.given):
             self.given[address] = {}
         self.seen = self.looked if self.given else self.seen
@@ -96,7 +96,7 @@ class _Crew:
             raise UsageError(f"no worker has been there for {ALONE:g} s: the same command goes on where it was")
         return named
 
-    def _died(self, chunk: Chunk) -> list[Kept]:
+    def _handle_death(self, chunk: Chunk) -> list[Kept]:
         """A chunk is begun again task by task, each by a worker that has nothing else; or its run is named."""
         if len(chunk.tasks) == 1:
             task = chunk.tasks[0]
@@ -148,22 +148,22 @@ class _Crew:
         if key is not None and not any(items.pop(key, None) for items in self.given.values()):
             return
         if item.future.status == "finished":
-            came = self._fetched(item)
+            came = self._fetch(item)
             if came is None:
                 self.client.cancel([item.future], force=True)
                 self.queue.again.extend(item.chunk.tasks)
                 return
             yield from self.queue.took(item.chunk, *came)
         elif item.future.status == "cancelled":
-            yield from self._died(item.chunk)
+            yield from self._handle_death(item.chunk)
         else:
             error = item.future.exception()
             if type(error).__name__ != "KilledWorker":  # the scheduler's own count of deaths
                 raise error
-            yield from self._died(item.chunk)
+            yield from self._handle_death(item.chunk)
         item.future.release()
 
-    def _fetched(self, item: _Given) -> tuple[Answer, float] | None:
+    def _fetch(self, item: _Given) -> tuple[Answer, float] | None:
         """What a worker has ready; None where it died before that was fetched (Dask would wait for ever)."""
         while True:
             with suppress(TimeoutError):

@@ -33,9 +33,9 @@ def picture(found: Swept, kind: str) -> bytes:
                 _bands(axes[row, 0], found, kept, name)
             for k, varied in enumerate(over):
                 _scatter(axes[row, k + bands], found, kept, name, varied)
-            axes[row, 0].set_ylabel(_labelled(found, name))
+            axes[row, 0].set_ylabel(_label(found, name))
         for k, varied in enumerate(over):
-            axes[-1, k + bands].set_xlabel(_labelled(found, varied))
+            axes[-1, k + bands].set_xlabel(_label(found, varied))
         if bands:
             axes[-1, 0].set_xlabel("time, s")
         shown = ": all, 80 %, median" if len(found.cases) > FEW else ""
@@ -46,7 +46,7 @@ def picture(found: Swept, kind: str) -> bytes:
     return drawing(size, kind, draw)
 
 
-def _labelled(found: Swept, name: str) -> str:
+def _label(found: Swept, name: str) -> str:
     return ", ".join(filter(None, (name, found.unit(name))))
 
 

@@ -48,7 +48,7 @@ class Study:
         """All cases, always in one order: the last list varies fastest, what is drawn fastest of all."""
         lists, drawn = [a for a in self.axes if not a.drawn], [a for a in self.axes if a.drawn]
         points = self._points(len(drawn))
-        columns = [axis.at(points[:, k]) for k, axis in enumerate(drawn)]
+        columns = [axis.values_at(points[:, k]) for k, axis in enumerate(drawn)]
         for chosen in itertools.product(*(a.values for a in lists)):
             fixed = {a.name: value for a, value in zip(lists, chosen, strict=True)}
             for k in range(max(self.runs, 1)):

@@ -87,7 +87,7 @@ def axes_of(runner: Runner, texts: tuple[str, ...]) -> list[Axis]:
 
 
 def _evaluate(runner: Runner) -> Evaluate:
-    loaded = runner.loaded()
+    loaded = runner.load_model()
     known = {p.name: p.unit.dimension for p in loaded.first.prepared.network.parameters}
 
     def value(name: str, text: str) -> float | None:
@@ -122,8 +122,8 @@ def sweep(
     """
     runner = runner or Runner(request, keep)
     cases = tuple(study.cases())
-    _judged(runner, cases[0])
-    target = runner.loaded().target
+    _check_first(runner, cases[0])
+    target = runner.load_model().target
     texts = lock.hashes(target)
     digest = study.digest(request=replace(request, output=None), texts=texts, version=__version__, keep=keep)
     units, attributes = _units(runner, cases[0]), _attributes(target, study)
@@ -151,7 +151,7 @@ def sweep(
         finally:
             results.write(place, cases, journal.done, units, attributes, timings=timings)
         journal.remove()
-    alone = runner.said(cases[0]) if journal.done.singles else ""
+    alone = runner.reason_for_single_runs(cases[0]) if journal.done.singles else ""
     return Swept(output, cases, journal.done, units, resumed, alone)
 
 
@@ -166,15 +166,15 @@ def _items(
     return spread(request, tasks, left, dask, keep)
 
 
-def _judged(runner: Runner, case: Case) -> None:
+def _check_first(runner: Runner, case: Case) -> None:
     """What is wrong with the text, or with instants that are asked for, stops a sweep before its first run."""
     try:
-        runner.loaded().bound({n: v for n, v in case.items() if n not in CHOICES and not n.startswith("level ")})
+        runner.load_model().bound({n: v for n, v in case.items() if n not in CHOICES and not n.startswith("level ")})
     except ModelError as error:  # numbers that the text refuses are a run's own failure
         if not {d.code for d in error.diagnostics} <= REFUSED:
             raise
     report = Report()
-    instants_of(runner.request, runner.loaded().target.document, report)
+    instants_of(runner.request, runner.load_model().target.document, report)
     report.raise_if_failed()
 
 
@@ -194,7 +194,7 @@ def _attributes(target: Target, study: Study) -> dict[str, Any]:
 
 def _units(runner: Runner, case: Case) -> dict[str, str]:
     """Of parameters, what varies of them and traced quantities by name."""
-    prepared = runner.loaded().first.prepared
+    prepared = runner.load_model().first.prepared
     known = {p.name: si_text(p.unit.dimension) for p in prepared.network.parameters}
     rows = [row for row in prepared.structure["rows"] if row.get("stored")]
     known |= {name: known[whole] for name in case if (whole := name.partition("[")[0]) in known}

@@ -175,7 +175,7 @@ class Bench:
         """Asked of the judged quantities."""
         return min([self.options.accuracy or ACCURACY, *(wanted for _, wanted in self.options.accuracy_on)])
 
-    def judged(self, trace: Trace) -> tuple[str, ...]:
+    def judged_quantities(self, trace: Trace) -> tuple[str, ...]:
         """Quantities whose errors count."""
         on = [name for name, _ in self.options.accuracy_on]
         return tuple(name for name in trace.names if not on or self.options.accuracy is not None or name in on)
@@ -262,21 +262,21 @@ class Bench:
         found = outcome.traced
         error = None
         if outcome.final:
-            error = error_of(found, reference, self.judged(reference), self.accuracy, until, at=at)
+            error = error_of(found, reference, self.judged_quantities(reference), self.accuracy, until, at=at)
             if not math.isfinite(error):
                 numbers = all(np.isfinite(found[name].values).all() for name in found.names)
                 lack = "apart from events it has no instants to compare" if numbers else "a quantity is no number"
                 reason = reason or lack
         counts = {key: n for key, n in outcome.statistics.items() if isinstance(n, int)}
         size, method = self.size(combination), combination.method
-        fixed = work.fixed(found.time.size, size, method)
+        fixed = work.work_of_rows(found.time.size, size, method)
         return Measured(
             combination,
             tolerance,
             error,
             outcome.timings["cpu_integrate_s"],
             outcome.statistics["steps"],
-            fixed + work.counted(counts, size, method),
+            fixed + work.work_of_steps(counts, size, method),
             fixed,
             float(np.max(np.abs(found["audit.energy"].values), initial=0.0)),
             float(np.max(found["audit.constraints"].values, initial=0.0)),
@@ -351,7 +351,7 @@ def bench_of(request: Request, folder: Path) -> Bench:
     if key not in _benches:
         report, own = Report(), folder / f"ahead-{os.getpid()}"
         own.mkdir(exist_ok=True)
-        target = targets.asked(request, report)
+        target = targets.target_of(request, report)
         assert target is not None
         _benches[key] = Bench(request, target, report, own, time.monotonic())
         _benches[key].prepare()

@@ -69,13 +69,13 @@ def picture(found: Traded, kind: str) -> bytes:
         axis.set_xlabel("largest relative error of the traced quantities")
         axis.set_ylabel("work, ns of one machine")
         axis.set_title(found.name, fontweight="bold", fontsize=11, pad=10)
-        axis.set_title(_resolved(found), loc="right", fontsize=8.5, color="#7b828c", pad=10)
+        axis.set_title(_uncertainty_text(found), loc="right", fontsize=8.5, color="#7b828c", pad=10)
         _legend(axis, found, colour)
 
     return drawing((8.6, 5.0), kind, draw)
 
 
-def _resolved(found: Traded) -> str:
+def _uncertainty_text(found: Traded) -> str:
     return f"reference known to {found.reference.uncertainty:.0e}"
 
 

@@ -30,7 +30,7 @@ LEAST = 40
 """Steps that every run may take: the longest is a twentieth of the span."""
 
 
-def _allowed(request: Request) -> None:
+def _check_request(request: Request) -> None:
     """UsageError where what a trade chooses is said already."""
     check_tolerances(request)
     if request.rtol is not None or request.atol is not None:
@@ -55,12 +55,12 @@ def trade(
     full: every combination at every tolerance; budget [s] of wall time for all; jobs: processes that make runs ahead;
     None: where it pays, which it does not where the search leaves most combinations out.
     """
-    _allowed(request)
+    _check_request(request)
     began = time.monotonic()
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     if target is None:
         return None
-    request = targets.held(request, target)
+    request = targets.with_text(request, target)
     bench = Bench(request, target, report, folder, began)
     if not bench.prepare():
         return None
@@ -109,7 +109,7 @@ def trade(
         (*bench.refusals, *_never(search)),
         tuple((c.combination, c.closed) for c in search.climbs if c.closed not in ("", "measured", c.refused)),
         known,
-        bench.judged(kept),
+        bench.judged_quantities(kept),
         search.ended,
     )
 

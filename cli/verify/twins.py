@@ -11,7 +11,7 @@ from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.start.starting import Started
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.names import stored
+from sysdyn.names import trace_name
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.structure.redundancy import combination, dependent, reactions
 from sysdyn.values import dataclass
@@ -72,7 +72,7 @@ def free_quantities(prepared: Prepared, started: Started) -> tuple[str, ...]:
     free = free_multipliers(started)
     quantities = prepared.compiled.energies.quantities if free else ()
     found = [q.name for q in quantities if q.stored and any(n.data[0] in free for n in _multipliers(q.expression))]
-    return tuple(stored(name) for name in found)
+    return tuple(trace_name(name) for name in found)
 
 
 def _multipliers(expression: ex.Node) -> list[ex.Node]:

@@ -62,10 +62,10 @@ def verify(
     check_tolerances(request)
     if request.method == "euler":
         raise UsageError("--method euler: verify compares bdf and radau, or another and bdf; euler has no accuracy")
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     if target is None:
         return None
-    return _Verification(targets.held(request, target), target, report, folder, progress).all(jobs)
+    return _Verification(targets.with_text(request, target), target, report, folder, progress).all(jobs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ def _part(asked: tuple[Request, Path | None, str | None]) -> _Part:
     """One formulation (None: the reference) in a process of its own."""
     request, folder, name = asked
     report = Report()
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     assert target is not None
     before = set(report)
     own = _Verification(request, target, report, folder, None)
@@ -134,7 +134,7 @@ class _Verification:
         asked: list[str | None] = []
         if jobs is None or jobs == 1:
             self._formulation(None)
-            if self._stopped():
+            if self._has_stopped():
                 return None
             asked += [name for name in EVERY if name != self.runs[0].formulation]
         else:
@@ -150,7 +150,7 @@ class _Verification:
                     self._take(part)
                     self.done = min(self.planned, self.done + len(METHODS) + (name is None))
                     self._advance(0.0, None)
-                if name is None and self._stopped():
+                if name is None and self._has_stopped():
                     return None
         except KeyboardInterrupt:
             if self.finer is None:
@@ -158,13 +158,13 @@ class _Verification:
             self.interrupted = True
         self._tell()
         assert self.finer is not None
-        return self._compared(self.finer)
+        return self._compare_runs(self.finer)
 
     def _here(self, item: tuple[Request, Path | None, str | None]) -> None:
         """A formulation in this process."""
         self._formulation(item[2])
 
-    def _stopped(self) -> bool:
+    def _has_stopped(self) -> bool:
         """The reference did not come to its end: it is said why."""
         if self.runs and self.finer is not None:
             return False
@@ -197,7 +197,7 @@ class _Verification:
                 label = prepared.formulation
                 options = options_of(request, self.target, prepared, report, self.began, None)
                 if options is not None and not report.failed:
-                    self._methods(prepared, _gridded(options), report, reference=name is None)
+                    self._methods(prepared, _on_grid(options), report, reference=name is None)
             elif name is not None and (refusal := _refusal(name, report)):
                 self.refusals.append(refusal)
                 report = Report()
@@ -283,7 +283,7 @@ class _Verification:
 
     # --- comparison ---------------------------------------------------------------------------------------------
 
-    def _compared(self, finer: Run) -> Verified:
+    def _compare_runs(self, finer: Run) -> Verified:
         reference = self.runs[0]
         for name in reference.trace.names:
             if not math.isfinite(self.bounds.get(name, math.inf)):
@@ -335,7 +335,7 @@ class _Verification:
         with ex.fresh():
             prepared = ready(request, self.target, report)
             options = prepared and options_of(request, self.target, prepared, report, self.began, None)
-            other = self._other(prepared, _gridded(options), run) if prepared and options else None
+            other = self._other(prepared, _on_grid(options), run) if prepared and options else None
         return (math.inf, None) if other is None else horizon(run.trace, other.trace, bounds)
 
 
@@ -348,7 +348,7 @@ def _refusal(formulation: str, report: Report) -> Refusal | None:
     return Refusal(formulation, reasons[0].code, reasons[0].message) if reasons else None
 
 
-def _gridded(options: Options) -> Options:
+def _on_grid(options: Options) -> Options:
     """Options whose trace holds the same instants whatever the method."""
     if options.every is not None:
         return options

@@ -17,7 +17,7 @@ from sysdyn.compiler.binding.binding import Binding, offsets_of, places_of
 from sysdyn.compiler.binding.columns import Varied, following, reads_of_structure
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.model.energies import EnergyModel
-from sysdyn.compiler.model.interpret import grid, last_of, looped
+from sysdyn.compiler.model.interpret import grid, last_of, with_loop_variables
 from sysdyn.compiler.model.parameters import Extents
 from sysdyn.compiler.program.program import Program
 from sysdyn.dsl.model.expression import Node, reads, topological_unbound
@@ -119,7 +119,7 @@ def _again(binding: Binding, path: Way, overrides: Mapping[str, float]) -> Bindi
     if not all(math.isfinite(values[name]) for name in (*overrides, *(name for name, _ in path.follow))):
         return None
     for slope, nodes, columns in path.slopes:
-        value = np.asarray(last_of(nodes, looped(columns, lookup)))
+        value = np.asarray(last_of(nodes, with_loop_variables(columns, lookup)))
         wrong = value != 0.0 if slope.flat else value == 0.0
         if slope.sign:
             wrong = ~(slope.sign * value > 0.0)
@@ -127,10 +127,10 @@ def _again(binding: Binding, path: Way, overrides: Mapping[str, float]) -> Bindi
             return None
     starts = list(binding.initial)
     for k, nodes, columns in path.pins:
-        value = np.asarray(last_of(nodes, looped(columns, lookup)), dtype=float)
+        value = np.asarray(last_of(nodes, with_loop_variables(columns, lookup)), dtype=float)
         if not np.isfinite(value).all():
             return None
-        starts[k] = starts[k].at(np.full(starts[k].values.shape, value))
+        starts[k] = starts[k].with_values(np.full(starts[k].values.shape, value))
     p = binding.p.copy()
     for name, place in path.places:
         p[place] = values[name]

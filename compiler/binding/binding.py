@@ -57,7 +57,7 @@ class Start:
         names = ("family", "positions", "values", "fixed", "label", "file", "line")
         return {name: getattr(self, name) for name in names}
 
-    def at(self, values: NDArray[np.float64]) -> Start:
+    def with_values(self, values: NDArray[np.float64]) -> Start:
         """The same statement with other values."""
         return Start(self.family, self.positions, values, self.fixed, self.label, self.file, self.line, self.place)
 
@@ -160,7 +160,7 @@ def _starts(form: DescriptorForm, owners: dict[str, Extents], parameters: Parame
     found = []
     for pin in form.pins:
         family = form.families[pin.family]
-        *at, values = over(pin.nest, (*pin.at, pin.value), parameters.checked(pin.place))
+        *at, values = over(pin.nest, (*pin.at, pin.value), parameters.lookup_at_place(pin.place))
         box = owners[family.owner]
         where = _positions(family.owner, box, at, pin.place) if box else np.zeros(len(values), dtype=np.int32)
         parameters.finite(values, pin.place, f"the initial value of {family.name}")

@@ -122,23 +122,23 @@ class _Judge:
         own = ex.var(b.name, "bf" if b.side == "e" else "be", *b.at)
         name = b.name.partition("#")[0]
         if b.kind == "dissipator":
-            yield self._signed(name, law, own, b.place)
+            yield self._judge_sign(name, law, own, b.place)
         elif b.kind in ("effort", "flow"):
             read = {n for n in ex.variables(law) if n.op == "var"}
             if not read:
                 yield Finding(name, "port", "structure", "a source that follows time and parameters", b.place)
             elif read == {own}:
-                yield self._signed(name, law, own, b.place)
+                yield self._judge_sign(name, law, own, b.place)
             else:
                 controlled.append((name, ex.mul(law, _conjugate(b, own)), b.place))
         elif b.kind in ("kinetic", "potential"):
-            yield from self._pumped(name, law, b.place)
+            yield from self._find_time_varying_store(name, law, b.place)
 
-    def _signed(self, name: str, law: Node, own: Node, place: Place) -> Finding:
+    def _judge_sign(self, name: str, law: Node, own: Node, place: Place) -> Finding:
         """A law and its own variable: e f >= 0?"""
         if self._sliding(law):
             return Finding(name, "dissipates", "structure", "dry friction, against its own sliding", place)
-        fixed = cache(self._fixed)
+        fixed = cache(self._parameter_value)
         above, below = (enclose_over(law, {own: r}, fixed) for r in ((0.0, np.inf), (-np.inf, 0.0)))
         if above[0] >= 0.0 and below[1] <= 0.0:
             none = above[1] == 0.0 and below[0] == 0.0
@@ -154,7 +154,7 @@ class _Judge:
             largest = max(largest, abs(value)) if np.isfinite(value) else largest
         return Finding(name, "dissipates", "sampled", f"e f >= 0 at {len(DECADES)} points", place)
 
-    def _pumped(self, name: str, law: Node, place: Place) -> Iterator[Finding]:
+    def _find_time_varying_store(self, name: str, law: Node, place: Place) -> Iterator[Finding]:
         """A store whose law changes with time or signals is supplied through it."""
         moving = [n for n in ex.variables(law) if n.op == "time" or n.data[1] == "s"]
         if moving:
@@ -163,7 +163,9 @@ class _Judge:
     def _stores(self, network: Network) -> Iterator[Finding]:
         for energy in network.energies:
             if energy.function in ("T*", "T", "V", "V*"):
-                yield from self._pumped(f"energy of line {_line(energy.place)}", energy.expression, energy.place)
+                yield from self._find_time_varying_store(
+                    f"energy of line {_line(energy.place)}", energy.expression, energy.place
+                )
 
     def _contents(self, network: Network) -> Iterator[Finding]:
         """Contents D(f), G(e): the power is sum f dD/df; summand by summand where one variable moves it."""
@@ -183,7 +185,7 @@ class _Judge:
             if own and not ex.is_const(still, 0.0) and self._sliding(energy.expression):
                 yield Finding(name, "port", "structure", "what it slides on moves", energy.place)
             if len(own) == 1:
-                yield self._signed(name, slopes[own[0]], rates[own[0]], energy.place)
+                yield self._judge_sign(name, slopes[own[0]], rates[own[0]], energy.place)
             elif own:
                 yield self._quadratic(name, inner, list(rates.values()), energy.place)
 
@@ -193,8 +195,8 @@ class _Judge:
         second = [[derivative(s, v) for v in own] for s in slopes]
         still = dict.fromkeys(own, ex.const(0.0))
         if not any(ex.variables(n) for row in second for n in row):
-            matrix = np.array([[self._fixed(n) for n in row] for row in second])
-            flat = all(self._fixed(ex.substitute(s, still)) == 0.0 for s in slopes)
+            matrix = np.array([[self._parameter_value(n) for n in row] for row in second])
+            flat = all(self._parameter_value(ex.substitute(s, still)) == 0.0 for s in slopes)
             values = np.linalg.eigvalsh((matrix + matrix.T) / 2.0)
             if flat and values[0] >= -1e-14 * abs(values).max():
                 role = "dissipates" if values[-1] > 0.0 else "conserves"
@@ -202,7 +204,7 @@ class _Judge:
             if flat:
                 return Finding(name, "active", "structure", f"its matrix has the eigenvalue {values[0]:.3g}", place)
         power = ex.add(*(ex.mul(v, s) for v, s in zip(own, slopes, strict=True)))
-        return self._sampled(name, [power], place)
+        return self._sample_power(name, [power], place)
 
     def _works(self, network: Network, controlled: list[tuple[str, Node, Place]]) -> Iterator[Finding]:
         given = {u.name for u in network.unknowns}
@@ -246,11 +248,13 @@ class _Judge:
             gamma, own = closing[0].expression, unknowns[0]
             slope = derivative(gamma, flows[0])
             known = {n for n in ex.variables(gamma) if n.op == "var"} <= {own, flows[0]}
-            if known and not ex.variables(slope) and self._fixed(slope) != 0.0:
+            if known and not ex.variables(slope) and self._parameter_value(slope) != 0.0:
                 flow = ex.neg(ex.div(ex.substitute(gamma, {flows[0]: ex.const(0.0)}), slope))
                 part = derivative(effort, own)
                 if not ex.variables(part):
-                    return self._signed(name, ex.neg(ex.mul(ex.substitute(rate, {flows[0]: flow}), part)), own, place)
+                    return self._judge_sign(
+                        name, ex.neg(ex.mul(ex.substitute(rate, {flows[0]: flow}), part)), own, place
+                    )
         return Finding(name, "unknown", "structure", "an effort constraint gives its effort", place)
 
     def _constraints(self, network: Network) -> Iterator[Finding]:
@@ -262,7 +266,7 @@ class _Judge:
 
     def _together(self, controlled: Sequence[tuple[str, Node, Place]]) -> Finding:
         """Controlled sources and works by what they absorb together; the first that supplies most is named."""
-        found = self._sampled(
+        found = self._sample_power(
             ", ".join(dict.fromkeys(name for name, _, _ in controlled)),
             [power for _, power, _ in controlled],
             controlled[0][2],
@@ -272,7 +276,7 @@ class _Judge:
         worst = min(controlled, key=lambda item: self._least(item[1]))
         return Finding(worst[0], "active", found.how, f"controlled: {found.said}", worst[2])
 
-    def _sampled(self, name: str, powers: Sequence[Node], place: Place) -> Finding:
+    def _sample_power(self, name: str, powers: Sequence[Node], place: Place) -> Finding:
         """The sum of absorbed powers at random points."""
         leaves = sorted({n for p in powers for n in ex.variables(p)}, key=lambda n: n.number)
         lost = False
@@ -305,7 +309,7 @@ class _Judge:
             found = evaluate([root], lambda n, args: values[n] if n in values else self._leaf(n, args))[0]
             return float(np.ravel(found)[0])
 
-    def _fixed(self, root: Node) -> float:
+    def _parameter_value(self, root: Node) -> float:
         if root.op == "param" and not root.args:  # most of what a netlist asks
             return float(np.ravel(self._leaf(root, []))[0])
         return self._value(root, {})

@@ -78,10 +78,10 @@ def following(network: Network, varied: set[str]) -> list[str]:
                 known.add(p.name)
                 found.append(p.name)
                 changed = True
-    return _ordered(network, found)
+    return _dependency_order(network, found)
 
 
-def _ordered(network: Network, names: list[str]) -> list[str]:
+def _dependency_order(network: Network, names: list[str]) -> list[str]:
     """Names after those that their formulas use."""
     formulas = {p.name: p.values for p in network.parameters}
     left, order = list(names), list[str]()

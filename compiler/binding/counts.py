@@ -76,7 +76,7 @@ def _constraints(
     alone = next((row for row in left if row not in matched), None)
     if alone is None:
         return []
-    rows, coordinates = _reached(alone, matched, pairs)
+    rows, coordinates = _overdetermined_block(alone, matched, pairs)
     of = sorted({form.families[k].owner for k, _ in coordinates})
     labels = sorted({form.rows[k].label for k, _ in rows})
     if not of:
@@ -128,7 +128,7 @@ def match(left: Sequence[Element], pairs: dict[Element, list[Element]]) -> dict[
     return partner
 
 
-def _reached(
+def _overdetermined_block(
     root: Element, matched: dict[Element, Element], pairs: dict[Element, list[Element]]
 ) -> tuple[list[Element], list[Element]]:
     """Rows and columns on alternating paths from an unmatched row: the overdetermined block."""

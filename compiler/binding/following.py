@@ -71,7 +71,7 @@ def following(network: Network, form: DescriptorForm, program: Program, binding:
     """All that follows from the given parameters of a bound model."""
     owners, where = places_of(network, form, program, binding)
     where |= {name: k for k, name in enumerate(program.scalars)}
-    follows = {p.name: used for p in network.parameters if (used := _used(network, p))}
+    follows = {p.name: used for p in network.parameters if (used := _parameters_read(network, p))}
     pieces = [
         *_parameters(network, binding, where, follows),
         *_initial(form, binding),
@@ -88,7 +88,7 @@ def _names(roots: Sequence[Node]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(n.data for n in topological(roots) if n.op == "param"))
 
 
-def _used(network: Network, parameter: Parameter) -> tuple[str, ...]:
+def _parameters_read(network: Network, parameter: Parameter) -> tuple[str, ...]:
     """The parameters that the text gives a parameter by; none for a number."""
     known = {p.name for p in network.parameters}
     roots = [*parameter.values, *(e.value for e in network.elements if e.name == parameter.name)]

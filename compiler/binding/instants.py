@@ -70,7 +70,7 @@ def instants(
     """
     search = _Search(binding.parameters, t0, t1)
     try:
-        for watched in _watched(form, {t.name: t for t in tables}, read):
+        for watched in _watched_operations(form, {t.name: t for t in tables}, read):
             search.add(watched)
         for node in crossed:
             if _in_time_alone(node) and _degree((node,)) > 1:
@@ -101,8 +101,8 @@ def changes(
     search = _Search(parameters, *span)
     try:
         for node in topological_unbound([root]):
-            for watched in _of(node, dict(tables)):
-                search.add(replace(watched, nest=_trimmed(watched.arguments, nest)))
+            for watched in _watches_of(node, dict(tables)):
+                search.add(replace(watched, nest=_trim_nest(watched.arguments, nest)))
         return search.times()
     except _TooManyError:
         return np.zeros(0)
@@ -122,7 +122,7 @@ def _zeros(node: Node, arguments: tuple[Node, ...]) -> Watched:
     return Watched(node, arguments, lambda v: np.sign(v[0]), np.zeros(1), ())
 
 
-def _watched(form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node]) -> Iterator[Watched]:
+def _watched_operations(form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node]) -> Iterator[Watched]:
     """Operations of all rows that are integrated, and of what events read, those inside others first."""
     stack: list[tuple[Node, Nest]] = [(node, ()) for node in read]
     for block in form.blocks:
@@ -135,14 +135,14 @@ def _watched(form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node
             if node.op == "reduce":
                 first, last, body = node.args
                 stack.append((body, (*nest, Loop(node.data[1], first, last))))
-            for watched in _of(node, tables):
-                kept = _trimmed(watched.arguments, nest)
+            for watched in _watches_of(node, tables):
+                kept = _trim_nest(watched.arguments, nest)
                 if (node, kept) not in seen:
                     yield Watched(node, watched.arguments, watched.label, watched.levels, kept)
-            seen.add((node, _trimmed(node.args, nest)))
+            seen.add((node, _trim_nest(node.args, nest)))
 
 
-def _of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
+def _watches_of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
     """What is watched of a node; nothing where it does not depend on time alone."""
     if not any(_in_time_alone(a) for a in node.args):
         return
@@ -176,7 +176,7 @@ def _in_time_alone(node: Node) -> bool:
     return bool(found) and all(leaf.op == "time" for leaf in found)
 
 
-def _trimmed(arguments: tuple[Node, ...], nest: Nest) -> Nest:
+def _trim_nest(arguments: tuple[Node, ...], nest: Nest) -> Nest:
     """The loops whose variables the arguments use, and those that these loops' bounds use."""
     used = {n.data for n in topological(arguments) if n.op == "index"}
     kept: list[Loop] = []
@@ -240,7 +240,7 @@ class _Search:
             return
         labels = Labels(watched, columns, self._parameters.lookup)
         try:
-            brackets = self._affine(watched, labels, number) or self._sampled(watched, labels, number)
+            brackets = self._affine(watched, labels, number) or self._bracket_changes(watched, labels, number)
         except KeyError:  # a constant that is known at the start only
             return
         start = self.t0 + ROUND_OFF * (self.t1 - self.t0)
@@ -290,7 +290,7 @@ class _Search:
         around = 1e-12 * np.maximum(max(abs(self.t0), abs(self.t1)), np.abs(t))
         return index, np.maximum(t - around, self.t0), np.minimum(t + around, self.t1)
 
-    def _sampled(self, watched: Watched, labels: Labels, number: int) -> tuple[Whole, Array, Array]:
+    def _bracket_changes(self, watched: Watched, labels: Labels, number: int) -> tuple[Whole, Array, Array]:
         """Brackets between neighbouring samples of different labels, on pieces smooth inside."""
         inside = [self._found[n] for n in topological(watched.arguments) if n in self._found]
         edges = distinct(np.array([self.t0, self.t1]), *inside)
@@ -305,7 +305,7 @@ class _Search:
             part = (np.arange(each) + random.uniform(0.1, 0.9, (left.size, each))) / each
             t = np.concatenate([left[:, None], left[:, None] + (right - left)[:, None] * part, right[:, None]], axis=1)
             pairs = np.repeat(np.arange(number), t.size), np.tile(t.ravel(), number)
-            value = labels.at(*pairs).reshape(number, *t.shape)
+            value = labels.labels_at(*pairs).reshape(number, *t.shape)
             k, piece, place = np.nonzero(value[..., 1:] != value[..., :-1])
             if k.size > 4 * MOST:
                 raise _TooManyError

@@ -117,7 +117,7 @@ class _Jumping:
     def what(self) -> str | None:
         """Where it jumps, in words; None where it does not."""
         for t in self._instants():
-            if self._apart(self._points(FEW), time(), *_around(t)):
+            if self._jumps_between(self._points(FEW), time(), *_adjacent_doubles(t)):
                 return f"at t = {t:.9g} s"
         for node in (n for n in topological_unbound([self.root]) if _steps(n, self.network)):
             moving = sorted((n for n in variables(node) if n.op == "var"), key=lambda n: n.number)
@@ -165,7 +165,7 @@ class _Jumping:
                 break
             same = self._labels(label, points, point, leaf, middle) == first
             low, high = np.where(inside & same, middle, low), np.where(inside & ~same, middle, high)
-        return self._apart({name: values[point] for name, values in points.items()}, leaf, low, high)
+        return self._jumps_between({name: values[point] for name, values in points.items()}, leaf, low, high)
 
     def _label(self, node: Node) -> tuple[tuple[Node, ...], Callable[..., Array]]:
         """The arguments of an operation, and what is constant on its branches."""
@@ -203,7 +203,7 @@ class _Jumping:
 
         return look
 
-    def _apart(self, points: Mapping[Node | str, Array], leaf: Node, *sides: Array | float) -> bool:
+    def _jumps_between(self, points: Mapping[Node | str, Array], leaf: Node, *sides: Array | float) -> bool:
         """Whether the expression differs at any points where one leaf has the values of two sides."""
         shape = points[leaf].shape
         looks = [self._look({**points, leaf: np.broadcast_to(side, shape)}) for side in sides]
@@ -213,6 +213,6 @@ class _Jumping:
             return bool((np.abs(found[0] - found[-1]) > MEETS * np.maximum(*sizes)).any())
 
 
-def _around(t: float) -> tuple[float, float]:
+def _adjacent_doubles(t: float) -> tuple[float, float]:
     """The doubles before and behind an instant."""
     return float(np.nextafter(t, -np.inf)), float(np.nextafter(t, np.inf))

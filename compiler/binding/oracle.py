@@ -72,7 +72,7 @@ class Oracle:
                     np.add.at(r, self.to[summand.row] + np.broadcast_to(where, values.shape), np.abs(c * values))
         return r
 
-    def undefined(
+    def find_undefined(
         self, block: str, t: float, y: Array, yd: Array, *, infinite: bool = True
     ) -> tuple[int, Node, list[float]] | None:
         """(row family, node, its arguments) of the first operation that makes of numbers what is none; None: there is

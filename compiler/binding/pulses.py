@@ -68,7 +68,7 @@ def pulses(
         for k in range(min(number, ELEMENTS)):
             held = {name: float(values[k]) for name, values in columns.items()}
             try:
-                found += _of(_bounded(root, _fixed(binding, held), outlines), t0, t1, known)
+                found += _pulses_of(_outline_of(root, _evaluator_at_rest(binding, held), outlines), t0, t1, known)
             except KeyError:  # a constant that is known at the start only
                 break
     times = distinct(np.zeros(0), *found)
@@ -91,7 +91,7 @@ def quickest(binding: Binding, t0: float, t1: float, read: Sequence[Node], form:
     return found
 
 
-def _fixed(binding: Binding, held: Mapping[str, float]) -> Values:
+def _evaluator_at_rest(binding: Binding, held: Mapping[str, float]) -> Values:
     """Values of what does not depend on time, in one iteration of the loops around it."""
 
     def look(node: Node, args: list[Value]) -> Value:
@@ -126,7 +126,7 @@ def _signals(form: DescriptorForm | None, crossed: Sequence[Node]) -> Iterator[t
             stack += [(a, nest) for a in root.args]
 
 
-def _bounded(root: Node, fixed: Values, outlines: Mapping[str, Outline]) -> Outline:
+def _outline_of(root: Node, fixed: Values, outlines: Mapping[str, Outline]) -> Outline:
     """Bounds by the expression itself and, from both ends of an interval, by its slope.
 
     A sum of terms that rise and fall is bounded by the first as if they were independent; where the slope has one sign
@@ -192,7 +192,7 @@ def _cells(signal: Outline, t0: float, t1: float) -> Array:
     return distinct(*done, low)
 
 
-def _of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
+def _pulses_of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
     """Instants of each pulse of one signal: the edges of its small cells, thinned to five.
 
     What is small is asked again and again, each time FINER, so that a pulse is found on a signal that varies by itself.
@@ -211,7 +211,9 @@ def _of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
                 taken[first:last] = True
                 runs.append(edges[first : last + 1])
         yield from (
-            _within(signal, run) for run, told in zip(runs, _told(signal, runs, stops), strict=True) if not told
+            _quartiles(signal, run)
+            for run, told in zip(runs, _is_monotone(signal, runs, stops), strict=True)
+            if not told
         )
         number += len(runs)
         narrow *= FINER
@@ -219,7 +221,7 @@ def _of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
             return
 
 
-def _told(signal: Outline, runs: Sequence[Array], stops: Array) -> Sequence[bool]:
+def _is_monotone(signal: Outline, runs: Sequence[Array], stops: Array) -> Sequence[bool]:
     """Of each run of cells whether the signal only rises or falls between stops in it, and rests before and behind."""
     if not runs:
         return ()
@@ -240,7 +242,7 @@ def _told(signal: Outline, runs: Sequence[Array], stops: Array) -> Sequence[bool
     return list(told)
 
 
-def _within(signal: Outline, edges: Array) -> Array:
+def _quartiles(signal: Outline, edges: Array) -> Array:
     """The ends of a pulse, and where it changes most: quarters of its total variation."""
     value = signal(edges, edges)[0]
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.nan_to_num(value))))])

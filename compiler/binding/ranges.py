@@ -46,9 +46,9 @@ class Ranges:
 
     def extremes(self, node: Node, bounds: Bounds) -> tuple[float, float]:
         """Least and largest value of an affine index."""
-        return self._at(node, bounds, 0), self._at(node, bounds, 1)
+        return self._end_value(node, bounds, 0), self._end_value(node, bounds, 1)
 
-    def _at(self, node: Node, bounds: Bounds, side: int) -> float:
+    def _end_value(self, node: Node, bounds: Bounds, side: int) -> float:
         def lookup(leaf: Node, args: list[Value]) -> Value:
             if leaf.op == "index" and leaf.data in bounds:
                 return bounds[leaf.data][side]

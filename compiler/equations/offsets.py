@@ -56,7 +56,7 @@ def offsets(form: DescriptorForm) -> Offsets | None:
         orders.append(held)
     if len(orders) != len(unknowns):
         return None
-    c, d = _solved(orders, len(unknowns)) or (None, None)
+    c, d = _canonical_offsets(orders, len(unknowns)) or (None, None)
     if c is None or d is None:
         return None
     found = tuple((*name, int(times)) for name, times in zip(names, c, strict=True) if times)
@@ -64,7 +64,7 @@ def offsets(form: DescriptorForm) -> Offsets | None:
     return Offsets(found, late, max(c, default=0) + bool(late))
 
 
-def _solved(orders: Sequence[dict[int, int]], n: int) -> tuple[list[int], list[int]] | None:
+def _canonical_offsets(orders: Sequence[dict[int, int]], n: int) -> tuple[list[int], list[int]] | None:
     """Offsets of rows and of unknowns."""
     sigma = np.full((n, n), NEVER)
     for i, held in enumerate(orders):

@@ -46,14 +46,14 @@ def integrate(model: EnergyModel) -> tuple[EnergyModel, tuple[Diagnostic, ...]]:
     rows: list[Row] = []
     for row in model.rows:
         if row.kind == "psi" and row.name in chosen:
-            integrated, offset = _integrated(row, model.mirror)
+            integrated, offset = _integrate_row(row, model.mirror)
             rows.append(integrated)
             offsets.append(offset)
             if not row.adds:
                 notes.append(_note(row, labels[row.name], offset, tangible, model.mirror))
         else:
             rows.append(row)
-    return _renamed(replace(model, rows=tuple(rows), offsets=tuple(offsets)), chosen), tuple(notes)
+    return _rename_multipliers(replace(model, rows=tuple(rows), offsets=tuple(offsets)), chosen), tuple(notes)
 
 
 def _touches(rows: list[Row], tangible: frozenset[str], mirror: Mirror) -> bool:
@@ -84,7 +84,7 @@ def _primitive(expression: Node, mirror: Mirror) -> Node:
     return add(*parts, mul(free, time()))
 
 
-def _integrated(row: Row, mirror: Mirror) -> tuple[Row, Offset]:
+def _integrate_row(row: Row, mirror: Mirror) -> tuple[Row, Offset]:
     name = f"#offset {row.name}"
     terms = tuple(Term(_primitive(t.expression, mirror), t.loops, t.place) for t in row.terms)
     constant = () if row.adds else (Term(neg(param(name, *row.at)), row.nest, row.place),)
@@ -120,7 +120,7 @@ def _at_start(expression: Node, mirror: Mirror) -> str:
     return to_text(substitute(expression, {**marks, time(): const(0.0)}))
 
 
-def _renamed(model: EnergyModel, labels: set[str]) -> EnergyModel:
+def _rename_multipliers(model: EnergyModel, labels: set[str]) -> EnergyModel:
     """Multipliers mu of the labels written as kappa everywhere."""
 
     def new(root: Node) -> Node:

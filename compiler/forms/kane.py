@@ -50,7 +50,7 @@ class Projection:
 def kane(model: EnergyModel) -> DescriptorForm:
     """Unknowns q f kappa e s, and mu where it is kept.  ModelError E607 where the rows of Psi depend on each other."""
     (rows, joining), form = constraints(model), lagrangian(model)
-    read = _joined(rows, _reactions_read(form) | joining)
+    read = _coupled_labels(rows, _reactions_read(form) | joining)
     found = projection(model, {label: entries for label, entries in rows.items() if label not in read})
     speeds = speeds_of(model, read)
     if speeds.speeds:
@@ -240,11 +240,11 @@ def _reactions_read(form: DescriptorForm) -> frozenset[str]:
     return frozenset(read | {f.owner for f in pinned if f.kind == "mu"})
 
 
-def _joined(rows: Mapping[str, Entries], read: frozenset[str]) -> frozenset[str]:
+def _coupled_labels(rows: Mapping[str, Entries], read: frozenset[str]) -> frozenset[str]:
     """These labels, and all whose rows share flows with them."""
     columns = {c for label in read for c in rows[label]}
     more = frozenset(label for label, entries in rows.items() if columns & set(entries))
-    return read if more <= read else _joined(rows, read | more)
+    return read if more <= read else _coupled_labels(rows, read | more)
 
 
 class _Projected:
@@ -255,9 +255,9 @@ class _Projected:
         self.flows = {var(n, "f"): speeds.flow(n) for n in speeds.rest}
         self.change = {var(n, "f", order=1): total_rate(speeds.flow(n)) for n in speeds.rest}
         self.assembly = Assembly()
-        self.rated = self._rated()
+        self.rated = self._massless_coordinates()
 
-    def _rated(self) -> frozenset[str]:
+    def _massless_coordinates(self) -> frozenset[str]:
         """Coordinates whose mixed balances are algebraic (see `lowering`), with their rates."""
         block = self.lagrange.block("dynamics_rate")
         rows = {s.row for kernel in block.kernels for s in kernel.rows} if block else set()

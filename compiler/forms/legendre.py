@@ -68,7 +68,7 @@ class _Block:
     terms: tuple[int, ...]
 
 
-def transformed(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[EnergyModel, tuple[Slope, ...]]:
+def legendre_transform(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[EnergyModel, tuple[Slope, ...]]:
     """The model with T(p, q) for the blocks of T* that allow it; the determinants that must not become zero."""
     m = model.mirror
     terms = model.function(m.coenergy)
@@ -78,13 +78,13 @@ def transformed(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[En
     solved: dict[str, tuple[Node, Node]] = {}
     for block in _blocks(terms, m.rate):
         whole = add(*(terms[k].expression for k in block.terms))
-        inertia = _inertia(whole, block.flows, _known(parameters))
+        inertia = _inertia(whole, block.flows, _scalar_values(parameters))
         if inertia is None:
             continue
         place = terms[block.terms[0]].place
         momenta = _momenta(whole, block.flows, m.conjugate)
-        if len(inertia) > WRITTEN and not _apart(inertia):
-            solved |= _solved(whole, block.flows, inertia, momenta, m.conjugate)
+        if len(inertia) > WRITTEN and not _is_diagonal(inertia):
+            solved |= _flow_relations(whole, block.flows, inertia, momenta, m.conjugate)
         else:
             gone |= set(block.terms)
             found += [Term(part, (), place) for part in _energy(whole, block.flows, inertia, momenta)]
@@ -98,8 +98,8 @@ def transformed(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[En
 
 def _rest_on(inertia: Square, flows: Sequence[Node]) -> Iterator[tuple[Node, Node]]:
     """A flow and what of parameters must not be zero, for M to have an inverse; at one point where M moves."""
-    apart = _apart(inertia)
-    sizes = [row[k] for k, row in enumerate(inertia)] if apart else _eliminated(inertia)[1]
+    apart = _is_diagonal(inertia)
+    sizes = [row[k] for k, row in enumerate(inertia)] if apart else _factor_inertia(inertia)[1]
     drawn = random.Random(0)
     at: dict[Node, Node] = {}
     for node in topological(sizes):
@@ -143,7 +143,7 @@ def _inertia(whole: Node, flows: Sequence[Node], known: Values) -> list[list[Nod
     for entry in (e for row in inertia for e in row):
         if any(n in rates or (n.op == "var" and n.data[1] not in ("q", "p", "s")) for n in variables(entry)):
             return None
-    if not _apart(inertia) and len(flows) > COUPLED:
+    if not _is_diagonal(inertia) and len(flows) > COUPLED:
         return None
     return inertia if _regular(inertia, known) else None
 
@@ -172,7 +172,7 @@ def _form(inertia: Square, momenta: Sequence[Node]) -> list[Node]:
     return found
 
 
-def _solved(
+def _flow_relations(
     whole: Node, flows: Sequence[Node], inertia: Square, momenta: Sequence[Node], conjugate: str
 ) -> dict[str, tuple[Node, Node]]:
     """By coordinate 0 = dT/dp - f, and the rate of this where it holds: M^-1 (p' - (dT*/df)')."""
@@ -183,7 +183,7 @@ def _solved(
 
 def _flows(inertia: Square, momenta: Sequence[Node]) -> list[Node]:
     """M^-1 z, by elimination."""
-    lower, pivots = _eliminated(inertia)
+    lower, pivots = _factor_inertia(inertia)
     y: list[Node] = []
     for k, z in enumerate(momenta):
         y.append(sub(z, add(*(mul(lower[k][j], y[j]) for j in range(k)))))
@@ -194,7 +194,7 @@ def _flows(inertia: Square, momenta: Sequence[Node]) -> list[Node]:
     return found[::-1]
 
 
-def _eliminated(inertia: Square) -> tuple[list[list[Node]], list[Node]]:
+def _factor_inertia(inertia: Square) -> tuple[list[list[Node]], list[Node]]:
     """The rows of L and the pivots of M = L D L^T."""
     lower: list[list[Node]] = []
     pivots: list[Node] = []
@@ -209,13 +209,13 @@ def _eliminated(inertia: Square) -> tuple[list[list[Node]], list[Node]]:
 
 
 def _inverse(inertia: Square) -> list[list[Node]]:
-    if not _apart(inertia):
+    if not _is_diagonal(inertia):
         return inverse(inertia)
     zero = const(0.0)
     return [[power(e, const(-1.0)) if j == k else zero for k, e in enumerate(row)] for j, row in enumerate(inertia)]
 
 
-def _apart(inertia: Square) -> bool:
+def _is_diagonal(inertia: Square) -> bool:
     """Whether M is diagonal."""
     return all(is_const(e, 0.0) for j, row in enumerate(inertia) for k, e in enumerate(row) if j != k)
 
@@ -223,7 +223,7 @@ def _apart(inertia: Square) -> bool:
 def _regular(inertia: Square, known: Values) -> bool:
     """Whether no pivot of M is nearly zero at some points; of those far out, only where M has values there."""
     entries = [e for row in inertia for e in row]
-    pivots = [row[k] for k, row in enumerate(inertia)] if _apart(inertia) else _eliminated(inertia)[1]
+    pivots = [row[k] for k, row in enumerate(inertia)] if _is_diagonal(inertia) else _factor_inertia(inertia)[1]
     n = len(pivots)
     for seed in range(DRAWN):
         drawn = random.Random(seed)
@@ -249,7 +249,7 @@ def _regular(inertia: Square, known: Values) -> bool:
     return True
 
 
-def _known(parameters: Sequence[Parameter]) -> Values:
+def _scalar_values(parameters: Sequence[Parameter]) -> Values:
     """Values of scalar parameters by name; of others 1."""
     said = {p.name: p.values[0] for p in parameters if not p.shape and len(p.values) == 1}
     found: dict[str, float] = {}

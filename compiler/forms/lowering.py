@@ -24,12 +24,18 @@ from sysdyn.compiler.forms.meters.audit import add_audit
 from sysdyn.compiler.forms.meters.observing import (
     add_initials,
     add_observations,
-    begun,
+    displacement_unknowns,
     missing,
-    observed,
+    observed_coordinates,
     pins_and_equations,
 )
-from sysdyn.compiler.forms.momenta import given, inertial, jumping, resolved, shared
+from sysdyn.compiler.forms.momenta import (
+    coordinates_by_energy,
+    coordinates_of_shared_inertia,
+    inertial,
+    jumping,
+    resolve_momenta,
+)
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.calculus import derivative, differential, gradient, moving, parameter_rates, time_derivative
@@ -50,9 +56,9 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     """The descriptor form; `legendre`: every inertial coordinate carries its momentum as an unknown, else those alone
     whose inertia jumps.
     """
-    stores = given(model)
+    stores = coordinates_by_energy(model)
     carriers = stores | (inertial(model) if legendre else jumping(model))
-    model = resolved(model, frozenset(carriers))
+    model = resolve_momenta(model, frozenset(carriers))
     form = _Lowering(model, stores, frozenset(carriers))
     form.declare()
     form.kinetic()
@@ -66,7 +72,7 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     form.families += missing(equations)
     if equations or form.moves_flows():
         measured = {n.data[0] for i in model.initials if i.store for n in variables(i.target) if n.op == "var"}
-        form.held(shared(model) - carriers - measured)
+        form.add_momentum_rows(coordinates_of_shared_inertia(model) - carriers - measured)
     owners = (*model.coordinates, *model.unknowns, *model.states, *model.positions)
     shapes = [(f.name, f.shape) for f in owners]
     shapes += [(e.owner, loop_ranges(e.target.nest)) for e in equations]
@@ -181,7 +187,9 @@ class _Lowering:
         # an integrated psi makes nothing tangible, but its displacements are variables
         pieces = [t.expression for row in m.of_kind("phi") for t in row.terms]
         held = {n.data[0] for piece in pieces for n in local_variables(piece, m.mirror.coordinate)}
-        seen = begun(m, observed(m, self.carriers) | held | {c.name for c in m.coordinates if c.tangible})
+        seen = displacement_unknowns(
+            m, observed_coordinates(m, self.carriers) | held | {c.name for c in m.coordinates if c.tangible}
+        )
         found = [Unknowns(c.shown, "q", c.name, c.units["q"], c.place) for c in m.coordinates if c.name in seen]
         rates = [f"({c.shown})'" if c.less else f"{c.name}'" for c in m.coordinates]
         found += [Unknowns(r, "f", c.name, c.units["f"], c.place) for c, r in zip(m.coordinates, rates, strict=True)]
@@ -286,7 +294,7 @@ class _Lowering:
         one = any(_of_one_combination(energy, rates) for energy, rates in inertias)
         return one or any(row.kind != "lambda" for row in self.model.rows)
 
-    def held(self, names: frozenset[str]) -> None:
+    def add_momentum_rows(self, names: frozenset[str]) -> None:
         """The least change of these flows is that of the momenta which they make together: what they miss of zero, at
         the start alone, as momenta that are unknowns change there.
         """

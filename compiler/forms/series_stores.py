@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from sysdyn.compiler.forms.efforts import Effort, efforts
-from sysdyn.compiler.forms.momenta import moved
+from sysdyn.compiler.forms.momenta import coordinates_with_inertia
 from sysdyn.compiler.model.energies import EnergyModel, Row
 from sysdyn.compiler.model.terms import Nest, local_variables
 from sysdyn.dsl.model.calculus import derivative
@@ -33,7 +33,7 @@ class _Told:
 
 def with_efforts_of_stores(model: EnergyModel) -> EnergyModel:
     """The model whose laws read the stores in series with what they are of."""
-    told = dict(_told(model))
+    told = dict(_series_pairs(model))
     if not told:
         return model
 
@@ -53,8 +53,8 @@ def with_efforts_of_stores(model: EnergyModel) -> EnergyModel:
     return replace(model, rows=tuple(map(row, model.rows)))
 
 
-def _told(model: EnergyModel) -> Iterator[tuple[str, _Told]]:
-    heavy, shapes = moved(model), {u.name: u.shape for u in model.unknowns}
+def _series_pairs(model: EnergyModel) -> Iterator[tuple[str, _Told]]:
+    heavy, shapes = coordinates_with_inertia(model), {u.name: u.shape for u in model.unknowns}
     balances: dict[str, list[Effort]] = {}
     for effort in efforts(model):
         balances.setdefault(effort.on.data[0], []).append(effort)

@@ -95,7 +95,7 @@ def speeds_of(model: EnergyModel, kept: frozenset[str]) -> Speeds:
         if labels & kept or len(names) > LARGEST or not names <= set(scalars) or len(labels) == len(part):
             continue
         order = [name for name in scalars if name in names]
-        square = _completed(model, part, order)
+        square = _complete_basis(model, part, order)
         inverted = inverse([[line.entries.get(name, const(0.0)) for name in order] for line in square])
         for k, line in enumerate(square):
             if line.speed is not None:
@@ -146,7 +146,7 @@ def _parts(lines: Sequence[_Line]) -> list[tuple[set[str], list[_Line]]]:
     return found
 
 
-def _completed(model: EnergyModel, part: Sequence[_Line], order: Sequence[str]) -> list[_Line]:
+def _complete_basis(model: EnergyModel, part: Sequence[_Line], order: Sequence[str]) -> list[_Line]:
     """The lines and as many flows as make them a square of full rank."""
     units = {c.name: c for c in model.coordinates}
     square: list[_Line] = []

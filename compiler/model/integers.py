@@ -33,7 +33,7 @@ class Index:
     constant: int
     table: int = -1
 
-    def listed(self) -> list[int]:
+    def as_list(self) -> list[int]:
         """Its numbers; of a table only where there is one."""
         return [self.loop, self.slot, self.constant, *([self.table] if self.table >= 0 else [])]
 

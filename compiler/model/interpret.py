@@ -113,7 +113,7 @@ def grid(nest: Nest, lookup: Lookup) -> dict[str, NDArray[np.float64]]:
     """Loop variables of a nest as arrays over its iterations, last loop fastest."""
     columns: dict[str, NDArray[np.float64]] = {}
     for loop in nest:
-        inside = looped(columns, lookup)
+        inside = with_loop_variables(columns, lookup)
         low, high = (np.rint(np.asarray(v)) for v in evaluate([loop.first, loop.last], inside))
         size = len(next(iter(columns.values()))) if columns else 1
         low, high = np.broadcast_to(low, size), np.broadcast_to(high, size)
@@ -129,10 +129,10 @@ def over(nest: Nest, roots: Sequence[Node], lookup: Lookup) -> list[NDArray[np.f
     """Values of expressions for all iterations of a nest, one array each (one element without loops)."""
     columns = grid(nest, lookup)
     size = len(next(iter(columns.values()))) if columns else 1
-    values = evaluate(roots, looped(columns, lookup))
+    values = evaluate(roots, with_loop_variables(columns, lookup))
     return [np.broadcast_to(np.asarray(v, dtype=float), (size,)).copy() for v in values]
 
 
-def looped(columns: Mapping[str, Value], lookup: Lookup) -> Lookup:
+def with_loop_variables(columns: Mapping[str, Value], lookup: Lookup) -> Lookup:
     """Loop variables by name: nodes of other `fresh` blocks mean the same."""
     return lambda node, args: columns[node.data] if node.op == "index" and node.data in columns else lookup(node, args)

@@ -72,7 +72,7 @@ def rounding(root: Node) -> Node:
     found: dict[Node, Node] = {}
     for node in topological_unbound([root]):
         exact = node.op in EXACT or any(a not in found for a in node.args)
-        found[node] = const(0.0) if exact else add(_own_rounding(node), *_inherited(node, found))
+        found[node] = const(0.0) if exact else add(_own_rounding(node), *_propagated_errors(node, found))
     return found[root]
 
 
@@ -83,7 +83,7 @@ def _own_rounding(node: Node) -> Node:
     return linear(abs(node.data[0]), [(abs(c), call("abs", a)) for c, a in zip(node.data[1], node.args, strict=True)])
 
 
-def _inherited(node: Node, found: dict[Node, Node]) -> Iterator[Node]:
+def _propagated_errors(node: Node, found: dict[Node, Node]) -> Iterator[Node]:
     """What the errors of the arguments come to; of an exact argument none, also where the derivative is a pole."""
     for argument, partial in zip(node.args, partials(node), strict=True):
         error = found[argument]

@@ -50,7 +50,7 @@ class Parameters:
             self._settings.setdefault(setting.name, []).append(setting)
         self._given = {key if isinstance(key, str) else key[0] for key in overrides} | self._settings.keys()
         self._check(overrides)
-        for parameter in self._ordered(overrides):
+        for parameter in self._dependency_order(overrides):
             self._bind(parameter, overrides)
         if network.scene is not None and network.scene.start is not None:
             self.start = float(evaluate([network.scene.start], self.lookup)[0])
@@ -61,7 +61,7 @@ class Parameters:
             if plain not in self._known:
                 raise ModelError([Diagnostic("E405", f"there is no parameter '{plain}'", None)])
 
-    def _ordered(self, overrides: Mapping[Override, Any]) -> list[Parameter]:
+    def _dependency_order(self, overrides: Mapping[Override, Any]) -> list[Parameter]:
         """Parameters after those that their values and shapes use."""
         known = self._known
         order, circles = in_order(known, lambda name: self._uses(known[name], name in overrides))
@@ -99,7 +99,7 @@ class Parameters:
         else:
             values = self._formula(parameter, box)
         for setting in () if name in overrides else self._settings.get(name, ()):
-            *at, value = evaluate((*setting.at, setting.value), self.checked(setting.place))
+            *at, value = evaluate((*setting.at, setting.value), self.lookup_at_place(setting.place))
             values[self._element(name, box, tuple(at), setting.place)] = value
         for key, value in overrides.items():
             if not isinstance(key, str) and key[0] == name:
@@ -112,7 +112,7 @@ class Parameters:
 
     def _formula(self, parameter: Parameter, box: Extents) -> NDArray[np.float64]:
         """The values as the text gives them."""
-        lookup = self.checked(parameter.place)
+        lookup = self.lookup_at_place(parameter.place)
         shape = extents(box)
         if parameter.indices:
             pairs = zip(parameter.indices, box, strict=False)  # indices that follow hold a list, or one value for all
@@ -182,14 +182,14 @@ class Parameters:
             at.append(rounded - first)
         return values[tuple(at)]
 
-    def checked(self, place: Place) -> Callable[[Node, list[Value]], Value]:
+    def lookup_at_place(self, place: Place) -> Callable[[Node, list[Value]], Value]:
         """`lookup` with the place added to what it finds wrong."""
 
         def look(node: Node, args: list[Value]) -> Value:
             try:
                 return self.lookup(node, args)
             except ModelError as error:
-                raise ModelError([_placed(d, place) for d in error.diagnostics]) from None
+                raise ModelError([_add_place(d, place) for d in error.diagnostics]) from None
 
         return look
 
@@ -208,7 +208,7 @@ def _number(parameter: Parameter) -> float | None:
     return node.data if node.op == "const" and math.isfinite(node.data) else None
 
 
-def _placed(found: Diagnostic, place: Place) -> Diagnostic:
+def _add_place(found: Diagnostic, place: Place) -> Diagnostic:
     return Diagnostic(found.code, found.message, found.place or place, found.help, found.related, found.label)
 
 

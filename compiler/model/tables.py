@@ -25,11 +25,11 @@ def numbers(table: Table) -> Array:
     values = np.asarray(table.values, dtype=float)
     if len(axes) == 1:
         rows = coefficients(axes[0], values, table.method, table.outside)
-        return np.concatenate((_closed(axes[0], table.outside), rows.ravel()))
+        return np.concatenate((_lookup_points(axes[0], table.outside), rows.ravel()))
     return np.concatenate((axes[0], axes[1], values))
 
 
-def _closed(x: Array, outside: str) -> Array:
+def _lookup_points(x: Array, outside: str) -> Array:
     """The breakpoints that pieces are looked up by: of a table that stops, the last one still belongs to its piece."""
     if outside != "stop":
         return x
@@ -136,7 +136,7 @@ def evaluate(table: Table, arguments: list[Any], orders: tuple[int, ...]) -> Any
     u, order = np.asarray(arguments[0], dtype=float), orders[0]
     x = np.asarray(table.points[0], dtype=float)
     rows = coefficients(x, np.asarray(table.values, dtype=float), table.method, table.outside)
-    piece = np.sum(u[..., None] >= _closed(x, table.outside), axis=-1)
+    piece = np.sum(u[..., None] >= _lookup_points(x, table.outside), axis=-1)
     distance = u - x[np.maximum(piece - 1, 0)]
     value = np.zeros_like(u)
     for power in range(order, 4):

@@ -28,7 +28,7 @@ def along(network: Network, *, complementary: bool) -> Network:
         return network
     if complementary:
         network = _with_transformers(network)
-    return _in_series(_beside(network))
+    return _in_series(_connect_along_nodes(network))
 
 
 def _combination(root: Node) -> Parts | None:
@@ -95,7 +95,7 @@ def _plain(parts: Parts) -> bool:
 # -- between common-flow nodes -----------------------------------------------------------------------------
 
 
-def _beside(network: Network) -> Network:
+def _connect_along_nodes(network: Network) -> Network:
     """Elements along displacements of common-flow nodes and branches, between these nodes."""
     targets = _single(network.branches)
     absorbed: dict[str, list[tuple[int, Branch]]] = {}
@@ -105,7 +105,7 @@ def _beside(network: Network) -> Network:
         return b if found is None else replace(b, on=None, plus=found[0], minus=found[1])
 
     branches = tuple(ends(b) if b.on is not None else b for b in network.branches)
-    return _without(replace(network, branches=branches), absorbed)
+    return _drop_paths(replace(network, branches=branches), absorbed)
 
 
 def _ends(
@@ -154,7 +154,7 @@ def _root(b: Branch, targets: dict[str, Branch]) -> tuple[int, Branch] | None:
     return sign, here
 
 
-def _without(network: Network, found: dict[str, list[tuple[int, Branch]]]) -> Network:
+def _drop_paths(network: Network, found: dict[str, list[tuple[int, Branch]]]) -> Network:
     """The network without the branches that are only the way of the elements along them."""
     bare = _bare(network)
     ways = {name: elements for name, elements in found.items() if name in bare}
@@ -199,14 +199,14 @@ def _in_series(network: Network) -> Network:
     placed: dict[str, Branch] = {}
     nodes: list[NodeFamily] = []
     for chain in chains:
-        inner, branches = _placed(chain)
+        inner, branches = _place_chain(chain)
         nodes += inner
         placed |= {b.name: b for b in branches}
     network = replace(network, nodes=(*network.nodes, *nodes))
-    return _without(replace(network, branches=tuple(placed.get(b.name, b) for b in network.branches)), found)
+    return _drop_paths(replace(network, branches=tuple(placed.get(b.name, b) for b in network.branches)), found)
 
 
-def _placed(chain: _Chain) -> tuple[list[NodeFamily], Iterator[Branch]]:
+def _place_chain(chain: _Chain) -> tuple[list[NodeFamily], Iterator[Branch]]:
     """Nodes between the elements of a chain, and the elements there."""
     root = chain.root
     members = [*chain.elements, *([(1, root)] if chain.kept else [])]

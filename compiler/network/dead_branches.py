@@ -29,7 +29,7 @@ def dead_branches(network: Network, found: Sequence[Link], asked: frozenset[Quan
     alone = {q for q, links in touched.items() if links == 1 and q not in read}
     able = [b for b in network.branches if ("b", b.name) in alone and _able(b)]
     ends = [(b, q) for b in able for q in _nodes(b) if q in alone and len(set(_ends(b))) == 2]
-    grounded = _grounded(network) if ends else set[str | None]()
+    grounded = _nodes_joined_to_ground(network) if ends else set[str | None]()
     single = {("n", n.name) for n in network.nodes if n.name in grounded and not n.shape}
     dead = {b.name: end for b, end in reversed(ends) if end in single}  # of two ends the first
     if not dead:
@@ -81,7 +81,7 @@ def _ties(
             yield frozenset({("b", b.name)})
 
 
-def _grounded(network: Network) -> set[str | None]:
+def _nodes_joined_to_ground(network: Network) -> set[str | None]:
     """Nodes that branches join to the ground of their domain (None)."""
     beside: dict[str | None, set[str | None]] = {}
     for b in network.branches:

@@ -113,7 +113,7 @@ def _acting(network: Network, item: Any, acted: Sequence[Node], read: Sequence[N
     return Link(item, joined, (all_ - joined) | read_by(network, read))
 
 
-def _held(network: Network, item: Any, root: Node, own: frozenset[Quantity]) -> Link:
+def _link_of_workless(network: Network, item: Any, root: Node, own: frozenset[Quantity]) -> Link:
     """A workless statement: its reactions hold signals fixed."""
     found = _acting(network, item, [signals_held(root)[0]], [root])
     return replace(found, joined=found.joined | own)
@@ -129,18 +129,18 @@ def _branch(network: Network, b: Branch) -> Link:
 
 
 def _coupling(network: Network, c: Coupling) -> Link:
-    return _held(network, c, c.ratio, frozenset({("b", c.first), ("b", c.second)}))
+    return _link_of_workless(network, c, c.ratio, frozenset({("b", c.first), ("b", c.second)}))
 
 
 def _constraints(network: Network) -> Iterator[Link]:
     for c in network.constraints:
         if c.kind != "gamma":
-            yield _held(network, c, c.expression, frozenset({("c", c.name)}))
-    for item, closed in _closed(network):
+            yield _link_of_workless(network, c, c.expression, frozenset({("c", c.name)}))
+    for item, closed in _closures(network):
         yield Link(item, closed, read_by(network, [item.expression]))
 
 
-def _closed(network: Network) -> Iterator[tuple[Constraint, frozenset[Quantity]]]:
+def _closures(network: Network) -> Iterator[tuple[Constraint, frozenset[Quantity]]]:
     """Each gamma with the implicit unknowns that it closes.
 
     One whose rows are those of its only unknown that no other closes, closes that one; what is left closes together.
@@ -169,7 +169,7 @@ def _whole(c: Constraint, shape: Shape) -> bool:
     return ranges == shape and c.at == loop_indices(c.loops)
 
 
-def reached(found: Sequence[Link], asked: frozenset[Quantity]) -> frozenset[Quantity]:
+def influences_on(found: Sequence[Link], asked: frozenset[Quantity]) -> frozenset[Quantity]:
     """All that influences what is asked: through what is joined both ways, through what is read one way."""
     of: dict[Quantity, list[int]] = {}
     for k, link in enumerate(found):

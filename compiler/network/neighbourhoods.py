@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from operator import itemgetter
 
-from sysdyn.compiler.network.skeleton import Shaped, shaped
+from sysdyn.compiler.network.skeleton import Shaped, shape_of
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Network, Terminal
 from sysdyn.values import dataclass
@@ -57,7 +57,7 @@ def laws_of(network: Network) -> Laws:
     """What each branch that may stand in a family has for a law, and its number among those that differ."""
     free, numbers, found = _free(network), dict[object, int](), Laws({}, {})
     for b in network.branches:
-        shape = shaped(b.law, b.name) if b.name in free else None
+        shape = shape_of(b.law, b.name) if b.name in free else None
         if shape is not None:
             found.shapes[b.name] = shape
             key = b.domain.name, b.kind, b.side, shape.key
@@ -113,14 +113,14 @@ def _whole(network: Network, laws: Laws, sites: dict[str, Site]) -> Found:
     """Sites and runs without the families that single branches tear to pieces: these stay as they are written."""
     for _ in range(ROUNDS):
         runs = list(_runs(network, laws, sites))
-        torn = _torn(network, sites, runs)
+        torn = _fragmented_families(network, sites, runs)
         if not torn:
             return sites, runs
         sites = {name: site for name, site in sites.items() if site[0] not in torn}
     return {}, []
 
 
-def _torn(network: Network, sites: dict[str, Site], runs: Sequence[Run]) -> set[str]:
+def _fragmented_families(network: Network, sites: dict[str, Site], runs: Sequence[Run]) -> set[str]:
     """Families of which alike neighbours are fewer than SHORT on the average."""
     cuts: dict[str, set[int]] = {}
     for run in runs:

@@ -101,23 +101,23 @@ def with_positions(network: Network, wanted: frozenset[Wanted]) -> Network:
     def position(end: Terminal) -> Node:
         return ex.const(0.0) if end.node is None else ex.var(f"{end.node}.start", "start", *end.at)
 
-    def begun(join: _Join) -> Initial:
+    def initial_of(join: _Join) -> Initial:
         apart = ex.sub(position(join.plus), position(join.minus))
         return Initial(ex.sub(join.content, apart), ex.const(0.0), True, join.loops, join.place, join.name)
 
-    def positioned(root: Node) -> Node:
+    def substitute_positions(root: Node) -> Node:
         found = _positions([root])
         return ex.substitute(root, {n: position(Terminal(n.data[0], n.args)) for n in found}) if found else root
 
     nodes = [n for n in network.nodes if n.name in parts]
     points = (_point_of(n) for n in network.nodes if n.name in parts and (n.name, "nq") in wanted)
-    kept = rewritten(network, positioned, ("initials",)).initials
+    kept = rewritten(network, substitute_positions, ("initials",)).initials
     return replace(
         network,
         positions=tuple(State(f"{n.name}.start", n.shape, n.domain.displacement, n.place) for n in nodes),
         initials=(
             *(i for i in kept if not is_position(i.target, stores_of(network))),
-            *(begun(join) for join in (*springs, *points) if any(name in parts for name in join.nodes)),
+            *(initial_of(join) for join in (*springs, *points) if any(name in parts for name in join.nodes)),
         ),
     )
 

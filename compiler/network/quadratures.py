@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Box, Sizes, without
+from sysdyn.compiler.network.primal.bounds import Box, Sizes, box_difference
 from sysdyn.compiler.network.primal.overlaps import ranges_of
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -67,13 +67,13 @@ def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
     stores = stores_of(network)
     roots = ex.topological(expressions(network, "observations", "dynamics", "expectations", "branches.law"))
     wanted = dict.fromkeys((n.data[0], n.data[1]) for n in roots if is_position(n, stores))
-    return _integrated(network, wanted, "f"), frozenset(wanted)
+    return _add_quadratures(network, wanted, "f"), frozenset(wanted)
 
 
 def with_momenta(network: Network) -> Network:
     """The primal family's: NAME.p, p' = e, of dissipators whose law reads their own momentum."""
     wanted = {(b.name, "bp"): None for b in network.branches if b.kind == "dissipator" and reads(b, "bp")}
-    return _integrated(network, wanted, "e") if wanted else network
+    return _add_quadratures(network, wanted, "e") if wanted else network
 
 
 def reads(branch: Branch, kind: str) -> bool:
@@ -82,7 +82,7 @@ def reads(branch: Branch, kind: str) -> bool:
     return any(n.op == "var" and n.data[:2] == (branch.name, kind) for n in law)
 
 
-def _integrated(network: Network, wanted: Iterable[Wanted], rate: str) -> Network:
+def _add_quadratures(network: Network, wanted: Iterable[Wanted], rate: str) -> Network:
     """With a dynamic variable for each of these, of this rate (e or f), read in their places."""
     wanted = dict.fromkeys(wanted)
 
@@ -136,7 +136,7 @@ def massive(network: Network) -> frozenset[str]:
             reach = sizes.reach(b.plus.at, ranges_of(b.loops, sizes, b.place), b.place)
             found.setdefault(b.plus.node, []).append(reach)
     boxes = {n.name: sizes.box(n.shape, n.place) for n in network.nodes}
-    return frozenset(name for name, holes in found.items() if not without(boxes[name], *holes))
+    return frozenset(name for name, holes in found.items() if not box_difference(boxes[name], *holes))
 
 
 def stores_of(network: Network) -> frozenset[str]:

@@ -22,7 +22,7 @@ from sysdyn.compiler.network.quadratures import from_masses, massive, with_quadr
 from sysdyn.compiler.network.stated import ALL, as_elements
 from sysdyn.compiler.network.sticking import as_relations
 from sysdyn.compiler.network.ties import as_transformers
-from sysdyn.compiler.network.ungrounded import grounded
+from sysdyn.compiler.network.ungrounded import add_references
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import (
@@ -48,14 +48,16 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    bare = from_masses(from_stores(grounded(as_elements(as_relations(complements(as_transformers(network))), ALL))))
+    bare = from_masses(
+        from_stores(add_references(as_elements(as_relations(complements(as_transformers(network))), ALL)))
+    )
     network = with_positions(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
-    return replace(relabelled(network), read=read)
+    return replace(relabel(network), read=read)
 
 
-def relabelled(network: Network) -> Network:
+def relabel(network: Network) -> Network:
     """The same statements with the letters of the other family; twice is the network itself."""
     network = rewritten(network, _node)
     return replace(

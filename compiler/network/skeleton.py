@@ -27,7 +27,7 @@ class _StrangeError(Exception):
     """Something that no hole and no key stands for."""
 
 
-def shaped(root: Node | None, own: str) -> Shaped | None:
+def shape_of(root: Node | None, own: str) -> Shaped | None:
     """The shape of an expression of time and of quantities of the element `own`; None where it reads more or bends."""
     if root is None:
         return None
@@ -65,13 +65,13 @@ def _key(node: Node, own: str, holes: list[Node], left: list[int], *, whole: boo
     raise _StrangeError
 
 
-def filled(shape: Shaped, own: str, at: tuple[Node, ...], holes: Sequence[Node]) -> Node:
+def fill_shape(shape: Shaped, own: str, at: tuple[Node, ...], holes: Sequence[Node]) -> Node:
     """The expression with other things in its holes, of the element `own` at these indices."""
     rest = list(reversed(holes))
-    return _filled(shape.key, own, at, rest)
+    return _fill(shape.key, own, at, rest)
 
 
-def _filled(key: tuple[object, ...], own: str, at: tuple[Node, ...], rest: list[Node]) -> Node:
+def _fill(key: tuple[object, ...], own: str, at: tuple[Node, ...], rest: list[Node]) -> Node:
     what, *inner = key
     match what:
         case "hole":
@@ -83,11 +83,11 @@ def _filled(key: tuple[object, ...], own: str, at: tuple[Node, ...], rest: list[
             return var(own, str(kind), *at, order=int(order))  # type: ignore[call-overload]
         case "sum":
             constant, *coefficients = [rest.pop() for _ in range(len(inner) + 1)]
-            args = [_filled(part, own, at, rest) for part in inner]  # type: ignore[arg-type]
+            args = [_fill(part, own, at, rest) for part in inner]  # type: ignore[arg-type]
             terms = [_times(c, a) for c, a in zip(coefficients, args, strict=True)]
             return add(constant, *terms)
     data, *parts = inner
-    args = [_filled(part, own, at, rest) for part in parts]  # type: ignore[arg-type]
+    args = [_fill(part, own, at, rest) for part in parts]  # type: ignore[arg-type]
     if what == "mul":
         return product(1.0, zip(data, args, strict=True))  # type: ignore[call-overload]
     return power(*args) if what == "pow" else call(str(data), *args)

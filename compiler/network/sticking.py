@@ -32,16 +32,16 @@ def as_relations(network: Network) -> Network:
     own = [p for p in network.parameters if p.name in owners]
     efforts = _efforts(network, set(owners))
 
-    def freed(root: Node) -> Node:
+    def with_set_values(root: Node) -> Node:
         for n in _senses(root, owners):
             unknown = ex.var(_set(n.data), "e", *n.args)
             alone = ex.substitute(root, {n: ex.const(0.0)})
             root = ex.add(alone, unknown) if n.data in efforts else ex.substitute(root, {n: unknown})
         return root
 
-    found = rewritten(network, freed)
+    found = rewritten(network, with_set_values)
     said = {o.name: o.expression for o in found.observations}
-    given = dict(pair for s in frictions for pair in _watched(s, said, efforts))
+    given = dict(pair for s in frictions for pair in _watched_friction(s, said, efforts))
     senses = {label: iter([name for name, other in owners.items() if other == label]) for label in owners.values()}
     return replace(
         found,
@@ -95,7 +95,7 @@ def _between_nodes(network: Network, row: Constraint) -> Network:
     senses = {s.sense.data for s in mine if s.sense is not None}
     sign, nodes = derivative(row.expression, flows[0]), {n.name: n.domain for n in network.nodes}
     for k, energy in enumerate(network.energies):
-        rest = _without(energy, senses)
+        rest = _without_friction(energy, senses)
         if energy.function != "D" or rest is energy.expression:
             continue
         part = replace(energy, expression=ex.sub(energy.expression, rest))
@@ -119,7 +119,7 @@ def _between_nodes(network: Network, row: Constraint) -> Network:
     return network
 
 
-def _without(energy: Energy, senses: set[str]) -> Node:
+def _without_friction(energy: Energy, senses: set[str]) -> Node:
     """A content without its friction: the terms with one of these senses."""
     found = [n for n in ex.topological([energy.expression]) if n.op == "param" and n.data in senses]
     return ex.substitute(energy.expression, dict.fromkeys(found, ex.const(0.0))) if found else energy.expression
@@ -147,7 +147,7 @@ def _row(c: Constraint, sense: str, efforts: Mapping[str, tuple[Branch, Node]]) 
     return replace(c, kind="gamma", name=_set(sense), at=at, expression=ex.conditional(sticks, c.expression, slips))
 
 
-def _watched(s: Switch, said: Mapping[str, Node], efforts: Container[str]) -> Iterator[tuple[str, Node]]:
+def _watched_friction(s: Switch, said: Mapping[str, Node], efforts: Container[str]) -> Iterator[tuple[str, Node]]:
     """What events read of a friction: its effort, and what that lacks to c on both sides."""
     assert s.sense is not None
     bound, effort = said[s.bound or ""], ex.var(_set(s.sense.data), "e", *s.sense.args)

@@ -29,7 +29,7 @@ class Strand:
     branches: tuple[tuple[Branch, bool], ...]
     nodes: tuple[str | None, ...]
 
-    def reversed(self) -> Strand:
+    def reverse(self) -> Strand:
         """The same the other way round."""
         return Strand(tuple((b, not sense) for b, sense in reversed(self.branches)), self.nodes[::-1])
 
@@ -86,7 +86,7 @@ class _Graph:
             ahead, behind = self._way(b, sense=True), self._way(b, sense=False)
             seen |= {c.name for c, _ in (*ahead[0], *behind[0])}
             if ahead[1][-1] not in self.joints:
-                back = Strand(*behind).reversed()
+                back = Strand(*behind).reverse()
                 yield Strand((*back.branches[:-1], *ahead[0]), (*back.nodes[:-2], *ahead[1]))
 
     def _way(self, b: Branch, *, sense: bool) -> tuple[tuple[tuple[Branch, bool], ...], tuple[str | None, ...]]:
@@ -184,6 +184,6 @@ def _classes(ways: Sequence[tuple[Strand, Links]], of: Mapping[str | None, str])
         key: object = (links, (one, two))
         back = tuple((not sense, law) for sense, law in reversed(links)), (two, one)
         if back < (links, (one, two)):
-            key, way = back, way.reversed()
+            key, way = back, way.reverse()
         found.setdefault(key, []).append(way)
     return tuple(tuple(same) for same in found.values() if len(same) >= RUN)

@@ -104,14 +104,14 @@ def _with_junction(
         at = loop_indices(c.loops)
         couplings.append(Coupling("transformer", name, others[k][0], at, c.loops, "e", ex.neg(factor), c.place))
 
-    def felt(root: Node) -> Node:
+    def multipliers_as_efforts(root: Node) -> Node:
         named = (n for n in ex.topological([root]) if n.op == "var" and n.data[0] == c.name)
         read = [n for n in named if n.data[1] in ("kappa", "mu")]
         return ex.substitute(root, {n: ex.neg(ex.var(others[0][0], "be", *n.args)) for n in read}) if read else root
 
     begun = (Initial(c.expression, ex.const(0.0), True, c.loops, c.place),) if c.kind == "phi" else ()
     kept = tuple(branches.get(b.name, b) for b in network.branches)
-    network = rewritten(replace(network, branches=kept), felt)
+    network = rewritten(replace(network, branches=kept), multipliers_as_efforts)
     return replace(
         network,
         initials=(*network.initials, *begun),

@@ -23,9 +23,9 @@ LARGEST = 2.0**16
 _READ = frozenset(("y", "yd", "p", "element", "time", "index"))
 
 
-def shared(routine: Routine) -> Routine:
+def share_operations(routine: Routine) -> Routine:
     """The same values but for round-off, in fewer operations."""
-    return replace(routine, body=_used(_factored(_Scaled(routine.body).body)))
+    return replace(routine, body=_drop_unused(_share_factors(_Scaled(routine.body).body)))
 
 
 def _binary(value: float) -> bool:
@@ -62,12 +62,12 @@ class _Scaled:
                     self._keep(target)
                 self.body.append(s)
 
-    def _apart(self, value: Operand) -> tuple[float, Operand]:
+    def _scale_of(self, value: Operand) -> tuple[float, Operand]:
         return self._scale.get(value, (1.0, value)) if isinstance(value, int) else (1.0, value)
 
     def _whole(self, value: Operand) -> Operand:
         """The value itself, made where it is only known by another."""
-        scale, own = self._apart(value)
+        scale, own = self._scale_of(value)
         return own if scale == 1.0 else self._make("sum", (0.0, (scale,)), (own,))
 
     def _keep(self, target: int) -> None:
@@ -92,7 +92,7 @@ class _Scaled:
 
     def _sum(self, s: Assign) -> None:
         constant, given = s.data
-        parts = [self._apart(a) for a in s.args]
+        parts = [self._scale_of(a) for a in s.args]
         coefficients = [c * scale for c, (scale, _) in zip(given, parts, strict=True)]
         args = tuple(own for _, own in parts)
         first = coefficients[0]
@@ -107,7 +107,7 @@ class _Scaled:
     def _product(self, s: Assign) -> None:
         scale, args = 1.0, []
         for exponent, value in zip(s.data, s.args, strict=True):
-            factor, own = self._apart(value)
+            factor, own = self._scale_of(value)
             power = factor**exponent if exponent == int(exponent) else 0.0
             if _binary(power) and _binary(scale * power):
                 scale *= power
@@ -117,7 +117,7 @@ class _Scaled:
         self._is(s.target, scale, self._make("mul", tuple(s.data), tuple(args), s.target))
 
 
-def _factored(body: Sequence[Statement]) -> list[Statement]:
+def _share_factors(body: Sequence[Statement]) -> list[Statement]:
     """The pairs of factors that most products share are made once, and the pairs of what is left then."""
     products = [s for s in body if isinstance(s, Assign) and s.op == "mul"]
     factors = {s.target: _factors(s) for s in products}
@@ -228,7 +228,7 @@ def _targets(body: Sequence[Statement]) -> Iterable[int]:
             yield from _targets(s.body)
 
 
-def _used(body: Sequence[Statement]) -> tuple[Statement, ...]:
+def _drop_unused(body: Sequence[Statement]) -> tuple[Statement, ...]:
     """The statements without those whose value nobody reads."""
     found: list[Statement] = []
     used: set[int] = set()

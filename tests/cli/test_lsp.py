@@ -481,7 +481,7 @@ def test_a_name_changed_everywhere_leaves_a_model_what_it_is(model):
     assert len(declared) > 10
     every = 1 if os.environ.get("SYSDYN_LONG") else 3
     for d in [*{d.place.span: d for d in declared}.values()][::every]:
-        changes = hover.renamed(document, d.place.span.start, "other_name")["changes"][document.uri]
+        changes = hover.rename_edits(document, d.place.span.start, "other_name")["changes"][document.uri]
         text = document.source.text
         for change in reversed(changes):
             start, end = (positions.offset(document.source, change["range"][side]) for side in ("start", "end"))

@@ -101,7 +101,7 @@ def _all():
     ("word", "name"), [("unit", "units"), ("functions", "expressions"), ("phi", "constraints"), ("scene", "scenes")]
 )
 def test_words_lead_to_their_page(word, name):
-    assert topics.named(word).name == name
+    assert topics.find_topic(word).name == name
 
 
 def test_help_knows_commands_and_codes(capsys):

@@ -11,7 +11,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import INDICES, chosen
-from sysdyn.cli.page.columns import aligned, complex_text
+from sysdyn.cli.page.columns import align, complex_text
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.runtime.trace.opening import replaceable
 
@@ -59,8 +59,8 @@ def command(
     if at is not None and equilibrium:
         raise UsageError("--at together with --equilibrium: an instant of a run, or a state of rest")
     kinds = _kinds(response)
-    _known(files)
-    from sysdyn.cli.analysis.linear import linearised
+    _check_outputs(files)
+    from sysdyn.cli.analysis.linear import linearise
     from sysdyn.cli.analysis.states import state_of
     from sysdyn.cli.run.request.asked import separate
     from sysdyn.dsl.model import expression as ex
@@ -81,7 +81,7 @@ def command(
         from sysdyn.cli.analysis.linear import inputs_of
 
         try:
-            linear = linearised(found, inputs_of(found.target, found.prepared, moved), form)
+            linear = linearise(found, inputs_of(found.target, found.prepared, moved), form)
         except NoLinearisation as error:
             console.report.error("E607", f"no linearisation: {error}", found.prepared.network.place)
             return console.finish(1)
@@ -157,7 +157,7 @@ def _kinds(response: str | None) -> tuple[str, ...]:
     return kinds
 
 
-def _known(files: Iterable[str]) -> None:
+def _check_outputs(files: Iterable[str]) -> None:
     for file in files:
         if Path(file).suffix not in (*DATA, *PICTURES):
             raise UsageError(f"-o '{file}': one of {', '.join((*DATA, *PICTURES))}")
@@ -291,7 +291,7 @@ def _still(linear: Any) -> str:
 
 def _table(linear: Any) -> str:
     """Modes and transfer functions as text."""
-    lines = [aligned(_modes(linear))] if linear.modes else ["no states"]
+    lines = [align(_modes(linear))] if linear.modes else ["no states"]
     for t in linear.transfers:
         lines += ["", linear.label(t)]
         lines.append(f"  gain   {t.gain:.9g}" + ("" if t.static is None else f", at rest {t.static:.9g}"))
@@ -306,12 +306,12 @@ def _modes(linear: Any) -> list[list[str]]:
     rows = [["eigenvalue [1/s]", "damping", "frequency [rad/s]", "participation", "energy in"]]
     for mode, energies in zip(linear.modes, linear.energies, strict=True):
         damping = "" if mode.damping is None else f"{mode.damping:.4g}"
-        shares = _listed(linear.reduced.names, mode.participation), _listed(linear.stores, energies)
+        shares = _largest_shares(linear.reduced.names, mode.participation), _largest_shares(linear.stores, energies)
         rows.append([complex_text(mode.eigenvalue), damping, f"{mode.frequency:.6g}", *shares])
     return rows if linear.stores else [row[:-1] for row in rows]
 
 
-def _listed(names: Sequence[str], shares: Sequence[float]) -> str:
+def _largest_shares(names: Sequence[str], shares: Sequence[float]) -> str:
     """Those that take part most."""
     order = sorted(range(len(names)), key=lambda k: -shares[k])
     return ", ".join(f"{names[k]} {100 * shares[k]:.0f} %" for k in order[:4] if shares[k] >= 0.05)

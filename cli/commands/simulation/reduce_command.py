@@ -11,7 +11,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import scene_command
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.cli.reduce.activity import Activities
 from sysdyn.cli.reduce.reduction import Cost, Reduced, reduce
 from sysdyn.cli.report.balance import WORDS
@@ -77,7 +77,7 @@ def _activity(found: Activities) -> str:
         bar = "#" * round(BAR * a.share / most) if most > 0.0 else ""
         sum_ = "" if a.role == "through" else f"{100.0 * total:.3f} %"
         rows.append([a.label, WORDS[a.role], f"{a.activity:.4g}", f"{100.0 * a.share:.3f} %", sum_, bar])
-    return aligned(rows, right=(2, 3, 4))
+    return align(rows, right=(2, 3, 4))
 
 
 def _summary(found: Reduced, target: Path, *, kept: bool, timings: bool) -> str:
@@ -86,7 +86,7 @@ def _summary(found: Reduced, target: Path, *, kept: bool, timings: bool) -> str:
         error = "-" if t.error is None else f"{t.error:.1e}"
         reason = t.reason if len(t.reason) <= 70 else t.reason[:67] + "..."
         rows.append([t.label, t.how, f"{100.0 * t.share:.3f} %", error, "kept" if t.kept else reason])
-    lines = ["", aligned(rows, right=(2, 3))] if found.trials else [""]
+    lines = ["", align(rows, right=(2, 3))] if found.trials else [""]
     if not found.ended:
         lines.append("the budget of wall time is spent: elements that were not tried may go too")
     number = sum(t.kept for t in found.trials)

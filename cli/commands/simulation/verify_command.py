@@ -10,7 +10,7 @@ import click
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import INTERRUPTED, SOLVER, worst
 from sysdyn.cli.options import scene_command, side_by_side
-from sysdyn.cli.page.columns import aligned, fitted, refusals, terminal
+from sysdyn.cli.page.columns import align, fit_columns, refusals, terminal
 
 if TYPE_CHECKING:
     from sysdyn.cli.verify.agreement import Gap
@@ -58,25 +58,25 @@ def command(
         return console.unable()
     console.result = _result(found, keep=output is not None, timings=not no_timings)
     console.results(_table(found, timings=not no_timings))
-    code = _judged(found, console)
+    code = _report_faults(found, console)
     if found.interrupted:
         console.complain("interrupted: these are the runs so far", INTERRUPTED)
         code = worst((code, INTERRUPTED))
     return console.finish(code)
 
 
-def _judged(found: Verified, console: Console) -> int:
+def _report_faults(found: Verified, console: Console) -> int:
     """Says what is wrong; the exit code."""
-    from sysdyn.cli.run.start.starting import shortened
+    from sysdyn.cli.run.start.starting import first_lines
 
     code = 0
     for text in _complaints(found):
         console.complain(text, 1)
         code = 1
-    for text in shortened(_doubts(found)):
+    for text in first_lines(_doubts(found)):
         console.complain(text, SOLVER)
         code = SOLVER
-    for text in shortened(_unbalanced(found)):
+    for text in first_lines(_ledger_lines(found)):
         console.complain(text, SOLVER)
         code = SOLVER
     for text in _warnings(found):
@@ -96,13 +96,13 @@ def _judged(found: Verified, console: Console) -> int:
 
 
 def _complaints(found: Verified) -> list[str]:
-    from sysdyn.cli.run.start.starting import shortened
+    from sysdyn.cli.run.start.starting import first_lines
 
     pairs = []
     for d in found.disagreements:
         if d.doubted:
             continue
-        pairs.append(f"{d.one.name} and {d.other.name} disagree: {_apart(d)}")
+        pairs.append(f"{d.one.name} and {d.other.name} disagree: {_disagreement_text(d)}")
     carriers = [
         f"{' and '.join(t.backends)} disagree in {t.formulation}: row {t.row} by {t.difference:.1e} of itself"
         for t in found.twins
@@ -111,7 +111,7 @@ def _complaints(found: Verified) -> list[str]:
     begun = [
         f"{run.name} begins elsewhere than {found.runs[0].name}: {_values(found, gap)}" for run, gap in found.apart
     ]
-    return [*begun, *shortened(pairs), *carriers]
+    return [*begun, *first_lines(pairs), *carriers]
 
 
 def _values(found: Verified, gap: Gap) -> str:
@@ -135,13 +135,13 @@ def _doubts(found: Verified) -> list[str]:
     """Differences from runs that are not met by their own estimate: nothing is known from them."""
     return [
         f"{' and '.join(run.name for run in d.doubted)}: not met by its own estimate, and apart from "
-        f"{(d.one if d.other in d.doubted else d.other).name}: {_apart(d)}"
+        f"{(d.one if d.other in d.doubted else d.other).name}: {_disagreement_text(d)}"
         for d in found.disagreements
         if d.doubted
     ]
 
 
-def _unbalanced(found: Verified) -> list[str]:
+def _ledger_lines(found: Verified) -> list[str]:
     """Ledgers that are off, a line each."""
     return [
         f"{run.name}: the {m.what} ledger is off by {m.value:.2g} {m.unit}, {m.limit:.2g} {m.unit} is allowed, "
@@ -151,7 +151,7 @@ def _unbalanced(found: Verified) -> list[str]:
     ]
 
 
-def _apart(d: Disagreement) -> str:
+def _disagreement_text(d: Disagreement) -> str:
     gap, unit = d.gap, d.one.trace[d.gap.variable].units
     a, b = (f"{value:.6g}{'' if unit == '1' else f' {unit}'}" for value in gap.values)
     worst = f"{gap.variable} is {a} and {b} at {gap.time:.6g} s, {gap.ratio:.3g} times what is allowed"
@@ -180,10 +180,10 @@ def _table(found: Verified, *, timings: bool) -> str:
         rows = [[cell for k, cell in enumerate(row) if k != 5] for row in rows]
     accuracy, (t0, t1) = found.runs[0].accuracy, found.span
     lines = [f"{found.name}: {t0:g} s to {t1:g} s, apart in units of {TIMES:g} x {accuracy:g} x nominal"]
-    rows, said = fitted(rows, SPARE, terminal())
+    rows, said = fit_columns(rows, SPARE, terminal())
     columns = len(rows[0])
-    lines += [aligned(rows, right={*range(2, columns)} - {columns - 2}), *([said] if said else [])]
-    lines += [*_starts(found), *_refused(found)]
+    lines += [align(rows, right={*range(2, columns)} - {columns - 2}), *([said] if said else [])]
+    lines += [*_starts(found), *_refusal_lines(found)]
     lines += [f"not compared: {name}: {reason}" for name, reason in found.left_out]
     if found.twins:
         apart = max(found.twins, key=lambda t: t.difference)
@@ -191,7 +191,7 @@ def _table(found: Verified, *, timings: bool) -> str:
     return "\n".join([*lines, _horizon(found), _verdict(found)])
 
 
-def _refused(found: Verified) -> list[str]:
+def _refusal_lines(found: Verified) -> list[str]:
     """Formulations left out, those with one reason together."""
 
     def reason(r: Refusal) -> str:

@@ -43,13 +43,13 @@ def command(
     pages = [f for f in (junit_file, html_file) if f == "-"]
     if pages and (console.as_json or len(pages) > 1):
         raise UsageError("only one thing can go to standard output")
-    from sysdyn.cli.compare.diffing import as_json, cases, differences, headline, opened, table
+    from sysdyn.cli.compare.diffing import as_json, cases, differences, headline, open_trace, table
     from sysdyn.cli.page.junit import junit
     from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance
 
     began = time.monotonic()
     try:
-        with opened(ref) as one, opened(test) as two:
+        with open_trace(ref) as one, open_trace(test) as two:
             verdict = differences(one, two, Tolerance(rtol, atol, wide))
             if html_file:
                 from sysdyn.cli.compare.comparison_page import page

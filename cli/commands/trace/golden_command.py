@@ -14,7 +14,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, USAGE, UsageError, worst
 from sysdyn.cli.options import BACKENDS, FORMULATIONS, Setting, of_file, side_by_side
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.cli.plain_files import inside, project
 from sysdyn.dsl.text.source import real
 
@@ -89,7 +89,7 @@ def record(
         raise UsageError(f"--rtol {rtol:g} --atol {atol:g}: between 0 and 1, and not negative")
     if request.file == "-":
         raise UsageError("a golden trace belongs to a model in a file")
-    target = targets.asked(request, console.report)
+    target = targets.target_of(request, console.report)
     if target is None:
         return console.finish(1)
     scene, model = target.scene.name.name if target.scene else None, target.model.name.name
@@ -103,7 +103,7 @@ def record(
         raise UsageError(f"{place} is of {known[0].model}: --name gives another folder")
     if any(g.name == label for g in known):
         raise UsageError(f"{place.name}/{label} is recorded already: 'sysdyn golden accept' renews it, with a reason")
-    found = _measured(console, request, rtol, atol, jobs)
+    found = _record_or_exit(console, request, rtol, atol, jobs)
     if isinstance(found, int):
         return console.finish(found)
     said = request.settings, request.until
@@ -195,12 +195,12 @@ def _mutants(console: Console, goldens: Sequence[Golden], jobs: int | None) -> i
     """`check --mutate`: exit 1 where a golden does not notice a change that it could have noticed."""
     from dataclasses import asdict
 
-    from sysdyn.cli.golden.jobs import mutated
+    from sysdyn.cli.golden.jobs import mutate_golden
     from sysdyn.cli.run.many.crew import each
 
     found: list[Mutant] = []
     code = 0
-    for golden, made in zip(goldens, each(mutated, goldens, jobs), strict=True):
+    for golden, made in zip(goldens, each(mutate_golden, goldens, jobs), strict=True):
         mutants, stopped = made if isinstance(made, tuple) else ([], (SOLVER, f"its process died ({made.how})"))
         for mutant in mutants:
             found.append(mutant)
@@ -280,10 +280,10 @@ def accept(
 
 def _again(console: Console, goldens: Sequence[Golden], jobs: int | None) -> Iterator[Recorded | int]:
     """The record of each golden, made anew; the exit code after saying why there is none."""
-    from sysdyn.cli.golden.jobs import renewed
+    from sysdyn.cli.golden.jobs import record_again
     from sysdyn.cli.run.many.crew import Lost, each
 
-    for golden, made in zip(goldens, each(renewed, goldens, jobs), strict=True):
+    for golden, made in zip(goldens, each(record_again, goldens, jobs), strict=True):
         died = isinstance(made, Lost)
         said, found = ([], (SOLVER, f"{golden.label}: its process died ({made.how})")) if died else made
         for line in said:
@@ -323,14 +323,14 @@ def list_(console: Console, folder: str) -> int:
             }
         )
     console.result = {"goldens": items}
-    console.data(aligned(rows))
+    console.data(align(rows))
     return console.finish()
 
 
 # ---- what record and accept share
 
 
-def _measured(console: Console, request: Request, rtol: float, atol: float, jobs: int | None) -> Recorded | int:
+def _record_or_exit(console: Console, request: Request, rtol: float, atol: float, jobs: int | None) -> Recorded | int:
     """The record; the exit code after saying why there is none."""
     from sysdyn.cli.golden import recording
     from sysdyn.cli.golden.runs import Stopped

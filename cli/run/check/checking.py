@@ -34,7 +34,7 @@ def file_checked(asked: tuple[str, bool, bool]) -> Checked:
         wrong = [d.place.span for d in report if d.severity == "error" and d.place and d.place.file == path]
         for target in targets.all_targets(document, report):
             with ex.fresh():
-                summary = checked(target, report, refused)
+                summary = check_target(target, report, refused)
             items = [item.span for item in (target.model, target.scene) if item is not None]
             if any(i.start <= span.start < i.end for span in wrong for i in items):
                 summary["ok"] = False  # a slip that was read as it was meant is still to be mended
@@ -60,32 +60,32 @@ def file_checked(asked: tuple[str, bool, bool]) -> Checked:
     return Checked(tuple(report), tuple(said), result)
 
 
-def checked(target: targets.Target, report: Report, refused: bool = False) -> dict[str, object]:
+def check_target(target: targets.Target, report: Report, refused: bool = False) -> dict[str, object]:
     """Findings go to the report; the counts come back.  refused: what cannot be run yet is an error."""
     names = {"scene": target.scene.name.name if target.scene else None, "model": target.model.name.name}
     inner = Report()
     network = load.network(target.document, target.model, target.scene, inner, required=target.scene is not None)
     summary: dict[str, object] = {**names, "ok": network is not None}
     if network is not None and all(p.values for p in network.parameters):
-        summary |= _started(target, network, inner)
+        summary |= _check_start(target, network, inner)
     incomplete = refused and not summary["ok"]
-    report.extend(targets.unsupported(inner) if incomplete else inner)
+    report.extend(targets.refuse_unsupported(inner) if incomplete else inner)
     return summary
 
 
-def _started(target: targets.Target, network: Network, report: Report) -> dict[str, object]:
+def _check_start(target: targets.Target, network: Network, report: Report) -> dict[str, object]:
     try:
-        return _judged(target, network, report)
+        return _check_prepared(target, network, report)
     except ModelError as error:  # of numbers that make no model
         report.extend(error.diagnostics)
         return {"ok": False}
 
 
-def _judged(target: targets.Target, network: Network, report: Report) -> dict[str, object]:
+def _check_prepared(target: targets.Target, network: Network, report: Report) -> dict[str, object]:
     from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
     from sysdyn.cli.run.request.asked import Request
     from sysdyn.cli.run.request.scene_numbers import wrong_numbers
-    from sysdyn.cli.run.start.starting import counted_as, described, start
+    from sysdyn.cli.run.start.starting import change_lines, counted_as, start
     from sysdyn.cli.run.verdict.expectations import missing_goldens
     from sysdyn.compiler.binding.certificate import certificate
     from sysdyn.compiler.binding.jumps import jumps
@@ -122,7 +122,7 @@ def _judged(target: targets.Target, network: Network, report: Report) -> dict[st
         "ok": runs and not report.failed,
         "formulation": prepared.formulation,
         **facts.counts,
-        "moved": described(prepared, started.state),
+        "moved": change_lines(prepared, started.state),
         "passivity": {
             "verdict": judged.verdict,
             "proven": judged.proven,
@@ -145,6 +145,6 @@ def _line(summary: dict[str, object]) -> str:
     counts += f", {summary['redundant']} redundant" if summary["redundant"] else ""
     moved = summary["moved"]
     assert isinstance(moved, list)
-    from sysdyn.cli.run.start.starting import shortened
+    from sysdyn.cli.run.start.starting import first_lines
 
-    return "; ".join([f"ok: {counts}", *shortened(moved)])
+    return "; ".join([f"ok: {counts}", *first_lines(moved)])

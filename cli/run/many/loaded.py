@@ -153,7 +153,7 @@ class Loaded:
         check_tolerances(request)
         self.request = request
         report = Report()
-        target = targets.asked(request, report)
+        target = targets.target_of(request, report)
         if target is None or report.failed:
             raise ModelError(report.diagnostics)
         self.target: Target = target
@@ -188,7 +188,7 @@ class Loaded:
         return frozenset(found)
 
     @cached_property
-    def _asked(self) -> tuple[Asked, dict[Any, ex.Node]]:
+    def _conditions(self) -> tuple[Asked, dict[Any, ex.Node]]:
         """What the text asks of its numbers, with the space of its expressions."""
         nodes, request = dict[Any, ex.Node](), self.request
         with ex.fresh(nodes):
@@ -197,9 +197,9 @@ class Loaded:
                 self.target.document, model, scene, request.settings, request.levels
             ), nodes
 
-    def allowed(self, keys: Sequence[Any], values: Floats) -> NDArray[np.bool_]:
+    def allowed_rows(self, keys: Sequence[Any], values: Floats) -> NDArray[np.bool_]:
         """Which rows of numbers [k, keys] the text does not refuse."""
-        asked, nodes = self._asked
+        asked, nodes = self._conditions
         fine = np.ones(len(values), dtype=bool)
         with ex.fresh(nodes):
             mine = asked.conditions_of(frozenset(key if isinstance(key, str) else str(key[0]) for key in keys))
@@ -221,14 +221,14 @@ class Loaded:
         for at, number in np.ndenumerate(np.asarray(value, dtype=float)):
             yield name, tuple(f + k for f, k in zip(first, at, strict=False)), number
 
-    def _refused(self, numbers: Mapping[Any, Any]) -> bool:
+    def _is_refused(self, numbers: Mapping[Any, Any]) -> bool:
         """Whether the text refuses these numbers."""
         keys, values = list[Any](), list[float]()
         for key, value in numbers.items():
             for name, at, number in self._elements(key, value):
                 keys.append((name, *at) if at else name)
                 values.append(float(number))
-        return not self.allowed(keys, np.array([values]))[0]
+        return not self.allowed_rows(keys, np.array([values]))[0]
 
     def _text(self, settings: tuple[tuple[str, str], ...]) -> Compiled:
         """The text under settings that its numbers cannot take."""
@@ -277,7 +277,7 @@ class Loaded:
         compiled = self._text(texts)
         if not numbers:
             return compiled.prepared, compiled
-        if self._refused(numbers):  # the rules say what is wrong with them
+        if self._is_refused(numbers):  # the rules say what is wrong with them
             each = [one for name, value in settings.items() for one in self._elements(name, value)]
             shown = ((f"{name}[{','.join(map(str, at))}]" if at else name, text_of(value)) for name, at, value in each)
             compiled = self._text(tuple(shown))
@@ -303,9 +303,9 @@ class Loaded:
         request = replace(self.request, **changes) if changes else self.request
         check_tolerances(request)
         prepared, compiled = self.bound(settings)
-        return (self._alone if alone else self._run)(request, prepared, compiled, report)
+        return (self._run_alone if alone else self._run)(request, prepared, compiled, report)
 
-    def _alone(self, request: Request, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
+    def _run_alone(self, request: Request, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
         """A run of which nobody looks at more than its trace once the next one begins."""
         network = prepared.network
         eventful = network.events or network.switches or prepared.compiled.form.kinks
@@ -323,7 +323,7 @@ class Loaded:
         """
         prepared, compiled = self.bound(settings)
         found = self._in_core(settings, prepared, compiled)
-        return found if found is not None else self._alone(self.request, prepared, compiled, report)
+        return found if found is not None else self._run_alone(self.request, prepared, compiled, report)
 
     def _in_core(self, settings: Settings, prepared: Prepared, compiled: Compiled) -> Trace | None:
         """The trace of a run in the core; None where there is none."""
@@ -334,7 +334,7 @@ class Loaded:
             try:
                 names = frozenset(name.partition("[")[0] for name in settings).intersection(self.parameters)
                 moving = compiled.cores.moving(core, names)
-                numbers = None if moving is None else core.alone(prepared.binding, moving)
+                numbers = None if moving is None else core.numbers_of_run(prepared.binding, moving)
                 return None if numbers is None else core.batch.trace(*numbers, tuple(parameters_of(prepared)))
             finally:
                 compiled.cores.give(core)

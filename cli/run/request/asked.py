@@ -19,7 +19,7 @@ from sysdyn.compiler.binding.columns import Read, value_of
 from sysdyn.compiler.binding.instants import distinct, instants
 from sysdyn.compiler.binding.jumps import jumps
 from sysdyn.compiler.binding.pulses import pulses, quickest
-from sysdyn.compiler.network.pruning import listed
+from sysdyn.compiler.network.pruning import list_removals
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.scenes.scenes import FINEST_ACCURACY
 from sysdyn.dsl.model import dimensions as dim
@@ -214,14 +214,14 @@ def _stops(prepared: Prepared, t0: float, t1: float) -> tuple[np.ndarray, str | 
     conditions = {n.data[0] for e in network.events if e.condition is not None for n in ex.variables(e.condition)}
     unseen = [o.expression for o in network.observations if not o.stored]
     crossed = [o.expression for o in network.observations if not o.stored and o.name in conditions]
-    found = instants(*text, unseen, crossed, _closed(network))
+    found = instants(*text, unseen, crossed, _comparisons_at_zero(network))
     answer = distinct(found.times, pulses(*text, crossed, found.times)), found.note
     kept.clear()
     kept[t0, t1] = answer, {name: value_of(binding, name) for name in read.read}
     return answer
 
 
-def _closed(network: Network) -> list[ex.Node]:
+def _comparisons_at_zero(network: Network) -> list[ex.Node]:
     """What conditions of events compare with zero, where they hold at the zero itself."""
     asked = {o.name: o.expression for o in network.observations if not o.stored}
     compared = [n for e in network.events if e.condition is not None for n in ex.topological([e.condition])]
@@ -316,12 +316,12 @@ def default_output(file: str, scene: str, end: str = ".h5") -> str:
 def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
     """What the trace says of itself, asked once a text."""
     if "attributes" not in prepared.layouts:
-        prepared.layouts["attributes"] = _said(target, prepared)
+        prepared.layouts["attributes"] = _trace_attributes(target, prepared)
     return prepared.layouts["attributes"]
 
 
-def _said(target: Target, prepared: Prepared) -> dict[str, str]:
-    left_out = {"pruned": listed(prepared.left_out)} if prepared.left_out else {}
+def _trace_attributes(target: Target, prepared: Prepared) -> dict[str, str]:
+    left_out = {"pruned": list_removals(prepared.left_out)} if prepared.left_out else {}
     return {
         "Conventions": "CF-1.11",
         "title": target.name,

@@ -146,7 +146,7 @@ def _scene(held: Mapping[str, Any], target: Target) -> Lock | None:
     return found
 
 
-def taken(
+def settings_from_lock(
     lock: Lock,
     target: Target,
     formulation: str | None,

@@ -108,13 +108,13 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
     return whole(document, path, model, None, report)
 
 
-def asked(request: Request, report: Report, choose: Callable[..., Target | None] = one) -> Target | None:
+def target_of(request: Request, report: Report, choose: Callable[..., Target | None] = one) -> Target | None:
     """What a request means of its file, by `one`, `still` or `whole`."""
     document = read(request.file, report, request.text)
     return choose(document, request.file, request.model, request.scene, report)
 
 
-def held(request: Request, target: Target) -> Request:
+def with_text(request: Request, target: Target) -> Request:
     """The request for other processes: what stood on standard input is read once."""
     return replace(request, text=target.document.file.source.text if request.file == "-" else None)
 
@@ -144,7 +144,7 @@ def whole(document: Document, path: str, model: str | None, scene: str | None, r
     raise UsageError(f"{path} has no model")
 
 
-def unsupported(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+def refuse_unsupported(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     """The findings where a run is asked of a text that cannot be run yet: what N608 notes is then the error E608."""
     help_ = "leave it out of what is run; 'check' passes texts that are ahead of the compiler"
     return (replace(d, code="E608", help=d.help or help_) if d.code == "N608" else d for d in found)

@@ -44,7 +44,7 @@ def inconsistent(
 ) -> None:
     """Report why there is no start; until: `time.monotonic()` at which no more is tried."""
     where = place_of(prepared, error.rows[0]) if error.rows else prepared.network.place
-    names = ", ".join(dict.fromkeys(_shown(r) for r in error.rows)) or ", ".join(error.names)
+    names = ", ".join(dict.fromkeys(_row_text(r) for r in error.rows)) or ", ".join(error.names)
     fixed_at = dict.fromkeys(place_of(prepared, c) for c in error.candidates)  # a line may fix several
     related = [Related("this value is fixed", place) for place in fixed_at]
     if where.source is not prepared.network.place.source and related:  # the law of an element of a library
@@ -69,7 +69,7 @@ def inconsistent(
         case _ if zero := _zero(prepared, t0, until):
             said = f"with {zero.name} = {quantity(0.0, zero.unit)} there is no start"
             left = f"{_residual(error)} is left over in {names}"
-            free = f", or '~' for '=' of {_listed(prepared, error)}" if error.candidates else ""
+            free = f", or '~' for '=' of {_fixed_values(prepared, error)}" if error.candidates else ""
             here = [Related("this is left over", where), *related]
             report.error("E903", f"{said}: {left}", zero.place, help=f"{zero.name} other than zero{free}", related=here)
         case _ if error.candidates:
@@ -102,7 +102,7 @@ def inconsistent(
 
 def _contradicting(prepared: Prepared, error: InconsistentStart, names: str) -> tuple[str, str]:
     """Fixed values that contradict each other, or rows (names); what may be freed."""
-    fixed = _listed(prepared, error)
+    fixed = _fixed_values(prepared, error)
     left = f"{names}: residual {_residual(error)}"
     own = {r.label.rstrip("'") for r in error.rows} <= {c.label.rstrip("'") for c in error.candidates}
     itself = own and all(not r.file for r in error.rows)
@@ -128,7 +128,7 @@ def _nearer(prepared: Prepared, error: InconsistentStart) -> str:
     return help_ if one is None else f"{given}; else {help_}"
 
 
-def _shown(row: RowLabel) -> str:
+def _row_text(row: RowLabel) -> str:
     """A row by its name; what an `init` says of an expression has none."""
     return f"the value at line {row.line}" if row.label == row.kind == "initial" and row.line else row.label
 
@@ -142,7 +142,7 @@ def _without_inertia(prepared: Prepared, name: str) -> bool:
     return all(n.op != "var" or n.data[0] != name for root in kinetic for n in variables(root))
 
 
-def _listed(prepared: Prepared, error: InconsistentStart) -> str:
+def _fixed_values(prepared: Prepared, error: InconsistentStart) -> str:
     """The fixed values to free, as the author writes them: `x'`, and `shaft.f` of a node or an element."""
     places = [place_of(prepared, c) for c in error.candidates]
     names = names_of(prepared.network, (c.label for c in error.candidates))

@@ -61,12 +61,12 @@ def start(
     """
     found = Report()
     try:
-        return _started(prepared, t0, found, redundancy, until)
+        return _find_start(prepared, t0, found, redundancy, until)
     finally:
         report.extend(load.at_authors(prepared.network, found))
 
 
-def _started(
+def _find_start(
     prepared: Prepared, t0: float, report: Report, redundancy: str | None, until: float | None
 ) -> Started | None:
     scene = prepared.network.scene
@@ -78,8 +78,8 @@ def _started(
             facts = structure(system, state)
             implicit = undetermined(system, state, facts)
     except InconsistentStart as error:
-        if error.kind != "nonfinite" or not _undefined(prepared, system, t0, report):
-            _refused(prepared, t0, error, report, until)
+        if error.kind != "nonfinite" or not _report_undefined(prepared, system, t0, report):
+            _report_refusal(prepared, t0, error, report, until)
         return None
     except NotFiniteError:
         _steep(prepared, system, t0, report)
@@ -107,7 +107,9 @@ def _late(prepared: Prepared, when: str, remedy: str, report: Report) -> None:
     report.error("E934", text, prepared.network.place, help=remedy)
 
 
-def _refused(prepared: Prepared, t0: float, error: InconsistentStart, report: Report, until: float | None) -> None:
+def _report_refusal(
+    prepared: Prepared, t0: float, error: InconsistentStart, report: Report, until: float | None
+) -> None:
     """Report why there is no start; of gathered elements at the lines of the author, as `compile_network` does."""
     if prepared.compiled.written is not None:
         found = Report()
@@ -138,28 +140,30 @@ def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None
         return None
 
 
-def moved(prepared: Prepared, state: ConsistentState) -> list[Moved]:
+def changes_by_start(prepared: Prepared, state: ConsistentState) -> list[Moved]:
     """What the start moved, by the author's names."""
     names = names_of(prepared.network, (name for name, *_ in state.moved))
     return [(name, before, after, why) for name, (_, before, after, why) in zip(names, state.moved, strict=True)]
 
 
-def described(prepared: Prepared, state: ConsistentState) -> list[str]:
+def change_lines(prepared: Prepared, state: ConsistentState) -> list[str]:
     """The same, a line each."""
-    return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in moved(prepared, state)]
+    return [
+        f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in changes_by_start(prepared, state)
+    ]
 
 
-def sought(state: ConsistentState) -> str:
+def strategy_note(state: ConsistentState) -> str:
     """How the start was found, where Newton's method from the guesses was not enough; else nothing."""
     return SOUGHT.get(state.strategy, "") and f"the start was found {SOUGHT[state.strategy]} ({state.strategy})"
 
 
-def shortened(lines: list[str]) -> list[str]:
+def first_lines(lines: list[str]) -> list[str]:
     """The first few of many lines."""
     return lines if len(lines) <= 6 else [*lines[:5], f"... {len(lines) - 5} more of these"]
 
 
-def _undefined(prepared: Prepared, system: System, t0: float, report: Report) -> bool:
+def _report_undefined(prepared: Prepared, system: System, t0: float, report: Report) -> bool:
     """Whether a function is no number at the start, which is told (E519)."""
     from sysdyn.cli.run.verdict.culprit import undefined_at_start  # of mistakes alone
 
@@ -172,7 +176,7 @@ def _undefined(prepared: Prepared, system: System, t0: float, report: Report) ->
 
 def _steep(prepared: Prepared, system: System, t0: float, report: Report) -> None:
     """E519: the rows at the start, or their slopes, are no numbers."""
-    if _undefined(prepared, system, t0, report):
+    if _report_undefined(prepared, system, t0, report):
         return
     message = "the slopes of the equations are no numbers at the start: values beyond 1e308, or a root at zero?"
     report.error("E519", message, prepared.network.place, help="look at the sizes of parameters and initial values")

@@ -54,10 +54,10 @@ def culprit(prepared: Prepared, system: System, error: SolverFailure) -> Culprit
         points += [(t, y + side * np.maximum(np.abs(y), 1.0), yd) for side in BESIDE]
     for point in points:
         for block in blocks:
-            found = oracle.undefined(block.name, *point, infinite=error.cause == "nonfinite")
+            found = oracle.find_undefined(block.name, *point, infinite=error.cause == "nonfinite")
             if found is not None:
                 last.time, last.y = point[0], point[1]
-                return _told(prepared, *found, last)
+                return _describe(prepared, *found, last)
     return None
 
 
@@ -69,19 +69,19 @@ def undefined_at_start(prepared: Prepared, system: System, t: float) -> tuple[st
         if block.name in (*WITHOUT_ENTRIES, "initial"):
             continue
         with np.errstate(all="ignore"):
-            found = oracle.undefined(block.name, t, y, np.zeros_like(y))
+            found = oracle.find_undefined(block.name, t, y, np.zeros_like(y))
         if found is not None:
-            told = _told(prepared, *found, LastState(prepared, system, t, y))
+            told = _describe(prepared, *found, LastState(prepared, system, t, y))
             place = _statement(prepared, found[1]) or prepared.compiled.form.rows[found[0]].place
             return told.text, place or prepared.network.place
     return None
 
 
-def _told(prepared: Prepared, row: int, node: Node, arguments: list[float], last: LastState) -> Culprit:
+def _describe(prepared: Prepared, row: int, node: Node, arguments: list[float], last: LastState) -> Culprit:
     place = _statement(prepared, node) or prepared.compiled.form.rows[row].place
     label = RowLabel(place.element if place else "", "law", place.file if place else "", place.start[0] if place else 0)
     listed = ", ".join(f"{a:.9g}" for a in arguments)
-    read = ", ".join(last.of(node)[:3])
+    read = ", ".join(last.values_read(node)[:3])
     if node.op == "table":
         name = str(node.data[0]).partition(RANGE)[0]
         said = f"the argument of table {name} left its range: it is {read or listed}"

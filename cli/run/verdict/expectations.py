@@ -49,7 +49,7 @@ def watch(prepared: Prepared) -> Watch:
         judged = [(k, e) for k, e in claims if f"expect {k} left" in column]
         worst = {k: -1.0 for k, e in judged if e.moment == "always"}
 
-        def wanted(time: Floats, values: Floats) -> NDArray[np.bool_]:
+        def rows_to_keep(time: Floats, values: Floats) -> NDArray[np.bool_]:
             kept = np.zeros(time.size, dtype=bool)
             for k, e in judged:
                 if e.at is not None:
@@ -62,7 +62,7 @@ def watch(prepared: Prepared) -> Watch:
                             kept[row], worst[k] = True, float(off[row]) if e.operator in LOOSE else np.inf
             return kept
 
-        return wanted
+        return rows_to_keep
 
     return of_run
 

@@ -45,7 +45,7 @@ class LastState:
             (f.owner, f.kind): int(first) for f, first in zip(system.description.families, system.form.at, strict=False)
         }
 
-    def shown(self, k: int) -> str:
+    def value_text(self, k: int) -> str:
         """`x' = 4 m/s`."""
         unit = self.system.description.families[int(self.system.family_of[k])].unit
         return f"{self.name(k)} = {self.y[k]:.6g}{'' if unit == '1' else f' {unit}'}"
@@ -63,14 +63,14 @@ class LastState:
         names = self.system.unknown_names
         return [k for k in range(number) if self.system.kinds[k] in STATE and RANGE not in names[k]]
 
-    def listed(self) -> str:
+    def some_values(self) -> str:
         """A few unknowns."""
-        return ", ".join(self.shown(k) for k in self.states()[:SHOWN])
+        return ", ".join(self.value_text(k) for k in self.states()[:SHOWN])
 
-    def of(self, node: Node) -> list[str]:
+    def values_read(self, node: Node) -> list[str]:
         """The unknowns that an expression reads, with their values."""
         found = (self._place(n) for n in ex.variables(node))
-        return [self.shown(k) for k in dict.fromkeys(k for k in found if k is not None)]
+        return [self.value_text(k) for k in dict.fromkeys(k for k in found if k is not None)]
 
     def _place(self, node: Node) -> int | None:
         """Where a variable without indices stands in y."""
@@ -100,13 +100,13 @@ class LastState:
         except (ArithmeticError, KeyError, ValueError, TypeError, ModelError):
             return math.nan
 
-    def grown(self, start: NDArray[np.float64]) -> str | None:
+    def unbounded_growth(self, start: NDArray[np.float64]) -> str | None:
         """The unknown that has grown beyond all bounds since the start."""
         states = self.states()
         size = np.abs(self.y[states]) / np.maximum(np.abs(start[states]), 1.0)
         if not states or not size.max() > GROWN:
             return None
-        return f"{self.shown(states[int(np.argmax(size))])} grows without bound"
+        return f"{self.value_text(states[int(np.argmax(size))])} grows without bound"
 
     def vanishing(self, start: NDArray[np.float64]) -> str | None:
         """A divisor that has nearly vanished since the start."""
@@ -120,7 +120,7 @@ class LastState:
                         what = "the argument of a logarithm" if called else "a divisor"
                         itself = base.op == "var" and self._place(base) is not None
                         value = "" if itself else f"{to_text(base)} = {now:.3g}, "
-                        return f"{what} goes to zero: {value}{', '.join(self.of(base)[:2])}"
+                        return f"{what} goes to zero: {value}{', '.join(self.values_read(base)[:2])}"
         return None
 
     def dependent(self, start: NDArray[np.float64] | None = None) -> list[Constraint]:

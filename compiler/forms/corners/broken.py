@@ -42,7 +42,7 @@ def broken(root: Node, tables: Mapping[str, Table], floors: Set[Node] = frozense
     for node in topological([root]):
         args = tuple(done[a] for a in node.args)
         table = tables.get(node.data[0]) if node.op == "table" else None
-        apart = table is not None and _apart(table, node)
+        apart = table is not None and _can_be_broken(table, node)
         if table is not None and apart:
             done[node] = _pieces(table, args[0], node.data[1], floors)
         elif table is not None and len(args) > 1 and len(table.values) <= MOST:
@@ -64,7 +64,7 @@ def _spread(table: Table, node: Node, args: tuple[Node, ...]) -> Node:
     return const(table.values[at[0] * len(table.points[1]) + at[1]])
 
 
-def _apart(table: Table, node: Node) -> bool:
+def _can_be_broken(table: Table, node: Node) -> bool:
     if len(node.args) > 1 or table.outside == "stop" or not isinstance(node.data[1], int):
         return False
     inner = topological(node.args)

@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from sysdyn.compiler.forms.corners.broken import broken
-from sysdyn.compiler.forms.corners.kinks import YES, Surface, roots, surfaces, watched
+from sysdyn.compiler.forms.corners.kinks import YES, Surface, roots, surfaces, watched_branches
 from sysdyn.compiler.forms.corners.peaks import peaks
 from sysdyn.compiler.forms.corners.written import written
 from sysdyn.compiler.forms.descriptor import (
@@ -32,7 +32,7 @@ from sysdyn.compiler.forms.descriptor import (
     Unknowns,
 )
 from sysdyn.compiler.forms.steepness import magnitude
-from sysdyn.compiler.model.mirror import lettered
+from sysdyn.compiler.model.mirror import with_family_letters
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
@@ -67,7 +67,7 @@ def frozen(
     """The form of a network with frozen branches, and the parameters that hold them; notes."""
     tables, place = {t.name: t for t in network.tables}, network.place
     whole, floors = form, _floors(form, network) if tables else frozenset[Node]()
-    form = replace(form, blocks=tuple(_opened(b, tables, floors) for b in form.blocks)) if tables else form
+    form = replace(form, blocks=tuple(_expand_tables(b, tables, floors) for b in form.blocks)) if tables else form
     form = written(form, network)
     found = surfaces(form, frozenset(n.data for s in network.switches for n in s.direction), floors)
     passed, notes = peaks(form, whole, network, found)
@@ -87,14 +87,14 @@ def _floors(form: DescriptorForm, network: Network) -> frozenset[Node]:
     rows = [s for kernel in (block.kernels if block else ()) if not kernel.nest for s in kernel.rows]
     found = {s.expression for s in rows if form.rows[s.row].label in gaps}
     own = (
-        {on.u for root, _ in roots(form) for n in topological([root]) if (on := watched(n)) is not None}
+        {on.u for root, _ in roots(form) for n in topological([root]) if (on := watched_branches(n)) is not None}
         if found
         else ()
     )
     return frozenset(found - {w for u in own for w in (u, neg(u))})
 
 
-def _opened(block: Block, tables: Mapping[str, Table], floors: frozenset[Node]) -> Block:
+def _expand_tables(block: Block, tables: Mapping[str, Table], floors: frozenset[Node]) -> Block:
     """A block with its tables of straight pieces written out."""
     kernels = (
         replace(k, rows=tuple(replace(s, expression=broken(s.expression, tables, floors)) for s in k.rows))
@@ -128,23 +128,23 @@ class _Freezer:
 
     def _affine(self, root: Node) -> None:
         for k, sense in enumerate(self.sense):
-            if sense is None or not any(self._of(n) == k for n in topological([root])):
+            if sense is None or not any(self._surface_number(n) == k for n in topological([root])):
                 continue
             self.done = {}
             if not is_const(derivative(derivative(self.freeze(root, held=True), sense), sense), 0.0):
                 self.sense[k] = None
         self.done = {}
 
-    def _of(self, node: Node) -> int:
+    def _surface_number(self, node: Node) -> int:
         """The number of the surface of an operation; -1 of any other."""
-        found = watched(node)
+        found = watched_branches(node)
         if found is None:
             return -1
         return self.number.get(found.u, self.number.get(neg(found.u), -1))
 
     def _kink(self, k: int, s: Surface) -> Frozen:
         row = self.before.rows[s.row]
-        text = repr(lettered(self.before.formulation, s.u))
+        text = repr(with_family_letters(self.before.formulation, s.u))
         rate = f"#rate {k}" if self._rate(k) is not None else None
         slide = (f"#above {k}", f"#below {k}") if self.sense[k] is not None else ()
         inner = any(n.op == "var" and n.data[1] in ("q", "f", "p") for n in variables(s.u))
@@ -177,8 +177,8 @@ class _Freezer:
         live = rebuild(node, args)
         if node.op == "cond":
             return self._conditional(node, live, held)
-        k = self._of(node)
-        found = watched(node)
+        k = self._surface_number(node)
+        found = watched_branches(node)
         if k < 0 or found is None:
             return live
         mine = found.u in self.number
@@ -208,7 +208,11 @@ class _Freezer:
     def _conditional(self, node: Node, live: Node, held: bool) -> Node:
         """A conditional: between its branches while a relation in its condition slides."""
         test, then, other = node.args
-        slides = [k for k in dict.fromkeys(map(self._of, topological([test]))) if k >= 0 and self.sense[k] is not None]
+        slides = [
+            k
+            for k in dict.fromkeys(map(self._surface_number, topological([test])))
+            if k >= 0 and self.sense[k] is not None
+        ]
         if not slides:
             return live
         weight = self._weight(test, held)
@@ -227,10 +231,10 @@ class _Freezer:
             return sub(one, mul(*(sub(one, self._weight(a, held)) for a in test.args)))
         if test.op == "not":
             return sub(one, self._weight(test.args[0], held))
-        k = self._of(test)
+        k = self._surface_number(test)
         sense = self.sense[k] if k >= 0 else None
         plain = conditional(self.done[test], one, const(0.0))
-        found = watched(test)
+        found = watched_branches(test)
         if sense is None or found is None:
             return plain
         up = (found.above is YES) == (found.u in self.number)

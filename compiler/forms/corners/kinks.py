@@ -79,7 +79,7 @@ class Sided:
 YES, NO = compare("==", const(0.0), const(0.0)), compare("!=", const(0.0), const(0.0))
 
 
-def sided(node: Node) -> Sided | None:
+def branches_of(node: Node) -> Sided | None:
     """The two branches of an operation; None of one without."""
     if node.op == "call" and node.data in ("abs", "sign", "step"):
         (x,) = node.args
@@ -94,9 +94,9 @@ def sided(node: Node) -> Sided | None:
     return None
 
 
-def watched(node: Node) -> Sided | None:
+def watched_branches(node: Node) -> Sided | None:
     """The branches of an operation on unknowns outside all loops."""
-    found = sided(node)
+    found = branches_of(node)
     if found is None or not any(v.op == "var" for v in variables(found.u)):
         return None
     if any(v.op == "var" and (v.data[1] == "audit" or v.data[2]) for v in variables(found.u)):
@@ -116,7 +116,7 @@ def surfaces(
     holding: dict[Node, dict[Node, None]] = {}
     for root, row in roots(form):
         for node in topological([root]):
-            found = watched(node)
+            found = watched_branches(node)
             if found is None or found.u in floors or neg(found.u) in floors:
                 continue
             own = reads(found.u, directions)
@@ -148,7 +148,7 @@ def side(root: Node, u: Node, above: bool) -> Node:
     """The branch of an expression on one side of u = 0."""
 
     def branch(node: Node) -> Node | None:
-        found = watched(node)
+        found = watched_branches(node)
         if found is None or not (found.u is u or found.u is neg(u)):
             return None
         return found.above if (found.u is u) == above else found.below
@@ -184,16 +184,16 @@ def smoothness(root: Node, u: Node, known: dict[tuple[Node, ...], int | None] | 
     if above is below:
         return SMOOTH
     known = {} if known is None else known
-    key = _renamed((u, above, below))
+    key = _number_leaves((u, above, below))
     if key not in known:
-        known[key] = _sampled(u, above, below)
+        known[key] = _classify_by_samples(u, above, below)
     found = known[key]
     if found is None:
         return KINK if _continuous(root, u) else JUMPS  # what the operation itself does
     return found
 
 
-def _renamed(nodes: tuple[Node, ...]) -> tuple[Node, ...]:
+def _number_leaves(nodes: tuple[Node, ...]) -> tuple[Node, ...]:
     """The same text with leaves numbered as they come."""
     done: dict[Node, Node] = {}
     for node in topological(nodes):
@@ -207,7 +207,7 @@ def _renamed(nodes: tuple[Node, ...]) -> tuple[Node, ...]:
     return tuple(done[node] for node in nodes)
 
 
-def _sampled(u: Node, above: Node, below: Node) -> int | None:
+def _classify_by_samples(u: Node, above: Node, below: Node) -> int | None:
     """By values on u = 0 of the two branches there; None where none are known."""
     others, found, known = _others((above, below), u), SMOOTH, False
     moved = _mover(u, others)
@@ -230,9 +230,9 @@ def _sampled(u: Node, above: Node, below: Node) -> int | None:
                 return JUMPS
             continue
         known = True
-        if _apart(here[:2], there[:2], asked=asked):
+        if _differ(here[:2], there[:2], asked=asked):
             return JUMPS
-        if _apart(here[2:], there[2:], asked=asked):
+        if _differ(here[2:], there[2:], asked=asked):
             found = KINK
     return found if known else None
 
@@ -268,7 +268,7 @@ def _all_on_branches(root: Node, values: Mapping[Node, float]) -> Node:
     """An expression with every operation on the branch that it has at these values."""
 
     def branch(node: Node) -> Node | None:
-        found = sided(node)
+        found = branches_of(node)
         if found is None:
             return None
         return found.above if _values((found.u,), values)[0] > 0.0 else found.below
@@ -287,7 +287,7 @@ def _others(sides: tuple[Node, ...], u: Node) -> tuple[Node, ...]:
     """What the other conditions of both branches compare with zero."""
     found: dict[Node, None] = {}
     for node in topological(sides):
-        on = sided(node)
+        on = branches_of(node)
         gap = sub(*node.args) if node.op == "cmp" else on.u if on is not None else u
         known = gap is u or neg(gap) is u or neg(gap) in found
         if not known and any(n.op in LEAVES for n in topological([gap])):
@@ -306,7 +306,7 @@ def _values(nodes: tuple[Node, ...], values: Mapping[Node, float]) -> list[float
     return evaluate(nodes, lambda node: _look(node, values))
 
 
-def _apart(here: list[float], there: list[float], *, asked: bool) -> bool:
+def _differ(here: list[float], there: list[float], *, asked: bool) -> bool:
     """Whether two values differ on the surface, against those there and beside it; asked: where there are none."""
     known = [abs(x) for x in (*here, *there) if math.isfinite(x)]
     if not all(map(math.isfinite, here)):
@@ -316,7 +316,7 @@ def _apart(here: list[float], there: list[float], *, asked: bool) -> bool:
 
 def _continuous(root: Node, u: Node) -> bool:
     """Whether the operations at u = 0 are continuous there themselves."""
-    on = [n for n in topological([root]) if (s := watched(n)) is not None and (s.u is u or s.u is neg(u))]
+    on = [n for n in topological([root]) if (s := watched_branches(n)) is not None and (s.u is u or s.u is neg(u))]
     return all(n.op == "call" and n.data in ("abs", "min", "max") for n in on)
 
 
@@ -332,22 +332,22 @@ def _on_sides(gaps: tuple[Node, ...], u: Node, number: int) -> dict[Node, float]
         leaf = chance.choice([n for n in topological([gap]) if n.op in LEAVES])
         away = chance.choice(SIDES) * chance.uniform(BESIDE, 2.0 * BESIDE)
         with suppress(ArithmeticError, KeyError, TypeError, ValueError):
-            values[leaf] = _beside(gap, leaf, values, away)
+            values[leaf] = _root_by_secants(gap, leaf, values, away)
     return values
 
 
-def _beside(gap: Node, leaf: Node, values: Mapping[Node, float], away: float) -> float:
+def _root_by_secants(gap: Node, leaf: Node, values: Mapping[Node, float], away: float) -> float:
     """The value of a leaf at which a gap is zero, by secants, or beside it on the side of `away`."""
 
-    def at(x: float) -> float:
+    def gap_at(x: float) -> float:
         return evaluate((gap,), lambda node: _look(node, {**values, leaf: x}))[0]
 
     x = values[leaf]
     for _ in range(SECANTS):
-        here = at(x)
-        x -= here / (at(x + BESIDE) - here) * BESIDE
+        here = gap_at(x)
+        x -= here / (gap_at(x + BESIDE) - here) * BESIDE
     x = float(f"{x:.12g}")
-    return x + away if at(x + away) * away >= 0.0 else x - away
+    return x + away if gap_at(x + away) * away >= 0.0 else x - away
 
 
 def _on_surface(u: Node, slope: Node, moved: Node, values: dict[Node, float]) -> Mapping[Node, float] | None:

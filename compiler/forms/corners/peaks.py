@@ -22,7 +22,7 @@ from itertools import pairwise
 from itertools import product as product_of
 
 from sysdyn.compiler.forms.corners.kinks import JUDGED, Surface
-from sysdyn.compiler.forms.corners.turning import compared, rising, turning
+from sysdyn.compiler.forms.corners.turning import rising, turning, turns_in_conditions
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Kernel
 from sysdyn.dsl.model.expression import (
     Node,
@@ -96,7 +96,7 @@ def _hidden(root: Node, tables: Mapping[str, Table], watched: bool) -> Iterator[
         degree = 1.0 / _degree(q)
         wide = (1.0 + end) ** degree
         yield sub(const(wide), power(linear(1.0, ((1.0, q),)), const(degree))), 2.0 * wide
-    for u in turning(root) if watched else compared(root):
+    for u in turning(root) if watched else turns_in_conditions(root):
         yield u, AT_ONCE
 
 

@@ -101,13 +101,13 @@ def ledgers(model: EnergyModel, entries: Sequence[Entry], acting: Iterable[Effor
     for name, first in head.items():
         members.setdefault(first, []).append(name)
     parts = [
-        Ledger("energy", units[first], tuple(own), tuple(members[first]), _listed(members[first]))
+        Ledger("energy", units[first], tuple(own), tuple(members[first]), _label_of(members[first]))
         for first, own in found.items()
     ]
     return (*parts, *_of_states(model), *_of_momenta(model, acting))
 
 
-def _listed(names: Sequence[str]) -> str:
+def _label_of(names: Sequence[str]) -> str:
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return f"energy of {', '.join(names[:SHOWN])}{more}"
 

@@ -18,7 +18,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
-from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_size, shape_of, union, without
+from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_difference, box_size, shape_of, union
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import (
@@ -34,7 +34,7 @@ from sysdyn.compiler.network.primal.incidence import (
 )
 from sysdyn.compiler.network.primal.integrals import line
 from sysdyn.compiler.network.primal.laws import Laws
-from sysdyn.compiler.network.primal.overlaps import initially, inside, meeting, narrowed, ranges_of, untold
+from sysdyn.compiler.network.primal.overlaps import initially, inside, meeting, ranges_of, restrict_loops, untold
 from sysdyn.compiler.network.primal.reading import Ranges, Rewriter, touches_network
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
@@ -71,14 +71,16 @@ def held_at(branch: Branch, kind: str, value: Node) -> Node | None:
     return None if straight is None else straight.inverse(value)
 
 
-def told(b: Branch, initials: Iterable[Initial], sizes: Sizes) -> Iterator[tuple[Initial, tuple[Loop, ...], Node]]:
+def contents_by_text(
+    b: Branch, initials: Iterable[Initial], sizes: Sizes
+) -> Iterator[tuple[Initial, tuple[Loop, ...], Node]]:
     """Of statements about a branch those that tell what elements of it hold, the loops over these, what they hold."""
     within = ranges_of(b.loops, sizes, b.place)
     for initial in initials:
         found = meeting(initial, b.at, within, sizes)
         content = None if found is None else held_at(b, initial.target.data[1], found[1])
         if found is not None and content is not None:
-            yield initial, narrowed(b.loops, found[0]), content
+            yield initial, restrict_loops(b.loops, found[0]), content
 
 
 def at_stores(
@@ -143,24 +145,24 @@ def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> 
             yield replace(initial, loops=loops)
             continue
         at = touch.loops_at(node.args)
-        target = var(touch.element.name, "be", *(a.at(at) for a in touch.element.at))
+        target = var(touch.element.name, "be", *(a.substitute_loops(at) for a in touch.element.at))
         value = initial.value if touch.end == PLUS else neg(initial.value)
         yield replace(initial, target=target, value=value, loops=loops)
 
 
-def _grounded(touch: Touch) -> bool:
+def _ends_at_ground(touch: Touch) -> bool:
     """Whether an element's other end is the ground."""
     return touch.element.ends[1 - touch.end].node.startswith("#ground ")
 
 
 def _between_ground(touch: Touch) -> bool:
     told = held_at(touch.element.branch, "be", const(1.0)) is not None
-    return not touch.free and _grounded(touch) and told
+    return not touch.free and _ends_at_ground(touch) and told
 
 
 def _holds(touch: Touch) -> bool:
     """Whether a kinetic store stands there between a node and the ground."""
-    return touch.element.branch.kind == "kinetic" and (len(touch.element.ends) < 2 or _grounded(touch))
+    return touch.element.branch.kind == "kinetic" and (len(touch.element.ends) < 2 or _ends_at_ground(touch))
 
 
 class Contents:
@@ -213,7 +215,7 @@ class Contents:
         for e in between:
             if e.number in self.looped and e.branch.law is not None:
                 value = self.start(e.name, indices(e.named), ranges_over(e.named))
-                self._constant(e, value if self._fixed(e, e.named) else None)
+                self._constant(e, value if self._is_fixed(e, e.named) else None)
 
     def start(self, name: str, at: tuple[Node, ...], within: overlaps.Ranges) -> Node:
         """The initial content of a store: what the statement about it says, else 0."""
@@ -231,7 +233,7 @@ class Contents:
         if element.branch.kind != "potential":
             self._led[element.number] = element
         sought = self._loose or self.looped & {element.number, *(m.leader.number for m in members)}
-        fixed = all(self._fixed(element, m.box) and self._fixed(m.leader, _led_by(m)) for m in members)
+        fixed = all(self._is_fixed(element, m.box) and self._is_fixed(m.leader, _led_by(m)) for m in members)
         self._constant(element, value if fixed or not sought else None)
 
     def _constant(self, element: Element, value: Node | None) -> None:
@@ -250,17 +252,17 @@ class Contents:
             self.states.append(State(name, shape, unit, place))
             self.dynamics.append(Dynamic(var(name, "s", *indices(box)), const(0.0), loops_over(box), place))
 
-    def _fixed(self, element: Element, box: Box) -> bool:
+    def _is_fixed(self, element: Element, box: Box) -> bool:
         """Whether the text fixes the contents of all these elements; of what is no store it does, if only at zero."""
         given = self._given.get(element.name, ())
-        return element.branch.kind != "potential" or not without(box, *(said for i, said in given if i.fixed))
+        return element.branch.kind != "potential" or not box_difference(box, *(said for i, said in given if i.fixed))
 
     # -- initial conditions -------------------------------------------------------------------------------------
 
-    def resolved(self, measured: Container[str]) -> Iterator[Initial]:
+    def initial_conditions(self, measured: Container[str]) -> Iterator[Initial]:
         """The initial conditions of coordinates and other unknowns; measured: stores whose guesses stand elsewhere."""
         known: set[tuple[Node, Node, tuple[Loop, ...], bool]] = set()
-        for initial in (*self.initials, *self._begun()):
+        for initial in (*self.initials, *self._follower_initials()):
             if not initial.fixed and initial.target.op == "var" and initial.target.data[0] in measured:
                 continue
             if not touches_network(initial.target) and not touches_network(initial.value):
@@ -281,14 +283,14 @@ class Contents:
                     known.add(said)
                     yield replace(initial, target=target, value=value, loops=own)
 
-    def _begun(self) -> Iterator[Initial]:
+    def _follower_initials(self) -> Iterator[Initial]:
         """What followers that are no stores begin at."""
         for e in self._led.values():
             b, given = e.branch, [initial for initial, _ in self._given.get(e.name, ())]
             within = ranges_of(b.loops, self.reader.sizes, b.place)
             zero = Initial(var(e.name, "bq", *b.at), const(0.0), True, b.loops, b.place, said=False)
             for ranges in untold(given, b.at, within, self.reader.sizes):
-                yield replace(zero, loops=narrowed(b.loops, ranges))
+                yield replace(zero, loops=restrict_loops(b.loops, ranges))
 
     def _one(self, initial: Initial, ranges: Ranges) -> tuple[Node, Node] | None:
         """Where one piece is read: target and value; of stores whose constant is told the coordinate of their class;

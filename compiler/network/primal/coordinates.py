@@ -22,7 +22,7 @@ from sysdyn.compiler.network.primal.potentials import Potentials
 from sysdyn.compiler.network.primal.precedence import foremost
 from sysdyn.compiler.network.primal.reading import EliminationTable, IndexBox, Rewriter
 from sysdyn.compiler.network.primal.series import Series, series
-from sysdyn.compiler.network.primal.unspecified import measured
+from sysdyn.compiler.network.primal.unspecified import guess_contents
 from sysdyn.dsl.model.expression import Node, variables
 from sysdyn.dsl.model.network import Constraint, Coordinate, Dynamic, Energy, Expectation, Network, Work
 from sysdyn.dsl.model.rewriting import EXPRESSIONS, expressions
@@ -49,14 +49,14 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     initials = foremost(tuple(told), network.branches, sizes)
     read = _charges(network)
     contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected, read=read)
-    guesses, stores = measured(network, said.constant, initials, sizes, reader, reflected=reflected)
+    guesses, stores = guess_contents(network, said.constant, initials, sizes, reader, reflected=reflected)
     found = replace(
         network,
         parameters=(*network.parameters, *contents.parameters),
         coordinates=(*network.coordinates, *_node_coordinates(network), *classes.coordinates),
         unknowns=(*network.unknowns, *said.unknowns.values()),
         states=(*network.states, *said.states.values(), *contents.states),
-        initials=(*contents.resolved(stores), *said.initials, *guesses),
+        initials=(*contents.initial_conditions(stores), *said.initials, *guesses),
         nodes=(),
         branches=(),
         couplings=(),

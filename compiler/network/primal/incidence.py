@@ -126,14 +126,16 @@ def _element(number: int, branch: Branch, sizes: Sizes) -> Iterator[Element]:
     for loop in branch.loops:
         for bound in (loop.first, loop.last):
             if sizes.affine(bound, loops, branch.place).loop is not None:
-                raise unrolled(f"the range of {branch.name} along {loop.index} follows another index", branch.place)
+                raise unrolling_error(
+                    f"the range of {branch.name} along {loop.index} follows another index", branch.place
+                )
     box = tuple(sizes.interval(loop.first, loop.last, branch.place) for loop in branch.loops)
     if not box_size(box):
         return
     at = tuple(sizes.affine(node, loops, branch.place) for node in branch.at)
     for name in loops:
         if sum(a.loop == name for a in at) != 1:
-            raise unrolled(f"{branch.name} is not indexed once by {name}", branch.place)
+            raise unrolling_error(f"{branch.name} is not indexed once by {name}", branch.place)
     ends: tuple[Contact, ...] = ()
     if branch.on is None:
         pair = (branch.plus, branch.minus)
@@ -146,11 +148,11 @@ def _contact(terminal: Terminal, branch: Branch, loops: tuple[str, ...], sizes: 
     at = tuple(sizes.index(node, loops, branch.place) for node in terminal.at)
     used = [a.loop for a in at if a.loop is not None]
     if len(used) != len(set(used)):
-        raise unrolled(f"{branch.name} meets node {name} along a diagonal", branch.place)
+        raise unrolling_error(f"{branch.name} meets node {name} along a diagonal", branch.place)
     return Contact(name, at)
 
 
-def unrolled(what: str, place: Place | None) -> ModelError:
+def unrolling_error(what: str, place: Place | None) -> ModelError:
     """E806: a pattern that index classes cannot hold."""
     return ModelError([Diagnostic("E806", f"{what}: it would have to be unrolled", place)])
 

@@ -68,7 +68,7 @@ def _monomials(node: Node, v: Node, found: dict[Node, Monomials | None]) -> Mono
                 return None
             for power, coefficient in part.items():
                 total[power] = linear(0.0, ((1.0, total.get(power, const(0.0))), (c, coefficient)))
-        return _kept(total)
+        return _drop_zeros(total)
     if node.op == "mul":
         result: Monomials = {(0, 0): const(1.0)}
         for exponent, a in zip(node.data, node.args, strict=True):
@@ -82,7 +82,7 @@ def _monomials(node: Node, v: Node, found: dict[Node, Monomials | None]) -> Mono
                 result = _times(result, part)
                 if max(a + b for a, b in result) > HIGHEST:
                     return None
-        return _kept(result)
+        return _drop_zeros(result)
     return None
 
 
@@ -96,7 +96,7 @@ def _times(left: Monomials, right: Monomials) -> Monomials:
     return total
 
 
-def _kept(found: Monomials) -> Monomials:
+def _drop_zeros(found: Monomials) -> Monomials:
     return {power: c for power, c in found.items() if not is_const(c, 0.0)}
 
 

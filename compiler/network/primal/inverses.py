@@ -102,7 +102,7 @@ def inverse(branch: Branch, law: Node, v: Node, w: Node, slopes: Slopes, tables:
     found = _Found()
     signs = {blank: _sign(a) for blank, a in known.items()}
     held = {t.name: t for t in tables}
-    solved = _solved(plain, x, y, signs, held, found)
+    solved = _solve_for(plain, x, y, signs, held, found)
     if solved is None or not _holds(plain, solved, x, y, known, {**held, **found.tables}):
         return None
     for node in (substitute(d, filled) for d in found.divisors):
@@ -134,7 +134,7 @@ def _sign(values: NDArray[np.float64]) -> int:
     return 1 if (values > 0.0).all() else -1 if (values < 0.0).all() else 0
 
 
-def _solved(
+def _solve_for(
     law: Node, v: Node, w: Node, signs: Mapping[Node, int], tables: Mapping[str, Table], found: _Found
 ) -> Node | None:
     """The inverse, shell by shell; the core by sympy."""
@@ -156,7 +156,7 @@ def _solved(
         elif law.op == "call" and law.data in _SHELLS:
             found.symbolic = True
             w = _SHELLS[law.data](w)
-        elif law.op == "table" and law.data[1] == 0 and (turned := _turned(tables[law.data[0]])) is not None:
+        elif law.op == "table" and law.data[1] == 0 and (turned := _exchange_columns(tables[law.data[0]])) is not None:
             found.tables[turned.name] = turned
             w = table(turned.name, w)
         else:
@@ -193,7 +193,7 @@ def _root(law: Node, v: Node, w: Node, found: _Found) -> Node | None:
     return mul(w, product(1.0, ((1.0 / degree - 1.0, call("abs", w)),)))
 
 
-def _turned(given: Table) -> Table | None:
+def _exchange_columns(given: Table) -> Table | None:
     """The table with its columns exchanged; None where it is not linear and strictly monotone, or not extended."""
     if given.method != "linear" or len(given.points) != 1 or given.outside != "extend":
         return None
@@ -227,7 +227,7 @@ def _core(law: Node, v: Node, w: Node, signs: Mapping[Node, int], found: _Found)
 
     slope, algebra = derivative(branch, v), Algebra(v, y, used, positive=odd)
     if reals(slope, known).sign == 0:
-        simple = algebra.simplified(slope)
+        simple = algebra.simplify(slope)
         if simple is None or reals(simple, known).sign == 0:
             return None
     found.signed.update(used)
@@ -288,7 +288,7 @@ def _holds(
     slope = derivative(solved, w)
     for values in _parameters(known):
 
-        def at(root: Node, name: Node, x: NDArray[np.float64], values: Mapping[Node, float] = values) -> Value:
+        def evaluate_on(root: Node, name: Node, x: NDArray[np.float64], values: Mapping[Node, float] = values) -> Value:
             def lookup(node: Node, args: list[Value]) -> Value:
                 if node.op == "table":
                     return evaluate_table(tables[node.data[0]], args, (node.data[1],))
@@ -296,9 +296,9 @@ def _holds(
 
             return np.broadcast_to(np.asarray(evaluate([root], lookup)[0], dtype=float), x.shape)
 
-        if not _forth(law, solved, v, w, at) or not _back(law, solved, v, w, at):
+        if not _forth(law, solved, v, w, evaluate_on) or not _back(law, solved, v, w, evaluate_on):
             return False
-        steep = at(slope, w, np.append(_DECADES, 0.0))
+        steep = evaluate_on(slope, w, np.append(_DECADES, 0.0))
         if np.isnan(steep).any() or np.isinf(steep[-1]):
             return False
     return True

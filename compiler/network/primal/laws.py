@@ -110,7 +110,7 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     keep = network.scene is not None and network.scene.keeps("keep_implicit")
     for coupling, label in _ratios(network, elements, sizes):
         explicit = coupling.kind != "gyrator" or coupling.side == "e"
-        divided = explicit or slopes.divided(coupling)
+        divided = explicit or slopes.may_divide(coupling)
         _couple(coupling, label, elements, sizes, found, keep=keep, divided=divided)
     found.slopes = tuple(slopes.decided)
     return found
@@ -260,7 +260,7 @@ def _couple(
         ratio = c.ratio if c.side == "e" else neg(div(const(1.0), c.ratio))
         efforts = mul(ratio, second), neg(mul(ratio, first))
         if keep or not divided:
-            efforts = _kept(c, part, efforts, elements, found, divided=divided)
+            efforts = _gyrator_by_efforts(c, part, efforts, elements, found, divided=divided)
         for effort, name in zip(efforts, (c.first, c.second), strict=True):
             place = replace(c.place, element=c.stem)
             found.works.append(Work(neg(effort), var(name, "bq", *c.at), c.loops, place))
@@ -283,7 +283,7 @@ def _couple(
                 found.efforts[e.number] = _at_element(effort, places, e)
 
 
-def _kept(
+def _gyrator_by_efforts(
     coupling: Coupling,
     part: Part,
     efforts: tuple[Node, Node],

@@ -13,7 +13,7 @@ from dataclasses import field
 from typing import TypeVar
 
 from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Picked, Sizes, box_holds
-from sysdyn.compiler.network.primal.incidence import Contact, Element, unrolled
+from sysdyn.compiler.network.primal.incidence import Contact, Element, unrolling_error
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.calculus import time_derivative
 from sysdyn.dsl.model.expression import (
@@ -165,12 +165,12 @@ class Rewriter:
             if node.op == "var" and node.data[1] in KINDS:
                 done[node] = self._read(node, ranges, active)
             elif node.op == "reduce":
-                done[node] = self._reduced(node, (done[node.args[0]], done[node.args[1]]), ranges, active)
+                done[node] = self._rewrite_reduction(node, (done[node.args[0]], done[node.args[1]]), ranges, active)
             else:
                 done[node] = rebuild(node, tuple(done[a] for a in node.args))
         return done[root]
 
-    def _reduced(self, node: Node, ends: tuple[Node, Node], ranges: Ranges, active: tuple[Node, ...]) -> Node:
+    def _rewrite_reduction(self, node: Node, ends: tuple[Node, Node], ranges: Ranges, active: tuple[Node, ...]) -> Node:
         operator, name = node.data
         body = node.args[2]
         if not touches_network(body):
@@ -185,7 +185,7 @@ class Rewriter:
                 raise
             self._check(found, {name: own})
             halves = _halves(Loop(name, *ends), found.at)
-            parts = [self._reduced(node, (h.first, h.last), ranges, active) for h in halves]
+            parts = [self._rewrite_reduction(node, (h.first, h.last), ranges, active) for h in halves]
         return combine_terms(operator, parts)
 
     def _read(self, node: Node, ranges: Ranges, active: tuple[Node, ...]) -> Node:
@@ -252,14 +252,14 @@ class Rewriter:
         if contact.node.startswith("#ground ") and kind != "ne":
             return const(0.0)
         loops = piece.element.loops_at(at)
-        return var(contact.node, kind, *(a.at(loops) for a in contact.at))
+        return var(contact.node, kind, *(a.substitute_loops(loops) for a in contact.at))
 
     def at_piece(self, root: Node, piece: IndexBox, at: tuple[Node, ...]) -> Node:
         """An expression over an element's loops at the indices of its name; sums inside get variables of their own."""
         change = {index(name): node for name, node in piece.element.loops_at(at).items()}
-        return substitute(self._renamed(root), change)
+        return substitute(self._rename_loops(root), change)
 
-    def _renamed(self, root: Node) -> Node:
+    def _rename_loops(self, root: Node) -> Node:
         done: dict[Node, Node] = {}
         nodes = topological([root])
         if all(node.op != "reduce" for node in nodes):
@@ -299,7 +299,7 @@ class Rewriter:
                 k = next(k for k, (b, r) in enumerate(zip(box, reach, strict=True)) if not b.holds(r))
                 loop = places[k].loop
                 if loop is None:
-                    raise unrolled(f"{name} by a table of indices", self.place)
+                    raise unrolling_error(f"{name} by a table of indices", self.place)
                 raise _BoxSplitError(loop, box[k].last.plus(1).minus(places[k].offset), name)
         text = ", ".join(str(i.first.value) for i in reach)
         raise ModelError([Diagnostic("E805", f"{name}[{text}] is outside its range", self.place)])

@@ -76,10 +76,16 @@ def series(incidence: Incidence, read: frozenset[str]) -> Series:
 
 def _key(link: Link) -> tuple[object, ...]:
     """What identifies a link whether or not its points were made constants."""
-    return (tuple((i.first.value, i.last.value) for i in link.box), link.a.item, link.b.item, link.sign, _fixed(link))
+    return (
+        tuple((i.first.value, i.last.value) for i in link.box),
+        link.a.item,
+        link.b.item,
+        link.sign,
+        _first_corner(link),
+    )
 
 
-def _fixed(link: Link) -> tuple[object, ...]:
+def _first_corner(link: Link) -> tuple[object, ...]:
     """Where both ends lie at the box's first corner."""
     first = [i.first.value for i in link.box]
     return tuple((0 if k is None else first[k]) + c.value for end in (link.a, link.b) for k, c in end.at)
@@ -137,14 +143,14 @@ def _classes(flowing: Sequence[Element], likeness: IndexClasses) -> tuple[tuple[
             part = next(names)
             own, shape = part.name, shape_of(part.box)
         else:
-            own, shape = _unused(name, taken), shape_of(tuple(box[k] for k in c.kept))
+            own, shape = _unique_name(name, taken), shape_of(tuple(box[k] for k in c.kept))
             taken.add(own)
         coordinates.setdefault(own, _coordinate(own, shape, flowing[c.leader[0]]))
         members += _members(c, own, flowing, likeness)
     return tuple(coordinates.values()), tuple(_fewer(members))
 
 
-def _unused(name: str, taken: set[str]) -> str:
+def _unique_name(name: str, taken: set[str]) -> str:
     if name not in taken:
         return name
     return next(n for k in range(2, len(taken) + 3) if (n := f"{name}.{k}") not in taken)
@@ -155,24 +161,24 @@ def _class(members: list[tuple[Cell, int]], flowing: Sequence[Element], likeness
     stores = [m for m in members if flowing[m[0][0]].branch.kind == "potential"]
     leader, sign = (stores or members)[0]
     element = flowing[leader[0]]
-    tied = {d for d, k in enumerate(leader[1]) if likeness.collapsed(leader, likeness.axis(leader[0], d)[0], k)}
-    if any(_tied(cell, likeness) for cell, _ in members) and not likeness.extended(leader):
+    tied = {d for d, k in enumerate(leader[1]) if likeness.is_collapsed(leader, likeness.axis(leader[0], d)[0], k)}
+    if any(_has_tied_elements(cell, likeness) for cell, _ in members) and not likeness.free_dimensions(leader):
         return _Class(leader, sign, tuple(members), ())
     kept = tuple(k for k, a in enumerate(element.at) if a.loop is None or element.loops.index(a.loop) not in tied)
     return _Class(leader, sign, tuple(members), kept)
 
 
-def _tied(cell: Cell, likeness: IndexClasses) -> bool:
-    return any(likeness.collapsed(cell, likeness.axis(cell[0], d)[0], k) for d, k in enumerate(cell[1]))
+def _has_tied_elements(cell: Cell, likeness: IndexClasses) -> bool:
+    return any(likeness.is_collapsed(cell, likeness.axis(cell[0], d)[0], k) for d, k in enumerate(cell[1]))
 
 
 def _family(c: _Class, flowing: Sequence[Element], likeness: IndexClasses) -> tuple[str, Box, bool]:
     element = flowing[c.leader[0]]
-    box = _named(element, likeness.box(c.leader))
+    box = _box_of_indices(element, likeness.box(c.leader))
     return element.name, box, len(c.kept) == len(element.at)
 
 
-def _named(element: Element, box: Box) -> Box:
+def _box_of_indices(element: Element, box: Box) -> Box:
     """A box of loop variables as one of the name's indices."""
     ranges = dict(zip(element.loops, box, strict=True))
     return tuple(a.over(ranges) for a in element.at)
@@ -201,9 +207,9 @@ def _members(c: _Class, name: str, flowing: Sequence[Element], likeness: IndexCl
                 at.append((element.place_of(element.loops[own[axis]]), mine.minus(offset)))
             else:
                 at.append((None, first[d].first))
-        leads = cell == c.leader and not _tied(cell, likeness)
+        leads = cell == c.leader and not _has_tied_elements(cell, likeness)
         kept = tuple(at[k] for k in c.kept)
-        box = _named(element, likeness.box(cell))
+        box = _box_of_indices(element, likeness.box(cell))
         yield Member(element, box, sign * c.sign, name, kept, leader, tuple(at), leads)
 
 

@@ -29,7 +29,7 @@ class Algebra:
             self._objects[node] = sign * symbol
             self._nodes[symbol] = mul(const(float(sign)), node)
 
-    def simplified(self, root: Node) -> Node | None:
+    def simplify(self, root: Node) -> Node | None:
         """The expression over one denominator, its factors apart."""
         return self._node(self._sympy.factor(self._sympy.together(self._object(root))))
 
@@ -39,12 +39,12 @@ class Algebra:
         The law may hold one square root; freed of it, the equation is of the second degree in v or v^2.
         """
         sympy = self._sympy
-        for root in self._freed(self._object(law) - self._w):
+        for root in self._rationalize_root(self._object(law) - self._w):
             node = self._node(sympy.factor(root / self._w if over_value else root))
             if node is not None:
                 yield node
 
-    def _freed(self, equation: Any) -> Iterator[Any]:
+    def _rationalize_root(self, equation: Any) -> Iterator[Any]:
         """The roots of an equation with one square root, squared."""
         sympy, v = self._sympy, self._v
         powers = [p for p in equation.atoms(sympy.Pow) if p.exp.is_Rational and p.exp.q == 2 and p.has(v)]

@@ -25,7 +25,7 @@ from sysdyn.dsl.names.symbols import Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
-from sysdyn.names import stored
+from sysdyn.names import trace_name
 
 _Said = TypeVar("_Said", syntax.Set, syntax.Trace)
 RESERVED = ("time", "audit", "parameters", "events", "derivatives")
@@ -250,7 +250,7 @@ class SceneReader:
             raise self.resolver.fail(
                 "E905", f"'{format_expression(item.expr)}' is an array: trace its elements", item.span
             )
-        name = item.alias.name if item.alias else stored(format_expression(item.expr))
+        name = item.alias.name if item.alias else trace_name(format_expression(item.expr))
         where = item.alias.span if item.alias else item.span
         if name in RESERVED:
             raise self.resolver.fail(
